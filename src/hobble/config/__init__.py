@@ -1,0 +1,1 @@
+"""Configurations, data sets and skeletons: YAML layers, typed models, readable refusals."""

@@ -1,0 +1,126 @@
+"""From YAML files and command-line overrides to validated models, with errors that name file and key."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from hobble.config.models import Configuration, Dataset, SkeletonFile
+from hobble.core.errors import HobbleError, InputError
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """`over` on top of `base`, mappings merged deeply, anything else replaced."""
+    out = copy.deepcopy(dict(base))
+    for key, value in over.items():
+        both = isinstance(value, Mapping) and isinstance(out.get(key), Mapping)
+        out[key] = merge(out[key], value) if both else copy.deepcopy(value)
+    return out
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Read a YAML mapping; raises InputError with the line where it does not parse."""
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        there = ", ".join(sorted(p.stem for p in path.parent.glob("*.yaml"))) or "none"
+        raise InputError(path, "no such file", fix=f"There are: {there}.") from None
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else None
+        raise InputError(path, f"not valid YAML: {error.problem}", line=line) from None
+    if data is None:
+        return {}
+    if not isinstance(data, dict):
+        raise InputError(path, "must hold keys and values")
+    return data
+
+
+def layers(folder: Path, name: str) -> tuple[dict[str, Any], list[Path]]:
+    """The values of `<folder>/<name>.yaml` over those of what it `extends`, and the files read."""
+    files: list[Path] = []
+    chain: list[dict[str, Any]] = []
+    next_name: str | None = name
+    while next_name is not None:
+        path = folder / f"{next_name}.yaml"
+        if path in files:
+            raise InputError(path, f"extends itself by way of {' -> '.join(p.stem for p in files)}")
+        files.append(path)
+        chain.append(read_yaml(path))
+        next_name = chain[-1].get("extends")
+    merged: dict[str, Any] = {}
+    for values in reversed(chain):
+        merged = merge(merged, values)
+    return merged, files
+
+
+def validate(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
+    """Validate, or raise one HobbleError that lists every problem as `file: key: what is allowed`."""
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        lines = [f"{where}: {_problem(item, model)}" for item in error.errors()]
+        raise HobbleError("\n".join(lines)) from None
+
+
+def _problem(item: Any, model: type[BaseModel]) -> str:
+    key = ".".join(str(part) for part in item["loc"]) or "(whole file)"
+    if item["type"] == "extra_forbidden":
+        allowed = ", ".join(_keys_at(model, item["loc"][:-1])) or "none"
+        return f"{key}: there is no such key. Allowed here: {allowed}."
+    message = item["msg"].removeprefix("Value error, ")
+    return f"{key}: {message[0].lower()}{message[1:]}, not {item['input']!r:.80}."
+
+
+def _keys_at(model: Any, location: tuple[Any, ...]) -> list[str]:
+    for part in location:
+        field = getattr(model, "model_fields", {}).get(part)
+        if field is not None:
+            model = field.annotation
+        arguments = [model, *getattr(model, "__args__", ())]
+        arguments += [inner for a in arguments for inner in getattr(a, "__args__", ())]
+        model = next((a for a in arguments if isinstance(a, type) and issubclass(a, BaseModel)), model)
+    return list(getattr(model, "model_fields", {}))
+
+
+class Catalogue:
+    """Everything under config/: configurations, data sets and skeletons, each validated once when asked for.
+
+    overrides: values from the command line that go on top of every configuration.
+    """
+
+    def __init__(self, folder: Path, overrides: Mapping[str, Any] | None = None) -> None:
+        self.folder = folder
+        self.overrides = dict(overrides or {})
+        self._cache: dict[tuple[str, str], Any] = {}
+
+    def names(self) -> list[str]:
+        """Names of the configurations there are."""
+        return sorted(path.stem for path in self.folder.glob("*.yaml"))
+
+    def configuration(self, name: str) -> Configuration:
+        """The configuration `name`, resolved."""
+        return self._get("configuration", name, self.folder, Configuration, self.overrides)
+
+    def dataset(self, name: str) -> Dataset:
+        """The data set `name`, resolved."""
+        return self._get("dataset", name, self.folder / "datasets", Dataset, {})
+
+    def skeleton(self, name: str) -> SkeletonFile:
+        """The skeleton `name`."""
+        return self._get("skeleton", name, self.folder / "skeletons", SkeletonFile, {})
+
+    def _get(self, kind: str, name: str, folder: Path, model: type[Model], over: Mapping[str, Any]) -> Model:
+        if (kind, name) not in self._cache:
+            values, files = layers(folder, name)
+            where = " < ".join(str(path) for path in files)
+            if over:
+                values, where = merge(values, over), f"{where} < --config"
+            self._cache[kind, name] = validate(model, values, where)
+        return self._cache[kind, name]

@@ -1,0 +1,121 @@
+"""The two things a YAML file can describe: a data set and a configuration (and the skeleton they name)."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+
+from hobble.config import sections as s
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+Link = Annotated[str, Field(min_length=3)]
+
+
+class ClipEntry(s.Section):
+    """One clip of a data set."""
+
+    gait: s.Gait | None = Field(None, description="the gait it mostly shows, for automatic labels")
+    ground: s.Ground = "flat"
+    status: str | None = Field(None, description='what hurts all the while: "RightLeg-RightFoot[4];..."')
+    injured: Link | None = Field(None, description="synthetic: the link hurt, at severities 3, 5, 7 and 10")
+    recipe: str | None = Field(None, description="synthetic: which plan the walker follows")
+    share: s.PositiveFloat = Field(1.0, description="synthetic: length relative to the other clips")
+    source_fps: s.PositiveFloat | None = Field(None, description="overrules the file's Frame Time")
+
+    @model_validator(mode="after")
+    def _status_reads(self) -> ClipEntry:
+        if self.status and not re.fullmatch(r"([\w:.]+-[\w:.]+\[\d+(\.\d+)?\];?)+", self.status):
+            raise ValueError(f"status {self.status!r} does not read as Joint-Joint[0..10];...")
+        return self
+
+    @property
+    def is_injured(self) -> bool:
+        """Whether the configuration says that something hurts."""
+        return bool(self.status or self.injured)
+
+
+class Dataset(s.Section):
+    """Clips, the skeleton they are put on, and how they become a database."""
+
+    extends: Name | None = None
+    skeleton: Name
+    source: Name | None = Field(None, description="a data set whose source files this one reads")
+    folder: str | None = Field(None, description="where the BVH files lie, inside the mocap folder")
+    clips: dict[Name, ClipEntry | None] = Field(
+        default_factory=dict, description="clips by name; none: every .bvh in the folder"
+    )
+    held_out: tuple[Name, ...] = Field((), description="clips kept from training, with their mirrors")
+    mirror: bool = False
+    synthetic: s.Synthetic | None = None
+    motion: s.Motion = s.Motion()
+    labels: s.Labels = s.Labels()
+    terrain: s.Terrain = s.Terrain()
+    database: s.Database = s.Database()
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Dataset:
+        if self.synthetic is None and self.folder is None:
+            raise ValueError("a data set needs `folder` (BVH files) or `synthetic` (the embedded walker)")
+        if self.synthetic is not None and not self.clips:
+            raise ValueError("a synthetic data set lists its clips")
+        unknown = [c for c in self.held_out if self.clips and c not in self.clips]
+        if unknown:
+            raise ValueError(f"held_out names clips that are not in `clips`: {', '.join(unknown)}")
+        return self
+
+
+class Configuration(s.Section):
+    """One network: the data it learns from, how it is trained, run, measured and shown."""
+
+    extends: Name | None = None
+    dataset: Name = "synthetic"
+    injury: bool = Field(False, description="severities as inputs and all clips; else the healthy clips only")
+    network_of: Name | None = Field(None, description="read another configuration's network, train none")
+    network: s.Network = s.Network()
+    training: s.Training = s.Training()
+    runtime: s.Runtime = s.Runtime()
+    evaluation: s.Evaluation = s.Evaluation()
+    report: s.Report = s.Report()
+
+
+class JointEntry(s.Section):
+    """A joint of a skeleton."""
+
+    parent: str | None
+    offset: tuple[float, float, float]
+
+
+class SkeletonFile(s.Section):
+    """A rig: see `hobble.core.skeleton.Skeleton`."""
+
+    joints: dict[str, JointEntry]
+    roles: dict[str, str]
+    end_sites: dict[str, tuple[float, float, float]] = {}
+    links: tuple[tuple[str, str], ...] = ()
+    unseen: tuple[str, ...] = ()
+    maps: dict[Name, dict[str, str]] = Field(
+        {}, description="for retargeting: skeleton -> {this rig's joint: the joint of that skeleton}"
+    )
+
+    @model_validator(mode="after")
+    def _hangs_together(self) -> SkeletonFile:
+        seen: set[str] = set()
+        for name, joint in self.joints.items():
+            if joint.parent is None and seen:
+                raise ValueError(f"joint {name}: only the first joint may be without a parent")
+            if joint.parent is not None and joint.parent not in seen:
+                raise ValueError(f"joint {name}: its parent {joint.parent!r} must stand above it")
+            seen.add(name)
+        named: dict[str, Any] = {
+            "roles": self.roles.values(),
+            "end_sites": self.end_sites,
+            "links": [joint for link in self.links for joint in link],
+            "unseen": self.unseen,
+        }
+        for key, names in named.items():
+            for name in names:
+                if name not in seen:
+                    raise ValueError(f"{key}: there is no joint {name!r}")
+        return self

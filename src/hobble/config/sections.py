@@ -1,0 +1,166 @@
+"""The typed sections of a data set and of a configuration: every key, its default, its unit and its range.
+
+These models are read once, before the DAG is built. Jobs get plain dicts of the values, so that editing a
+description here re-runs nothing.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Positive = Annotated[int, Field(gt=0)]
+PositiveFloat = Annotated[float, Field(gt=0)]
+Share = Annotated[float, Field(ge=0, lt=1)]
+Ground = Literal["flat", "rocky", "jumpy", "beam"]
+Gait = Literal["stand", "walk", "jog", "crouch", "jump", "bump"]
+
+
+class Section(BaseModel):
+    """A part of a YAML file; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, str_strip_whitespace=True)
+
+
+class Synthetic(Section):
+    """The embedded data set: how much of it, and from which seed."""
+
+    frames: Annotated[int, Field(ge=600)] = Field(
+        20_000, description="frames at 60 Hz over all clips together"
+    )
+    fps: Literal[60, 120] = Field(120, description="frames a second in the files written")
+    seed: int = 1
+
+
+class Motion(Section):
+    """How BVH files are read and checked. `auto` is found from the rig; anything else overrules it."""
+
+    fps: PositiveFloat = Field(60.0, description="frames a second of the clips made")
+    source_fps: PositiveFloat | None = Field(None, description="overrules the files' Frame Time")
+    unit: Literal["auto"] | PositiveFloat = Field("auto", description="centimetres per unit of the file")
+    up: Literal["auto", "Y", "Z"] = "auto"
+    proportions: Literal["skeleton", "clip"] = Field(
+        "skeleton", description="retarget onto the skeleton's bone lengths, or keep each clip's own"
+    )
+    defects: Literal["repair", "refuse"] = Field(
+        "repair", description="what to do with frames that are plainly broken; repairs are reported"
+    )
+
+
+class Labels(Section):
+    """Contacts, phase and gait. Speeds are those of the facts page: centimetres a frame at 120 Hz."""
+
+    files: bool = Field(True, description="use hand-made label files where they lie beside the clip")
+    contact_threshold: PositiveFloat = Field(0.02, description="squared displacement, cm2 per 60 Hz frame")
+    phase_zero: Literal["right", "left"] = Field("right", description="the foot that lands at phase 0")
+    heel_speed: PositiveFloat = 0.375
+    toe_speed: PositiveFloat = 0.0875
+    valley_factor: PositiveFloat = 2.875
+    shortest_step: Positive = Field(5, description="steps of this many 120 Hz frames or fewer are dropped")
+
+
+class Terrain(Section):
+    """Patches of ground and their fits under the clips."""
+
+    heightmaps: tuple[Heightmap, ...] = Field(
+        default_factory=lambda: tuple(
+            Heightmap(kind=kind, seed=i)
+            for i, kind in enumerate(("fractal", "fractal", "hills", "stairs", "slope", "boxes", "beams"))
+        )
+    )
+    patches: Positive = 20_000
+    fits: Positive = Field(10, description="fits kept for each cycle; a flat cycle has one, counted so often")
+    cell: PositiveFloat = Field(3.937007874, description="centimetres a cell")
+    size: Positive = Field(128, description="cells a side of a patch")
+    height_scale: PositiveFloat = 3.0
+    highest: PositiveFloat = Field(50.0, description="a patch that goes further from its mean is dropped")
+    smoothing: Annotated[float, Field(ge=0)] = Field(0.1, description="regularisation of the residual's RBF")
+    heel_height: float = 5.0
+    toe_height: float = 4.0
+    seed: int = 1
+
+
+class Heightmap(Section):
+    """One source of ground: generated, matplotlib's real elevation model, or a file."""
+
+    kind: Literal["fractal", "hills", "stairs", "slope", "boxes", "beams", "elevation", "file"]
+    path: str | None = Field(None, description="for kind: file; relative to the mocap folder")
+    seed: int = 0
+
+    @model_validator(mode="after")
+    def _path_for_files(self) -> Heightmap:
+        if (self.kind == "file") != (self.path is not None):
+            raise ValueError("`path` goes with `kind: file`, and only with it")
+        return self
+
+
+class Database(Section):
+    """What a row holds and how rows lie on disk."""
+
+    window: Positive = Field(60, description="frames to each side of the present one")
+    step: Positive = Field(10, description="frames between trajectory samples")
+    facing_sigma: PositiveFloat = Field(20.0, description="smoothing of the facing direction, frames")
+    joint_weight: PositiveFloat = 0.1
+    terrain_side: PositiveFloat = Field(25.0, description="centimetres from the path to the side heights")
+    dtype: Literal["float32", "float16"] = "float32"
+    seed: int = 1
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Database:
+        if self.window % self.step:
+            raise ValueError(f"window ({self.window}) must be a multiple of step ({self.step})")
+        return self
+
+
+class Network(Section):
+    """The phase-functioned network. Two hidden layers is what the published weight sizes show."""
+
+    hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
+    units: Positive = 512
+    control_points: Annotated[int, Field(ge=4, le=16)] = 4
+
+
+class Training(Section):
+    """The original recipe; a pass is every (frame, fit) pair once, in `sections` sections."""
+
+    passes: Positive = 20
+    sections: Positive = 10
+    batch: Positive = 32
+    learning_rate: PositiveFloat = 1e-4
+    beta1: Share = 0.9
+    beta2: Share = 0.999
+    dropout: Share = Field(0.3, description="share of units dropped before each layer, the input included")
+    l1: Annotated[float, Field(ge=0)] = Field(0.01, description="weight of the mean absolute weights")
+    seed: int = 1
+    memory_mb: Positive = Field(512, description="largest part of the database held in memory")
+    continues: str | None = Field(None, description="a configuration whose last checkpoint is the start")
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+
+
+class Runtime(Section):
+    """The character."""
+
+    mode: Literal["constant", "linear", "cubic"] = Field("cubic", description="how phase is looked up")
+    severity_rate: PositiveFloat = Field(10.0, description="largest change of a severity in a second")
+    severity_scale: PositiveFloat = Field(1.0, description="severities are divided by this")
+    foot_locking: bool = True
+
+
+class Evaluation(Section):
+    """The measurements."""
+
+    joints: Literal["all", "equivalent"] = Field(
+        "all", description="`equivalent`: only the joints that the 31-joint skeleton has too"
+    )
+    laps: Positive = 19
+    seconds: PositiveFloat = Field(8.0, description="length of each injury response walk")
+
+
+class Report(Section):
+    """The page."""
+
+    title: str | None = None
+
+
+Terrain.model_rebuild()

@@ -1,0 +1,1 @@
+"""What every stage stands on: rotations, skeletons, clips, inverse kinematics, safe files, errors."""

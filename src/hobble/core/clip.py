@@ -1,0 +1,77 @@
+"""A clip: the motion of one skeleton over time."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from hobble.core.files import load_npz, save_npz
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton, forward_kinematics
+
+
+@dataclass(frozen=True)
+class Clip:
+    """F frames of a skeleton of J joints: centimetres, right-handed, Y up, +Z forward.
+
+    rotations: (F, J, 4) local, w first. root: (F, 3) position of the root joint.
+    translations: (F, J, 3) local joint positions where the source really moves them, else None.
+    """
+
+    name: str
+    skeleton: Skeleton
+    fps: float
+    rotations: Array = field(repr=False)
+    root: Array = field(repr=False)
+    translations: Array | None = field(default=None, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+    @cached_property
+    def _world(self) -> tuple[Array, Array]:
+        return forward_kinematics(self.skeleton, self.rotations, self.root, self.translations)
+
+    @property
+    def global_rotations(self) -> Array:
+        """(F, J, 4) world rotations."""
+        return self._world[0]
+
+    @property
+    def positions(self) -> Array:
+        """(F, J, 3) world positions in centimetres."""
+        return self._world[1]
+
+
+def save_clip(path: str | Path, clip: Clip) -> None:
+    """Write a clip with its skeleton as one npz file."""
+    extra = {} if clip.translations is None else {"translations": clip.translations.astype(np.float32)}
+    save_npz(
+        path,
+        name=np.array(clip.name),
+        skeleton=np.array(json.dumps(clip.skeleton.to_dict())),
+        fps=np.array(clip.fps),
+        rotations=clip.rotations.astype(np.float32),
+        root=clip.root,
+        **extra,
+    )
+
+
+def load_clip(path: str | Path) -> Clip:
+    """Read what `save_clip` wrote; rotations come back as float64 of unit length."""
+    data = load_npz(path)
+    rotations = data["rotations"].astype(float)
+    rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+    translations = data.get("translations")
+    return Clip(
+        str(data["name"]),
+        Skeleton.from_dict(json.loads(str(data["skeleton"]))),
+        float(data["fps"]),
+        rotations,
+        data["root"],
+        None if translations is None else translations.astype(float),
+    )

@@ -1,0 +1,35 @@
+"""Errors a person can act on: one message, with the file, the place in it, and what to do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class HobbleError(Exception):
+    """A refusal the user can understand; its text is the whole message, no traceback is needed."""
+
+
+class InputError(HobbleError):
+    """Something is wrong with a file, at a line or a frame where one is known.
+
+    >>> str(InputError("walk.bvh", "rotation is NaN", line=12, fix="Export the clip again."))
+    'walk.bvh, line 12: rotation is NaN. Export the clip again.'
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        problem: str,
+        *,
+        line: int | None = None,
+        frame: int | None = None,
+        fix: str | None = None,
+    ) -> None:
+        self.path, self.problem, self.line, self.frame, self.fix = path, problem, line, frame, fix
+        place = str(path)
+        if line is not None:
+            place += f", line {line}"
+        if frame is not None:
+            place += f", frame {frame}"
+        text = f"{place}: {problem.rstrip('.')}."
+        super().__init__(f"{text} {fix}" if fix else text)

@@ -1,0 +1,32 @@
+"""Two-bone inverse kinematics: bend a leg or an arm so that its end reaches a point."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.quat import Array
+
+
+def two_bone_knee(hip: Array, target: Array, pole: Array, upper: float, lower: float) -> tuple[Array, Array]:
+    """Where the knee goes, and where the ankle ends up, by the law of cosines.
+
+    hip, target: (..., 3) positions. pole: (..., 3) direction the knee points to, not along the leg.
+    upper, lower: bone lengths. A target out of reach is approached to 0.1% of full stretch.
+    Returns knee and ankle positions, each (..., 3).
+    """
+    reach = target - hip
+    distance = np.linalg.norm(reach, axis=-1, keepdims=True)
+    along = reach / np.maximum(distance, 1e-9)
+    distance = np.clip(distance, abs(upper - lower) * 1.001 + 1e-6, (upper + lower) * 0.999)
+    cosine = (upper**2 + distance**2 - lower**2) / (2 * upper * distance)
+    cosine = np.clip(cosine, -1.0, 1.0)
+    out = pole - along * np.sum(pole * along, axis=-1, keepdims=True)
+    out = out / np.maximum(np.linalg.norm(out, axis=-1, keepdims=True), 1e-9)
+    knee = hip + upper * (along * cosine + out * np.sqrt(1 - cosine**2))
+    return knee, hip + along * distance
+
+
+def aim(rotation: Array, bone: Array, direction: Array) -> Array:
+    """Turn a world rotation by the least amount that points its local `bone` along world `direction`."""
+    return quat.mul(quat.between(quat.rotate(rotation, bone), direction), rotation)

@@ -1,0 +1,159 @@
+"""Unit quaternions, w first, as arrays whose last axis is 4; one function serves a joint and a whole clip."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.floating]
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def normalize(q: ArrayLike) -> Array:
+    """Scale (..., 4) to unit length."""
+    q = np.asarray(q)
+    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+
+
+def mul(a: ArrayLike, b: ArrayLike) -> Array:
+    """Hamilton product: rotate by `b` first, then by `a`. (..., 4) x (..., 4) -> (..., 4)."""
+    aw, ax, ay, az = np.moveaxis(np.asarray(a), -1, 0)
+    bw, bx, by, bz = np.moveaxis(np.asarray(b), -1, 0)
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def inv(q: ArrayLike) -> Array:
+    """Inverse of unit quaternions."""
+    q = np.asarray(q)
+    return q * np.array([1, -1, -1, -1], dtype=q.dtype)
+
+
+def rotate(q: ArrayLike, v: ArrayLike) -> Array:
+    """Rotate vectors (..., 3) by unit quaternions (..., 4)."""
+    q, v = np.asarray(q), np.asarray(v)
+    u = q[..., 1:]
+    t = 2.0 * np.cross(u, v)
+    return v + q[..., :1] * t + np.cross(u, t)
+
+
+def from_axis_angle(axis: ArrayLike, angle: ArrayLike) -> Array:
+    """Unit axis (..., 3) and angle (...) in radians."""
+    axis, half = np.asarray(axis, float), np.asarray(angle, float)[..., None] / 2
+    shape = np.broadcast_shapes(axis.shape[:-1], half.shape[:-1])
+    out = np.empty((*shape, 4))
+    out[..., :1] = np.cos(half)
+    out[..., 1:] = axis * np.sin(half)
+    return out
+
+
+def between(a: ArrayLike, b: ArrayLike) -> Array:
+    """The shortest rotation that takes direction `a` to direction `b`, each (..., 3), of any length.
+
+    For opposite directions any axis across `a` will do; the one nearest to Y is taken.
+    """
+    a = np.asarray(a, float) / np.linalg.norm(a, axis=-1, keepdims=True)
+    b = np.asarray(b, float) / np.linalg.norm(b, axis=-1, keepdims=True)
+    a, b = np.broadcast_arrays(a, b)
+    w = 1.0 + np.sum(a * b, axis=-1, keepdims=True)
+    q = np.concatenate([w, np.cross(a, b)], axis=-1)
+    opposite = w[..., 0] < 1e-9
+    if np.any(opposite):
+        side = np.where(np.abs(a[..., 1:2]) < 0.9, [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+        across = side - a * np.sum(a * side, axis=-1, keepdims=True)
+        q = np.where(opposite[..., None], np.concatenate([np.zeros_like(w), across], axis=-1), q)
+    return normalize(q)
+
+
+def from_euler(angles: ArrayLike, order: str) -> Array:
+    """Intrinsic Euler angles in radians, (..., 3) in the sequence that `order` names ("ZYX": Z first).
+
+    This is what a BVH file's channels mean: R = R_first R_second R_third.
+    """
+    angles = np.asarray(angles, float)
+    q = None
+    for i, axis in enumerate(order.upper()):
+        step = from_axis_angle(np.eye(3)["XYZ".index(axis)], angles[..., i])
+        q = step if q is None else mul(q, step)
+    assert q is not None
+    return q
+
+
+def to_euler(q: ArrayLike, order: str = "ZYX") -> Array:
+    """Intrinsic Tait-Bryan angles in radians, the inverse of `from_euler`; the middle one is in +-90 degrees."""
+    from scipy.spatial.transform import Rotation
+
+    q = np.asarray(q, float)
+    flat = Rotation.from_quat(q.reshape(-1, 4), scalar_first=True)
+    return flat.as_euler(order.upper()).reshape(*q.shape[:-1], 3)
+
+
+def to_matrix(q: ArrayLike) -> Array:
+    """(..., 4) -> rotation matrices (..., 3, 3) that act on column vectors."""
+    q = np.asarray(q)
+    eye = np.broadcast_to(np.eye(3, dtype=q.dtype), (*q.shape[:-1], 3, 3))
+    return np.swapaxes(rotate(q[..., None, :], eye), -1, -2)
+
+
+def from_matrix(m: ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) -> (..., 4), w >= 0."""
+    from scipy.spatial.transform import Rotation
+
+    m = np.asarray(m, float)
+    q = Rotation.from_matrix(m.reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    return positive(q.reshape(*m.shape[:-2], 4))
+
+
+def positive(q: ArrayLike) -> Array:
+    """The same rotations with w >= 0."""
+    q = np.asarray(q)
+    return np.where(q[..., :1] < 0, -q, q)
+
+
+def log(q: ArrayLike) -> Array:
+    """Axis times HALF the angle, (..., 4) -> (..., 3); w is made >= 0 first (`pfnn-facts`: local rotation)."""
+    q = positive(q)
+    length = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    half = np.arctan2(length, q[..., :1])
+    scale = np.where(length > 1e-12, half / np.maximum(length, 1e-12), 1.0)
+    return q[..., 1:] * scale
+
+
+def exp(v: ArrayLike) -> Array:
+    """Inverse of `log`: (..., 3) -> (..., 4)."""
+    v = np.asarray(v)
+    half = np.linalg.norm(v, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(half), v * np.sinc(half / np.pi)], axis=-1)
+
+
+def slerp(a: ArrayLike, b: ArrayLike, t: ArrayLike) -> Array:
+    """From `a` at t = 0 to `b` at t = 1 along the shorter way; `t` broadcasts against the leading axes."""
+    a, b = np.asarray(a), np.asarray(b)
+    return mul(a, exp(log(mul(inv(a), b)) * np.asarray(t)[..., None]))
+
+
+def continuous(q: ArrayLike) -> Array:
+    """Flip signs along axis 0 so that successive frames lie in one hemisphere."""
+    q = np.array(q)
+    flips = np.sum(q[1:] * q[:-1], axis=-1) < 0
+    signs = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)
+    q[1:] *= signs[..., None]
+    return q
+
+
+def angle(a: ArrayLike, b: ArrayLike) -> Array:
+    """Angle in radians between two rotations, 0 to pi."""
+    return 2.0 * np.linalg.norm(log(mul(inv(a), b)), axis=-1)
+
+
+def yaw(angle: ArrayLike) -> Array:
+    """Rotation about +Y by `angle` radians: takes +Z to (sin, 0, cos)."""
+    return from_axis_angle(np.array([0.0, 1.0, 0.0]), angle)

@@ -1,0 +1,149 @@
+"""A skeleton: joints, parents, rest offsets, what its joints are for, and the links that can be hurt."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.quat import Array
+
+SIDES = (("Left", "Right"), ("left", "right"), ("LHip", "RHip"), ("LThumb", "RThumb"))
+
+
+def other_side(name: str) -> str:
+    """The joint's counterpart across the body, or the same name for one on the midline.
+
+    >>> other_side("LeftUpLeg"), other_side("LHipJoint"), other_side("Neck1"), other_side("Hand_R")
+    ('RightUpLeg', 'RHipJoint', 'Neck1', 'Hand_L')
+    """
+    for left, right in SIDES:
+        if left in name:
+            return name.replace(left, right)
+        if right in name:
+            return name.replace(right, left)
+    match = re.fullmatch(r"(.*[_.])([LR])", name)
+    return match[1] + ("R" if match[2] == "L" else "L") if match else name
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """The rig that a clip moves.
+
+    joints: J names, a parent always before its children; the first is the root.
+    parents: J indices, -1 for the root.
+    offsets: (J, 3) in centimetres, from the parent, with every rotation at identity (the rest pose).
+    roles: what a joint is for ("hips", "left_heel", ...) -> its name; see config/skeletons/README.md.
+    links: pairs (parent-side joint, child-side joint) that can carry an injury severity, in column order.
+    unseen: joints that the network predicts but does not get as input (their weight is 1e-10).
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: Array = field(repr=False)
+    roles: Mapping[str, str] = field(default_factory=dict, repr=False)
+    links: tuple[tuple[str, str], ...] = field(default=(), repr=False)
+    unseen: tuple[str, ...] = field(default=(), repr=False)
+    end_sites: Mapping[str, tuple[float, float, float]] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Skeleton:
+        """Build from plain data as config/skeletons/<name>.yaml holds it (already validated)."""
+        joints = tuple(data["joints"])
+        parents = tuple(
+            -1 if j["parent"] is None else joints.index(j["parent"]) for j in data["joints"].values()
+        )
+        offsets = np.array([j["offset"] for j in data["joints"].values()], float)
+        links = tuple((a, b) for a, b in data.get("links", ()))
+        ends = {name: tuple(xyz) for name, xyz in data.get("end_sites", {}).items()}
+        unseen = tuple(data.get("unseen", ()))
+        return cls(data["name"], joints, parents, offsets, dict(data["roles"]), links, unseen, ends)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, the inverse of `from_dict`; offsets to 1e-6 cm."""
+        joints = {
+            name: {
+                "parent": self.joints[p] if p >= 0 else None,
+                "offset": [round(float(x), 6) for x in offset],
+            }
+            for name, p, offset in zip(self.joints, self.parents, self.offsets, strict=True)
+        }
+        return {
+            "name": self.name,
+            "joints": joints,
+            "roles": dict(self.roles),
+            "links": [list(link) for link in self.links],
+            "unseen": list(self.unseen),
+            "end_sites": {name: list(xyz) for name, xyz in self.end_sites.items()},
+        }
+
+    def index(self, joint: str) -> int:
+        """Index of a joint by name; raises KeyError with the names there are."""
+        try:
+            return self.joints.index(joint)
+        except ValueError:
+            raise KeyError(f"no joint {joint!r} in skeleton {self.name}: {', '.join(self.joints)}") from None
+
+    def role(self, role: str) -> int:
+        """Index of the joint that plays `role`."""
+        return self.index(self.roles[role])
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Links as status files write them: "LeftUpLeg-LeftLeg"."""
+        return tuple(f"{a}-{b}" for a, b in self.links)
+
+    @property
+    def mirror_joints(self) -> np.ndarray:
+        """(J,) index of each joint's counterpart on the other side."""
+        return np.array([self._counterpart(name) for name in self.joints])
+
+    @property
+    def mirror_links(self) -> np.ndarray:
+        """(L,) index of each link's counterpart on the other side."""
+        names = self.link_names
+        mirrored = [f"{other_side(a)}-{other_side(b)}" for a, b in self.links]
+        return np.array([names.index(m) if m in names else i for i, m in enumerate(mirrored)], int)
+
+    def _counterpart(self, name: str) -> int:
+        other = other_side(name)
+        return self.joints.index(other if other in self.joints else name)
+
+    def children(self, joint: int) -> list[int]:
+        """Indices of the joints directly below `joint`."""
+        return [i for i, p in enumerate(self.parents) if p == joint]
+
+
+def forward_kinematics(
+    skeleton: Skeleton, rotations: Array, root: Array, translations: Array | None = None
+) -> tuple[Array, Array]:
+    """World rotations (F, J, 4) and positions (F, J, 3) of local rotations (F, J, 4) and root (F, 3).
+
+    translations: (F, J, 3) local positions that replace the rest offsets of every joint but the root.
+    """
+    global_rotations = np.empty_like(rotations, dtype=float)
+    positions = np.empty((*rotations.shape[:-1], 3))
+    for j, p in enumerate(skeleton.parents):
+        if p < 0:
+            global_rotations[..., j, :] = rotations[..., j, :]
+            positions[..., j, :] = root
+            continue
+        offset = skeleton.offsets[j] if translations is None else translations[..., j, :]
+        parent = global_rotations[..., p, :]
+        global_rotations[..., j, :] = quat.mul(parent, rotations[..., j, :])
+        positions[..., j, :] = positions[..., p, :] + quat.rotate(parent, offset)
+    return global_rotations, positions
+
+
+def local_rotations(skeleton: Skeleton, global_rotations: Array) -> Array:
+    """Local rotations (..., J, 4) of world rotations (..., J, 4): the way back from forward kinematics."""
+    out = np.array(global_rotations, float)
+    for j, p in enumerate(skeleton.parents):
+        if p >= 0:
+            out[..., j, :] = quat.mul(quat.inv(global_rotations[..., p, :]), global_rotations[..., j, :])
+    return out

@@ -1,0 +1,49 @@
+"""The frame around every job's script: a log, progress, and errors as messages."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import sys
+import traceback
+from collections.abc import Iterator
+from typing import Any
+
+from hobble.core.errors import HobbleError
+
+BUG = "This is a fault of Hobble, not of your data; please report it with the log."
+
+
+@contextlib.contextmanager
+def job(snakemake: Any) -> Iterator[logging.Logger]:
+    """Log to the rule's log file and, from warnings on, to the terminal; end a HobbleError in one message.
+
+    A HobbleError ends the process with status 1 and its text. Anything unforeseen ends it with its last line
+    on the terminal and the whole traceback in the log.
+    """
+    path = snakemake.log[0]
+    os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+    logger = logging.getLogger("hobble")
+    logger.setLevel(logging.INFO)
+    to_file = logging.FileHandler(path, mode="w", encoding="utf-8")
+    to_file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    to_terminal = logging.StreamHandler(sys.stderr)
+    to_terminal.setLevel(logging.WARNING)
+    to_terminal.setFormatter(logging.Formatter(f"{snakemake.rule}: %(message)s"))
+    logger.handlers = [to_file, to_terminal]
+    logging.captureWarnings(True)
+    try:
+        yield logger
+    except HobbleError as error:
+        logger.error("%s", error)
+        sys.exit(1)
+    except MemoryError:
+        logger.error("ran out of memory. Give the job more, or make the data set or the batch smaller.")
+        sys.exit(1)
+    except Exception as error:
+        to_file.stream.write(traceback.format_exc())
+        logger.error("%s: %s. %s See %s", type(error).__name__, error, BUG, path)
+        sys.exit(1)
+    finally:
+        logging.shutdown()
