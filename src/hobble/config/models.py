@@ -92,7 +92,7 @@ class SkeletonFile(s.Section):
 
     joints: dict[str, JointEntry]
     roles: dict[str, str]
-    end_sites: dict[str, tuple[float, float, float]] = {}
+    end_sites: dict[str, tuple[float, float, float]] = Field(default_factory=dict)
     links: tuple[tuple[str, str], ...] = ()
     unseen: tuple[str, ...] = ()
     maps: dict[Name, dict[str, str]] = Field(

@@ -88,7 +88,7 @@ def from_euler(angles: ArrayLike, order: str) -> Array:
 
 
 def to_euler(q: ArrayLike, order: str = "ZYX") -> Array:
-    """Intrinsic Tait-Bryan angles in radians, the inverse of `from_euler`; the middle one is in +-90 degrees."""
+    """Intrinsic Tait-Bryan angles in radians, the inverse of `from_euler`; the middle in +-90 degrees."""
     from scipy.spatial.transform import Rotation
 
     q = np.asarray(q, float)
@@ -119,7 +119,7 @@ def positive(q: ArrayLike) -> Array:
 
 
 def log(q: ArrayLike) -> Array:
-    """Axis times HALF the angle, (..., 4) -> (..., 3); w is made >= 0 first (`pfnn-facts`: local rotation)."""
+    """Axis times HALF the angle, (..., 4) -> (..., 3); w is made >= 0 first."""
     q = positive(q)
     length = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     half = np.arctan2(length, q[..., :1])

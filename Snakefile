@@ -1,0 +1,37 @@
+# From motion capture to a character that can be hurt. Targets: results/<configuration>/report.html
+import sys
+from pathlib import Path
+
+from hobble.core.errors import HobbleError
+from hobble.workflow.project import Project
+
+try:
+    project = Project(Path(workflow.basedir), config)
+    project.check(workflow.dag_settings.targets if workflow.dag_settings else ())
+except HobbleError as error:
+    raise WorkflowError(str(error)) from None
+
+
+wildcard_constraints:
+    configuration="|".join(project.catalogue.names()),
+    dataset=r"[^/]+",
+    clip=r"[^/]+(?<!_mirror)",
+    rows=r"[^/]+",
+
+
+rule all:
+    default_target: True
+    input:
+        "results/holden/report.html",
+
+
+include: "workflow/rules/synthetic.smk"
+include: "workflow/rules/motion.smk"
+include: "workflow/rules/labels.smk"
+include: "workflow/rules/injury.smk"
+include: "workflow/rules/terrain.smk"
+include: "workflow/rules/database.smk"
+include: "workflow/rules/training.smk"
+include: "workflow/rules/runtime.smk"
+include: "workflow/rules/evaluation.smk"
+include: "workflow/rules/report.smk"

@@ -1,0 +1,255 @@
+"""What the rules ask: which clips there are, where files lie, which part of the configuration counts."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from hobble.config.load import Catalogue
+from hobble.config.models import ClipEntry, Configuration, Dataset
+from hobble.core.errors import HobbleError, InputError
+from hobble.workflow.fingerprint import fingerprint
+
+DATASETS = "results/datasets"
+MIRROR = "_mirror"
+LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
+STAGES = ("synthetic", "motion", "labels", "injury", "terrain", "database")
+
+
+class Project:
+    """The configuration folder of one checkout, with the overrides of one command line.
+
+    base: the folder of the Snakefile. config: Snakemake's config; `mocap` is the folder with the
+    user's clips, every other key goes on top of each configuration.
+    """
+
+    def __init__(self, base: Path, config: Mapping[str, Any]) -> None:
+        self.base = base
+        self.mocap = Path(config.get("mocap", base / "data"))
+        overrides = {key: value for key, value in config.items() if key != "mocap"}
+        self.catalogue = Catalogue(base / "config", overrides)
+
+    # Configurations and what they name
+
+    def configuration(self, name: str) -> Configuration:
+        """The resolved configuration `name`."""
+        return self.catalogue.configuration(name)
+
+    def dataset(self, name: str) -> Dataset:
+        """The resolved data set `name`."""
+        return self.catalogue.dataset(name)
+
+    def options(self, dataset: str, *sections: str) -> dict[str, Any]:
+        """Plain values of one section of a data set, or of several by name."""
+        model = self.dataset(dataset)
+        values = {s: getattr(model, s).model_dump(mode="json") for s in sections}
+        return values[sections[0]] if len(sections) == 1 else values
+
+    def section(self, configuration: str, name: str) -> dict[str, Any]:
+        """Plain values of one section of a configuration."""
+        return getattr(self.configuration(configuration), name).model_dump(mode="json")
+
+    def resolved(self, configuration: str) -> dict[str, Any]:
+        """Everything that determines a configuration's results, as plain data."""
+        model = self.configuration(configuration)
+        return {
+            "name": configuration,
+            "configuration": model.model_dump(mode="json"),
+            "dataset": {"name": model.dataset, **self.dataset(model.dataset).model_dump(mode="json")},
+        }
+
+    def check(self, targets: Iterable[str]) -> None:
+        """Validate every configuration, data set and skeleton that the targets on the command line need.
+
+        Raises HobbleError, so that a mistake is told before the DAG is built.
+        """
+        for target in targets or ("results/holden/report.html",):
+            parts = Path(target).parts
+            if len(parts) > 2 and parts[0] == "results":
+                self._check_one(parts[1] if parts[1] != "datasets" else None, parts[2])
+
+    def _check_one(self, configuration: str | None, folder: str) -> None:
+        dataset = folder
+        if configuration is not None:
+            chosen = self.configuration(configuration)
+            dataset = chosen.dataset
+            for other in filter(None, (chosen.network_of, chosen.training.continues)):
+                self.configuration(other)
+        self.catalogue.skeleton(self.dataset(dataset).skeleton)
+        self.clips(dataset)
+
+    # Clips
+
+    @functools.cache  # noqa: B019 - one project lives as long as the process
+    def clips(self, dataset: str) -> dict[str, ClipEntry]:
+        """The clips of a data set by name, without mirrors. Raises HobbleError where there are none."""
+        model = self.dataset(dataset)
+        if model.clips:
+            found = {name: entry or ClipEntry() for name, entry in model.clips.items()}
+        else:
+            names = sorted(path.stem for path in self.folder(dataset).glob("*.bvh"))
+            found = {name: ClipEntry() for name in names if not name.endswith(MIRROR)}
+            if not found:
+                raise InputError(self.folder(dataset), "no .bvh files here", fix="Put clips there.")
+        made = [name for name in found if name.endswith(MIRROR)]
+        if made:
+            raise HobbleError(
+                f"data set {dataset}: {', '.join(made)}: a mirror is made from its original by `mirror: true`"
+            )
+        return found
+
+    def folder(self, dataset: str) -> Path:
+        """Where the data set's own source files lie. Raises InputError where a user's folder is missing."""
+        model = self.dataset(dataset)
+        if model.synthetic is not None:
+            return Path(DATASETS, model.source or dataset, "synthetic")
+        path = self.mocap / (model.folder or "")
+        if not path.is_dir():
+            raise InputError(
+                path,
+                f"no such folder, but data set {dataset} reads its clips there",
+                fix="Put the clips there, or name the folder that holds it with --config mocap=FOLDER.",
+            )
+        return path
+
+    def entry(self, dataset: str, clip: str) -> ClipEntry:
+        """What the data set says of a clip or of the original of a mirror."""
+        clips = self.clips(dataset)
+        name = clip.removesuffix(MIRROR)
+        if name not in clips:
+            raise HobbleError(f"data set {dataset} has no clip {name!r}; it has: {', '.join(clips)}")
+        return clips[name]
+
+    def source(self, dataset: str, clip: str) -> str:
+        """Path of the clip's BVH file."""
+        self.entry(dataset, clip)
+        path = self.folder(dataset) / f"{clip}.bvh"
+        if self.dataset(dataset).synthetic is None and not path.is_file():
+            raise InputError(path, f"no such file, but data set {dataset} lists this clip")
+        return str(path)
+
+    def label_files(self, dataset: str, clip: str) -> list[str]:
+        """Hand-made label files beside the clip."""
+        stem = self.folder(dataset) / clip
+        if self.dataset(dataset).synthetic is not None:
+            return [f"{stem}_footsteps.txt", f"{stem}_gait.txt"]
+        files = [f"{stem}{suffix}" for suffix in LABEL_FILES]
+        return [f for f in files if Path(f).is_file()] if self.dataset(dataset).labels.files else []
+
+    def status_files(self, dataset: str, clip: str) -> list[str]:
+        """The status file beside the clip, if there is one and the data set gives no status of its own."""
+        path = f"{self.folder(dataset) / clip}_injuries.txt"
+        if self.dataset(dataset).synthetic is not None:
+            return [path]
+        return [path] if Path(path).is_file() and not self.entry(dataset, clip).status else []
+
+    def is_injured(self, dataset: str, clip: str) -> bool:
+        """Whether anything hurts in the clip, by the configuration or by its status file."""
+        if self.entry(dataset, clip).is_injured:
+            return True
+        if self.dataset(dataset).synthetic is not None:
+            return False
+        return any("[" in Path(f).read_text(errors="replace") for f in self.status_files(dataset, clip))
+
+    def selected(self, dataset: str, selection: str) -> dict[str, str]:
+        """Clip -> "train" or "held_out", of the `healthy` or of `all` clips; mirrors go with originals."""
+        model = self.dataset(dataset)
+        held_out = set(model.held_out)
+        missing = held_out - set(self.clips(dataset))
+        if missing:
+            raise HobbleError(f"data set {dataset}: held_out names no clip: {', '.join(sorted(missing))}")
+        splits = {}
+        for clip in self.clips(dataset):
+            if selection == "healthy" and self.is_injured(dataset, clip):
+                continue
+            for name in (clip, clip + MIRROR) if model.mirror else (clip,):
+                splits[name] = "held_out" if clip in held_out else "train"
+        if "train" not in splits.values():
+            raise HobbleError(f"data set {dataset}: no {selection} clip is left to train on")
+        return splits
+
+    def frames(self, dataset: str, clip: str) -> int:
+        """Synthetic clips: the frames at 60 Hz that fall to this one."""
+        synthetic = self.dataset(dataset).synthetic
+        assert synthetic is not None
+        total = sum(entry.share for entry in self.clips(dataset).values())
+        return round(synthetic.frames * self.entry(dataset, clip).share / total)
+
+    def motion_options(self, dataset: str, clip: str) -> dict[str, Any]:
+        """The motion section, with what the clip's entry overrules."""
+        options = self.options(dataset, "motion")
+        source_fps = self.entry(dataset, clip).source_fps
+        return {**options, "source_fps": source_fps} if source_fps else options
+
+    # What a configuration is made from
+
+    def selection(self, configuration: str) -> str:
+        """Which clips it trains on: `healthy`, or `all` with severities as inputs."""
+        return "all" if self.configuration(configuration).injury else "healthy"
+
+    def splits(self, configuration: str) -> dict[str, str]:
+        """Clip -> split."""
+        dataset = self.configuration(configuration).dataset
+        return self.selected(dataset, self.selection(configuration))
+
+    def of_dataset(self, configuration: str, pattern: str) -> list[str]:
+        """`pattern` (with {clip} in it, or not) under the configuration's data set, for each of its clips."""
+        root = f"{DATASETS}/{self.configuration(configuration).dataset}"
+        if "{clip}" not in pattern:
+            return [f"{root}/{pattern}"]
+        return [f"{root}/{pattern.format(clip=clip)}" for clip in self.splits(configuration)]
+
+    def network(self, configuration: str, file: str) -> str:
+        """A file of the configuration's network, or of the network it reads."""
+        owner = self.configuration(configuration).network_of or configuration
+        return f"results/{owner}/network/{file}"
+
+    def database(self, configuration: str) -> str:
+        """The database that the configuration learns from."""
+        dataset = self.configuration(configuration).dataset
+        return f"{DATASETS}/{dataset}/database/{self.selection(configuration)}"
+
+    def start(self, configuration: str) -> list[str]:
+        """The checkpoint that training goes on from, if it continues another configuration's."""
+        other = self.configuration(configuration).training.continues
+        return [f"results/{other}/network/checkpoint.npz"] if other else []
+
+    def heightmap_files(self, dataset: str) -> list[str]:
+        """Heightmaps that are files, in the order of the configuration."""
+        maps = self.dataset(dataset).terrain.heightmaps
+        return [str(self.mocap / m.path) for m in maps if m.path]
+
+    def templates(self) -> list[str]:
+        """The page's templates; a change in one re-makes only the reports."""
+        folder = self.base / "src" / "hobble" / "report"
+        return sorted(str(p) for p in folder.iterdir() if p.suffix in {".j2", ".css", ".js", ".yaml"})
+
+    def skeleton_file(self, dataset: str) -> str:
+        """Path of the data set's skeleton."""
+        return str(self.base / "config" / "skeletons" / f"{self.dataset(dataset).skeleton}.yaml")
+
+    def stages(self, configuration: str) -> dict[str, dict[str, list[str]]]:
+        """For the account of costs: the benchmark files and the artefacts of each stage."""
+        model = self.configuration(configuration)
+        root = Path(DATASETS, model.dataset)
+        source = Path(DATASETS, self.dataset(model.dataset).source or model.dataset)
+        owner = Path("results", model.network_of or configuration)
+        own = Path("results", configuration)
+        out = {}
+        for stage in STAGES:
+            home = source if stage == "synthetic" else root
+            out[stage] = {"benchmarks": [str(home / "benchmarks" / stage)], "files": [str(home / stage)]}
+        out["database"]["files"] = [str(root / "database/clips"), self.database(configuration)]
+        for stage, home, folder in (
+            ("training", owner, "network"),
+            ("runtime", own, "runtime"),
+            ("evaluation", own, "evaluation"),
+        ):
+            out[stage] = {"benchmarks": [str(home / "benchmarks" / stage)], "files": [str(home / folder)]}
+        return out
+
+    def code(self, script: str) -> str:
+        """Fingerprint of a rule's script and of all it imports from the package."""
+        return fingerprint(self.base / "workflow" / "scripts" / f"{script}.py", self.base / "src")

@@ -1,0 +1,49 @@
+rule database_clip:
+    """The rows of X, Y and P of one clip."""
+    input:
+        clip="results/datasets/{dataset}/motion/{rows}.npz",
+        labels="results/datasets/{dataset}/labels/{rows}.npz",
+        injury="results/datasets/{dataset}/injury/{rows}.npz",
+        terrain="results/datasets/{dataset}/terrain/clips/{rows}.npz",
+    output:
+        rows="results/datasets/{dataset}/database/clips/{rows}.npz",
+    log:
+        "results/datasets/{dataset}/logs/database/database_clip/{rows}.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/database/database_clip/{rows}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        clip=lambda w: w.rows,
+        options=lambda w: project.options(w.dataset, "database"),
+        code=project.code("database_clip"),
+    script:
+        "../scripts/database_clip.py"
+
+
+rule database_merge:
+    """The rows of all clips, shuffled, in chunks, with their statistics."""
+    input:
+        clips=lambda w: expand(
+            f"results/datasets/{w.dataset}/database/clips/{{clip}}.npz",
+            clip=project.selected(w.dataset, w.selection),
+        ),
+    output:
+        database=directory("results/datasets/{dataset}/database/{selection}"),
+    log:
+        "results/datasets/{dataset}/logs/database/database_merge/{selection}.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/database/database_merge/{selection}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1500,
+        runtime=120,
+    params:
+        splits=lambda w: project.selected(w.dataset, w.selection),
+        injury=lambda w: w.selection == "all",
+        options=lambda w: project.options(w.dataset, "database"),
+        code=project.code("database_merge"),
+    script:
+        "../scripts/database_merge.py"

@@ -1,0 +1,48 @@
+rule injury_clip:
+    """How much each link hurts in each frame."""
+    input:
+        clip="results/datasets/{dataset}/motion/{clip}.npz",
+        report="results/datasets/{dataset}/motion/{clip}.json",
+        status=lambda w: project.status_files(w.dataset, w.clip),
+    output:
+        injury="results/datasets/{dataset}/injury/{clip}.npz",
+        report="results/datasets/{dataset}/injury/{clip}.json",
+    log:
+        "results/datasets/{dataset}/logs/injury/injury_clip/{clip}.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/injury/injury_clip/{clip}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        clip=lambda w: w.clip,
+        status=lambda w: project.entry(w.dataset, w.clip).status,
+        options={},
+        code=project.code("injury_clip"),
+    script:
+        "../scripts/injury_clip.py"
+
+
+rule injury_mirror:
+    """The severities of a mirrored clip."""
+    input:
+        injury="results/datasets/{dataset}/injury/{clip}.npz",
+        report="results/datasets/{dataset}/injury/{clip}.json",
+        clip="results/datasets/{dataset}/motion/{clip}_mirror.npz",
+    output:
+        injury="results/datasets/{dataset}/injury/{clip}_mirror.npz",
+        report="results/datasets/{dataset}/injury/{clip}_mirror.json",
+    log:
+        "results/datasets/{dataset}/logs/injury/injury_mirror/{clip}.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/injury/injury_mirror/{clip}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        clip=lambda w: f"{w.clip}_mirror",
+        code=project.code("injury_mirror"),
+    script:
+        "../scripts/injury_mirror.py"

@@ -1,0 +1,50 @@
+rule labels_clip:
+    """Contacts, phase and gait of a clip, from hand-made files where there are any."""
+    input:
+        clip="results/datasets/{dataset}/motion/{clip}.npz",
+        report="results/datasets/{dataset}/motion/{clip}.json",
+        files=lambda w: project.label_files(w.dataset, w.clip),
+    output:
+        labels="results/datasets/{dataset}/labels/{clip}.npz",
+        report="results/datasets/{dataset}/labels/{clip}.json",
+    log:
+        "results/datasets/{dataset}/logs/labels/labels_clip/{clip}.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/labels/labels_clip/{clip}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        clip=lambda w: w.clip,
+        gait=lambda w: project.entry(w.dataset, w.clip).gait,
+        ground=lambda w: project.entry(w.dataset, w.clip).ground,
+        options=lambda w: project.options(w.dataset, "labels"),
+        code=project.code("labels_clip"),
+    script:
+        "../scripts/labels_clip.py"
+
+
+rule labels_mirror:
+    """The labels of a mirrored clip: the other foot, half a cycle on."""
+    input:
+        labels="results/datasets/{dataset}/labels/{clip}.npz",
+        report="results/datasets/{dataset}/labels/{clip}.json",
+        clip="results/datasets/{dataset}/motion/{clip}_mirror.npz",
+    output:
+        labels="results/datasets/{dataset}/labels/{clip}_mirror.npz",
+        report="results/datasets/{dataset}/labels/{clip}_mirror.json",
+    log:
+        "results/datasets/{dataset}/logs/labels/labels_mirror/{clip}.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/labels/labels_mirror/{clip}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        clip=lambda w: f"{w.clip}_mirror",
+        options=lambda w: project.options(w.dataset, "labels"),
+        code=project.code("labels_mirror"),
+    script:
+        "../scripts/labels_mirror.py"

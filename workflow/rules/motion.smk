@@ -1,0 +1,47 @@
+rule motion_clip:
+    """A BVH file, read, checked and put on the data set's skeleton at 60 Hz."""
+    input:
+        bvh=lambda w: project.source(w.dataset, w.clip),
+        skeleton=lambda w: project.skeleton_file(w.dataset),
+    output:
+        clip="results/datasets/{dataset}/motion/{clip}.npz",
+        report="results/datasets/{dataset}/motion/{clip}.json",
+    log:
+        "results/datasets/{dataset}/logs/motion/motion_clip/{clip}.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/motion/motion_clip/{clip}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        clip=lambda w: w.clip,
+        skeleton_name=lambda w: project.dataset(w.dataset).skeleton,
+        maps=str(project.base / "config/skeletons"),
+        options=lambda w: project.motion_options(w.dataset, w.clip),
+        code=project.code("motion_clip"),
+    script:
+        "../scripts/motion_clip.py"
+
+
+rule motion_mirror:
+    """The clip with left and right swapped."""
+    input:
+        clip="results/datasets/{dataset}/motion/{clip}.npz",
+        report="results/datasets/{dataset}/motion/{clip}.json",
+    output:
+        clip="results/datasets/{dataset}/motion/{clip}_mirror.npz",
+        report="results/datasets/{dataset}/motion/{clip}_mirror.json",
+    log:
+        "results/datasets/{dataset}/logs/motion/motion_mirror/{clip}.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/motion/motion_mirror/{clip}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        clip=lambda w: f"{w.clip}_mirror",
+        code=project.code("motion_mirror"),
+    script:
+        "../scripts/motion_mirror.py"

@@ -1,0 +1,74 @@
+rule configuration:
+    """The resolved configuration and data set, as they determine the results."""
+    output:
+        "results/{configuration}/configuration.yaml",
+    log:
+        "results/{configuration}/logs/report/configuration.log",
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        resolved=lambda w: project.resolved(w.configuration),
+        code=project.code("configuration"),
+    script:
+        "../scripts/configuration.py"
+
+
+rule pipeline_summary:
+    """What each stage cost: seconds and memory from its benchmark files, bytes from its artefacts."""
+    input:
+        # Everything that the account covers, so that it is drawn up last.
+        rules.accuracy.output.json,
+        rules.responsivity.output.json,
+        rules.injury_response.output.json,
+        rules.generate.output.scenarios,
+    output:
+        json="results/{configuration}/pipeline.json",
+    log:
+        "results/{configuration}/logs/report/pipeline_summary.log",
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        configuration=lambda w: w.configuration,
+        stages=lambda w: project.stages(w.configuration),
+        code=project.code("pipeline_summary"),
+    script:
+        "../scripts/pipeline_summary.py"
+
+
+rule report:
+    """One HTML file that a person opens, reads and plays with."""
+    input:
+        accuracy=rules.accuracy.output.json,
+        responsivity=rules.responsivity.output.json,
+        injury=rules.injury_response.output.json,
+        pipeline=rules.pipeline_summary.output.json,
+        scenarios=rules.generate.output.scenarios,
+        configuration=rules.configuration.output,
+        weights=lambda w: project.network(w.configuration, "weights.npz"),
+        history=lambda w: project.network(w.configuration, "history.csv"),
+        motion=lambda w: project.of_dataset(w.configuration, "motion/{clip}.json"),
+        labels=lambda w: project.of_dataset(w.configuration, "labels/{clip}.json"),
+        injuries=lambda w: project.of_dataset(w.configuration, "injury/{clip}.json"),
+        terrain=lambda w: project.of_dataset(
+            w.configuration, "terrain/clips/{clip}.npz"
+        ),
+        template=project.templates(),
+    output:
+        html="results/{configuration}/report.html",
+    log:
+        "results/{configuration}/logs/report/report.log",
+    benchmark:
+        "results/{configuration}/benchmarks/report/report.tsv"
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        configuration=lambda w: w.configuration,
+        dataset=lambda w: project.configuration(w.configuration).dataset,
+        splits=lambda w: project.splits(w.configuration),
+        title=lambda w: project.configuration(w.configuration).report.title,
+        code=project.code("report"),
+    script:
+        "../scripts/report.py"

@@ -1,0 +1,27 @@
+rule synthetic_clip:
+    """One clip of the embedded walker, as a user's folder would hold it."""
+    input:
+        skeleton=lambda w: project.skeleton_file(w.dataset),
+    output:
+        bvh="results/datasets/{dataset}/synthetic/{clip}.bvh",
+        footsteps="results/datasets/{dataset}/synthetic/{clip}_footsteps.txt",
+        gait="results/datasets/{dataset}/synthetic/{clip}_gait.txt",
+        status="results/datasets/{dataset}/synthetic/{clip}_injuries.txt",
+    log:
+        "results/datasets/{dataset}/logs/synthetic/synthetic_clip/{clip}.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/synthetic/synthetic_clip/{clip}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        clip=lambda w: w.clip,
+        frames=lambda w: project.frames(w.dataset, w.clip),
+        recipe=lambda w: project.entry(w.dataset, w.clip).recipe,
+        injured=lambda w: project.entry(w.dataset, w.clip).injured,
+        ground=lambda w: project.entry(w.dataset, w.clip).ground,
+        options=lambda w: project.options(w.dataset, "synthetic"),
+        code=project.code("synthetic_clip"),
+    script:
+        "../scripts/synthetic_clip.py"

@@ -1,0 +1,25 @@
+rule training:
+    """The network, learnt from the database; checkpoints survive a kill."""
+    input:
+        database=lambda w: project.database(w.configuration),
+        checkpoint=lambda w: project.start(w.configuration),
+    output:
+        weights="results/{configuration}/network/weights.npz",
+        history="results/{configuration}/network/history.csv",
+        checkpoint="results/{configuration}/network/checkpoint.npz",
+    log:
+        "results/{configuration}/logs/training/training.log",
+    benchmark:
+        "results/{configuration}/benchmarks/training/training.tsv"
+    threads: 2
+    resources:
+        mem_mb=3000,
+        runtime=1440,
+    params:
+        configuration=lambda w: w.configuration,
+        network=lambda w: project.section(w.configuration, "network"),
+        training=lambda w: project.section(w.configuration, "training"),
+        checkpoints="results/{configuration}/checkpoints",
+        code=project.code("training"),
+    script:
+        "../scripts/training.py"
