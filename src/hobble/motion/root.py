@@ -1,0 +1,117 @@
+"""The root frame: where the character is and faces, frame by frame, and what it looks like from there.
+
+The formulas are those of the original pipeline (Holden, Komura, Saito 2017). The root stands on the ground below the
+hips, its Z axis is the facing direction, its X axis the character's left. "World to root" takes a world vector to
+root coordinates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+
+
+@dataclass(frozen=True)
+class RootFrames:
+    """The root of each of F frames.
+
+    position: (F, 2) x and z of the hips, cm, not smoothed.
+    direction: (F, 3) unit facing direction, horizontal, smoothed.
+    rotation: (F, 4) world to root: the turn about Y that takes `direction` to +Z.
+    turn: (F - 1,) yaw velocity from each frame to the next, radians, in the sense of column 2 of Y
+        (the runtime applies its negative).
+    """
+
+    position: Array = field(repr=False)
+    direction: Array = field(repr=False)
+    rotation: Array = field(repr=False)
+    turn: Array = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+
+def across_body(skeleton: Skeleton, positions: Array) -> Array:
+    """Unit vectors (..., 3) from right to left, over shoulders and hips, of joint positions (..., J, 3)."""
+    shoulders = (
+        positions[..., skeleton.role("left_shoulder"), :] - positions[..., skeleton.role("right_shoulder"), :]
+    )
+    hips = positions[..., skeleton.role("left_hip"), :] - positions[..., skeleton.role("right_hip"), :]
+    across = shoulders + hips
+    return across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
+
+
+def facing(skeleton: Skeleton, positions: Array, sigma: float) -> Array:
+    """Facing direction (F, 3), unit and horizontal, of joint positions (F, J, 3).
+
+    across x up, smoothed over time by a Gaussian of `sigma` frames (edges: nearest), normalised again.
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    forward = np.cross(across_body(skeleton, positions), [0.0, 1.0, 0.0])
+    if sigma > 0:
+        forward = gaussian_filter1d(forward, sigma, axis=0, mode="nearest")
+    return forward / np.maximum(np.linalg.norm(forward, axis=-1, keepdims=True), 1e-9)
+
+
+def root_frames(clip: Clip, sigma: float) -> RootFrames:
+    """Root position, facing and rotation of every frame; `sigma` in frames of the clip (20 at 60 Hz)."""
+    direction = facing(clip.skeleton, clip.positions, sigma)
+    rotation = quat.yaw(-np.arctan2(direction[:, 0], direction[:, 2]))
+    change = quat.rotate(quat.mul(rotation[1:], quat.inv(rotation[:-1])), np.array([0.0, 0.0, 1.0]))
+    turn = np.arctan2(change[:, 0], change[:, 2])
+    hips = clip.skeleton.role("hips")
+    return RootFrames(clip.positions[:, hips][:, [0, 2]], direction, rotation, turn)
+
+
+def points_to_root(root: RootFrames, points: Array, frames: Array | slice | None = None) -> Array:
+    """World points (N, ..., 3) seen from the roots of `frames` (N of them; all by default). cm.
+
+    Heights stay above the world's zero.
+    """
+    at = slice(None) if frames is None else frames
+    position, _ = _beside(root, at, points)
+    origin = np.zeros((*position.shape[:-1], 3))
+    origin[..., [0, 2]] = position
+    return vectors_to_root(root, points - origin, at)
+
+
+def vectors_to_root(root: RootFrames, vectors: Array, frames: Array | slice | None = None) -> Array:
+    """World vectors (N, ..., 3), such as velocities and directions, turned into the roots of `frames`."""
+    _, rotation = _beside(root, slice(None) if frames is None else frames, vectors)
+    return quat.rotate(rotation, vectors)
+
+
+def rotations_to_root(root: RootFrames, rotations: Array, frames: Array | slice | None = None) -> Array:
+    """World rotations (N, ..., 4) as rotations (N, ..., 4) relative to the roots of `frames`."""
+    _, turn = _beside(root, slice(None) if frames is None else frames, rotations)
+    return quat.mul(np.broadcast_to(turn, rotations.shape), rotations)
+
+
+def local_pose(clip: Clip, root: RootFrames) -> tuple[Array, Array, Array]:
+    """What the network sees and predicts of every joint, for the frames 0 .. F-2.
+
+    Returns positions (F-1, J, 3) in cm, velocities (F-1, J, 3) in cm a frame, both in the frame's root, and
+    rotations (F-1, J, 3): axis times half the angle.
+    """
+    n = slice(0, len(clip) - 1)
+    positions = points_to_root(root, clip.positions[n], n)
+    velocities = vectors_to_root(root, np.diff(clip.positions, axis=0), n)
+    rotations = quat.log(rotations_to_root(root, clip.global_rotations[n], n))
+    return positions, velocities, rotations
+
+
+def _beside(root: RootFrames, frames: Array | slice, values: Array) -> tuple[Array, Array]:
+    """Position and rotation of the chosen roots, shaped to broadcast against `values` (N, ..., k)."""
+    position, rotation = root.position[frames], root.rotation[frames]
+    between = (1,) * (values.ndim - 2)
+    return (
+        position.reshape(len(position), *between, 2),
+        rotation.reshape(len(rotation), *between, 4),
+    )
