@@ -1,0 +1,1 @@
+"""One HTML file that a person opens, reads and plays with."""

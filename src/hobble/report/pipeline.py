@@ -1,0 +1,113 @@
+"""What each stage cost, from Snakemake's own benchmark files and the sizes of the artefacts."""
+
+from __future__ import annotations
+
+import csv
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from hobble.core.errors import InputError
+from hobble.report.provenance import machine, versions
+
+
+def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]) -> dict[str, Any]:
+    """The account of costs that `pipeline.json` holds.
+
+    stages: in the order of the pipeline, stage -> {"benchmarks": tsv files or folders of them, "files": artefacts
+    or folders of them}. What is not there is listed under `missing`, not refused: a stage may have been copied
+    from another machine without its benchmarks.
+    Returns `stages` (one entry each: jobs, seconds and longest in seconds, max_rss_mb, cpu_seconds, files, bytes,
+    and the same for each rule), `total_seconds`, `total_bytes`, `missing`, `machine`, `versions`.
+    """
+    missing: list[str] = []
+    entries = []
+    for stage, paths in stages.items():
+        jobs = _jobs(paths.get("benchmarks", ()), missing)
+        sizes = _sizes(paths.get("files", ()), missing)
+        by_rule: dict[str, list[dict[str, float]]] = defaultdict(list)
+        for rule, row in jobs:
+            by_rule[rule].append(row)
+        entries.append(
+            {
+                "stage": stage,
+                **_total([row for _, row in jobs]),
+                "files": len(sizes),
+                "bytes": sum(sizes),
+                "rules": [{"rule": rule, **_total(rows)} for rule, rows in sorted(by_rule.items())],
+            }
+        )
+    return {
+        "configuration": configuration,
+        "stages": entries,
+        "total_seconds": round(sum(entry["seconds"] for entry in entries), 3),
+        "total_bytes": sum(entry["bytes"] for entry in entries),
+        "missing": sorted(missing),
+        "machine": machine(),
+        "versions": versions(),
+    }
+
+
+def read_benchmark(path: str | Path) -> list[dict[str, float]]:
+    """The runs in one of Snakemake's benchmark files; what it could not measure ("-", "NA") is left out.
+
+    Raises InputError where the file is not a benchmark.
+    """
+    with open(path, encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file, delimiter="\t"))
+    if rows and "s" not in rows[0]:
+        raise InputError(path, "not a Snakemake benchmark: it has no column `s`", fix="Delete it.")
+    return [
+        {key: number for key, text in row.items() if (number := _number(text)) is not None} for row in rows
+    ]
+
+
+def _number(text: str | None) -> float | None:
+    try:
+        return float(text) if text else None
+    except ValueError:
+        return None
+
+
+def _jobs(paths: Iterable[str], missing: list[str]) -> list[tuple[str, dict[str, float]]]:
+    """(rule, measurement) of every benchmark at or below `paths`: <stage>/<rule>.tsv or <stage>/<rule>/<clip>.tsv."""
+    found = []
+    for root in map(Path, paths):
+        if root.is_dir():
+            files = [
+                (p.relative_to(root).parts[0].removesuffix(".tsv"), p) for p in sorted(root.rglob("*.tsv"))
+            ]
+        elif root.is_file():
+            files = [(root.stem, root)]
+        else:
+            missing.append(str(root))
+            continue
+        found += [(rule, row) for rule, path in files for row in read_benchmark(path)]
+    return found
+
+
+def _sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
+    """Bytes of every file at or below `paths`, hidden ones (Snakemake's marks, half-written files) left out."""
+    sizes = []
+    for root in map(Path, paths):
+        if root.is_dir():
+            files = [p for p in root.rglob("*") if p.is_file() and not p.name.startswith(".")]
+            sizes += [p.stat().st_size for p in files]
+        elif root.is_file():
+            sizes.append(root.stat().st_size)
+        else:
+            missing.append(str(root))
+    return sizes
+
+
+def _total(rows: list[dict[str, float]]) -> dict[str, Any]:
+    seconds = [row.get("s", 0.0) for row in rows]
+    memory = [row["max_rss"] for row in rows if "max_rss" in row]
+    return {
+        "jobs": len(rows),
+        "seconds": round(sum(seconds), 3),
+        "longest": round(max(seconds, default=0.0), 3),
+        "cpu_seconds": round(sum(row.get("cpu_time", 0.0) for row in rows), 3),
+        "max_rss_mb": round(max(memory), 1) if memory else None,
+    }

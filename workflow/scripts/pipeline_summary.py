@@ -1,0 +1,8 @@
+"""Creates results/<configuration>/pipeline.json from the benchmark files and the sizes of every stage's artefacts."""
+
+from hobble.core.files import write_json
+from hobble.report.pipeline import summarise
+from hobble.workflow.job import job
+
+with job(snakemake):
+    write_json(snakemake.output.json, summarise(snakemake.params.configuration, snakemake.params.stages))
