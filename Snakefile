@@ -7,7 +7,9 @@ from hobble.workflow.project import Project
 
 try:
     project = Project(Path(workflow.basedir), config)
-    project.check(workflow.dag_settings.targets if workflow.dag_settings else ())
+    project.check(
+        argument for argument in sys.argv[1:] if argument.startswith("results/")
+    )
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 
@@ -17,6 +19,7 @@ wildcard_constraints:
     dataset=r"[^/]+",
     clip=r"[^/]+(?<!_mirror)",
     rows=r"[^/]+",
+    selection="healthy|all",
 
 
 rule all:

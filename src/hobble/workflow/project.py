@@ -65,20 +65,19 @@ class Project:
 
         Raises HobbleError, so that a mistake is told before the DAG is built.
         """
-        for target in targets or ("results/holden/report.html",):
-            parts = Path(target).parts
-            if len(parts) > 2 and parts[0] == "results":
-                self._check_one(parts[1] if parts[1] != "datasets" else None, parts[2])
+        for target in list(targets) or ["results/holden/report.html"]:
+            _, name, folder, *_ = (*Path(target).parts, "", "")
+            if name == "datasets":
+                self._check_dataset(folder)
+            elif name:
+                model = self.configuration(name)
+                for other in filter(None, (model.network_of, model.training.continues)):
+                    self.configuration(other)
+                self._check_dataset(model.dataset)
 
-    def _check_one(self, configuration: str | None, folder: str) -> None:
-        dataset = folder
-        if configuration is not None:
-            chosen = self.configuration(configuration)
-            dataset = chosen.dataset
-            for other in filter(None, (chosen.network_of, chosen.training.continues)):
-                self.configuration(other)
-        self.catalogue.skeleton(self.dataset(dataset).skeleton)
-        self.clips(dataset)
+    def _check_dataset(self, name: str) -> None:
+        self.catalogue.skeleton(self.dataset(name).skeleton)
+        self.selected(name, "all")
 
     # Clips
 
