@@ -1,0 +1,149 @@
+"""Layers, validation and the errors that name file, key and what is allowed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hobble.config.load import Catalogue, layers, merge, read_yaml, validate
+from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
+from hobble.core.errors import HobbleError
+
+LEAVES = st.integers() | st.text(max_size=3)
+TREES = st.dictionaries(
+    st.sampled_from("abc"), LEAVES | st.dictionaries(st.sampled_from("xyz"), LEAVES), max_size=3
+)
+
+
+@given(TREES, TREES)
+def test_merge_takes_the_upper_value_and_keeps_the_rest(base: dict, over: dict) -> None:
+    merged = merge(base, over)
+    assert set(merged) == set(base) | set(over)
+    for key in merged:
+        if key not in over:
+            assert merged[key] == base[key]
+        elif isinstance(over[key], dict) and isinstance(base.get(key), dict):
+            assert merged[key] == {**base[key], **over[key]}
+        else:
+            assert merged[key] == over[key]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "base.yaml").write_text("training: {passes: 3, batch: 8}\n")
+    (tmp_path / "child.yaml").write_text("extends: base\ntraining: {batch: 16}\n")
+    return tmp_path
+
+
+def test_extends_keeps_what_the_child_does_not_say(folder: Path) -> None:
+    model = Catalogue(folder).configuration("child")
+    assert (model.training.passes, model.training.batch) == (3, 16)
+
+
+def test_overrides_go_on_top_of_every_configuration(folder: Path) -> None:
+    catalogue = Catalogue(folder, {"training": {"passes": 7}})
+    assert [catalogue.configuration(n).training.passes for n in ("base", "child")] == [7, 7]
+
+
+def test_a_circle_of_extends_is_told(folder: Path) -> None:
+    (folder / "base.yaml").write_text("extends: child\n")
+    with pytest.raises(HobbleError, match=r"child\.yaml: extends itself by way of child -> base"):
+        layers(folder, "child")
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"traning": {}}, r"x\.yaml: traning: there is no such key\. Allowed here: .*training"),
+        ({"training": {"lr": 1}}, r"training\.lr: there is no such key\. Allowed here: passes, sections"),
+        ({"training": {"learning_rate": -1}}, r"training\.learning_rate: .*greater than 0, not -1"),
+        ({"training": {"batch": "many"}}, r"training\.batch: .*integer.*not 'many'"),
+        ({"runtime": {"mode": "quartic"}}, r"runtime\.mode: .*'constant', 'linear' or 'cubic'"),
+    ],
+)
+def test_a_wrong_value_names_file_key_and_what_is_allowed(values: dict, message: str) -> None:
+    with pytest.raises(HobbleError, match=message):
+        validate(Configuration, values, "x.yaml")
+
+
+def test_every_problem_is_told_at_once() -> None:
+    with pytest.raises(HobbleError) as caught:
+        validate(Configuration, {"foo": 1, "training": {"passes": 0}}, "x.yaml")
+    assert len(str(caught.value).splitlines()) == 2
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"skeleton": "s"}, "needs `folder`"),
+        ({"skeleton": "s", "synthetic": {}}, "lists its clips"),
+        ({"skeleton": "s", "folder": "f", "clips": {"a": None}, "held_out": ["b"]}, "not in `clips`: b"),
+        ({"skeleton": "s", "folder": "f", "database": {"window": 55}}, "multiple of step"),
+        ({"skeleton": "../s", "folder": "f"}, "skeleton: string should match"),
+    ],
+)
+def test_a_data_set_that_cannot_be_is_refused(values: dict, message: str) -> None:
+    with pytest.raises(HobbleError, match=message):
+        validate(Dataset, values, "d.yaml")
+
+
+def test_an_inline_status_must_read() -> None:
+    assert ClipEntry(status="RightUpLeg-RightLeg[8];RightLeg-RightFoot[8]").is_injured
+    with pytest.raises(ValueError, match="does not read"):
+        ClipEntry(status="right knee 8")
+
+
+def test_broken_yaml_names_its_line(tmp_path: Path) -> None:
+    (tmp_path / "x.yaml").write_text("a: 1\nb: [\n")
+    with pytest.raises(HobbleError, match=r"x\.yaml, line 3: not valid YAML"):
+        read_yaml(tmp_path / "x.yaml")
+
+
+def test_yaml_cannot_make_objects(tmp_path: Path) -> None:
+    (tmp_path / "x.yaml").write_text("a: !!python/object/apply:os.system ['true']\n")
+    with pytest.raises(HobbleError, match="not valid YAML"):
+        read_yaml(tmp_path / "x.yaml")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"joints": {"A": {"parent": "B", "offset": [0, 0, 0]}}}, "its parent 'B' must stand above"),
+        ({"links": [["Hips", "Tail"]]}, "links: there is no joint 'Tail'"),
+        ({"roles": {"hips": "Hip"}}, "roles: there is no joint 'Hip'"),
+    ],
+)
+def test_a_skeleton_that_does_not_hang_together_is_refused(change: dict, message: str) -> None:
+    good = {"joints": {"Hips": {"parent": None, "offset": [0, 0, 0]}}, "roles": {"hips": "Hips"}}
+    with pytest.raises(HobbleError, match=message):
+        validate(SkeletonFile, {**good, **change}, "s.yaml")
+
+
+def test_every_shipped_file_is_valid(root: Path) -> None:
+    catalogue = Catalogue(root / "config")
+    for name in catalogue.names():
+        dataset = catalogue.dataset(catalogue.configuration(name).dataset)
+        catalogue.skeleton(dataset.skeleton)
+    for path in (root / "config/datasets").glob("*.yaml"):
+        catalogue.dataset(path.stem)
+    for path in (root / "config/skeletons").glob("*.yaml"):
+        catalogue.skeleton(path.stem)
+
+
+def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
+    catalogue = Catalogue(root / "config")
+    holden = catalogue.configuration("holden")
+    t = holden.training
+    assert (t.passes, t.sections, t.batch, t.learning_rate, t.dropout, t.l1) == (20, 10, 32, 1e-4, 0.3, 0.01)
+    assert (holden.network.hidden_layers, holden.network.units, holden.network.control_points) == (2, 512, 4)
+    assert catalogue.configuration("holden-xl").network.hidden_layers == 3
+    xt = catalogue.configuration("holden-xt")
+    assert (xt.training.passes, xt.training.continues) == (40, "holden")
+    assert xt.training.model_copy(update={"passes": 20, "continues": None}) == t
+    assert catalogue.configuration("ava-m").network_of == "ava"
+    assert catalogue.configuration("injured").injury
+    assert catalogue.dataset("synthetic").terrain.fits == 10
+    assert catalogue.dataset("synthetic").synthetic.frames == 20_000
