@@ -1,0 +1,90 @@
+"""Running the real workflow on tiny data, from a copy of the checkout that a test may change."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+PARTS = ("Snakefile", "config", "workflow", "src")
+
+
+@dataclass
+class Workflow:
+    """A copy of the checkout and a folder to run it in."""
+
+    checkout: Path
+    folder: Path
+
+    def command(self, *arguments: str) -> list[str]:
+        snakefile = self.checkout / "Snakefile"
+        profile = self.checkout / "workflow/profiles/default"
+        base = [sys.executable, "-m", "snakemake", "-s", str(snakefile), "-d", str(self.folder)]
+        return [*base, "--workflow-profile", str(profile), *arguments]
+
+    def environment(self) -> dict[str, str]:
+        path = os.pathsep.join([str(self.checkout / "src"), os.environ.get("PYTHONPATH", "")])
+        return {**os.environ, "PYTHONPATH": path.rstrip(os.pathsep), "PYTHONDONTWRITEBYTECODE": "1"}
+
+    def run(self, *arguments: str, ok: bool = True) -> str:
+        """Run snakemake; returns stdout and stderr. Fails the test where it ends otherwise than `ok` says."""
+        done = subprocess.run(
+            self.command(*arguments), env=self.environment(), capture_output=True, text=True, timeout=600
+        )
+        text = done.stdout + done.stderr
+        assert (done.returncode == 0) is ok, text
+        return text
+
+    def planned(self, *arguments: str) -> dict[str, int]:
+        """Rule -> number of jobs that a dry run plans."""
+        text = self.run("-n", *arguments)
+        table = re.search(r"^Job stats:\n(.*?)\ntotal", text, re.M | re.S)
+        rows = re.findall(r"^(\w+) +(\d+)$", table[1], re.M) if table else []
+        return {rule: int(count) for rule, count in rows}
+
+    def edit(self, file: str, old: str, new: str) -> None:
+        path = self.checkout / file
+        text = path.read_text()
+        assert old in text, f"{file} has no {old!r}"
+        path.write_text(text.replace(old, new, 1))
+
+
+def copy_of(root: Path, folder: Path) -> Workflow:
+    checkout = folder / "checkout"
+    checkout.mkdir(parents=True)
+    for part in PARTS:
+        source = root / part
+        if source.is_dir():
+            shutil.copytree(source, checkout / part, ignore=shutil.ignore_patterns("__pycache__"))
+        else:
+            shutil.copy2(source, checkout / part)
+    (folder / "run").mkdir()
+    return Workflow(checkout, folder / "run")
+
+
+@pytest.fixture
+def workflow(root: Path, tmp_path: Path) -> Workflow:
+    """A fresh copy with no results."""
+    return copy_of(root, tmp_path)
+
+
+@pytest.fixture(scope="session")
+def finished(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Workflow:
+    """The `test` configuration, run to its report once; not to be changed by a test."""
+    made = copy_of(root, tmp_path_factory.mktemp("finished"))
+    made.run("-c2", "results/test/report.html")
+    return made
+
+
+@pytest.fixture
+def copied(finished: Workflow, tmp_path: Path) -> Workflow:
+    """A copy of the finished run that a test may change (times are kept, so nothing is out of date)."""
+    target = tmp_path / "copy"
+    shutil.copytree(finished.checkout.parent, target, symlinks=True)
+    return Workflow(target / "checkout", target / "run")

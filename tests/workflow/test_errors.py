@@ -1,0 +1,114 @@
+"""Bad input through the real workflow: one message with file and place, and what was whole stays whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.workflow
+
+DATASET = "skeleton: holden31\nfolder: mine\n"
+
+
+@pytest.fixture
+def mine(finished, workflow):
+    """A user's data set of two good clips, made from the tiny data set's files."""
+    folder = workflow.folder / "mocap" / "mine"
+    folder.mkdir(parents=True)
+    made = sorted((finished.folder / "results/datasets/tiny/synthetic").glob("*.bvh"))[:2]
+    for path in made:
+        for file in path.parent.glob(f"{path.stem}[._]*"):
+            (folder / file.name).write_bytes(file.read_bytes())
+    (workflow.checkout / "config/datasets/mine.yaml").write_text(DATASET)
+    workflow.clip = made[0].stem
+    workflow.other = made[1].stem
+    workflow.mine = folder
+    return workflow
+
+
+def make(workflow, *targets: str, ok: bool) -> str:
+    files = [f"results/datasets/mine/{target}" for target in targets]
+    return workflow.run("-c2", *files, "--keep-going", "--config", "mocap=mocap", ok=ok)
+
+
+def refused(workflow, stage: str, *pieces: str) -> None:
+    """The bad clip's job ends with one message that holds `pieces`; the good clip's job is done."""
+    text = make(workflow, f"{stage}/{workflow.clip}.npz", f"{stage}/{workflow.other}.npz", ok=False)
+    message = [line for line in text.splitlines() if line.startswith(f"{stage}_clip: ")]
+    assert len(message) == 1, text
+    for piece in pieces:
+        assert piece in message[0], message[0]
+    assert "Traceback" not in text
+    results = workflow.folder / "results/datasets/mine" / stage
+    assert (results / f"{workflow.other}.npz").is_file()
+    assert not (results / f"{workflow.clip}.npz").exists()
+
+
+def spoil(lines: list[str], how: str) -> str:
+    motion = lines.index("MOTION")
+    if how == "truncated":
+        return "\n".join(lines[: motion + 30])
+    if how == "nan":
+        lines[motion + 10] = "nan " + lines[motion + 10].split(" ", 1)[1]
+    if how == "skeleton":
+        lines = [line.replace("LeftToeBase", "LeftTail") for line in lines]
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize(
+    ("how", "pieces"),
+    [
+        ("truncated", ("line",)),
+        ("nan", ("line", "11")),
+        ("skeleton", ("LeftT",)),
+        ("empty", ("empty",)),
+        ("binary", ()),
+    ],
+)
+def test_a_bad_clip(mine, how: str, pieces: tuple[str, ...]) -> None:
+    path: Path = mine.mine / f"{mine.clip}.bvh"
+    if how == "empty":
+        path.write_bytes(b"")
+    elif how == "binary":
+        path.write_bytes(bytes(range(256)) * 20)
+    else:
+        path.write_text(spoil(path.read_text().splitlines(), how))
+    refused(mine, "motion", path.name, *pieces)
+
+
+@pytest.mark.parametrize(
+    ("line", "pieces"),
+    [
+        ("1-20 LeftWing-LeftTip[5];", ("line 2", "LeftWing-LeftTip")),
+        ("1-20 LeftUpLeg-LeftLeg[11];", ("line 2", "11", "10")),
+        ("20-1 LeftUpLeg-LeftLeg[5];", ("line 2", "20-1")),
+        ("frames:7", ("line 1", "7")),
+    ],
+)
+def test_a_bad_status_file(mine, line: str, pieces: tuple[str, ...]) -> None:
+    path: Path = mine.mine / f"{mine.clip}_injuries.txt"
+    first = path.read_text().splitlines()[0]
+    path.write_text(f"{line}\n" if line.startswith("frames") else f"{first}\n{line}\n")
+    refused(mine, "injury", path.name, *pieces)
+
+
+def test_a_data_folder_that_is_not_there(mine) -> None:
+    text = mine.run("-n", "results/datasets/mine/motion/a.npz", "--config", "mocap=nowhere", ok=False)
+    assert "nowhere/mine: no such folder" in text
+    assert "mocap=FOLDER" in text
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("training={learning_rate: -1}", "training.learning_rate: input should be greater than 0"),
+        ("trainnig={passes: 1}", "trainnig: there is no such key. Allowed here"),
+        ("dataset=nope", "nope.yaml: no such file. There are:"),
+    ],
+)
+def test_a_bad_configuration_ends_before_the_dag(workflow, override: str, message: str) -> None:
+    text = workflow.run("-n", "results/test/report.html", "--config", override, ok=False)
+    assert message in text
+    assert "Building DAG" not in text
+    assert "Traceback" not in text

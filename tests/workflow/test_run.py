@@ -1,0 +1,132 @@
+"""The whole workflow on tiny synthetic data: it ends, it is reproducible, it re-runs what it should."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.workflow
+
+TARGET = "results/test/report.html"
+MEASURED = {"milliseconds", "seconds", "machine"}
+
+
+def without_times(value: Any) -> Any:
+    """JSON without what a clock measured."""
+    if isinstance(value, dict):
+        return {k: without_times(v) for k, v in value.items() if k not in MEASURED}
+    return [without_times(v) for v in value] if isinstance(value, list) else value
+
+
+def artefacts(folder: Path) -> dict[str, bytes]:
+    """Every data file of a run that must come out the same, by its path."""
+    root = folder / "results"
+    files = [p for p in root.rglob("*") if p.suffix in {".npz", ".npy", ".bvh", ".txt", ".bin"}]
+    files = [p for p in files if "checkpoints" not in p.parts]
+    return {str(p.relative_to(root)): p.read_bytes() for p in sorted(files)}
+
+
+def test_the_report_and_everything_beside_it_is_made(finished) -> None:
+    results = finished.folder / "results" / "test"
+    accuracy = json.loads((results / "evaluation/accuracy.json").read_text())
+    assert accuracy["configuration"] == "test"
+    for split in ("train", "held_out"):
+        assert 0 < accuracy[split]["mean"] < 1
+        assert accuracy[split]["position_error_cm"] > 0
+    assert {row["split"] for row in accuracy["clips"]} == {"train", "held_out"}
+    history = (results / "network/history.csv").read_text().splitlines()
+    assert history[0].startswith("pass,section,samples,seconds,train_mse,held_out_mse")
+    assert len(history) == 1 + 2 * 10
+    pipeline = json.loads((results / "pipeline.json").read_text())
+    stages = {stage["stage"]: stage for stage in pipeline["stages"]}
+    assert set(stages) >= {"synthetic", "motion", "labels", "injury", "terrain", "database", "training"}
+    assert all(stage["seconds"] > 0 and stage["bytes"] > 0 for stage in stages.values())
+    injury = json.loads((results / "evaluation/injury.json").read_text())
+    assert injury["applies"]
+    page = (finished.folder / TARGET).read_text()
+    assert f"{accuracy['held_out']['position_error_cm']:.1f}" in page
+
+
+def test_a_second_call_has_nothing_to_do(finished) -> None:
+    assert "Nothing to be done" in finished.run("-n", TARGET)
+
+
+def test_two_runs_give_the_same_bytes(finished, workflow) -> None:
+    workflow.run("-c2", TARGET)
+    first, second = artefacts(finished.folder), artefacts(workflow.folder)
+    assert first.keys() == second.keys()
+    assert [name for name in first if first[name] != second[name]] == []
+    for name in ("accuracy", "injury", "responsivity"):
+        a, b = (
+            json.loads((w.folder / f"results/test/evaluation/{name}.json").read_text())
+            for w in (finished, workflow)
+        )
+        assert without_times(a) == without_times(b), name
+
+
+def test_more_passes_retrain_and_leave_the_database(finished) -> None:
+    planned = finished.planned(TARGET, "--config", "training={passes: 3}")
+    assert planned["training"] == 1
+    assert {"accuracy", "generate", "responsivity", "injury_response", "report"} <= set(planned)
+    assert not {"database_merge", "database_clip", "motion_clip", "terrain_fits"} & set(planned)
+
+
+def test_editing_labels_reruns_from_labels_on(copied) -> None:
+    module = next(p for p in (copied.checkout / "src/hobble/labels").glob("*.py") if p.stem == "contacts")
+    module.write_text(module.read_text() + "\n_EDITED = 1\n")
+    planned = copied.planned(TARGET)
+    assert {"labels_clip", "terrain_fits", "database_clip", "database_merge", "training"} <= set(planned)
+    assert not {"synthetic_clip", "motion_clip", "injury_clip", "terrain_patches"} & set(planned)
+
+
+def test_editing_a_comment_of_the_page_remakes_only_the_report(copied) -> None:
+    page = copied.checkout / "src/hobble/report/page.html.j2"
+    page.write_text(page.read_text() + "{# a comment #}\n")
+    assert set(copied.planned(TARGET)) == {"report"}
+
+
+def test_editing_a_comment_in_the_code_reruns_nothing(copied) -> None:
+    module = copied.checkout / "src/hobble/core/quat.py"
+    module.write_text(module.read_text() + "\n# a comment\n")
+    assert "Nothing to be done" in copied.run("-n", TARGET)
+
+
+def test_another_clip_changes_only_its_own_rows_and_the_merge(copied) -> None:
+    copied.edit("config/datasets/tiny.yaml", "held_out:", "motion: {fps: 60.0}\nheld_out:")
+    assert "Nothing to be done" in copied.run("-n", TARGET)  # the default, said aloud
+
+
+@pytest.mark.parametrize("moment", ["database", "training"])
+def test_killed_half_way_the_same_command_ends_with_the_same_bytes(finished, workflow, moment: str) -> None:
+    process = subprocess.Popen(
+        workflow.command("-c2", TARGET),
+        env=workflow.environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    sign = {
+        "database": lambda: list(workflow.folder.glob("results/datasets/tiny/database/clips/*.npz")),
+        "training": lambda: list(workflow.folder.glob("results/test/checkpoints/*/*.npz")),
+    }[moment]
+    deadline = time.monotonic() + 300
+    while not sign() and time.monotonic() < deadline and process.poll() is None:
+        time.sleep(0.05)
+    assert process.poll() is None, "it ended before it could be killed"
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert not (workflow.folder / TARGET).exists()
+    workflow.run("--unlock")
+    workflow.run("-c2", TARGET)
+    weights = "results/test/network/weights.npz"
+    a, b = (np.load(w.folder / weights) for w in (finished, workflow))
+    assert all(np.array_equal(a[name], b[name]) for name in a.files)
+    assert not list(workflow.folder.rglob("*.part"))
