@@ -32,12 +32,13 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
             os.fsync(file.fileno())
         os.replace(temporary, path)
     except OSError as error:
-        raise _explained(error, path) from error
+        raise explained(error, path) from error
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def _explained(error: OSError, path: Path) -> HobbleError:
+def explained(error: OSError, path: Path) -> HobbleError:
+    """The same failure as a message a person can act on: a full disk, a folder that cannot be written."""
     reasons = {
         errno.ENOSPC: ("the disk is full", "Free some space and run the same command again."),
         errno.EDQUOT: ("the disk quota is used up", "Free some space and run the same command again."),

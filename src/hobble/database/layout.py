@@ -15,9 +15,9 @@ SIDES = ("left", "centre", "right")
 class RowLayout:
     """The columns of X and Y for J joints, a window of `window` frames to each side, and L links.
 
-    With 31 joints, window 60, step 10: X has 342 columns (372 with 30 links) and Y 311.
-    Every property is a slice. Blocks that hold vectors are joint-major: x, y, z of joint 0, then joint 1, ...;
-    trajectory blocks are component-major: x of every sample, then z of every sample.
+    With 31 joints, window 60, step 10: X has 342 columns (372 with 30 links) and Y 311. Every property is a
+    slice. Blocks that hold vectors are joint-major: x, y, z of joint 0, then joint 1, ...; trajectory
+    blocks are component-major: x of every sample, then z of every sample.
     """
 
     joints: int
@@ -76,7 +76,7 @@ class RowLayout:
 
     @property
     def x_terrain(self) -> slice:
-        """Heights: to the +X side (left), at the centre, to the other side; less the mean of the centre ones."""
+        """Heights: +X side (left), centre, other side; less the mean of the centre ones."""
         return slice(self.x_joint_velocity.stop, self.x_joint_velocity.stop + 3 * self.samples)
 
     @property

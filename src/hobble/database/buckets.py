@@ -1,0 +1,59 @@
+"""Rows on their way through the external shuffle: scattered over files, each a stretch of the final order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from hobble.core.quat import Array
+
+INDEX = np.dtype([("place", "<i8"), ("count", "<i4"), ("clip", "<i4"), ("frame", "<i4"), ("phase", "<f4")])
+
+
+def gather_fits(fits: Array, count: np.ndarray, order: np.ndarray) -> Array:
+    """The fits (S, columns) of rows taken in another order; `count` (R,) is how many each row has."""
+    first = np.cumsum(count) - count
+    taken = count[order]
+    starts = np.cumsum(taken) - taken
+    return fits[np.repeat(first[order] - starts, taken) + np.arange(taken.sum())]
+
+
+class Buckets:
+    """Files of up to `rows_each` rows, each of consecutive places; rows arrive in any order."""
+
+    def __init__(self, folder: Path, rows: int, rows_each: int, columns: int, fit_columns: int) -> None:
+        self.folder, self.rows_each = folder, rows_each
+        self.columns, self.fit_columns = columns, fit_columns
+        self.count = -(-rows // rows_each)
+        folder.mkdir(parents=True)
+
+    def add(self, frames: Array, fits: Array, index: np.ndarray) -> None:
+        """Scatter rows: frames (R, columns), their fits (S, fit_columns) and index (R,) of INDEX."""
+        bucket = index["place"] // self.rows_each
+        order = np.argsort(bucket, kind="stable")
+        edges = np.searchsorted(bucket[order], np.arange(self.count + 1))
+        for b in np.unique(bucket):
+            rows = order[edges[b] : edges[b + 1]]
+            self._append(b, "frames", np.asarray(frames[rows], "<f4"))
+            self._append(b, "fits", np.asarray(gather_fits(fits, index["count"], rows), "<f4"))
+            self._append(b, "index", index[rows])
+
+    def _append(self, bucket: int, table: str, values: np.ndarray) -> None:
+        with open(self._file(bucket, table), "ab") as file:
+            file.write(values.tobytes())
+
+    def _file(self, bucket: int, table: str) -> Path:
+        return self.folder / f"{bucket:05d}.{table}"
+
+    def drain(self) -> Iterator[tuple[Array, Array, np.ndarray]]:
+        """Each bucket's frames, fits and index in the final order; its files are removed as they are read."""
+        for b in range(self.count):
+            index = np.fromfile(self._file(b, "index"), INDEX)
+            frames = np.fromfile(self._file(b, "frames"), "<f4").reshape(-1, self.columns)
+            fits = np.fromfile(self._file(b, "fits"), "<f4").reshape(-1, self.fit_columns)
+            for table in ("index", "frames", "fits"):
+                self._file(b, table).unlink()
+            order = np.argsort(index["place"])
+            yield frames[order], gather_fits(fits, index["count"], order), index[order]

@@ -1,0 +1,111 @@
+"""The rows of one clip: what depends on the frame once, what depends on the terrain fit once per fit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.core.files import load_npz, save_npz
+from hobble.core.quat import Array
+from hobble.database.layout import RowLayout
+
+HINT = "Delete it; the next run makes it again."
+
+
+@dataclass(frozen=True)
+class ClipRows:
+    """R rows of a clip, factorised. S is the sum of `fits`, L the skeleton's links.
+
+    x: (R, columns of X without terrain and injury); y: (R, Y). Joint heights are above the world's zero.
+    p: (R,) phase. severity: (R, L). frame, cycle, fits: (R,) int; `fits` counts the terrain fits of a row.
+    heights: (S, 3 * samples) less the mean of their centre ones; mean: (S,) that mean, to be taken off the
+    joint heights. The fits of a row lie together, in the order of the rows.
+    visits: how often each row counts in a pass over the data; a row of one fit is used with it so often.
+    layout: of the rows with every link of the skeleton.
+    """
+
+    clip: str
+    layout: RowLayout
+    skeleton: Mapping[str, Any] = field(repr=False)
+    x: Array = field(repr=False)
+    y: Array = field(repr=False)
+    p: Array = field(repr=False)
+    severity: Array = field(repr=False)
+    frame: np.ndarray = field(repr=False)
+    cycle: np.ndarray = field(repr=False)
+    fits: np.ndarray = field(repr=False)
+    heights: Array = field(repr=False)
+    mean: Array = field(repr=False)
+    visits: int = 10
+
+    def __len__(self) -> int:
+        return len(self.p)
+
+    @property
+    def first_fit(self) -> np.ndarray:
+        """(R,) where each row's fits begin in `heights` and `mean`."""
+        return np.cumsum(self.fits) - self.fits
+
+    def check(self, where: str | Path) -> None:
+        """Raise InputError, naming `where`, unless all shapes agree, fits are there and values are finite."""
+        layout, rows, fits = self.layout, len(self.p), int(np.sum(self.fits))
+        expected = {
+            "x": (rows, layout.x_terrain.start),
+            "y": (rows, layout.y_size),
+            "severity": (rows, layout.links),
+            "frame": (rows,),
+            "cycle": (rows,),
+            "fits": (rows,),
+            "heights": (fits, 3 * layout.samples),
+            "mean": (fits,),
+        }
+        for name, shape in expected.items():
+            if getattr(self, name).shape != shape:
+                got = getattr(self, name).shape
+                raise InputError(where, f"{name} is {got} where {shape} belongs", fix=HINT)
+        if rows and np.min(self.fits) < 1:
+            frame = int(self.frame[np.argmin(self.fits)])
+            raise InputError(where, "a row has no terrain fit", frame=frame)
+        for name in ("x", "y", "p", "severity"):
+            values = getattr(self, name).reshape(rows, -1)
+            bad = ~np.isfinite(values).all(axis=1)
+            if bad.any():
+                raise InputError(where, f"{name} is not a number", frame=int(self.frame[np.argmax(bad)]))
+        if not (np.isfinite(self.heights).all() and np.isfinite(self.mean).all()):
+            raise InputError(where, "terrain heights are not numbers")
+
+
+def save_clip_rows(path: str | Path, rows: ClipRows) -> None:
+    """Write rows as one npz, floats as float32."""
+    floats = {n: getattr(rows, n).astype(np.float32) for n in ("x", "y", "p", "severity", "heights", "mean")}
+    integers = {n: getattr(rows, n).astype(np.int32) for n in ("frame", "cycle", "fits")}
+    save_npz(
+        path,
+        clip=np.array(rows.clip),
+        layout=np.array(json.dumps(rows.layout.to_dict(), sort_keys=True)),
+        skeleton=np.array(json.dumps(rows.skeleton, sort_keys=True)),
+        visits=np.array(rows.visits),
+        **floats,
+        **integers,
+    )
+
+
+def load_clip_rows(path: str | Path) -> ClipRows:
+    """Read what `save_clip_rows` wrote; raises InputError where it is damaged or of another layout."""
+    data: dict[str, Any] = load_npz(path)
+    try:
+        data["clip"] = str(data["clip"])
+        data["layout"] = RowLayout.from_dict(json.loads(str(data["layout"])))
+        data["skeleton"] = json.loads(str(data["skeleton"]))
+        data["visits"] = int(data["visits"])
+        rows = ClipRows(**data)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(path, f"not a file of rows ({error})", fix=HINT) from error
+    rows.check(path)
+    return rows

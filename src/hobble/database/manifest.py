@@ -1,0 +1,69 @@
+"""What a database says of itself in manifest.json, which is written last: no manifest, no database."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hobble.core.errors import InputError
+from hobble.core.files import read_json, write_json
+from hobble.database.chunks import HINT, Chunk
+from hobble.database.layout import RowLayout
+
+FILE = "manifest.json"
+STATISTICS = "statistics.npz"
+VERSION = 1
+SPLITS = ("train", "held_out")
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """folder: where chunks and statistics lie inside the database, named by their content.
+
+    layout: of the rows composed. visits: how often a pass uses each row. clips: one entry a clip with
+    `clip`, `split`, `rows`, `pairs`. chunks: per split. original_bytes: what the same pairs take in the
+    original's layout.
+    """
+
+    folder: str
+    layout: RowLayout
+    skeleton: Mapping[str, Any]
+    visits: int
+    dtype: str
+    joint_weight: float
+    clips: list[dict[str, Any]]
+    chunks: Mapping[str, list[Chunk]]
+    original_bytes: int
+    bytes: int
+
+    def rows(self, split: str) -> int:
+        """Rows of a split."""
+        return sum(chunk.rows for chunk in self.chunks[split])
+
+    def save(self, path: Path) -> None:
+        """Write manifest.json into the database's folder, whole or not at all."""
+        values = {**vars(self), "format": "hobble database", "version": VERSION}
+        values["layout"] = self.layout.to_dict()
+        values["chunks"] = {split: [c.to_dict() for c in chunks] for split, chunks in self.chunks.items()}
+        write_json(path / FILE, values)
+
+    @classmethod
+    def load(cls, path: Path) -> Manifest:
+        """Read it; raises InputError where there is no whole database."""
+        file = path / FILE
+        if not file.exists():
+            raise InputError(
+                path, f"no database: there is no {FILE} in it, so its build did not finish", fix=HINT
+            )
+        values = read_json(file)
+        try:
+            if values.pop("format") != "hobble database" or values.pop("version") != VERSION:
+                raise InputError(file, f"not a database of version {VERSION}", fix=HINT)
+            values["layout"] = RowLayout.from_dict(values["layout"])
+            chunks = values["chunks"]
+            values["chunks"] = {split: [Chunk(**chunk) for chunk in chunks[split]] for split in SPLITS}
+            return cls(**values)
+        except (KeyError, TypeError, AttributeError) as error:
+            raise InputError(file, f"not a database's manifest ({error})", fix=HINT) from error

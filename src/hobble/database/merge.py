@@ -1,0 +1,220 @@
+"""The rows of all clips, shuffled once and written in chunks: a two-pass external shuffle in bounded memory.
+
+Pass 1 reads each clip once, adds it to the statistics and scatters its rows over buckets, each of which
+holds a stretch of one permutation of all rows. Pass 2 puts each bucket into the permutation's order,
+standardises it and writes its chunks. The manifest, written last and by renaming, is what makes the folder
+a database: a build that is killed leaves the database that was there before, or none.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import explained, save_npz
+from hobble.database.buckets import INDEX, Buckets
+from hobble.database.chunks import Chunk, write_chunk
+from hobble.database.clip_rows import ClipRows, load_clip_rows
+from hobble.database.compose import fit_columns, frame_columns, split_rows
+from hobble.database.layout import RowLayout
+from hobble.database.manifest import SPLITS, STATISTICS, Manifest
+from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
+
+CHUNK_BYTES = 4 << 20  # what a reader takes in one go: long enough for any disk, short enough for any memory
+BUCKET_BYTES = 64 << 20  # the memory of pass 2, a few times over
+
+Source = ClipRows | str | Path
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is known before a row is written: the layout of the rows, their clips and how they are cut up."""
+
+    layout: RowLayout
+    skeleton: Mapping[str, Any]
+    visits: int
+    clips: list[dict[str, Any]]
+    chunk_rows: int
+    bucket_rows: int
+
+    def rows(self, split: str) -> int:
+        """Rows of a split."""
+        return sum(clip["rows"] for clip in self.clips if clip["split"] == split)
+
+
+def write_database(
+    path: str | Path,
+    clips: Mapping[str, Source],
+    splits: Mapping[str, str],
+    *,
+    injury: bool,
+    joint_weight: float,
+    dtype: str = "float32",
+    seed: int = 1,
+    chunk_bytes: int = CHUNK_BYTES,
+) -> Manifest:
+    """Build the database folder `path` from rows by clip name, or from the files that hold them.
+
+    splits: clip name -> "train" or "held_out". injury: whether severities are inputs. dtype: float32 or
+    float16. The statistics are those of the clips in training. The same rows and options give the same
+    bytes. Raises HobbleError where no clip has rows to train on, InputError where a clip does not fit the
+    others.
+    """
+    path = Path(path)
+    path.mkdir(parents=True, exist_ok=True)
+    _sweep(path, keep=None)
+    work = path / f"part-{os.getpid()}"
+    try:
+        work.mkdir()
+        plan = _plan(clips, splits, injury, np.dtype(dtype).itemsize, chunk_bytes)
+        buckets, moments = _scatter(work, clips, plan, seed)
+        unseen = unseen_joints(plan.skeleton)
+        statistics = finish(plan.layout, *moments, joint_weight, unseen)
+        chunks = {
+            split: list(_chunks(work, split, buckets[split], plan, statistics, dtype)) for split in SPLITS
+        }
+        save_npz(work / STATISTICS, **{f.name: getattr(statistics, f.name) for f in fields(statistics)})
+        manifest = Manifest(
+            folder=_name(work, chunks),
+            layout=plan.layout,
+            skeleton=plan.skeleton,
+            visits=plan.visits,
+            dtype=dtype,
+            joint_weight=joint_weight,
+            clips=plan.clips,
+            chunks=chunks,
+            original_bytes=_original_bytes(plan),
+            bytes=sum(chunk.bytes for split in SPLITS for chunk in chunks[split]),
+        )
+        _publish(path, work, manifest)
+        return manifest
+    except OSError as error:
+        raise explained(error, path) from error
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def _sweep(path: Path, keep: str | None) -> None:
+    """Remove what a killed build left and, with `keep`, every build but that one."""
+    for entry in path.iterdir():
+        if entry.is_dir() and (entry.name.startswith("part-") or (keep is not None and entry.name != keep)):
+            shutil.rmtree(entry, ignore_errors=True)
+
+
+def _plan(
+    clips: Mapping[str, Source], splits: Mapping[str, str], injury: bool, item: int, chunk_bytes: int
+) -> Plan:
+    entries: list[dict[str, Any]] = []
+    first: ClipRows | None = None
+    visits, pairs, rows = 1, 0, 0
+    for name in sorted(clips):
+        clip = _load(clips[name])
+        if first is None:
+            first = replace(clip, **{f: getattr(clip, f)[:0] for f in ("x", "y", "severity", "heights")})
+        elif clip.layout != first.layout or list(clip.skeleton["joints"]) != list(first.skeleton["joints"]):
+            where = clips[name] if isinstance(clips[name], str | Path) else name
+            raise InputError(where, f"its rows are not laid out as those of {first.clip}")
+        entries.append(
+            {"clip": name, "split": splits[name], "rows": len(clip), "pairs": int(clip.fits.sum())}
+        )
+        visits = max(visits, clip.visits, int(clip.fits.max(initial=1)))
+        rows, pairs = rows + len(clip), pairs + int(clip.fits.sum())
+    if first is None or not any(e["rows"] for e in entries if e["split"] == "train"):
+        raise HobbleError(
+            "There is nothing to train on: no clip of the training part has a locomotion cycle "
+            "60 frames from its ends. Add clips, or hold fewer out."
+        )
+    layout = first.layout if injury else replace(first.layout, links=0)
+    values = frame_columns(layout) + fit_columns(layout) * pairs / rows
+    chunk_rows = max(1, int(chunk_bytes / (item * values + 16)))
+    each = max(1, int(BUCKET_BYTES / (chunk_rows * 4 * values)))
+    return Plan(layout, first.skeleton, visits, entries, chunk_rows, chunk_rows * each)
+
+
+def _load(source: Source) -> ClipRows:
+    return source if isinstance(source, ClipRows) else load_clip_rows(source)
+
+
+def _scatter(
+    work: Path, clips: Mapping[str, Source], plan: Plan, seed: int
+) -> tuple[dict[str, Buckets], tuple[Moments, Moments]]:
+    """Pass 1: every clip into its split's buckets, and the moments of the clips in training."""
+    layout = plan.layout
+    columns, of_fits = frame_columns(layout), fit_columns(layout)
+    buckets, places, done = {}, {}, dict.fromkeys(SPLITS, 0)
+    for number, split in enumerate(SPLITS):
+        rows = plan.rows(split)
+        buckets[split] = Buckets(work / f"buckets-{split}", rows, plan.bucket_rows, columns, of_fits)
+        places[split] = np.random.default_rng([seed, number]).permutation(rows)
+    x = y = None
+    for number, entry in enumerate(plan.clips):
+        clip, split = _load(clips[entry["clip"]]), entry["split"]
+        if split == "train":
+            x_clip, y_clip = clip_moments(clip)
+            x, y = (x_clip, y_clip) if x is None or y is None else (x + x_clip, y + y_clip)
+        index = np.zeros(len(clip), INDEX)
+        index["place"] = places[split][done[split] : done[split] + len(clip)]
+        index["count"], index["clip"] = clip.fits, number
+        index["frame"], index["phase"] = clip.frame, clip.p
+        frames = np.concatenate([clip.x, clip.severity[:, : layout.links], clip.y], axis=1)
+        fits = np.concatenate([clip.heights, clip.mean[:, None]], axis=1)
+        buckets[split].add(frames, fits, index)
+        done[split] += len(clip)
+    assert x is not None
+    assert y is not None
+    return buckets, (x, y)
+
+
+def _chunks(
+    work: Path, split: str, buckets: Buckets, plan: Plan, statistics: Statistics, dtype: str
+) -> Iterator[Chunk]:
+    """Pass 2: each bucket in order, standardised, as chunks of `chunk_rows` rows."""
+    number = 0
+    for frames, fits, index in buckets.drain():
+        ends = np.cumsum(index["count"])
+        for start in range(0, len(index), plan.chunk_rows):
+            part = slice(start, min(start + plan.chunk_rows, len(index)))
+            count = index["count"][part]
+            fit_part = slice(int(ends[start] - count[0]), int(ends[part.stop - 1]))
+            some, ground = split_rows(plan.layout, statistics, frames[part], fits[fit_part], count)
+            arrays = {
+                "frames": some.astype(dtype),
+                "fits": ground.astype(dtype),
+                "count": count,
+                "clip": index["clip"][part],
+                "frame": index["frame"][part],
+                "phase": index["phase"][part],
+            }
+            yield write_chunk(work, f"{split}/{number:05d}.safetensors", arrays)
+            number += 1
+
+
+def _name(work: Path, chunks: Mapping[str, list[Chunk]]) -> str:
+    """A name for the build that its content determines."""
+    digest = hashlib.sha256((work / STATISTICS).read_bytes())
+    digest.update(repr(chunks).encode())
+    return f"rows-{digest.hexdigest()[:12]}"
+
+
+def _original_bytes(plan: Plan) -> int:
+    """What the same pairs take where every one is a row of X, Y and P in float32, as in the original."""
+    values = plan.layout.x_size + plan.layout.y_size + 1
+    return 4 * values * plan.visits * sum(clip["rows"] for clip in plan.clips)
+
+
+def _publish(path: Path, work: Path, manifest: Manifest) -> None:
+    """Give the finished build its name, let the manifest point to it, then remove the build before."""
+    for leftover in work.glob("buckets-*"):
+        leftover.rmdir()
+    if not (path / manifest.folder).exists():
+        os.rename(work, path / manifest.folder)
+    manifest.save(path)
+    _sweep(path, keep=manifest.folder)

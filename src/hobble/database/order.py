@@ -1,0 +1,59 @@
+"""The order in which a pass visits rows and their fits, as pure functions of the seed.
+
+A pass is `visits` layers. A layer visits every row once; row r appears in layer l with its fit number
+picks[r, l % fits of r], a permutation drawn for each row and pass. So every (frame, fit) pair comes once in
+a pass, a flat row's one fit as often as there are layers, and no batch holds a frame twice. Sections cut
+the sequence of layers into near equal parts; with as many sections as visits, a section is a layer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+CHUNKS, ROWS, FITS = 1, 2, 3  # what a generator draws, so that no two draw the same numbers
+
+
+def generator(seed: int, *of: int) -> np.random.Generator:
+    """Seeded by a configuration's number and by what it is for, whatever was drawn before."""
+    return np.random.default_rng([seed, *of])
+
+
+def spans(rows: int, visits: int, section: int, sections: int) -> Iterator[tuple[int, int, int]]:
+    """The parts of layers that make up a section: (layer, first place, last place + 1)."""
+    total = rows * visits
+    start, stop = total * section // sections, total * (section + 1) // sections
+    while start < stop:
+        layer = start // rows
+        end = min(stop, (layer + 1) * rows)
+        yield layer, start - layer * rows, end - layer * rows
+        start = end
+
+
+def groups(
+    chunk_rows: Sequence[int], window: int, seed: int, pass_index: int, layer: int
+) -> list[np.ndarray]:
+    """The chunks that are read and mixed together, `window` of them at a time, in a fresh order."""
+    order = generator(seed, CHUNKS, pass_index, layer).permutation(len(chunk_rows))
+    return [order[i : i + window] for i in range(0, len(order), window)]
+
+
+def row_order(rows: int, seed: int, pass_index: int, layer: int, group: int) -> np.ndarray:
+    """(rows,) in which order the rows of a group come."""
+    return generator(seed, ROWS, pass_index, layer, group).permutation(rows)
+
+
+def picks(count: np.ndarray, visits: int, seed: int, pass_index: int, layer: int, chunk: int) -> np.ndarray:
+    """(R,) which of its fits each row of a chunk shows in this layer; `count` (R,) is how many it has.
+
+    No count may be above `visits`.
+    """
+    draws = generator(seed, FITS, pass_index, chunk).random((len(count), visits))
+    place = layer % np.maximum(count, 1)
+    out = np.zeros(len(count), np.int64)
+    for fits in np.unique(count[count > 1]):
+        of = np.flatnonzero(count == fits)
+        ranked = np.argsort(draws[of, :fits], axis=1)
+        out[of] = ranked[np.arange(len(of)), place[of]]
+    return out

@@ -1,0 +1,171 @@
+"""Means and standard deviations over every (frame, fit) pair, in one pass, without expanding the pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.database.clip_rows import ClipRows
+from hobble.database.layout import RowLayout
+
+SILENT = 1e10  # the deviation of an input that is to have no effect: it standardises to nothing
+UNSEEN = 1e-10  # weight of a joint left out of the input, as in the original
+LEAST = 1e-6  # below this a column does not vary at all
+BATCH = 2048  # rows held in float64 at a time
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Weight, mean (C,) and sum of weighted squared deviations (C,) of what has been seen so far."""
+
+    weight: float
+    mean: Array = field(repr=False)
+    squares: Array = field(repr=False)
+
+    def __add__(self, other: Moments) -> Moments:
+        """Of both together: Chan, Golub, LeVeque, Updating formulae (1979)."""
+        weight = self.weight + other.weight
+        if weight == 0:
+            return self
+        delta = other.mean - self.mean
+        mean = self.mean + delta * (other.weight / weight)
+        squares = self.squares + other.squares + delta**2 * (self.weight * other.weight / weight)
+        return Moments(weight, mean, squares)
+
+    @property
+    def std(self) -> Array:
+        """Population standard deviation (C,), as numpy's."""
+        return np.sqrt(self.squares / max(self.weight, 1e-300))
+
+    @classmethod
+    def nothing(cls, columns: int) -> Moments:
+        """Of no values."""
+        return cls(0.0, np.zeros(columns), np.zeros(columns))
+
+    @classmethod
+    def of(cls, values: Array, weights: Array | None = None) -> Moments:
+        """Of values (N, C), each row weighing 1 or its entry of `weights` (N,)."""
+        values = np.asarray(values, np.float64)
+        if not len(values):
+            return cls.nothing(values.shape[1])
+        w = np.ones(len(values)) if weights is None else np.asarray(weights, np.float64)
+        total = float(w.sum())
+        mean = w @ values / total
+        return cls(total, mean, w @ (values - mean) ** 2)
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """float32 x_mean, x_std (X,) and y_mean, y_std (Y,): what standardises rows; no deviation is 0."""
+
+    x_mean: Array = field(repr=False)
+    x_std: Array = field(repr=False)
+    y_mean: Array = field(repr=False)
+    y_std: Array = field(repr=False)
+
+
+def clip_moments(rows: ClipRows) -> tuple[Moments, Moments]:
+    """Moments of X (with terrain and every link) and of Y over the clip's (frame, fit) pairs.
+
+    Each row weighs 1, shared equally by its fits, so that a flat cycle's one fit counts as much as ten.
+    """
+    layout = rows.layout
+    x, y = Moments.nothing(layout.x_size), Moments.nothing(layout.y_size)
+    first = rows.first_fit
+    for start in range(0, len(rows), BATCH):
+        part = slice(start, min(start + BATCH, len(rows)))
+        fits = rows.fits[part]
+        span = slice(int(first[start]), int(first[part.stop - 1] + fits[-1]))
+        of_row = np.repeat(np.arange(len(fits)), fits)
+        share = 1.0 / fits[of_row]
+        mean = rows.mean[span].astype(np.float64)
+        row_mean = np.bincount(of_row, share * mean, len(fits))
+        spread = float(np.sum(share * (mean - row_mean[of_row]) ** 2))
+        heights = Moments.of(rows.heights[span], share)
+        x_frame = _lowered(rows.x[part], layout.x_joint_position, row_mean, spread)
+        x = x + _joined(x_frame, heights, Moments.of(rows.severity[part]))
+        y = y + _lowered(rows.y[part], layout.y_joint_position, row_mean, spread)
+    return x, y
+
+
+def _lowered(values: Array, joints: slice, row_mean: Array, spread: float) -> Moments:
+    """Moments of values whose joint heights have every fit's mean height taken off.
+
+    By the law of total variance: the variance between rows of the mean over a row's fits, plus that within
+    rows.
+    """
+    values = values.astype(np.float64)
+    heights = slice(joints.start + 1, joints.stop, 3)
+    values[:, heights] -= row_mean[:, None]
+    moments = Moments.of(values)
+    moments.squares[heights] += spread
+    return moments
+
+
+def _joined(*parts: Moments) -> Moments:
+    """Columns side by side; every part saw the same rows."""
+    mean = np.concatenate([part.mean for part in parts])
+    return Moments(parts[0].weight, mean, np.concatenate([part.squares for part in parts]))
+
+
+def x_groups(layout: RowLayout) -> list[slice]:
+    """Columns of X that share the mean of their deviations, as in the original; not the severities."""
+    half = layout.samples
+    split = [
+        slice(start, start + half)
+        for block in (layout.x_position, layout.x_direction)
+        for start in (block.start, block.start + half)
+    ]
+    return [*split, layout.x_gait, layout.x_joint_position, layout.x_joint_velocity, layout.x_terrain]
+
+
+def y_groups(layout: RowLayout) -> list[slice]:
+    """Columns of Y that share the mean of their standard deviations: the layout's blocks."""
+    return list(layout.blocks("y").values())
+
+
+def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
+    """Each group's mean deviation in all of its columns, `constant` where a whole group never varies."""
+    out = np.array(std, np.float64)
+    for group in groups:
+        mean = float(np.mean(std[group]))
+        out[group] = mean if mean > LEAST else constant
+    return out
+
+
+def severity_std(std: Array) -> Array:
+    """One deviation for all severities: that of the whole vector, so that hurt stands out but does not drown.
+
+    Taking each column's own would turn a link that is hurt in 1 frame of 1,000 into an input of 30
+    deviations. It is never less than 1. A link that is never hurt has no effect: the network cannot know
+    what it does.
+    """
+    return np.where(std > LEAST, max(1.0, float(np.sqrt(np.sum(std**2)))), SILENT)
+
+
+def finish(
+    layout: RowLayout, x: Moments, y: Moments, joint_weight: float, unseen: Sequence[int]
+) -> Statistics:
+    """Group the deviations and weigh the joints: block mean / (w joint_weight), w 1e-10 for unseen ones.
+
+    layout: of the rows to be made; without links, the severities' moments are left out.
+    """
+    x_std = grouped(x.std, x_groups(layout), SILENT)[: layout.x_size]
+    w = np.ones(layout.joints)
+    w[list(unseen)] = UNSEEN
+    for block in (layout.x_joint_position, layout.x_joint_velocity):
+        x_std[block] = np.minimum(x_std[block] / np.repeat(w * joint_weight, 3), 1e30)
+    x_std[layout.x_injury] = severity_std(x.std[layout.x_injury])
+    y_std = grouped(y.std, y_groups(layout), 1.0)
+    f32 = [np.asarray(v, np.float32) for v in (x.mean[: layout.x_size], x_std, y.mean, y_std)]
+    return Statistics(*f32)
+
+
+def unseen_joints(skeleton: Mapping[str, Any]) -> list[int]:
+    """Indices of the skeleton's joints that the network is not shown."""
+    joints = list(skeleton["joints"])
+    return [joints.index(name) for name in skeleton.get("unseen", ())]
