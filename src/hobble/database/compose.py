@@ -86,8 +86,7 @@ def _kernel() -> Any:
     return njit(nogil=True, cache=True)(_gather)
 
 
-def _gather(frames, fits, rows, fit, head, links, x_first, x_scale, y_first, y_scale, x, y):  # type:
-ignore[no-untyped-def]
+def _gather(frames, fits, rows, fit, head, links, x_first, x_scale, y_first, y_scale, x, y):
     heights = fits.shape[1] - 1
     for i in range(len(rows)):
         row, ground = frames[rows[i]], fits[fit[i]]

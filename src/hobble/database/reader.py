@@ -113,7 +113,7 @@ class Database:
         seed: int,
         block_rows: int = BLOCK_ROWS,
     ) -> Iterator[Block]:
-        """One section of one pass, in shuffled order, as blocks of `block_rows` rows (the last has what is left).
+        """One section of one pass, in shuffled order, as blocks of `block_rows` rows (the last: the rest).
 
         Over the `sections` sections of a pass every (frame, fit) pair comes once (a flat row's one fit as
         often as others have fits). What comes depends on the arguments (and, where the split is larger than
