@@ -1,0 +1,153 @@
+"""The status file: its grammar read, checked and written.
+
+The first line says how many frames the clip's file has, each further line what hurts in which of them::
+
+    frames:2500
+    1-2500 RightUpLeg-RightLeg[10];
+    500-2000 LeftShoulder-LeftArm[5];LeftUpLeg-LeftLeg[10];
+
+Frames count from 1 in the clip file's own rate, both ends included. A range from 0 is taken to start at 1 and
+one past the end to stop there. Where lines overlap, a later one counts for the links it names, from its first
+frame on.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from hobble.core.errors import InputError
+from hobble.core.files import write_text
+
+HIGHEST = 10.0
+RANGE = re.compile(r"(\d+)\s*-\s*(\d+)\s+(.*)")
+LINK = re.compile(r"\s*(.+?)\s*\[\s*([^\]]*?)\s*\]\s*")
+
+
+@dataclass(frozen=True)
+class Spell:
+    """Links hurt from frame `first` to `last`, both counted from 1 and included.
+
+    links: (link, severity) pairs. line: where it stands in its file, if it comes from one.
+    """
+
+    first: int
+    last: int
+    links: tuple[tuple[str, float], ...]
+    line: int | None = None
+
+
+@dataclass(frozen=True)
+class Status:
+    """What hurts in a clip whose file has `frames` frames; later spells count over earlier ones."""
+
+    frames: int
+    spells: tuple[Spell, ...] = ()
+
+
+def read_status(path: str | Path, links: Sequence[str]) -> Status:
+    """Read a status file; `links` are the names that may be hurt ("LeftUpLeg-LeftLeg").
+
+    Raises InputError with the line for anything that does not follow the grammar, an unknown link, a severity
+    outside 0..10 and a range that runs backwards.
+    """
+    path = Path(path)
+    frames: int | None = None
+    spells: list[Spell] = []
+    for number, line in enumerate(_text(path).splitlines(), 1):
+        line = line.strip()
+        if not line:
+            continue
+        if frames is None:
+            frames = _frame_count(path, number, line)
+        else:
+            spells.append(_spell(path, number, line, links))
+    if frames is None:
+        raise InputError(path, "is empty", fix="Its first line is `frames:` and the number of frames.")
+    return Status(frames, tuple(spells))
+
+
+def parse_links(text: str, links: Sequence[str], path: str | Path, line: int | None = None) -> tuple:
+    """The (link, severity) pairs of `A-B[4];C-D[8];`, as a status file or a data set's `status` writes them.
+
+    Raises InputError that names `path` and `line`.
+    """
+    pairs = []
+    for part in text.split(";"):
+        if not part.strip():
+            continue
+        match = LINK.fullmatch(part)
+        if match is None:
+            raise InputError(path, f"{part.strip()!r} does not read as Joint-Joint[severity]", line=line)
+        name, value = match[1], match[2]
+        if name not in links:
+            raise InputError(path, f"no such link: {name}", line=line, fix=_hint(name, links))
+        pairs.append((name, _severity(path, line, name, value)))
+    if not pairs:
+        raise InputError(path, "names no link", line=line, fix="Write Joint-Joint[severity];")
+    return tuple(pairs)
+
+
+def format_status(status: Status) -> str:
+    """The text of a status file; `read_status` gives back the same status."""
+    lines = [f"frames:{status.frames}"]
+    for spell in status.spells:
+        hurt = "".join(f"{link}[{severity:g}];" for link, severity in spell.links)
+        lines.append(f"{spell.first}-{spell.last} {hurt}")
+    return "\n".join(lines) + "\n"
+
+
+def write_status(path: str | Path, status: Status) -> None:
+    """Write a status file, whole or not at all."""
+    write_text(path, format_status(status))
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(path, "is not a text file") from None
+    except OSError as error:
+        raise InputError(path, f"cannot be read: {error.strerror}") from None
+
+
+def _frame_count(path: Path, number: int, line: str) -> int:
+    match = re.fullmatch(r"frames\s*:\s*(\d+)", line, re.IGNORECASE)
+    if match is None or int(match[1]) < 1:
+        raise InputError(
+            path, f"{line[:60]!r} is not a frame count", line=number, fix="The first line reads `frames:225`."
+        )
+    return int(match[1])
+
+
+def _spell(path: Path, number: int, line: str, links: Sequence[str]) -> Spell:
+    match = RANGE.fullmatch(line)
+    if match is None:
+        raise InputError(
+            path,
+            f"{line[:60]!r} does not read as `first-last Joint-Joint[severity];`",
+            line=number,
+        )
+    first, last = int(match[1]), int(match[2])
+    if last < first:
+        raise InputError(path, f"the range {first}-{last} runs backwards", line=number)
+    return Spell(first, last, parse_links(match[3], links, path, number), number)
+
+
+def _severity(path: str | Path, line: int | None, link: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 <= value <= HIGHEST:
+        raise InputError(path, f"severity {text or 'nothing'} of {link} is not in 0..10", line=line)
+    return value
+
+
+def _hint(name: str, links: Iterable[str]) -> str:
+    import difflib
+
+    near = difflib.get_close_matches(name, list(links), 3, 0.6)
+    return f"Did you mean {' or '.join(near)}?" if near else f"There are {', '.join(links)}."

@@ -1,0 +1,192 @@
+"""Hand-made label files, as they lie beside clips: `.phase`, `.gait`, `_footsteps.txt`, `_gait.txt`.
+
+Frame numbers in them count from 1 in the clip file's own rate. Whatever cannot be read is refused with file
+and line.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.labels.model import GAITS
+
+FILE_GAITS = ("stand", "walk", "jog", "run", "crouch", "jump", "crawl", "unknown")
+TO_GAIT = {"run": "jog", "crawl": "crouch", "unknown": "bump"}
+
+
+@dataclass(frozen=True)
+class SourceTime:
+    """How frames of the clip's source file relate to the frames of the clip.
+
+    frames: frames of the source file. fps: its rate. first: its (0-based) frame that is frame 0 of the clip.
+    """
+
+    frames: int
+    fps: float
+    first: int = 0
+
+    @property
+    def ratio(self) -> float:
+        """Source frames per 60 Hz frame; a Frame Time written with few digits is taken for the whole rate."""
+        whole = round(self.fps)
+        return (whole if abs(self.fps - whole) < 5e-4 * whole else self.fps) / 60.0
+
+    def to_clip(self, number: float) -> float:
+        """Frame of the clip, not rounded, of a source frame counted from 1."""
+        return (number - 1 - self.first) / self.ratio
+
+    def at_clip_frames(self, frames: int) -> Array:
+        """(frames,) source rows, from 0 and not rounded, at which the clip's frames lie."""
+        return np.arange(frames) * self.ratio + self.first
+
+
+def whole_frame(frame: float) -> int:
+    """The first whole frame at or after `frame`: a // 2 for frame a (from 1) of a 120 Hz file."""
+    return math.ceil(frame - 1e-6)
+
+
+def read_phase(path: Path, time: SourceTime, frames: int) -> Array:
+    """(frames,) phase at 60 Hz of a file with one value a source frame; between rows along the shorter way
+    round.
+
+    Raises InputError for a value that is not a number in 0..1, or another number of rows than the clip has.
+    """
+    rows = _matrix(path, time, 1)[:, 0]
+    before, after, share = _between(rows, time, frames)
+    step = (after - before + 0.5) % 1.0 - 0.5
+    return np.where(share > 0, (before + share * step) % 1.0, before)
+
+
+def read_gait(path: Path, time: SourceTime, frames: int) -> Array:
+    """(frames, 6) gait shares of a file with 8 columns: those of FILE_GAITS; raises like `read_phase`."""
+    rows = _matrix(path, time, len(FILE_GAITS))
+    before, after, share = _between(rows, time, frames)
+    return _six(before + share[:, None] * (after - before))
+
+
+def read_footsteps(path: Path, time: SourceTime) -> Array:
+    """(N, 3) footsteps (see `Labels`) of a file with lines `right left [*]`; the last may hold `right` alone.
+
+    Raises InputError with the line where frames are not numbers, do not rise, or lie past the clip.
+    """
+    steps: list[tuple[float, float, float]] = []
+    last, ended = 0.0, False
+    for number, words in _lines(path):
+        if ended:
+            raise InputError(path, "only the last line may hold one frame instead of two", line=number - 1)
+        dropped = words[-1] == "*"
+        landings = [_number(path, number, w) for w in (words[:-1] if dropped else words)]
+        if not 1 <= len(landings) <= 2:
+            raise InputError(path, "a line holds `right left` or `right left *`", line=number)
+        ended = len(landings) == 1
+        for landing in landings:
+            if landing <= last:
+                raise InputError(path, f"frame {landing:g} does not come after {last:g}", line=number)
+            if landing > time.frames + 1:
+                raise InputError(
+                    path, f"frame {landing:g} lies past the clip's last, {time.frames}", line=number
+                )
+            last = landing
+        right, left = (time.to_clip(x) for x in (*landings, math.nan)[:2])
+        steps.append((right, left, float(dropped)))
+    return np.array(steps, float).reshape(-1, 3)
+
+
+def read_gait_keys(path: Path, time: SourceTime, frames: int) -> Array:
+    """(frames, 6) gait shares of a file with lines `frame gait`, with linear fades between different gaits.
+
+    A fade ends one frame before its second key, as the original's `.gait` files do. Raises InputError with
+    the line where a frame is not a number, does not rise, or a gait has another name than FILE_GAITS.
+    """
+    names = (*FILE_GAITS, "bump")
+    keys: list[tuple[float, int]] = []
+    for number, words in _lines(path):
+        if len(words) != 2:
+            raise InputError(path, "a line holds `frame gait`", line=number)
+        frame = _number(path, number, words[0])
+        if words[1] not in names:
+            raise InputError(
+                path, f"no such gait: {words[1]!r}", line=number, fix=f"There are {', '.join(names)}."
+            )
+        if keys and frame <= keys[-1][0]:
+            raise InputError(path, f"frame {frame:g} does not come after {keys[-1][0]:g}", line=number)
+        if frame > time.frames + 1:
+            raise InputError(path, f"frame {frame:g} lies past the clip's last, {time.frames}", line=number)
+        keys.append((frame, GAITS.index(TO_GAIT.get(words[1], words[1]))))
+    if not keys:
+        raise InputError(path, "holds no keys", fix="Write lines of `frame gait`, or remove the file.")
+    at, gait = np.array(keys).T
+    when = time.at_clip_frames(frames) + 1
+    following = np.clip(np.searchsorted(at, when, side="right"), 1, max(len(at) - 1, 1))
+    shares = np.eye(len(GAITS))[gait.astype(int)]
+    if len(at) == 1:
+        return np.repeat(shares, frames, axis=0)
+    start, end = at[following - 1], at[following] - 1
+    fade = np.clip((when - start) / np.maximum(end - start, 1e-9), 0.0, 1.0)[:, None]
+    return (1 - fade) * shares[following - 1] + fade * shares[following]
+
+
+def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Number (from 1) and words of each line that is not empty."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(path, "is not a text file") from None
+    except OSError as error:
+        raise InputError(path, f"cannot be read: {error.strerror}") from None
+    for number, line in enumerate(text.splitlines(), 1):
+        if words := line.split():
+            yield number, words
+
+
+def _number(path: Path, line: int, word: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(path, f"{word!r} is not a number", line=line)
+    return value
+
+
+def _matrix(path: Path, time: SourceTime, columns: int) -> Array:
+    """Rows of `columns` numbers in 0..1, one for each source frame; a row too few or too many is forgiven."""
+    rows = []
+    for number, words in _lines(path):
+        if len(words) != columns:
+            raise InputError(path, f"has {len(words)} values where {columns} belong", line=number)
+        values = [_number(path, number, w) for w in words]
+        if not all(-1e-6 <= v <= 1 + 1e-6 for v in values):
+            raise InputError(path, "has a value outside 0..1", line=number)
+        rows.append(values)
+    if abs(len(rows) - time.frames) > 1:
+        raise InputError(
+            path,
+            f"has {len(rows)} rows, but the clip's file has {time.frames} frames",
+            fix="Make one row a frame, or remove the file to have it labelled without.",
+        )
+    return np.array(rows, float)
+
+
+def _between(rows: Array, time: SourceTime, frames: int) -> tuple[Array, Array, Array]:
+    """For each frame of the clip the rows before and after it, and how far it lies between them (0..1)."""
+    at = np.clip(time.at_clip_frames(frames), 0, len(rows) - 1)
+    nearest = np.round(at)
+    at = np.where(np.abs(at - nearest) < 1e-6, nearest, at)
+    before = np.floor(at).astype(int)
+    return rows[before], rows[np.minimum(before + 1, len(rows) - 1)], at - before
+
+
+def _six(eight: Array) -> Array:
+    """Columns of FILE_GAITS added up to those of GAITS."""
+    out = np.zeros((len(eight), len(GAITS)))
+    for column, name in enumerate(FILE_GAITS):
+        out[:, GAITS.index(TO_GAIT.get(name, name))] += eight[:, column]
+    return out

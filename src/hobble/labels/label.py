@@ -1,0 +1,151 @@
+"""The labels of one clip, put together: contacts, and phase and gait from files or from the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.core.files import write_json
+from hobble.core.quat import Array
+from hobble.labels import files as label_files
+from hobble.labels.contacts import foot_contacts
+from hobble.labels.files import SourceTime
+from hobble.labels.footfall import find_landings
+from hobble.labels.gait import automatic_gait, overwrite_crouch
+from hobble.labels.model import GAITS, LabelReport, Labels
+from hobble.labels.phase import (
+    dropped_frames,
+    find_cycles,
+    footsteps_of_phase,
+    mirrored_footsteps,
+    phase_of_footsteps,
+    rows_of_landings,
+)
+from hobble.labels.strip import strip
+
+
+def label_clip(
+    clip: Clip,
+    files: Iterable[str | Path],
+    motion: Mapping[str, Any],
+    gait: str | None,
+    ground: str,
+    options: Mapping[str, Any],
+) -> tuple[Labels, LabelReport]:
+    """Label a clip.
+
+    files: hand-made files beside its source; `.phase` goes before `_footsteps.txt`, `.gait` before
+    `_gait.txt`. motion: the report of the motion stage, for `source_fps` and `source_frames`. gait: the gait
+    it mostly shows, if that is known. ground: "flat", ... options: the section `labels` of the data set.
+    Raises InputError for a file that cannot be used.
+    """
+    given = _by_kind(files) if options["files"] else {}
+    time = SourceTime(motion["source_frames"], motion["source_fps"], motion.get("first_frame", 0))
+    warnings: list[str] = []
+    phase, known, footsteps = _phase(clip, given, time, options)
+    shares = _gait(clip, given, time, footsteps, gait)
+    if ground == "flat":
+        shares = overwrite_crouch(shares, clip)
+    known &= ~dropped_frames(footsteps, len(clip))
+    zero = options["phase_zero"]
+    cycles, dropped = find_cycles(footsteps, len(clip), zero)
+    if not len(cycles):
+        warnings.append(
+            "no locomotion cycle that starts 60 frames after the beginning and ends 62 before the end"
+        )
+    labels = Labels(
+        contacts=foot_contacts(clip, options["contact_threshold"]),
+        phase=phase if zero == "right" else (phase + 0.5) % 1.0,
+        phase_known=known,
+        gait=shares,
+        footsteps=footsteps,
+        cycles=cycles,
+    )
+    report = LabelReport(
+        clip=clip.name,
+        phase_source="file" if {"phase", "footsteps"} & given.keys() else "automatic",
+        gait_source="file" if {"gait", "gait_keys"} & given.keys() else "automatic",
+        phase_zero=zero,
+        cycles_dropped=dropped,
+        warnings=tuple(warnings),
+    )
+    return labels, report
+
+
+def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labels, LabelReport]:
+    """Labels of the mirrored clip: contacts swapped, phase half a cycle on, cycles of the other foot."""
+    footsteps = mirrored_footsteps(labels.footsteps)
+    cycles, dropped = find_cycles(footsteps, len(labels), report.phase_zero)
+    mirrored = Labels(
+        contacts=labels.contacts[:, [2, 3, 0, 1]],
+        phase=(labels.phase + 0.5) % 1.0,
+        phase_known=labels.phase_known,
+        gait=labels.gait,
+        footsteps=footsteps,
+        cycles=cycles,
+    )
+    values = {**asdict(report), "clip": clip.name, "cycles_dropped": dropped}
+    return mirrored, LabelReport(**values)
+
+
+def write_report(path: str | Path, report: LabelReport, labels: Labels, clip: Clip) -> None:
+    """Write the JSON beside the labels, with seconds of each gait and the data of the label picture."""
+    main = np.argmax(labels.gait, axis=1)
+    seconds = {name: float(np.sum(main == i) / clip.fps) for i, name in enumerate(GAITS)}
+    write_json(
+        path,
+        {
+            **asdict(report),
+            "seconds": seconds,
+            "cycles": len(labels.cycles),
+            "strip": strip(labels, clip),
+        },
+    )
+
+
+def _by_kind(files: Iterable[str | Path]) -> dict[str, Path]:
+    suffixes = {
+        ".phase": "phase",
+        ".gait": "gait",
+        "_footsteps.txt": "footsteps",
+        "_gait.txt": "gait_keys",
+    }
+    out = {}
+    for file in files:
+        for suffix, kind in suffixes.items():
+            if str(file).endswith(suffix):
+                out[kind] = Path(file)
+    return out
+
+
+def _phase(
+    clip: Clip, given: Mapping[str, Path], time: SourceTime, options: Mapping[str, Any]
+) -> tuple[Array, Array, Array]:
+    """Phase with the right foot at 0, where it is known, and footsteps."""
+    frames = len(clip)
+    if "footsteps" in given:
+        footsteps = label_files.read_footsteps(given["footsteps"], time)
+    if "phase" in given:
+        phase = label_files.read_phase(given["phase"], time, frames)
+        found, known = footsteps_of_phase(phase)
+        return phase, known, footsteps if "footsteps" in given else found
+    if "footsteps" not in given:
+        names = ("heel_speed", "toe_speed", "valley_factor", "shortest_step")
+        footsteps = rows_of_landings(find_landings(clip, **{n: options[n] for n in names}))
+    phase, known = phase_of_footsteps(footsteps, frames)
+    return phase, known, footsteps
+
+
+def _gait(
+    clip: Clip, given: Mapping[str, Path], time: SourceTime, footsteps: Array, dominant: str | None
+) -> Array:
+    if "gait" in given:
+        return label_files.read_gait(given["gait"], time, len(clip))
+    if "gait_keys" in given:
+        return label_files.read_gait_keys(given["gait_keys"], time, len(clip))
+    return automatic_gait(clip, footsteps, dominant)

@@ -1,0 +1,65 @@
+"""The labels of one clip, and the file they are kept in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from hobble.core.files import load_npz, save_npz
+from hobble.core.quat import Array
+
+GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
+CONTACT_ROLES = ("left_heel", "left_toe", "right_heel", "right_toe")
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Labels of F frames at 60 Hz.
+
+    contacts: (F, 4) bool, in the order of CONTACT_ROLES. phase: (F,) in 0..1. phase_known: (F,) bool, False
+    where no phase can be told. gait: (F, 6) shares in the order of GAITS.
+    footsteps: (N, 3): the frame where the right foot lands, the frame where the left one does next, and 1
+    where the step is not to be used, else 0; nan where that landing is not known; a row of nan ends a bout of
+    walking. cycles: (C, 2) int, first and last frame of each cycle kept, inclusive.
+    """
+
+    contacts: Array = field(repr=False)
+    phase: Array = field(repr=False)
+    phase_known: Array = field(repr=False)
+    gait: Array = field(repr=False)
+    footsteps: Array = field(repr=False)
+    cycles: Array = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.phase)
+
+
+@dataclass(frozen=True)
+class LabelReport:
+    """Where the labels of a clip came from and what is odd about them."""
+
+    clip: str
+    phase_source: str
+    gait_source: str
+    phase_zero: str
+    cycles_dropped: int
+    warnings: tuple[str, ...] = ()
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> LabelReport:
+        """Read back what the JSON beside the labels says; keys that are computed anew are ignored."""
+        values = {f.name: data[f.name] for f in fields(cls)}
+        return cls(**{**values, "warnings": tuple(values["warnings"])})
+
+
+def save_labels(path: str | Path, labels: Labels) -> None:
+    """Write labels as one npz file."""
+    save_npz(path, **{f.name: getattr(labels, f.name) for f in fields(labels)})
+
+
+def load_labels(path: str | Path) -> Labels:
+    """Read what `save_labels` wrote."""
+    data = load_npz(path)
+    return Labels(**{f.name: data[f.name] for f in fields(Labels)})

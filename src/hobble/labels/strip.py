@@ -1,0 +1,60 @@
+"""The label picture of a clip, as small arrays that the report draws."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.core.quat import Array
+from hobble.labels.model import CONTACT_ROLES, GAITS, Labels
+
+POINTS = 400
+
+
+def strip(labels: Labels, clip: Clip, points: int = POINTS) -> dict[str, Any]:
+    """Footfalls, phase, gait and speed along time, at most `points` values each.
+
+    `contacts`: for each joint a list of [from, to) in seconds. `seconds`: the times of `phase` (None where it
+    is not known), `gait` (a list for each) and `speed` (m/s). `landings`: seconds at which each foot lands.
+    """
+    frames = len(labels)
+    at = np.unique(np.linspace(0, max(frames - 1, 0), min(frames, points)).round().astype(int))
+    phase = [
+        round(float(p), 3) if k else None
+        for p, k in zip(labels.phase[at], labels.phase_known[at], strict=True)
+    ]
+    return {
+        "seconds": _rounded(at / clip.fps),
+        "contacts": {role: _runs(labels.contacts[:, i], clip.fps) for i, role in enumerate(CONTACT_ROLES)},
+        "landings": {
+            side: _rounded(labels.footsteps[np.isfinite(labels.footsteps[:, i]), i] / clip.fps)
+            for i, side in enumerate(("right", "left"))
+        },
+        "phase": phase,
+        "gait": {
+            name: _rounded(labels.gait[at, i]) for i, name in enumerate(GAITS) if labels.gait[:, i].any()
+        },
+        "speed": _rounded(_speed(clip)[at]),
+    }
+
+
+def _speed(clip: Clip) -> Array:
+    """(F,) speed of the root along the ground in m/s, over a fifth of a second."""
+    from scipy.ndimage import uniform_filter1d
+
+    ground = clip.root[:, [0, 2]]
+    if len(ground) < 2:
+        return np.zeros(len(ground))
+    step = np.linalg.norm(np.gradient(ground, axis=0), axis=1)
+    return uniform_filter1d(step, 12, mode="nearest") * clip.fps / 100
+
+
+def _runs(flags: Array, fps: float) -> list[list[float]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
+    return [_rounded(pair / fps) for pair in edges.reshape(-1, 2)]
+
+
+def _rounded(values: Array) -> list[float]:
+    return [round(float(v), 3) for v in values]
