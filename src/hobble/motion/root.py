@@ -1,8 +1,8 @@
 """The root frame: where the character is and faces, frame by frame, and what it looks like from there.
 
-The formulas are those of the original pipeline (Holden, Komura, Saito 2017). The root stands on the ground below the
-hips, its Z axis is the facing direction, its X axis the character's left. "World to root" takes a world vector to
-root coordinates.
+The formulas are those of the original pipeline (Holden, Komura, Saito 2017). The root stands on the ground
+below the hips, its Z axis is the facing direction, its X axis the character's left. "World to root" takes a
+world vector to root coordinates.
 """
 
 from __future__ import annotations

@@ -1,0 +1,167 @@
+"""From a BVH file to a clip on the target skeleton, with a report of what was found and done."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.motion.decode import Decoded, decode, frame_rate
+from hobble.motion.read import Bvh, read_bvh
+from hobble.motion.resample import sample_positions, sample_rotations, sample_times
+from hobble.motion.rig import Match, Target, clean_names, leg_length, load_skeleton, match_rig, unit_of
+
+STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
+SAME = 1e-3  # cm: offsets this near to the skeleton's are the skeleton's
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file's motion in centimetres, right-handed, Y up, at its own frame rate, on its own rig."""
+
+    clip: Clip
+    match: Match
+    unit: float
+    unit_name: str
+    up: str
+    first_frame: int
+    notes: list[str]
+
+
+def make_clip(
+    bvh: str | Path,
+    skeleton: str | Path,
+    maps: str | Path,
+    clip: str,
+    skeleton_name: str,
+    options: Mapping[str, Any],
+) -> tuple[Clip, dict[str, Any]]:
+    """Read a BVH file, check it, and put it on the skeleton at the frame rate of `options`.
+
+    skeleton: the target's file. maps: the folder of the skeleton files. clip: the name of the clip made.
+    options: the `motion` section of a data set (fps, source_fps, unit, up, proportions, defects).
+    Returns the clip and its report (`motion/<clip>.json` of docs/artefacts.md).
+    Raises InputError for a file that cannot be read, for another skeleton, and for what is broken beyond repair
+    or, with defects: refuse, broken at all.
+    """
+    target = load_skeleton(skeleton, skeleton_name)
+    file = read_bvh(bvh)
+    source = load_source(file, target, maps, options)
+    resampled = resample(source.clip, options["fps"])
+    made, notes = fit_skeleton(resampled, source.match, target.skeleton, options["proportions"])
+    made = replace(made, name=clip)
+    return made, _report(file, source, made, source.notes + notes)
+
+
+def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[str, Any]) -> Source:
+    """A file's motion in centimetres and Y up on its own rig, checked and where allowed repaired."""
+    notes = _frame_count(file, options["defects"])
+    rig = _rig(file)
+    match = match_rig(file.path, rig, target, maps)
+    rig = replace(rig, roles=match.roles)
+    unit, unit_name = _unit(file.path, rig, options["unit"])
+    decoded = decode(file, STILL / unit)
+    notes += decoded.notes
+    fps = options["source_fps"] or frame_rate(file.frame_time, file.frame_time_text)
+    clip = _scaled(file.path.stem, rig, decoded, fps, unit)
+    return Source(clip, match, unit, unit_name, "Y", 0, notes)
+
+
+def _rig(file: Bvh) -> Skeleton:
+    names = clean_names(file.names)
+    short = dict(zip(file.names, names, strict=True))
+    ends = {short[name]: sites[0] for name, sites in file.end_sites.items()}
+    return Skeleton(file.path.stem, names, file.parents, file.offsets, end_sites=ends)
+
+
+def _frame_count(file: Bvh, defects: str) -> list[str]:
+    if len(file) == file.declared:
+        return []
+    problem = f"declares {file.declared} frames and holds {len(file)}"
+    if defects == "refuse":
+        raise InputError(file.path, problem, fix="Export the clip again, or set motion.defects: repair.")
+    return [f"The file {problem}; those it holds are used."]
+
+
+def _unit(path: Path, rig: Skeleton, unit: str | float) -> tuple[float, str]:
+    if unit != "auto":
+        return float(unit), f"{float(unit):g} cm (given)"
+    leg = leg_length(rig)
+    found = unit_of(leg)
+    if found is None:
+        raise InputError(
+            path,
+            f"no unit makes this rig a person: thigh and shank together are {leg:g} units long",
+            fix="Set motion.unit in the data set to the centimetres per unit.",
+        )
+    return found
+
+
+def _scaled(name: str, rig: Skeleton, decoded: Decoded, fps: float, unit: float) -> Clip:
+    offsets = rig.offsets * unit
+    offsets[0] = 0.0
+    ends = {joint: (x * unit, y * unit, z * unit) for joint, (x, y, z) in rig.end_sites.items()}
+    skeleton = replace(rig, offsets=offsets, end_sites=ends)
+    translations = None if decoded.translations is None else decoded.translations * unit
+    return Clip(name, skeleton, fps, decoded.rotations, decoded.root * unit, translations)
+
+
+def resample(clip: Clip, fps: float) -> Clip:
+    """The clip at another frame rate; every frame that falls on one of the old is that frame exactly."""
+    if clip.fps == fps:
+        return clip
+    times = sample_times(len(clip), clip.fps, fps)
+    return replace(
+        clip,
+        fps=fps,
+        rotations=sample_rotations(clip.rotations, times),
+        root=sample_positions(clip.root, times),
+        translations=None if clip.translations is None else sample_positions(clip.translations, times),
+    )
+
+
+def fit_skeleton(clip: Clip, match: Match, target: Skeleton, proportions: str) -> tuple[Clip, list[str]]:
+    """The clip's motion on the target skeleton, or on its joints with the clip's own bone lengths."""
+    if match.same:
+        order = np.array([clip.skeleton.index(name) for name in target.joints])
+        own = _reordered(clip, order, target)
+        if np.abs(own.skeleton.offsets - target.offsets).max() <= SAME:
+            return replace(own, skeleton=target), []
+        if proportions == "clip":
+            return own, []
+    raise NotImplementedError
+
+
+def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
+    ends = {**target.end_sites, **clip.skeleton.end_sites}
+    skeleton = replace(target, offsets=clip.skeleton.offsets[order], end_sites=ends)
+    translations = None if clip.translations is None else clip.translations[:, order]
+    return Clip(clip.name, skeleton, clip.fps, clip.rotations[:, order], clip.root, translations)
+
+
+def _report(file: Bvh, source: Source, made: Clip, repairs: list[str]) -> dict[str, Any]:
+    data = file.path.read_bytes()
+    return {
+        "clip": made.name,
+        "source": file.path.name,
+        "sha256": hashlib.sha256(data).hexdigest(),
+        "bytes": len(data),
+        "source_frames": len(file),
+        "source_start": source.first_frame,
+        "source_fps": source.clip.fps,
+        "frames": len(made),
+        "seconds": round(len(made) / made.fps, 3),
+        "unit": source.unit,
+        "unit_name": source.unit_name,
+        "up": source.up,
+        "rig": source.match.rig,
+        "repairs": repairs,
+    }

@@ -1,0 +1,44 @@
+"""The same motion seen in a mirror: x negated, left and right swapped."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.core.errors import HobbleError
+from hobble.core.skeleton import Skeleton, other_side
+
+FLIP = np.array([-1.0, 1.0, 1.0])
+
+
+def mirror_skeleton(skeleton: Skeleton) -> Skeleton:
+    """The skeleton with the offsets of each side on the other; itself where it is symmetric.
+
+    Raises HobbleError where a joint's counterpart hangs from another joint's counterpart.
+    """
+    swap = skeleton.mirror_joints
+    for j, p in enumerate(skeleton.parents):
+        if p >= 0 and skeleton.parents[swap[j]] != swap[p]:
+            a, b = skeleton.joints[j], skeleton.joints[swap[j]]
+            raise HobbleError(f"skeleton {skeleton.name} cannot be mirrored: {a} and {b} hang differently")
+    ends = {}
+    for name in skeleton.end_sites:
+        x, y, z = skeleton.end_sites.get(other_side(name), skeleton.end_sites[name])
+        ends[name] = (-x, y, z)
+    return replace(skeleton, offsets=skeleton.offsets[swap] * FLIP, end_sites=ends)
+
+
+def mirror_clip(clip: Clip, name: str) -> Clip:
+    """The clip mirrored in the plane x = 0; mirrored twice it is the same again."""
+    swap = clip.skeleton.mirror_joints
+    translations = None if clip.translations is None else clip.translations[:, swap] * FLIP
+    return Clip(
+        name,
+        mirror_skeleton(clip.skeleton),
+        clip.fps,
+        clip.rotations[:, swap] * np.array([1.0, 1.0, -1.0, -1.0]),
+        clip.root * FLIP,
+        translations,
+    )

@@ -1,0 +1,42 @@
+"""From one frame rate to another: positions linearly, rotations by spherical interpolation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.quat import Array
+
+
+def sample_times(frames: int, source_fps: float, fps: float) -> Array:
+    """Times of the new frames, in source frames: (N,) from 0 to the last that lies within the clip.
+
+    >>> sample_times(5, 120, 60)
+    array([0., 2., 4.])
+    """
+    last = int(np.floor((frames - 1) * fps / source_fps + 1e-6))
+    return np.minimum(np.arange(last + 1) * (source_fps / fps), frames - 1)
+
+
+def _between(times: Array) -> tuple[Array, Array, Array]:
+    first = np.floor(times + 1e-9).astype(int)
+    share = np.clip(times - first, 0.0, 1.0)
+    share[share < 1e-9] = 0.0
+    return first, np.where(share > 0, first + 1, first), share
+
+
+def sample_rotations(rotations: Array, times: Array) -> Array:
+    """Rotations (N, J, 4) at times in frames, of (F, J, 4); a time on a frame gives that frame exactly."""
+    first, second, share = _between(times)
+    if not share.any():
+        return quat.continuous(rotations[first])
+    out = quat.slerp(rotations[first], rotations[second], share[:, None])
+    out[share == 0] = rotations[first[share == 0]]
+    return quat.continuous(quat.normalize(out))
+
+
+def sample_positions(positions: Array, times: Array) -> Array:
+    """Positions (N, ..., 3) at times in frames, of (F, ..., 3)."""
+    first, second, share = _between(times)
+    share = share.reshape(-1, *(1,) * (positions.ndim - 1))
+    return positions[first] * (1 - share) + positions[second] * share
