@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -112,3 +114,25 @@ def test_a_bad_configuration_ends_before_the_dag(workflow, override: str, messag
     assert message in text
     assert "Building DAG" not in text
     assert "Traceback" not in text
+
+
+@pytest.fixture
+def small_disk(workflow) -> Iterator[Path]:
+    """The run's folder on a file system of its own that is too small."""
+    mount = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(workflow.folder)]
+    if subprocess.run(mount, capture_output=True).returncode:
+        pytest.skip("this user may not mount a small file system")
+    yield workflow.folder
+    subprocess.run(["umount", "-l", str(workflow.folder)], check=True)
+
+
+def test_a_disk_that_fills(workflow, small_disk: Path) -> None:
+    target = "results/datasets/tiny/database/all"
+    text = workflow.run("-c2", target, "--keep-going", ok=False)
+    assert "the disk is full" in text
+    assert "Traceback" not in text
+    assert not list(small_disk.rglob("*.part"))
+    whole = {p: p.read_bytes() for p in small_disk.rglob("results/datasets/tiny/synthetic/*.bvh")}
+    subprocess.run(["mount", "-o", "remount,size=300m", str(small_disk)], check=True)
+    workflow.run("-c2", target)
+    assert {p: p.read_bytes() for p in whole} == whole
