@@ -1,0 +1,33 @@
+"""The text files that lie beside a clip: footsteps, gait keys and status."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+
+def footsteps_text(right: Sequence[int], left: Sequence[int]) -> str:
+    """Lines `a b`: the right foot lands, then the left; frames from 0 in, from 1 in the file."""
+    lines = []
+    lefts = np.asarray(left)
+    for a, following in zip(right, [*right[1:], None], strict=True):
+        between = lefts[lefts > a]
+        if len(between) and (following is None or between[0] < following):
+            lines.append(f"{a + 1} {between[0] + 1}")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def gait_text(keys: Sequence[tuple[int, str]]) -> str:
+    """Lines `frame label`; frames from 0 in, from 1 in the file."""
+    return "".join(f"{frame + 1} {label}\n" for frame, label in keys)
+
+
+def status_text(frames: int, link: str | None, changes: Sequence[tuple[int, int]]) -> str:
+    """`frames:N`, then `A-B link[severity];` for each stretch that hurts; frames from 0 in, from 1 in the file."""
+    lines = [f"frames:{frames}"]
+    ends = [*(start for start, _ in changes[1:]), frames]
+    for (start, severity), end in zip(changes, ends, strict=True):
+        if link and severity:
+            lines.append(f"{start + 1}-{end} {link}[{severity}];")
+    return "\n".join(lines) + "\n"

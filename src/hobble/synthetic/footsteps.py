@@ -1,0 +1,117 @@
+"""When each foot lands and leaves, and where it stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.quat import Array
+from hobble.synthetic.gait import LEFT, RIGHT, SIGN, Style
+from hobble.synthetic.ground import Ground
+from hobble.synthetic.path import Path
+
+ANKLE_HEIGHT = 7.0  # of the ankle joint over the sole; the toe joint is 4.5 cm lower on the skeleton
+FOOT = np.array([0.0, -4.5, 13.5])  # from ankle to toe joint in a foot that stands flat
+STAY = (3.0, np.radians(5.0))  # a standing figure leaves its foot where it would move less than this
+SOLE = np.array([-6.0, 0.0, 6.0, 13.5, 20.5])  # points of the sole along the foot, from below the ankle
+SHIFTS = sorted(np.arange(-16.0, 17.0, 2.0), key=abs)  # how far a foot is moved to keep it off an edge
+
+
+@dataclass(frozen=True)
+class Stance:
+    """A foot on the ground from frame `land` to frame `leave` (fractions of frames, of the padded path).
+
+    ankle: (3,) of the flat foot. turn: (4,) its world rotation. swings: whether the foot was lifted to get here.
+    """
+
+    land: float
+    leave: float
+    ankle: Array
+    turn: Array
+    swings: bool = True
+
+
+def phase_curve(style: Style, fps: float, start: float) -> Array:
+    """(F,) cycles, growing; the right foot lands where it is whole."""
+    return start + np.cumsum(style.frequency) / fps
+
+
+def landings(phase: Array, style: Style, side: int) -> Array:
+    """Frames (with fractions) at which a foot lands."""
+    own = phase - (style.lag if side == LEFT else 0.0)
+    whole = np.arange(np.ceil(own[0]), np.floor(own[-1]) + 1)
+    return np.interp(whole, own, np.arange(len(own), dtype=float))
+
+
+def stances(
+    path: Path, style: Style, phase: Array, ground: Ground, rng: np.random.Generator
+) -> tuple[list[Stance], list[Stance]]:
+    """Every stance of the left and of the right foot along the path."""
+    return _of_side(path, style, phase, ground, LEFT, rng), _of_side(path, style, phase, ground, RIGHT, rng)
+
+
+def _of_side(
+    path: Path, style: Style, phase: Array, ground: Ground, side: int, rng: np.random.Generator
+) -> list[Stance]:
+    frames = np.arange(len(path), dtype=float)
+    at = landings(phase, style, side)
+    out: list[Stance] = []
+    for land in at[:-1]:
+        here = np.interp(land, frames, phase)
+        duty = np.interp(land, frames, style.duty[:, side])
+        leave = np.interp(here + duty, phase, frames)
+        middle = np.interp(here + duty / 2, phase, frames)
+        ankle, turn = _footprint(path, style, ground, side, middle, rng)
+        standing = np.interp(middle, frames, path.gait[:, 0]) > 0.5
+        if out and standing and _close(out[-1], ankle, turn):
+            ankle, turn = out[-1].ankle, out[-1].turn
+            out.append(Stance(land, leave, ankle, turn, swings=False))
+        else:
+            out.append(Stance(land, leave, ankle, turn))
+    return out
+
+
+def _footprint(
+    path: Path, style: Style, ground: Ground, side: int, middle: float, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Under the body in mid-stance, the foot's middle ahead of the ankle; the faster, the further ahead."""
+    frames = np.arange(len(path), dtype=float)
+
+    def value(curve: Array) -> float:
+        return float(np.interp(middle, frames, curve))
+
+    moving = 1 - value(path.gait[:, 0])
+    facing = value(path.facing)
+    ahead = value(path.velocity[:, 1]) / 130
+    toe_out = np.radians(value(style.toe_out[:, side]))
+    out = SIGN[side] * value(style.width) + moving * rng.normal(0, 0.6)
+    along = value(style.shift[:, side]) - 4.0 - 11.0 * ahead + moving * rng.normal(0, 0.8)
+    yaw = facing + SIGN[side] * toe_out
+    x = value(path.position[:, 0]) + out * np.cos(facing) + along * np.sin(facing)
+    z = value(path.position[:, 1]) - out * np.sin(facing) + along * np.cos(facing)
+    return _planted(ground, np.array([x, z]), yaw)
+
+
+def _planted(ground: Ground, place: Array, yaw: float) -> tuple[Array, Array]:
+    """The foot flat on the ground, all of it on one step: ankle position and world rotation."""
+    ahead = np.array([np.sin(yaw), np.cos(yaw)])
+
+    def heights(along: Array) -> Array:
+        return ground(place[0] + along * ahead[0], place[1] + along * ahead[1])
+
+    for shift in SHIFTS:
+        sole = heights(shift + SOLE)
+        if np.max(np.abs(np.diff(sole))) < 4.0:
+            break
+    heel, toe = heights(shift + np.array([0.0, 13.5]))
+    x, z = place + shift * ahead
+    pitch = np.arctan2(toe - heel, 13.5)
+    turn = quat.mul(quat.yaw(yaw), quat.from_axis_angle([1.0, 0.0, 0.0], -pitch))
+    return np.array([x, heel + ANKLE_HEIGHT, z]), turn
+
+
+def _close(old: Stance, ankle: Array, turn: Array) -> bool:
+    moved = np.linalg.norm(ankle - old.ankle)
+    return bool(moved < STAY[0] and quat.angle(old.turn, turn) < STAY[1])

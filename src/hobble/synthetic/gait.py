@@ -1,0 +1,149 @@
+"""How each gait looks: timing, feet, pelvis, trunk and arms, as functions of speed.
+
+Reference values are those of level gait in healthy adults (Perry & Burnfield, Gait Analysis; Winter, The
+Biomechanics and Motor Control of Human Gait; Novacheck 1998 for running), for 1.3 m/s walking.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.synthetic.path import GAITS, Path
+
+# name: for each gait (value at the gait's reference speed, change per m/s). Degrees, centimetres, shares.
+REFERENCE_SPEED = (0.0, 1.3, 2.8, 0.8)
+TABLE: dict[str, tuple[tuple[float, float], ...]] = {
+    "duty": ((0.80, 0), (0.60, -0.06), (0.37, -0.05), (0.64, -0.06)),  # share of the cycle on the ground
+    "land_pitch": ((0, 0), (20, 6), (8, 2), (4, 0)),  # of the foot as it lands, + toe up
+    "off_pitch": ((-15, 0), (-58, -10), (-58, -4), (-38, -8)),  # as it leaves
+    "flat": ((0.15, 0), (0.14, 0), (0.18, 0), (0.15, 0)),  # share of stance until the toe is down
+    "heel_off": ((0.6, 0), (0.52, -0.04), (0.42, 0), (0.60, 0)),  # share of stance when the heel leaves
+    "lift": ((2, 0), (1.5, 1), (9, 3), (7, 0)),  # of the swinging foot over the line of its ends
+    "clearance": ((1, 0), (1.5, 0), (3, 0), (2, 0)),  # least height of the swinging sole
+    "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # of an ankle from the path
+    "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),
+    "height": ((94.6, 0), (92.6, -1.0), (89.5, -0.5), (56, 0)),  # of the hips above the ground
+    "bob": ((0, 0), (1.9, 1.2), (-3.6, 0.3), (0.8, 0)),  # + highest in mid-stance, - lowest
+    "sway": ((1.6, 0), (2.2, -0.8), (0.8, 0), (2.5, 0)),
+    "pelvis_yaw": ((0.3, 0), (5, 2), (6, 1), (5, 0)),
+    "pelvis_list": ((1.0, 0), (4, 1), (4, 0), (3, 0)),
+    "pelvis_tilt": ((3, 0), (4, 1), (9, 1), (24, 0)),
+    "lean": ((1, 0), (3, 2), (10, 2), (52, 0)),  # of the trunk, forward
+    "chest_yaw": ((0.3, 0), (4, 2), (9, 2), (4, 0)),
+    "arm_swing": ((0.8, 0), (17, 12), (27, 4), (9, 0)),
+    "arm_mean": ((1, 0), (-1, 0), (-8, 0), (14, 0)),  # + forward
+    "elbow": ((14, 0), (22, 8), (82, 2), (48, 0)),
+    "elbow_swing": ((0.5, 0), (9, 5), (11, 0), (5, 0)),
+    "abduction": ((9, 0), (9, 0), (13, 0), (14, 0)),
+}
+SIDED = ("duty", "land_pitch", "off_pitch", "heel_off", "lift", "clearance", "toe_out", "arm_swing")
+SIDED += ("arm_mean", "elbow", "elbow_swing", "abduction")
+LEFT, RIGHT = 0, 1
+SIGN = (1.0, -1.0)  # +X is the figure's left
+
+
+@dataclass(frozen=True)
+class Style:
+    """How the figure moves in each of F frames: (F,), or (F, 2) left and right. See TABLE; and, beside it:
+
+    frequency: cycles a second. lag: phase from the right foot's landing to the left's. shift: (F, 2) cm that a
+    footprint lies ahead. swing_out: (F, 2) cm of a swinging foot sideways. hike: (F, 2) degrees the pelvis is
+    raised over a swinging leg. side_lean: (F, 2) degrees of the trunk over the stance leg. twist: (F, 2)
+    degrees of an upper arm inward.
+    """
+
+    duty: Array
+    land_pitch: Array
+    off_pitch: Array
+    flat: Array
+    heel_off: Array
+    lift: Array
+    clearance: Array
+    width: Array
+    toe_out: Array
+    height: Array
+    bob: Array
+    sway: Array
+    pelvis_yaw: Array
+    pelvis_list: Array
+    pelvis_tilt: Array
+    lean: Array
+    chest_yaw: Array
+    arm_swing: Array
+    arm_mean: Array
+    elbow: Array
+    elbow_swing: Array
+    abduction: Array
+    frequency: Array
+    lag: Array
+    shift: Array
+    swing_out: Array
+    hike: Array
+    side_lean: Array
+    twist: Array
+
+    def changed(self, **values: Array) -> Style:
+        """A copy with some curves replaced."""
+        return Style(**{f.name: values.get(f.name, getattr(self, f.name)) for f in fields(self)})
+
+
+def healthy_style(path: Path) -> Style:
+    """The healthy style along a path: each gait's values at the speed of the moment, mixed by gait share."""
+    speed = path.speed / 100
+    values = {}
+    for name, row in TABLE.items():
+        base = np.array([value for value, _ in row])
+        slope = np.array([change for _, change in row])
+        each = base + slope * (speed[:, None] - np.array(REFERENCE_SPEED)) * (np.array(row)[:, 1] != 0)
+        mixed = np.sum(path.gait * each, axis=1)
+        values[name] = np.repeat(mixed[:, None], 2, axis=1) if name in SIDED else mixed
+    values["duty"] = np.clip(values["duty"], 0.28, 0.82)
+    values["heel_off"] = np.clip(values["heel_off"], 0.3, 0.75)
+    zero = np.zeros((len(path), 2))
+    style = Style(
+        **values,
+        frequency=np.sum(path.gait * _frequencies(speed), axis=1),
+        lag=np.full(len(path), 0.5),
+        shift=zero,
+        swing_out=zero,
+        hike=zero,
+        side_lean=zero,
+        twist=zero + 12.0,
+    )
+    return _directed(style, path)
+
+
+def _frequencies(speed: Array) -> Array:
+    """(F, 4) cycles a second of each gait: cadence grows with the square root of walking speed."""
+    stand = np.full_like(speed, 1 / 1.5)
+    walk = 0.935 * np.sqrt(np.maximum(speed, 0.5) / 1.3)
+    jog = 1.34 + 0.10 * (np.clip(speed, 1.5, 5.0) - 2.8)
+    crouch = 0.80 * np.sqrt(np.maximum(speed, 0.5) / 0.8)
+    assert len(GAITS) == 4
+    return np.stack([stand, walk, jog, crouch], axis=1)
+
+
+def _directed(style: Style, path: Path) -> Style:
+    """Backward and sideways steps: toe first, little roll, wider, quicker, less swing of the arms."""
+    speed = np.maximum(path.speed, 1e-6)
+    moving = np.clip(path.speed / 30, 0, 1)
+    ahead = np.where(moving > 0, path.velocity[:, 1] / speed, 1.0) * moving + (1 - moving)
+    forward, back, side = np.maximum(ahead, 0), np.maximum(-ahead, 0), 1 - np.abs(ahead)
+    forward, back, side = forward[:, None], back[:, None], side[:, None]
+    stride = path.speed / style.frequency
+    sideways = np.abs(path.velocity[:, 0]) / speed * moving
+    return style.changed(
+        land_pitch=style.land_pitch * forward - 16 * back - 8 * side,
+        off_pitch=style.off_pitch * forward + 8 * back - 16 * side,
+        # Feet that do not cross: the step between them, half a stride, opens and closes about this width.
+        width=style.width + 0.26 * stride * sideways,
+        lift=style.lift + 3 * (back + side),
+        frequency=style.frequency * (1 + 0.22 * sideways + 0.1 * back[:, 0]),
+        lean=style.lean * (1 - 0.6 * back[:, 0]),
+        pelvis_yaw=style.pelvis_yaw * ahead,
+        arm_swing=style.arm_swing * (0.25 + 0.75 * forward),
+        height=style.height - 1.5 * sideways - 1.0 * back[:, 0],
+    )

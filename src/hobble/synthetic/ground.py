@@ -1,0 +1,69 @@
+"""The ground the walker is planned on: flat, sloping, stepped or uneven, as heights over x and z."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hobble.core.quat import Array
+
+Ground = Callable[[Array, Array], Array]  # x, z in cm -> heights in cm
+
+
+def make_ground(kind: str, rng: np.random.Generator) -> Ground:
+    """The ground of one clip; kind is "flat", "slopes", "steps" or "uneven". The first steps go along +Z."""
+    return {"flat": lambda _: flat, "slopes": _slopes, "steps": _steps, "uneven": _uneven}[kind](rng)
+
+
+def flat(x: Array, z: Array) -> Array:
+    """Nothing but zero."""
+    return np.zeros(np.broadcast_shapes(np.shape(x), np.shape(z)))
+
+
+def _slopes(rng: np.random.Generator) -> Ground:
+    """Long hills, up to about 12 degrees steep along the way and gentler across it."""
+    return _waves(rng, lengths=(480, 640, 900), steepness=(0.07, 0.07, 0.07), across=0.35)
+
+
+def _uneven(rng: np.random.Generator) -> Ground:
+    """Bumps and hollows of a few centimetres, no two steps alike."""
+    return _waves(
+        rng,
+        lengths=(110, 150, 190, 260, 340, 600),
+        steepness=(0.05, 0.06, 0.06, 0.06, 0.06, 0.05),
+        across=1.5,
+    )
+
+
+def _waves(
+    rng: np.random.Generator, lengths: tuple[float, ...], steepness: tuple[float, ...], across: float
+) -> Ground:
+    angles = rng.uniform(-across, across, len(lengths))
+    numbers = 2 * np.pi / (np.array(lengths) * rng.uniform(0.9, 1.1, len(lengths)))
+    starts = rng.uniform(0, 2 * np.pi, len(lengths))
+    heights = np.array(steepness) / numbers
+
+    def ground(x: Array, z: Array) -> Array:
+        along = np.multiply.outer(np.asarray(x), np.sin(angles)) + np.multiply.outer(
+            np.asarray(z), np.cos(angles)
+        )
+        return np.sin(along * numbers + starts) @ heights
+
+    return ground
+
+
+def _steps(rng: np.random.Generator) -> Ground:
+    """Steps up and down across the way, 7 to 16 cm high and 50 to 130 cm deep, in flights of up to four."""
+    count = 400
+    edges = np.cumsum(rng.uniform(50, 130, count))
+    edges -= edges[count // 2]
+    flights = np.repeat(np.where(np.arange(count) % 2 == 0, 1.0, -1.0), rng.integers(1, 5, count))[:count]
+    levels = np.concatenate([[0.0], np.cumsum(flights * rng.uniform(7, 16, count))])
+    levels -= levels[count // 2]
+
+    def ground(x: Array, z: Array) -> Array:
+        z = np.asarray(z) + 0 * np.asarray(x)
+        return levels[np.searchsorted(edges, z)]
+
+    return ground

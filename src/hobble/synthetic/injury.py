@@ -1,0 +1,169 @@
+"""What hurts, when, and how it changes the way the figure moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from hobble.core.errors import HobbleError
+from hobble.core.quat import Array
+from hobble.synthetic.gait import LEFT, RIGHT, Style
+
+SEVERITIES = (0, 3, 5, 7, 10)
+LENGTHS = (0.7, 1.0, 1.0, 1.0, 1.1)  # of the stretches, relative
+LINKS = {
+    "LeftUpLeg-LeftLeg": ("thigh", LEFT),
+    "RightUpLeg-RightLeg": ("thigh", RIGHT),
+    "LeftLeg-LeftFoot": ("shank", LEFT),
+    "RightLeg-RightFoot": ("shank", RIGHT),
+    "LeftFoot-LeftToeBase": ("foot", LEFT),
+    "RightFoot-RightToeBase": ("foot", RIGHT),
+    "LowerBack-Spine": ("back", LEFT),
+    "LeftArm-LeftForeArm": ("upper arm", LEFT),
+    "RightArm-RightForeArm": ("upper arm", RIGHT),
+    "LeftForeArm-LeftHand": ("forearm", LEFT),
+    "RightForeArm-RightHand": ("forearm", RIGHT),
+}
+
+# At severity 10. A factor multiplies, `+` adds, `=` is what the value becomes; all in proportion to severity.
+# For legs and arms, sided values are those of the hurt side.
+EFFECTS: dict[str, dict[str, tuple[str, float]]] = {
+    "thigh": {
+        "duty": ("+", -0.11),
+        "off_pitch": ("*", 0.45),
+        "heel_off": ("+", 0.14),
+        "land_pitch": ("*", 0.35),
+        "lift": ("+", -2.0),
+        "clearance": ("*", 0.5),
+        "shift": ("+", -9.0),
+        "swing_out": ("+", 9.0),
+        "hike": ("+", 8.0),
+        "side_lean": ("+", 13.0),
+        "sway": ("+", 2.5),
+        "frequency": ("*", 0.86),
+        "arm_swing_all": ("*", 0.6),
+        "lag_hurt": ("+", -0.07),
+    },
+    "shank": {
+        "duty": ("+", -0.12),
+        "off_pitch": ("*", 0.25),
+        "heel_off": ("+", 0.10),
+        "land_pitch": ("*", 0.0),
+        "lift": ("+", -1.0),
+        "clearance": ("*", 0.8),
+        "shift": ("+", -7.0),
+        "toe_out": ("+", 5.0),
+        "side_lean": ("+", 8.0),
+        "sway": ("+", 1.2),
+        "frequency": ("*", 0.9),
+        "height": ("+", -2.0),
+        "arm_swing_all": ("*", 0.75),
+        "lag_hurt": ("+", -0.08),
+    },
+    "foot": {
+        "duty": ("+", -0.08),
+        "off_pitch": ("*", 0.08),
+        "heel_off": ("+", 0.2),
+        "land_pitch": ("*", 1.1),
+        "flat": ("+", 0.10),
+        "lift": ("+", 3.0),
+        "shift": ("+", -4.0),
+        "toe_out": ("+", 22.0),
+        "side_lean": ("+", 4.0),
+        "frequency": ("*", 0.97),
+        "arm_swing_all": ("*", 0.9),
+        "lag_hurt": ("+", -0.05),
+    },
+    "back": {
+        "lean": ("+", 24.0),
+        "pelvis_tilt": ("+", 4.0),
+        "pelvis_yaw": ("*", 0.3),
+        "pelvis_list": ("*", 0.4),
+        "chest_yaw": ("*", 0.15),
+        "arm_swing_all": ("*", 0.35),
+        "elbow_all": ("+", 12.0),
+        "off_pitch_all": ("*", 0.7),
+        "frequency": ("*", 0.93),
+        "bob": ("*", 0.4),
+        "height": ("+", -1.5),
+    },
+    "upper arm": {
+        "arm_swing": ("*", 0.0),
+        "elbow_swing": ("*", 0.0),
+        "elbow": ("=", 62.0),
+        "abduction": ("=", 3.0),
+        "arm_mean": ("=", 2.0),
+        "twist": ("=", 62.0),
+        "chest_yaw": ("*", 0.5),
+        "lean": ("+", 5.0),
+    },
+    "forearm": {
+        "arm_swing": ("*", 0.0),
+        "elbow_swing": ("*", 0.0),
+        "elbow": ("=", 112.0),
+        "abduction": ("=", 9.0),
+        "arm_mean": ("=", 16.0),
+        "twist": ("=", 38.0),
+        "chest_yaw": ("*", 0.75),
+        "lean": ("+", 1.5),
+    },
+}
+SPEED = {"thigh": 0.50, "shank": 0.52, "foot": 0.66, "back": 0.62, "upper arm": 0.86, "forearm": 0.90}
+
+
+def check_link(link: str, clip: str) -> None:
+    """Raise HobbleError for a link that the walker does not know how to hurt."""
+    if link not in LINKS:
+        raise HobbleError(
+            f"clip {clip}: injured: the walker cannot hurt {link!r}. It can: {', '.join(LINKS)}."
+        )
+
+
+def slowing(severity: Array, link: str) -> Array:
+    """(F,) factor on the speed of travel."""
+    return 1 - (1 - SPEED[LINKS[link][0]]) * severity / 10
+
+
+def schedule(frames: int) -> list[tuple[int, int]]:
+    """(first frame, severity) of each stretch of a clip, in order."""
+    ends = np.cumsum(LENGTHS) / np.sum(LENGTHS) * frames
+    return [(round(start), s) for start, s in zip((0.0, *ends[:-1]), SEVERITIES, strict=True)]
+
+
+def smoothed(changes: Sequence[tuple[int, int]], frames: int, first: int, fps: float) -> Array:
+    """(frames + 2 first,) severity that the motion follows: from one value to the next in about a cycle."""
+    steps = np.zeros(frames)
+    for start, value in changes:
+        steps[start:] = value
+    padded = np.pad(steps, first, mode="edge")
+    return gaussian_filter1d(padded, 0.3 * fps, mode="nearest")
+
+
+def hurt(style: Style, severity: Array, link: str) -> Style:
+    """The style with one link hurt; severity (F,) 0 to 10. Every effect is in proportion to severity."""
+    part, side = LINKS[link]
+    share = np.asarray(severity) / 10
+    changes: dict[str, Array] = {}
+    for name, (how, amount) in EFFECTS[part].items():
+        if name == "lag_hurt":
+            # The sound foot lands early, while the hurt one still stands.
+            changes["lag"] = style.lag + (amount if side == RIGHT else -amount) * share
+            continue
+        key = name.removesuffix("_all")
+        old = changes.get(key, getattr(style, key))
+        new = np.array(old)
+        where = (Ellipsis, side) if new.ndim == 2 and not name.endswith("_all") else Ellipsis
+        by = share if new[where].ndim == 1 else share[:, None]
+        new[where] = _apply(how, amount, new[where], by)
+        changes[key] = new
+    return style.changed(**changes)
+
+
+def _apply(how: str, amount: float, value: Array, share: Array) -> Array:
+    if how == "*":
+        return value * (1 + (amount - 1) * share)
+    if how == "+":
+        return value + amount * share
+    return value + (amount - value) * share

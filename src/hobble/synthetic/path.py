@@ -1,0 +1,102 @@
+"""From segments to curves over time: where the body goes, where it faces, in which gait, how much it hurts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from hobble.core.quat import Array
+from hobble.synthetic.recipes import CROUCH, JOG, STAND, WALK, Segment
+
+GAITS = (STAND, WALK, JOG, CROUCH)
+BLEND = 0.28  # seconds, sigma of the change from one segment to the next: about a second from end to end
+
+
+@dataclass(frozen=True)
+class Path:
+    """F frames at `fps`; the clip itself is frames `first` to F - `first`, the rest lets steps begin and end.
+
+    position: (F, 2) x and z in cm. facing: (F,) radians, + to the left. velocity: (F, 2) cm/s to the left and
+    forward of the facing direction. gait: (F, 4) shares of GAITS. severity: (F,) 0 to 10.
+    """
+
+    fps: float
+    first: int
+    position: Array
+    facing: Array
+    velocity: Array
+    gait: Array
+    severity: Array
+
+    def __len__(self) -> int:
+        return len(self.facing)
+
+    @property
+    def speed(self) -> Array:
+        """(F,) cm/s."""
+        return np.linalg.norm(self.velocity, axis=1)
+
+
+def walk_path(
+    segments: Sequence[Segment], frames: int, fps: float, slowing: Array | None, severity: Array | None
+) -> Path:
+    """Integrate the plan. slowing, severity: (frames + 2 * margin,) factor on the speed, and 0 to 10."""
+    first = margin(fps)
+    total = frames + 2 * first
+    which = _segment_of_frame(segments, frames, fps)
+    which = np.pad(which, (first, total - first - len(which)), mode="edge")
+    heading = np.radians([s.heading for s in segments])
+    speed = np.array([s.speed for s in segments])
+    wanted = np.stack([speed * np.sin(heading), speed * np.cos(heading)], axis=1)[which]
+    turning = np.array([np.radians(s.turn) / s.seconds for s in segments])[which]
+    gait = np.eye(len(GAITS))[[GAITS.index(s.gait) for s in segments]][which]
+    sigma = BLEND * fps
+    velocity = gaussian_filter1d(wanted, sigma, axis=0, mode="nearest")
+    turning = gaussian_filter1d(turning, sigma * 0.8, mode="nearest")
+    if slowing is not None:
+        velocity = velocity * slowing[:, None]
+        turning = turning * slowing
+    facing = np.cumsum(turning) / fps
+    facing -= facing[first]
+    sin, cos = np.sin(facing), np.cos(facing)
+    step = np.stack(
+        [velocity[:, 0] * cos + velocity[:, 1] * sin, velocity[:, 1] * cos - velocity[:, 0] * sin], 1
+    )
+    position = np.cumsum(step, axis=0) / fps
+    return Path(
+        fps,
+        first,
+        position - position[first],
+        facing,
+        velocity,
+        gaussian_filter1d(gait, sigma, axis=0, mode="nearest"),
+        np.zeros(total) if severity is None else severity,
+    )
+
+
+def margin(fps: float) -> int:
+    """Frames planned before the first and after the last frame of a clip."""
+    return round(4 * fps)
+
+
+def _segment_of_frame(segments: Sequence[Segment], frames: int, fps: float) -> np.ndarray:
+    ends = np.cumsum([s.seconds for s in segments])
+    which = np.searchsorted(ends, np.arange(frames) / fps, side="right")
+    return np.minimum(which, len(segments) - 1)
+
+
+def gait_keys(segments: Sequence[Segment], frames: int, fps: float) -> list[tuple[int, str]]:
+    """(frame, label) keys, frames from 0: labels fade linearly while the motion changes from gait to gait."""
+    which = _segment_of_frame(segments, frames, fps)
+    labels = [segments[i].gait for i in which]
+    half = round(1.6 * BLEND * fps)
+    keys = [(0, labels[0])]
+    for i in np.flatnonzero([a != b for a, b in zip(labels[1:], labels[:-1], strict=True)]) + 1:
+        start = max(i - half, keys[-1][0] + 1)
+        end = min(max(i + half, start + 1), frames - 1)
+        if start < end:
+            keys += [(start, labels[i - 1]), (end, labels[i])]
+    return keys

@@ -1,0 +1,24 @@
+"""Creates one clip of the embedded data set (BVH, footsteps, gait, status) from its recipe and a skeleton."""
+
+from pathlib import Path
+
+import yaml
+
+from hobble.synthetic.clip import write_clip
+from hobble.workflow.job import job
+
+with job(snakemake):
+    source = Path(snakemake.input.skeleton)
+    write_clip(
+        snakemake.params.clip,
+        {"name": source.stem, **yaml.safe_load(source.read_text(encoding="utf-8"))},
+        snakemake.params.frames,
+        snakemake.params.recipe,
+        snakemake.params.injured,
+        snakemake.params.ground,
+        snakemake.params.options,
+        bvh=snakemake.output.bvh,
+        footsteps=snakemake.output.footsteps,
+        gait=snakemake.output.gait,
+        status=snakemake.output.status,
+    )
