@@ -1,0 +1,1 @@
+"""The `training` stage: network weights from a database."""

@@ -1,0 +1,90 @@
+"""Batches out of the database's blocks, and a watch over their losses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import torch
+
+from hobble.core.errors import HobbleError
+from hobble.database.reader import Block, Database
+
+TRAIN = "train"
+BLOCK_ROWS = 4096
+LOOK_EVERY = (
+    2048  # samples between looks at the losses, so that an accelerator is not waited for at each batch
+)
+NAMED = 8  # clips that a message names
+
+
+def batches(
+    database: Database, pass_index: int, section: int, sections: int, seed: int, size: int
+) -> Iterator[Block]:
+    """The samples of one section in consecutive batches of `size`.
+
+    Only the last may be shorter; it is trained like the others (a loss is a mean over its rows), so that a
+    section sees each of its samples once and leaves nothing over for the next: a checkpoint between the two
+    is complete.
+    """
+    rows = size * max(1, BLOCK_ROWS // size)
+    for block in database.blocks(TRAIN, pass_index, section, sections, seed, rows):
+        for start in range(0, len(block.p), size):
+            yield Block(*(array[start : start + size] for array in block))
+
+
+class Watch:
+    """Adds up the losses of a section, and stops the training at the first that is no finite number.
+
+    where: the pass and section, as a person would say it. clips: names by index.
+    """
+
+    def __init__(self, where: str, clips: tuple[str, ...]) -> None:
+        self.where, self.clips = where, clips
+        self.samples, self._batches, self._total, self._new = 0, 0, 0.0, 0
+        self._waiting: list[tuple[torch.Tensor, Block]] = []
+
+    def add(self, loss: torch.Tensor, batch: Block) -> None:
+        """Note a batch and its loss, a scalar on any device."""
+        self._waiting.append((loss, batch))
+        self._new += len(batch.p)
+        if self._new >= LOOK_EVERY:
+            self._look()
+
+    def mean(self) -> float:
+        """The mean loss over the section's samples; raises HobbleError where one is not finite."""
+        self._look()
+        return self._total / max(self.samples, 1)
+
+    def _look(self) -> None:
+        if not self._waiting:
+            return
+        losses = torch.stack([loss for loss, _ in self._waiting]).double().cpu().numpy()
+        for loss, (_, batch) in zip(losses, self._waiting, strict=True):
+            self._batches += 1
+            if not np.isfinite(loss):
+                raise HobbleError(self._message(batch))
+            self.samples += len(batch.p)
+            self._total += float(loss) * len(batch.p)
+        self._waiting.clear()
+        self._new = 0
+
+    def _message(self, batch: Block) -> str:
+        what = f"training diverged in {self.where}, batch {self._batches}: its error is not a finite number"
+        bad = ~(np.isfinite(batch.x).all(1) & np.isfinite(batch.y).all(1) & np.isfinite(batch.p))
+        if bad.any():
+            rows = [
+                f"{self.clips[c]} frame {f}" for c, f in zip(batch.clip[bad], batch.frame[bad], strict=True)
+            ]
+            return f"{what}, since these rows of the database are not: {_some(rows)}. Look at the clip there."
+        names = [self.clips[c] for c in np.unique(batch.clip)]
+        return (
+            f"{what}. It holds frames of {_some(names)}. The last checkpoint is kept. "
+            "Lower training.learning_rate, or look for broken frames in these clips."
+        )
+
+
+def _some(names: list[Any]) -> str:
+    more = len(names) - NAMED
+    return ", ".join(names[:NAMED]) + (f" and {more} more" if more > 0 else "")

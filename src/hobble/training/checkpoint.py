@@ -1,0 +1,120 @@
+"""Everything a run needs to go on as if it had never stopped, in one file that is whole or absent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from hobble.core.errors import InputError
+from hobble.core.files import save_npz
+from hobble.training.network import Network, shapes_of
+from hobble.training.optimiser import Adam
+
+
+@dataclass
+class State:
+    """Where a training stands after `sections` whole sections, counted from its very start.
+
+    samples, seconds: seen and spent so far. best, best_mse: flat weights of the lowest held-out error so far.
+    history: a row of numbers for each section, in the order of `hobble.training.history.columns`. Random
+    choices (order of the rows, dropout) are seeded by pass and section, so the position is their state.
+    """
+
+    network: Network
+    adam: Adam
+    sections: int = 0
+    samples: int = 0
+    seconds: float = 0.0
+    best_mse: float = float("inf")
+    best: torch.Tensor | None = None
+    history: list[list[float]] = field(default_factory=list)
+
+    def keep_best(self, held_out_mse: float) -> None:
+        """Remember the present weights if their held-out error is the lowest so far."""
+        if held_out_mse < self.best_mse:
+            self.best_mse, self.best = held_out_mse, self.network.flat.clone()
+
+
+def pack(state: State, recipe: str) -> dict[str, np.ndarray]:
+    """Copies of everything in `state`, as arrays for one npz."""
+    best = state.network.flat if state.best is None else state.best
+    return {
+        "weights": _copied(state.network.flat),
+        "first": _copied(state.adam.first),
+        "second": _copied(state.adam.second),
+        "best": _copied(best),
+        "best_mse": np.array(state.best_mse),
+        "steps": np.array(state.adam.steps),
+        "sections": np.array(state.sections),
+        "samples": np.array(state.samples),
+        "seconds": np.array(state.seconds),
+        "history": np.array(state.history, float),
+        "sizes": np.array(state.network.sizes),
+        "control_points": np.array(state.network.control_points),
+        "recipe": np.array(recipe),
+    }
+
+
+def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
+    """Set `state` to what a checkpoint holds; raises InputError where it is of a network of another shape."""
+    try:
+        shape = (tuple(data["sizes"].tolist()), int(data["control_points"]))
+        if shape != (state.network.sizes, state.network.control_points):
+            here = _described(state.network.sizes, state.network.control_points)
+            raise InputError(
+                path,
+                f"holds a network of {_described(*shape)}, not of {here}",
+                fix="A training can only go on with the network it started with.",
+            )
+        state.network.flat.copy_(torch.from_numpy(data["weights"]))
+        state.adam.first.copy_(torch.from_numpy(data["first"]))
+        state.adam.second.copy_(torch.from_numpy(data["second"]))
+        state.adam.steps = int(data["steps"])
+        state.best, state.best_mse = torch.from_numpy(data["best"]), float(data["best_mse"])
+        state.sections, state.samples = int(data["sections"]), int(data["samples"])
+        state.seconds = float(data["seconds"])
+        state.history = data["history"].tolist()
+    except KeyError as error:
+        raise InputError(path, f"is no checkpoint of a training: it has no {error}") from None
+
+
+def _described(sizes: tuple[int, ...], control_points: int) -> str:
+    parameters = sum(int(np.prod(s)) for s in shapes_of(sizes, control_points))
+    return (
+        f"{'-'.join(map(str, sizes))} units and {control_points} control points ({parameters:,} parameters)"
+    )
+
+
+def _copied(flat: torch.Tensor) -> np.ndarray:
+    return flat.detach().cpu().numpy().copy()
+
+
+class Saver:
+    """Writes checkpoints behind the training's back, one at a time, each whole before it takes its name."""
+
+    def __init__(self, path: Path, recipe: str) -> None:
+        self.path, self.recipe = path, recipe
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="checkpoint")
+        self._pending: Future[None] | None = None
+
+    def __enter__(self) -> Saver:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._worker.shutdown(wait=True)
+
+    def save(self, arrays: dict[str, np.ndarray]) -> None:
+        """Wait for the checkpoint before this one (its errors are raised here), then write this one."""
+        self.wait()
+        self._pending = self._worker.submit(save_npz, self.path, **arrays)
+
+    def wait(self) -> None:
+        """Return when the last checkpoint is on disk; raises what writing it raised."""
+        if self._pending is not None:
+            self._pending.result()
+            self._pending = None

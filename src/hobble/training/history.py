@@ -1,0 +1,46 @@
+"""What a training looked like, section by section: history.csv, and the line that says how it goes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from hobble.core.files import write_text
+
+COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
+
+
+def columns(blocks: Iterable[str]) -> list[str]:
+    """Names of the columns: samples and seconds count from the start, passes and sections from 1.
+
+    train_mse is the mean over the section's batches, with dropout; the held-out errors are at its end,
+    without. All are mean squared errors of the standardised output.
+    """
+    return [*COLUMNS, *(f"held_out_{name}" for name in blocks)]
+
+
+def write_history(path: Path, blocks: Iterable[str], rows: Sequence[Sequence[float]]) -> None:
+    """Write history.csv; a value that does not exist (no clip is held out) is left empty."""
+    lines = [",".join(columns(blocks))]
+    lines += [",".join(_cell(i, value) for i, value in enumerate(row)) for row in rows]
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def _cell(column: int, value: float) -> str:
+    if value != value:
+        return ""
+    return str(round(value)) if column < 3 else f"{value:.3f}" if column == 3 else f"{value:.8g}"
+
+
+def duration(seconds: float) -> str:
+    """A time a person reads at a glance.
+
+    >>> duration(42.4), duration(754), duration(7512)
+    ('42 s', '12 min 34 s', '2 h 05 min')
+    """
+    seconds = round(seconds)
+    if seconds < 60:
+        return f"{seconds} s"
+    if seconds < 3600:
+        return f"{seconds // 60} min {seconds % 60:02d} s"
+    return f"{seconds // 3600} h {seconds % 3600 // 60:02d} min"

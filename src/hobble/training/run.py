@@ -1,0 +1,64 @@
+"""The stage as its script calls it: from a database on disk to weights, history and checkpoint."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from hobble.core.files import save_npz
+from hobble.database.reader import Database
+from hobble.training.checkpoint import pack
+from hobble.training.held_out import HeldOut
+from hobble.training.history import write_history
+from hobble.training.start import recipe_hash
+from hobble.training.train import train
+from hobble.training.weights import write_weights
+
+log = logging.getLogger("hobble.training")
+
+
+def run(
+    database: Path,
+    *,
+    configuration: str,
+    network: Mapping[str, Any],
+    training: Mapping[str, Any],
+    checkpoints: Path,
+    threads: int,
+    start: Path | None,
+    code: str | None,
+    weights: Path,
+    history: Path,
+    checkpoint: Path,
+) -> None:
+    """Train on the database folder and write the three files; see `hobble.training.train.train`.
+
+    The weights written are those at the end, as in the original; the checkpoint holds the best held-out ones
+    too.
+    """
+    data = Database.open(database, training["memory_mb"])
+    state = train(
+        data,
+        network=network,
+        training=training,
+        checkpoints=checkpoints,
+        threads=threads,
+        start=start,
+        code=code,
+    )
+    blocks = data.layout.blocks("y")
+    whole = HeldOut(data, state.network.flat.device, 0).whole(state.network)
+    each = zip(["held out, every row", *blocks], whole, strict=True)
+    log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in each))
+    facts = {
+        "passes": state.sections // training["sections"],
+        "samples": state.samples,
+        "steps": state.adam.steps,
+    }
+    if data.rows("held_out"):
+        facts["held_out_mse"] = whole[0]
+    write_weights(weights, state.network, data, configuration, facts)
+    write_history(history, blocks, state.history)
+    save_npz(checkpoint, **pack(state, recipe_hash(network, training, data, code)))

@@ -1,0 +1,106 @@
+"""The training: passes of sections of batches; loss, step, log, checkpoint."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from tqdm import tqdm
+
+from hobble.database.reader import Database
+from hobble.training.batches import TRAIN, Watch, batches
+from hobble.training.checkpoint import Saver, State, pack
+from hobble.training.held_out import HeldOut
+from hobble.training.history import duration
+from hobble.training.start import begin, recipe_hash, use_threads
+from hobble.training.step import Step
+
+log = logging.getLogger("hobble.training")
+
+
+def train(
+    database: Database,
+    *,
+    network: Mapping[str, Any],
+    training: Mapping[str, Any],
+    checkpoints: Path,
+    threads: int = 1,
+    start: Path | None = None,
+    code: str | None = None,
+) -> State:
+    """Train to `training["passes"]` passes over the database's training clips; returns where that ends.
+
+    network, training: the sections of a configuration. checkpoints: a folder in which the run keeps its
+    state, by the hash of all that determines it; a run that finds its own there goes on from it. start: a
+    checkpoint to begin from where there is none yet. The result depends on the arguments and the number of
+    threads, never on interruptions. Raises HobbleError where an error is no finite number, naming the batch;
+    the last checkpoint stays.
+    """
+    use_threads(threads)
+    recipe = recipe_hash(network, training, database, code)
+    path = Path(checkpoints) / recipe / "checkpoint.npz"
+    state = begin(database, network, training, recipe, path, start)
+    with Saver(path, recipe) as saver:
+        _run(state, database, training, saver)
+    return state
+
+
+def _run(state: State, database: Database, training: Mapping[str, Any], saver: Saver) -> None:
+    passes, sections, seed = training["passes"], training["sections"], training["seed"]
+    device = state.network.flat.device
+    step = Step(state.network, training["dropout"])
+    held_out = HeldOut(database, device, database.pairs(TRAIN) // sections)
+    generator = torch.Generator(device)
+    progress = Progress(state, passes * database.pairs(TRAIN))
+    for turn in range(state.sections, passes * sections):
+        pass_index, section = divmod(turn, sections)
+        where = f"pass {pass_index + 1} of {passes}, section {section + 1} of {sections}"
+        watch = Watch(where, database.clips)
+        generator.manual_seed(section_seed(seed, turn))
+        for batch in batches(database, pass_index, section, sections, seed, training["batch"]):
+            x, y, p = (torch.from_numpy(array).to(device) for array in batch[:3])
+            watch.add(step(x, y, p, step.masks(len(x), generator)), batch)
+            state.adam.step(step.gradient)
+            progress.bar.update(len(p))
+        train_mse = watch.mean()
+        state.sections, state.samples = turn + 1, state.samples + watch.samples
+        state.seconds = progress.seconds()
+        errors = held_out.errors(state.network)
+        state.keep_best(errors[0])
+        state.history.append([pass_index + 1, section + 1, state.samples, state.seconds, train_mse, *errors])
+        saver.save(pack(state, recipe=saver.recipe))
+        progress.report(where, state)
+    progress.bar.close()
+    saver.wait()
+
+
+def section_seed(seed: int, turn: int) -> int:
+    """Seed of what is drawn at random in section `turn`, counted from the start: dropout."""
+    return int(np.random.SeedSequence([seed, 1, turn]).generate_state(1, np.uint64)[0] >> 1)
+
+
+class Progress:
+    """A bar on a terminal, a line for each section in the log."""
+
+    def __init__(self, state: State, goal: int) -> None:
+        self.goal, self.first, self.before = goal, state.samples, state.seconds
+        self.began = time.perf_counter()
+        self.bar = tqdm(total=goal, initial=state.samples, unit=" samples", unit_scale=True, disable=None)
+
+    def seconds(self) -> float:
+        """Seconds spent on the training, those before an interruption included."""
+        return self.before + time.perf_counter() - self.began
+
+    def report(self, where: str, state: State) -> None:
+        """Say how it goes: speed, time left, errors."""
+        speed = (state.samples - self.first) / (self.seconds() - self.before)
+        left = duration((self.goal - state.samples) / speed)
+        train, held_out = state.history[-1][4:6]
+        errors = f"error {train:.4f}, held out {held_out:.4f}"
+        log.info("%s: %s, %s samples/s, %s left", where, errors, f"{speed:,.0f}", left)
+        self.bar.set_postfix_str(errors, refresh=False)

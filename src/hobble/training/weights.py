@@ -1,0 +1,57 @@
+"""network/weights.npz: what the runtime needs of a trained network, and nothing else."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.files import save_npz
+from hobble.database.layout import CONTACTS, GAITS
+from hobble.database.reader import Database
+from hobble.training.network import Network
+
+UNITS = (
+    "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z forward, +X left, "
+    "severities 0 to 10"
+)
+
+
+def write_weights(
+    path: Path, network: Network, database: Database, configuration: str, facts: Mapping[str, Any]
+) -> None:
+    """Write `W0` (K, out, in), `b0` (K, out), ..., `Xmean`, `Xstd`, `Ymean`, `Ystd` and `meta`, a JSON text.
+
+    facts: numbers about the training that go into `meta` as they are. Equal networks give equal bytes.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+        arrays[f"W{layer}"] = np.ascontiguousarray(weight.cpu().numpy().transpose(0, 2, 1))
+        arrays[f"b{layer}"] = bias.cpu().numpy()
+    s = database.statistics
+    arrays |= {"Xmean": s.x_mean, "Xstd": s.x_std, "Ymean": s.y_mean, "Ystd": s.y_std}
+    save_npz(path, **arrays, meta=np.array(meta(network, database, configuration, facts)))
+
+
+def meta(network: Network, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
+    """What the columns mean and where the network comes from, as JSON."""
+    links = ["-".join(link) for link in database.skeleton["links"]] if database.layout.links else []
+    return json.dumps(
+        {
+            "configuration": configuration,
+            "layout": database.layout.to_dict(),
+            "skeleton": database.skeleton,
+            "gaits": list(GAITS),
+            "contacts": list(CONTACTS),
+            "links": links,
+            "control_points": network.control_points,
+            "units": UNITS,
+            "network": "y = W2 elu(W1 elu(W0 x + b0) + b1) + b2 on standardised x and y; W and b are cyclic "
+            "Catmull-Rom splines of the phase through their control points at k / control_points",
+            **facts,
+        },
+        sort_keys=True,
+    )

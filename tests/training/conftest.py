@@ -1,0 +1,92 @@
+"""A small database with something to learn in it, built as the database stage builds one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core.skeleton import Skeleton
+from hobble.database.clip_rows import ClipRows
+from hobble.database.layout import RowLayout
+from hobble.database.merge import write_database
+from hobble.database.reader import Database
+
+SPLITS = {"walk": "train", "hop": "train", "turn": "held_out"}
+
+
+def figure() -> Skeleton:
+    """Four joints and one link: the least that a row can hold."""
+    names = ("Hips", "LeftLeg", "RightLeg", "Head")
+    return Skeleton("stick", names, (-1, 0, 0, 0), np.ones((4, 3)), {"hips": "Hips"}, (("Hips", "LeftLeg"),))
+
+
+def clip_rows(name: str, rows: int, fits: int, seed: int) -> ClipRows:
+    """Rows whose Y is a smooth function of X and the phase, with some noise."""
+    skeleton = figure()
+    layout = RowLayout(joints=4, links=1)
+    rng = np.random.default_rng(seed)
+    columns = layout.x_terrain.start
+    x = rng.normal(0, 2, (rows, columns)).astype(np.float32)
+    p = np.linspace(0, 3, rows, endpoint=False).astype(np.float32) % 1
+    mix = np.random.default_rng(7).normal(0, columns**-0.5, (2, columns, layout.y_size))
+    turn = np.cos(2 * np.pi * p)[:, None]
+    y = np.tanh(x @ mix[0]) * (1 + turn) + np.tanh(x @ mix[1]) * (1 - turn)
+    heights = rng.normal(0, 5, (rows * fits, 3 * layout.samples)).astype(np.float32)
+    return ClipRows(
+        name,
+        layout,
+        skeleton.to_dict(),
+        x,
+        (y + rng.normal(0, 0.05, y.shape)).astype(np.float32),
+        p,
+        rng.uniform(0, 10, (rows, 1)).astype(np.float32),
+        np.arange(60, 60 + rows),
+        np.arange(rows) // 40,
+        np.full(rows, fits),
+        heights,
+        rng.normal(0, 3, rows * fits).astype(np.float32),
+        10,
+    )
+
+
+@pytest.fixture(scope="session")
+def small_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """230 rows to train on and 70 held out, ten fits each or one: 2,300 samples a pass."""
+    path = tmp_path_factory.mktemp("database") / "all"
+    clips = {
+        "walk": clip_rows("walk", 150, 1, 1),
+        "hop": clip_rows("hop", 80, 10, 2),
+        "turn": clip_rows("turn", 70, 1, 3),
+    }
+    write_database(path, clips, SPLITS, injury=True, joint_weight=0.1)
+    return path
+
+
+@pytest.fixture
+def data(small_database: Path) -> Database:
+    return Database.open(small_database, 64)
+
+
+@pytest.fixture
+def network() -> dict[str, int]:
+    return {"hidden_layers": 2, "units": 24, "control_points": 4}
+
+
+@pytest.fixture
+def training() -> dict[str, object]:
+    return {
+        "passes": 2,
+        "sections": 3,
+        "batch": 32,
+        "learning_rate": 1e-3,
+        "beta1": 0.9,
+        "beta2": 0.999,
+        "dropout": 0.3,
+        "l1": 0.01,
+        "seed": 1,
+        "memory_mb": 64,
+        "continues": None,
+        "device": "cpu",
+    }
