@@ -1,0 +1,261 @@
+"""The character as a game programmer takes it: load it once, ask it for the next pose every frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.runtime.axes import Axes
+from hobble.runtime.character import Character, standing
+from hobble.runtime.controller import Controller
+from hobble.runtime.ground import as_ground
+from hobble.runtime.network import Network, load_network
+from hobble.runtime.predictor import Predictor
+from hobble.runtime.trajectory import STILL
+from hobble.runtime.waypoints import Follower, Waypoint
+
+JOG_FROM = 5.0  # cm a frame: between walking at 2.5 and jogging at 7.5
+TURN_IN_PLACE = np.radians(20)  # a standing figure steps around to face what is further aside than this
+
+
+@dataclass(frozen=True)
+class Pose:
+    """One frame, the caller's to keep and to change. For one character the leading axis C is left out.
+
+    positions: (C, J, 3); rotations: (C, J, 4) world, w first; contacts: (C, 4) left heel, left toe, right
+    heel, right toe, 0..1; phase: (C,) in cycles; root: (C, 3) where the trajectory is; yaw: (C,) radians of
+    its facing, 0 for +Z, growing to the left; severity: (C, L) as the network was told.
+    """
+
+    positions: Array = field(repr=False)
+    rotations: Array = field(repr=False)
+    contacts: Array
+    phase: Any
+    root: Array
+    yaw: Any
+    severity: Array = field(repr=False)
+
+
+class ProceduralAnimation:
+    """One or many characters that one network moves.
+
+        character = ProceduralAnimation.load("results/injured/network")
+        pose = character.next_pose((0, 2.5), injury={"LeftUpLeg-LeftLeg": 7})
+
+    All characters answer to the same calls; with C > 1 every argument may be given once for all or for each.
+    """
+
+    def __init__(
+        self,
+        network: Network,
+        *,
+        mode: str = "cubic",
+        storage: str = "float32",
+        characters: int = 1,
+        waypoints: Sequence[Waypoint] | None = None,
+        severity_rate: float = 10.0,
+        severity_scale: float = 1.0,
+        foot_locking: bool = True,
+        axes: Axes | None = None,
+        position: Any = None,
+        facing: Any = None,
+    ) -> None:
+        if network.skeleton is None:
+            raise ValueError("the network carries no skeleton: load it with skeleton=")
+        if characters < 1 or severity_rate <= 0 or severity_scale <= 0:
+            raise ValueError("characters, severity_rate and severity_scale are positive")
+        self.network, self.skeleton = network, network.skeleton
+        self.characters, self.axes = characters, axes or Axes()
+        self.severity_scale = severity_scale
+        self._severity_rate, self._foot_locking = severity_rate, foot_locking
+        self._predictor = Predictor(network, mode, storage)
+        self._waypoints = waypoints
+        self._links = {name: i for i, name in enumerate(network.links)}
+        self._gaits = {name: i for i, name in enumerate(network.gaits)}
+        self._terrain: tuple[Any, Any] = (None, None)
+        self.reset(position, facing)
+
+    @classmethod
+    def load(
+        cls, path: str | Path, *, skeleton: Skeleton | None = None, **options: Any
+    ) -> ProceduralAnimation:
+        """From weights.npz, a folder that holds it, or a folder of the original release's .bin files.
+
+        skeleton: where the file carries none. mode: "constant", "linear" or "cubic". storage: "float32" or
+        "int16". characters: how many. waypoints: a track to follow when `next_pose` is given no velocity.
+        severity_rate: largest change of a severity in a second; severity_scale: severities are divided by
+        this. foot_locking: hold feet in contact where they landed. axes: the caller's convention. position,
+        facing: as of `reset`. Raises InputError where the file is not a network that fits.
+        """
+        network = load_network(path, skeleton)
+        if network.skeleton is None:
+            raise InputError(path, "carries no skeleton", fix="Pass skeleton=, with as many joints.")
+        return cls(network, **options)
+
+    def reset(self, position: Any = None, facing: Any = None) -> None:
+        """Stand anew at `position` (3,) or (C, 3) facing the direction `facing` (3,) or (C, 3), healthy.
+
+        By default at the origin facing forward, or at the start of the waypoints, all characters in one
+        place.
+        """
+        count = self.characters
+        self.follower = Follower(self._waypoints, count) if self._waypoints is not None else None
+        place, yaw = self.follower.start if self.follower else (np.zeros(2), 0.0)
+        places = (
+            np.broadcast_to(place, (count, 2))
+            if position is None
+            else self._level(position, self.axes.points_in)
+        )
+        if facing is None:
+            yaws = np.full(count, yaw)
+        else:
+            ahead = self._level(facing, self.axes.directions_in)
+            yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
+        self.state: Character = standing(self.network, count, np.array(places, float), yaws)
+        self._controller = Controller(
+            self._predictor, self.state, severity_rate=self._severity_rate, foot_locking=self._foot_locking
+        )
+        self._wish_gait = np.zeros((count, len(self._gaits)))
+
+    @property
+    def seconds(self) -> Array:
+        """(6,) seconds that the last frame spent in prepare, input, insert, predict, output, update."""
+        return self._controller.seconds
+
+    def next_pose(
+        self,
+        target_velocity: Any = None,
+        facing: Any = None,
+        gait: str | Sequence[str] | Array | None = None,
+        injury: Mapping[str, Any] | Array | None = None,
+        terrain: Any = None,
+    ) -> Pose:
+        """One 60 Hz frame on.
+
+        target_velocity: (2,) on the ground or (3,), or (C, 2 or 3), per frame; None follows the waypoints or
+        stands. facing: direction to look in, likewise; None looks where it goes. gait: a name ("walk"), one
+        for each, shares (C, 6), or None to choose by speed; below 0.1 cm a frame the figure stands, whatever
+        the gait. injury: link -> severity 0..10 (or (C,) severities), or (L,) or (C, L); links not named
+        heal; None leaves all as they were. terrain: None for flat at zero, a function of two ground
+        coordinates (arrays) to heights, a `ground.Heightmap` or a 2D array.
+        Raises KeyError for a link or gait that the network does not have, ValueError for a severity out of
+        range.
+        """
+        velocity, ahead, gait = self._wish(target_velocity, facing, gait)
+        strafe, direction = self._facing(velocity, ahead)
+        if injury is not None:
+            self.state.severity_target[:] = self._severities(injury)
+        if terrain is not self._terrain[0]:
+            self._terrain = (terrain, as_ground(terrain, self.axes))
+        shares = self._gait(velocity, direction, gait)
+        self._controller.frame(velocity, direction, strafe, shares, self._terrain[1])
+        return self._pose()
+
+    def _wish(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array | None, Any]:
+        if velocity is not None:
+            ahead = None if facing is None else self._level(facing, self.axes.directions_in)
+            return self._level(velocity, self.axes.points_in), ahead, gait
+        if self.follower is None:
+            ahead = None if facing is None else self._level(facing, self.axes.directions_in)
+            return np.zeros((self.characters, 2)), ahead, gait
+        middle = self.network.layout.window
+        wish, heading = self.follower.lead(self.state.position[:, middle])
+        ahead = wish.copy()
+        for c, waypoint in enumerate(heading):
+            if waypoint.facing is not None:
+                ahead[c] = waypoint.facing
+        return wish, ahead, [w.gait for w in heading] if gait is None else gait
+
+    def _level(self, vector: Any, convert: Any) -> Array:
+        """The caller's vectors as our x, z (C, 2); two components are those on the ground."""
+        v = np.asarray(vector, float)
+        if v.shape[-1] == 2:
+            if self.axes.native:
+                return np.array(np.broadcast_to(v, (self.characters, 2)))
+            full = np.zeros((*v.shape[:-1], 3))
+            full[..., [k for k in range(3) if k != "XYZ".index(self.axes.up)]] = v
+            v = full
+        if not self.axes.native:
+            v = convert(v)
+        return np.array(np.broadcast_to(v[..., ::2], (self.characters, 2)))
+
+    def _facing(self, velocity: Array, ahead: Array | None) -> tuple[Array, Array]:
+        """How much each figure strafes (C,) and where it wants to look (C, 2)."""
+        going = np.hypot(velocity[:, 0], velocity[:, 1]) >= STILL
+        if ahead is None:
+            return np.zeros(self.characters), np.where(going[:, None], velocity, self.state.target_direction)
+        angle = np.arctan2(velocity[:, 0], velocity[:, 1]) - np.arctan2(ahead[:, 0], ahead[:, 1])
+        aside = np.abs(np.mod(angle + np.pi, 2 * np.pi) - np.pi)
+        return np.where(going, np.minimum(1.0, aside / STRAFE_FROM), 1.0), ahead
+
+    def _gait(self, velocity: Array, direction: Array, gait: Any) -> Array:
+        """Shares (C, 6) of each gait that the wish amounts to."""
+        shares = self._wish_gait
+        speed = np.hypot(velocity[:, 0], velocity[:, 1])
+        if isinstance(gait, np.ndarray) and gait.dtype.kind == "f":
+            shares[:] = gait
+            return shares
+        names = [gait] * self.characters if gait is None or isinstance(gait, str) else gait
+        shares[:] = 0.0
+        for c, name in enumerate(names):
+            if name is None:
+                name = "jog" if speed[c] >= JOG_FROM else "walk"
+            if name not in self._gaits:
+                raise KeyError(f"no gait {name!r}: {', '.join(self._gaits)}")
+            if speed[c] < STILL:
+                shares[c, self._gaits["stand"]] = 1.0 - self._turning(c, direction[c])
+                shares[c, self._gaits["walk"]] = 1.0 - shares[c, self._gaits["stand"]]
+                if name != "crouch":
+                    continue
+            shares[c, self._gaits[name]] = 1.0
+        return shares
+
+    def _turning(self, c: int, direction: Array) -> float:
+        """1 where a standing figure has to step around to face `direction`, else 0."""
+        x, z = self.state.direction[c, self.network.layout.window]
+        angle = np.arctan2(direction[0] * z - direction[1] * x, direction[0] * x + direction[1] * z)
+        return float(abs(angle) > TURN_IN_PLACE)
+
+    def _severities(self, injury: Any) -> Array:
+        if isinstance(injury, Mapping):
+            values = np.zeros((self.characters, len(self._links)))
+            for name, value in injury.items():
+                if name not in self._links:
+                    known = ", ".join(self._links) or "none: this network has no severity inputs"
+                    raise KeyError(f"no link {name!r}: {known}")
+                values[:, self._links[name]] = value
+        else:
+            values = np.broadcast_to(np.asarray(injury, float), (self.characters, len(self._links)))
+        if not np.all((values >= 0) & (values <= 10)):
+            raise ValueError("a severity is a number from 0 to 10")
+        return values / self.severity_scale
+
+    def _pose(self) -> Pose:
+        c, state = self._controller, self.state
+        positions, rotations, root = c.pose_position.copy(), c.pose_rotation.copy(), c.root.copy()
+        if not self.axes.native:
+            positions, root = self.axes.points_out(positions), self.axes.points_out(root)
+            rotations = self.axes.rotations_out(rotations)
+        contacts = np.clip(c.y[:, c.layout.y_contacts], 0, 1)
+        severity = state.severity.copy()
+        if self.characters > 1:
+            return Pose(positions, rotations, contacts, state.phase.copy(), root, c.yaw.copy(), severity)
+        return Pose(
+            positions[0],
+            rotations[0],
+            contacts[0],
+            float(state.phase[0]),
+            root[0],
+            float(c.yaw[0]),
+            severity[0],
+        )
+
+
+STRAFE_FROM = np.radians(45)  # from this angle between facing and going, strafing is full

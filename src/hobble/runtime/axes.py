@@ -1,0 +1,75 @@
+"""The caller's axes and unit, converted in one place; ours: right-handed, Y up, +Z forward, cm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from hobble.core.quat import Array
+
+# Rows: the caller's x, y, z in terms of ours (left, up, forward).
+MATRICES = {
+    ("right", "Y"): ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    # Unity: x to the right, z forward.
+    ("left", "Y"): ((-1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    # Blender: a figure faces -y, its left is +x.
+    ("right", "Z"): ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
+    # Unreal: x forward, y to the right.
+    ("left", "Z"): ((0, 0, 1), (-1, 0, 0), (0, 1, 0)),
+}
+UNITS = {"cm": 1.0, "m": 0.01}
+
+
+@dataclass(frozen=True)
+class Axes:
+    """A convention: handedness, the axis that points up, and the unit of length.
+
+    Velocities are per 60 Hz frame in every convention; quaternions are w first.
+    """
+
+    handed: Literal["right", "left"] = "right"
+    up: Literal["Y", "Z"] = "Y"
+    unit: Literal["cm", "m"] = "cm"
+
+    def __post_init__(self) -> None:
+        if (self.handed, self.up) not in MATRICES or self.unit not in UNITS:
+            raise ValueError(f"{self}: handed is right or left, up is Y or Z, unit is cm or m")
+
+    @property
+    def native(self) -> bool:
+        """Whether nothing needs converting."""
+        return (self.handed, self.up, self.unit) == ("right", "Y", "cm")
+
+    @property
+    def matrix(self) -> Array:
+        """(3, 3) signed permutation that takes our directions to the caller's."""
+        return np.array(MATRICES[self.handed, self.up], float)
+
+    @property
+    def scale(self) -> float:
+        """The caller's units in a centimetre."""
+        return UNITS[self.unit]
+
+    def directions_out(self, v: Array) -> Array:
+        """Our directions (..., 3) as the caller's."""
+        return v @ self.matrix.T
+
+    def directions_in(self, v: Array) -> Array:
+        """The caller's directions (..., 3) as ours."""
+        return v @ self.matrix
+
+    def points_out(self, p: Array) -> Array:
+        """Our positions or velocities (..., 3), cm, as the caller's."""
+        return self.directions_out(p) * self.scale
+
+    def points_in(self, p: Array) -> Array:
+        """The caller's positions or velocities (..., 3) as ours, cm."""
+        return self.directions_in(p) / self.scale
+
+    def rotations_out(self, q: Array) -> Array:
+        """Our rotations (..., 4) as the caller's: M R M^-1, whose axis turns over with a change of hand."""
+        out = np.array(q, float)
+        out[..., 1:] = self.directions_out(out[..., 1:]) * np.linalg.det(self.matrix).round()
+        return out

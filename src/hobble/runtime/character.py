@@ -1,0 +1,79 @@
+"""What a character is between two frames: pose, trajectory, phase, wishes, severities, feet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.runtime.network import Network
+
+
+@dataclass
+class Character:
+    """The state of C characters, changed in place by the controller. World axes, cm, velocities per frame.
+
+    position, direction: (C, T, 2) trajectory; gait: (C, T, 6). ground: (C, samples, 3) heights at left, path,
+    right; root_height: (C,) mean of those on the path. joint_position, joint_velocity: (C, J, 3);
+    joint_rotation: (C, J, 4) world: the network's own copy. phase: (C,). severity, severity_target: (C, L).
+    target_velocity, target_direction: (C, 2); strafe: (C,). foot_lock (C, 2), foot_hold (C, 2, 3), foot_lift
+    (C, 2): of `feet`.
+    """
+
+    position: Array
+    direction: Array
+    gait: Array
+    ground: Array
+    root_height: Array
+    joint_position: Array
+    joint_velocity: Array
+    joint_rotation: Array
+    phase: Array
+    severity: Array
+    severity_target: Array
+    target_velocity: Array
+    target_direction: Array
+    strafe: Array
+    foot_lock: Array
+    foot_hold: Array
+    foot_lift: Array
+
+
+def standing(network: Network, characters: int, position: Array, yaw: Array) -> Character:
+    """C characters in the network's mean pose at ground positions (C, 2), facing `yaw` (C,) in radians."""
+    layout = network.layout
+    count, joints, length = characters, layout.joints, 2 * layout.window
+    mean = network.y_mean.astype(float)
+    sin, cos = np.sin(yaw)[:, None], np.cos(yaw)[:, None]
+    x, y, z = mean[layout.y_joint_position].reshape(joints, 3).T
+    placed = np.stack(
+        [
+            x * cos + z * sin + position[:, :1],
+            np.broadcast_to(y, (count, joints)),
+            z * cos - x * sin + position[:, 1:],
+        ],
+        axis=-1,
+    )
+    gait = np.zeros((count, length, len(network.gaits)))
+    gait[..., network.gaits.index("stand")] = 1.0
+    facing = np.concatenate([sin, cos], axis=1)
+    return Character(
+        position=np.repeat(position[:, None], length, axis=1).astype(float),
+        direction=np.repeat(facing[:, None], length, axis=1),
+        gait=gait,
+        ground=np.zeros((count, layout.samples, 3)),
+        root_height=np.zeros(count),
+        joint_position=np.ascontiguousarray(placed),
+        joint_velocity=np.zeros((count, joints, 3)),
+        joint_rotation=np.tile([1.0, 0, 0, 0], (count, joints, 1)),
+        phase=np.zeros(count),
+        severity=np.zeros((count, layout.links)),
+        severity_target=np.zeros((count, layout.links)),
+        target_velocity=np.zeros((count, 2)),
+        target_direction=facing.copy(),
+        strafe=np.zeros(count),
+        foot_lock=np.zeros((count, 2)),
+        foot_hold=np.zeros((count, 2, 3)),
+        foot_lift=np.zeros((count, 2)),
+    )

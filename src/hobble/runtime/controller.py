@@ -1,0 +1,233 @@
+"""One frame of a character in six timed steps: prepare, input, insert, predict, output, update.
+
+- prepare: the caller's wish becomes targets, the future trajectory bends toward them, the ground is looked
+up;
+- input: trajectory, gait, ground, last pose and severities are put into a row X, in the root frame;
+- insert: the row is standardised into the network's input;
+- predict: the network at the present phase gives Y;
+- output: Y becomes the pose in the world, and the copy for the caller gets its feet placed;
+- update: root, past and future trajectory and phase move on by one frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from hobble.core.quat import Array
+from hobble.runtime import feet, trajectory
+from hobble.runtime.character import Character
+from hobble.runtime.predictor import Predictor
+
+STEPS = ("prepare", "input", "insert", "predict", "output", "update")
+FPS = 60
+
+Ground = Callable[[Array, Array], Array]
+
+
+class Controller:
+    """Runs characters of one network; `seconds` (6,) holds what each of STEPS took in the last frame.
+
+    severity_rate: largest change of a severity in a second; side: centimetres from the path to the side
+    heights. foot_locking: hold feet in contact where they landed.
+    """
+
+    def __init__(
+        self,
+        predictor: Predictor,
+        character: Character,
+        *,
+        severity_rate: float,
+        foot_locking: bool = True,
+        side: float = 25.0,
+    ) -> None:
+        network = predictor.network
+        layout = network.layout
+        count = len(character.phase)
+        self.predictor, self.character, self.layout = predictor, character, layout
+        self.severity_step = severity_rate / FPS
+        self.side, self.foot_locking = side, foot_locking
+        self.seconds = np.zeros(len(STEPS))
+        self.x = np.zeros((count, layout.x_size), np.float32)
+        self.z = np.zeros_like(self.x)
+        self.y = np.zeros((count, layout.y_size), np.float32)
+        self.root = np.zeros((count, 3))
+        self.yaw = np.zeros(count)
+        self.pose_position = character.joint_position.copy()
+        self.pose_rotation = character.joint_rotation.copy()
+        self._points = np.zeros((count, layout.samples, 3, 2))
+        self._x_columns = np.array([s.start for s in layout.blocks("x").values()], np.int64)
+        self._y_columns = trajectory.advance_columns(layout)
+        self._y_joints = np.array([layout.y_joint_position.start, layout.y_contacts.start], np.int64)
+        assert network.skeleton is not None
+        self._legs = feet.leg_joints(network.skeleton)
+        self._carried = feet.carried(network.skeleton, self._legs)
+        self._sole = feet.sole_heights(network, self._legs)
+        self._foot_ground = np.zeros((count, 4))
+
+    def frame(
+        self,
+        wish_velocity: Array,
+        wish_direction: Array,
+        wish_strafe: Array,
+        wish_gait: Array,
+        ground: Ground | None,
+    ) -> None:
+        """Run one frame; wishes as `trajectory.follow_wish`, ground: heights (N,) of world x, z (N,), or
+        flat."""
+        clock = perf_counter
+        t0 = clock()
+        self._prepare(wish_velocity, wish_direction, wish_strafe, wish_gait, ground)
+        t1 = clock()
+        self._input()
+        t2 = clock()
+        self.predictor.standardise(self.x, self.z)
+        t3 = clock()
+        self.predictor.evaluate(self.z, self.character.phase, self.y)
+        t4 = clock()
+        self._output(ground)
+        t5 = clock()
+        self._update()
+        t6 = clock()
+        self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
+
+    def _prepare(
+        self, velocity: Array, direction: Array, strafe: Array, gait: Array, ground: Ground | None
+    ) -> None:
+        c = self.character
+        _prepare(
+            velocity, direction, strafe, gait, c.target_velocity, c.target_direction, c.strafe, c.gait,
+            c.position, c.direction, c.severity, c.severity_target, self.severity_step,
+            self.layout.step, self.side, self._points,
+        )  # fmt: skip
+        if ground is None:
+            c.ground[:] = 0.0
+        else:
+            flat = self._points.reshape(-1, 2)
+            c.ground[:] = np.asarray(ground(flat[:, 0], flat[:, 1])).reshape(c.ground.shape)
+        c.root_height[:] = c.ground[:, :, 1].mean(axis=1)
+
+    def _input(self) -> None:
+        c = self.character
+        _fill_input(
+            c.position, c.direction, c.gait, c.ground, c.root_height, c.joint_position, c.joint_velocity,
+            c.severity, self._x_columns, self.layout.step, self.x,
+        )  # fmt: skip
+
+    def _output(self, ground: Ground | None) -> None:
+        c = self.character
+        _take_output(
+            self.y, self._y_joints, c.position, c.direction, c.root_height, c.joint_position,
+            c.joint_velocity, c.joint_rotation, self.root, self.yaw, self.pose_position, self.pose_rotation,
+        )  # fmt: skip
+        if ground is not None:
+            points = self.pose_position[:, self._legs[:, 2:].reshape(-1)]
+            at = np.ascontiguousarray(points).reshape(-1, 3)
+            self._foot_ground[:] = np.asarray(ground(at[:, 0], at[:, 2])).reshape(self._foot_ground.shape)
+        else:
+            self._foot_ground[:] = 0.0
+        feet.place_feet(
+            self.y[:, self.layout.y_contacts], self._foot_ground, self.foot_locking, self._legs,
+            self._carried, self._sole, c.foot_lock, c.foot_hold, c.foot_lift, self.pose_position,
+            self.pose_rotation,
+        )  # fmt: skip
+
+    def _update(self) -> None:
+        c = self.character
+        trajectory.advance(self.y, self._y_columns, c.position, c.direction, c.gait, c.phase)
+
+
+@njit(cache=True)
+def _prepare(
+    wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, velocity: Any, target: Any,
+    strafe: Any, gait: Any, position: Any, direction: Any, severity: Any, severity_target: Any, severity_step:
+    float, step: int, side: float, points: Any,
+) -> None:  # fmt: skip
+    trajectory.follow_wish(
+        wish_velocity, wish_direction, wish_strafe, wish_gait, velocity, target, strafe, gait
+    )
+    trajectory.blend_future(velocity, target, strafe, position, direction, gait)
+    trajectory.sample_points(position, direction, step, side, points)
+    for c in range(severity.shape[0]):
+        for k in range(severity.shape[1]):
+            change = severity_target[c, k] - severity[c, k]
+            severity[c, k] += min(max(change, -severity_step), severity_step)
+
+
+@njit(cache=True)
+def _fill_input(
+    position: Any, direction: Any, gait: Any, ground: Any, height: Any, joints: Any, velocities: Any,
+    severity: Any,
+    at: Any, step: int, x: Any,
+) -> None:  # fmt: skip
+    """Fill rows X; at: first columns of the blocks of X in order."""
+    middle, samples = position.shape[1] // 2, ground.shape[1]
+    for c in range(x.shape[0]):
+        px, pz = position[c, middle]
+        cos, sin = direction[c, middle, 1], direction[c, middle, 0]
+        for s in range(samples):
+            dx, dz = position[c, s * step, 0] - px, position[c, s * step, 1] - pz
+            x[c, at[0] + s] = dx * cos - dz * sin
+            x[c, at[0] + samples + s] = dx * sin + dz * cos
+            dx, dz = direction[c, s * step]
+            x[c, at[1] + s] = dx * cos - dz * sin
+            x[c, at[1] + samples + s] = dx * sin + dz * cos
+            for g in range(gait.shape[2]):
+                x[c, at[2] + g * samples + s] = gait[c, s * step, g]
+            for side in range(3):
+                x[c, at[5] + side * samples + s] = ground[c, s, side] - height[c]
+        px, pz = position[c, middle - 1]
+        cos, sin = direction[c, middle - 1, 1], direction[c, middle - 1, 0]
+        for j in range(joints.shape[1]):
+            dx, dz = joints[c, j, 0] - px, joints[c, j, 2] - pz
+            k = at[3] + 3 * j
+            x[c, k], x[c, k + 1], x[c, k + 2] = (
+                dx * cos - dz * sin,
+                joints[c, j, 1] - height[c],
+                dx * sin + dz * cos,
+            )
+            dx, dz = velocities[c, j, 0], velocities[c, j, 2]
+            k = at[4] + 3 * j
+            x[c, k], x[c, k + 1], x[c, k + 2] = dx * cos - dz * sin, velocities[c, j, 1], dx * sin + dz * cos
+        for k in range(severity.shape[1]):
+            x[c, at[6] + k] = severity[c, k]
+
+
+@njit(cache=True)
+def _take_output(
+    y: Any, at: Any, position: Any, direction: Any, height: Any, joints: Any, velocities: Any, rotations: Any,
+    root: Any, yaw: Any, pose_position: Any, pose_rotation: Any,
+) -> None:  # fmt: skip
+    """Bring predicted joints into the world; positions meet halfway with where their velocity carries
+    them."""
+    middle, count = position.shape[1] // 2, joints.shape[1]
+    for c in range(y.shape[0]):
+        sin, cos = direction[c, middle, 0], direction[c, middle, 1]
+        root[c, 0], root[c, 1], root[c, 2] = position[c, middle, 0], height[c], position[c, middle, 1]
+        yaw[c] = np.arctan2(sin, cos)
+        half_cos, half_sin = np.cos(yaw[c] / 2), np.sin(yaw[c] / 2)
+        for j in range(count):
+            p = at[0] + 3 * j
+            v, r = p + 3 * count, p + 6 * count
+            velocities[c, j, 0] = y[c, v] * cos + y[c, v + 2] * sin
+            velocities[c, j, 1] = y[c, v + 1]
+            velocities[c, j, 2] = y[c, v + 2] * cos - y[c, v] * sin
+            new_x = y[c, p] * cos + y[c, p + 2] * sin + root[c, 0]
+            new_z = y[c, p + 2] * cos - y[c, p] * sin + root[c, 2]
+            joints[c, j, 0] = 0.5 * (joints[c, j, 0] + velocities[c, j, 0] + new_x)
+            joints[c, j, 1] = 0.5 * (joints[c, j, 1] + velocities[c, j, 1] + y[c, p + 1] + root[c, 1])
+            joints[c, j, 2] = 0.5 * (joints[c, j, 2] + velocities[c, j, 2] + new_z)
+            rx, ry, rz = y[c, r], y[c, r + 1], y[c, r + 2]
+            half = np.sqrt(rx * rx + ry * ry + rz * rz)
+            scale = np.sin(half) / half if half > 1e-8 else 1.0
+            w, rx, ry, rz = np.cos(half), rx * scale, ry * scale, rz * scale
+            rotations[c, j, 0] = half_cos * w - half_sin * ry
+            rotations[c, j, 1] = half_cos * rx + half_sin * rz
+            rotations[c, j, 2] = half_cos * ry + half_sin * w
+            rotations[c, j, 3] = half_cos * rz - half_sin * rx
+        pose_position[c] = joints[c]
+        pose_rotation[c] = rotations[c]

@@ -1,0 +1,78 @@
+"""The ground under a character as the caller has it: a function, a heightmap, an array, or nothing (flat)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from hobble.core.quat import Array
+from hobble.runtime.axes import Axes
+
+CELL = 3.937007874  # centimetres a cell of the heightmaps of Holden et al. 2017
+
+
+@dataclass(frozen=True)
+class Heightmap:
+    """Heights (rows, columns) in cm: columns along +X, rows along +Z, `cell` cm apart, about `centre` (x, z).
+
+    Outside, the border goes on.
+    """
+
+    heights: Array = field(repr=False)
+    cell: float = CELL
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        heights = np.ascontiguousarray(self.heights, float)
+        if heights.ndim != 2 or min(heights.shape) < 2 or not np.all(np.isfinite(heights)):
+            raise ValueError(f"a heightmap is a finite 2D array of 2 x 2 or more, not {heights.shape}")
+        object.__setattr__(self, "heights", heights)
+
+    def __call__(self, x: Array, z: Array) -> Array:
+        """Heights (N,) at world x, z (N,), bilinear."""
+        return _bilinear(self.heights, self.cell, self.centre[0], self.centre[1], x, z)
+
+
+def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | None:
+    """A function of our x, z (N,) to our heights (N,) from what the caller gave in the axes given.
+
+    terrain: None (flat at zero), a function of the caller's two ground coordinates (arrays) to heights, a
+    Heightmap, or a 2D array of heights (a Heightmap around the origin; in cm, whatever the unit).
+    """
+    if terrain is None or isinstance(terrain, Heightmap):
+        return terrain
+    if isinstance(terrain, np.ndarray):
+        return Heightmap(terrain)
+    if not callable(terrain):
+        raise TypeError(
+            f"terrain is a function, a Heightmap, a 2D array or None, not {type(terrain).__name__}"
+        )
+    if axes.native:
+        return terrain  # type: ignore[no-any-return]
+    up = "XYZ".index(axes.up)
+    level = [k for k in range(3) if k != up]
+
+    def converted(x: Array, z: Array) -> Array:
+        points = axes.points_out(np.stack([x, np.zeros_like(x), z], axis=-1))
+        return np.asarray(terrain(points[:, level[0]], points[:, level[1]])) / axes.scale
+
+    return converted
+
+
+@njit(cache=True)
+def _bilinear(heights: Any, cell: float, centre_x: float, centre_z: float, x: Any, z: Any) -> Any:
+    rows, columns = heights.shape
+    out = np.empty(x.size)
+    for n in range(x.size):
+        u = min(max((x[n] - centre_x) / cell + (columns - 1) / 2, 0.0), columns - 1.0)
+        v = min(max((z[n] - centre_z) / cell + (rows - 1) / 2, 0.0), rows - 1.0)
+        i, j = min(int(u), columns - 2), min(int(v), rows - 2)
+        u, v = u - i, v - j
+        low = heights[j, i] * (1 - u) + heights[j, i + 1] * u
+        high = heights[j + 1, i] * (1 - u) + heights[j + 1, i + 1] * u
+        out[n] = low * (1 - v) + high * v
+    return out

@@ -1,0 +1,141 @@
+"""The path of a character on the ground: one entry a frame, half of it past, half wished for and predicted.
+
+Arrays lead with the characters: position and direction (C, T, 2) hold world x and z, gait (C, T, 6); T is
+twice the window (120) and entry T/2 is the present frame. Angles are yaw: 0 faces +Z, growing toward +X (the
+left). The formulas are those of the runtime of Holden et al. 2017.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from hobble.database.layout import RowLayout
+
+TARGET_MIX = 0.9
+GAIT_MIX = 0.1
+STILL = 0.1  # cm a frame: a slower wish is a wish to stand
+
+
+@njit(cache=True)
+def wrap(angle: float) -> float:
+    """The same angle within -pi..pi."""
+    return angle - 2 * np.pi * np.floor((angle + np.pi) / (2 * np.pi))
+
+
+@njit(cache=True)
+def follow_wish(
+    wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any,
+    velocity: Any, direction: Any, strafe: Any, gait: Any,
+) -> None:  # fmt: skip
+    """Move the smoothed targets toward what the caller asks for; the present frame's gait blends slowly.
+
+    wish_velocity, wish_direction, velocity, direction: (C, 2); wish_strafe, strafe: (C,); wish_gait: (C, 6).
+    """
+    middle = gait.shape[1] // 2
+    for c in range(velocity.shape[0]):
+        for k in range(2):
+            velocity[c, k] += TARGET_MIX * (wish_velocity[c, k] - velocity[c, k])
+        now = np.arctan2(direction[c, 0], direction[c, 1])
+        now += TARGET_MIX * wrap(np.arctan2(wish_direction[c, 0], wish_direction[c, 1]) - now)
+        direction[c, 0], direction[c, 1] = np.sin(now), np.cos(now)
+        strafe[c] += TARGET_MIX * (wish_strafe[c] - strafe[c])
+        for k in range(gait.shape[2]):
+            gait[c, middle, k] += GAIT_MIX * (wish_gait[c, k] - gait[c, middle, k])
+
+
+@njit(cache=True)
+def blend_future(velocity: Any, target: Any, strafe: Any, position: Any, direction: Any, gait: Any) -> None:
+    """Bend the predicted future toward the wished velocity and facing, more the further ahead.
+
+    The share of the wish is 1 - (1 - t)^b: b .5 for the position (1 when strafing), 2 for the direction (.5
+    when strafing). velocity, target: (C, 2) smoothed wishes.
+    """
+    length = position.shape[1]
+    middle = length // 2
+    for c in range(position.shape[0]):
+        bias_position = 0.5 + 0.5 * strafe[c]
+        bias_direction = 2.0 - 1.5 * strafe[c]
+        goal = np.arctan2(target[c, 0], target[c, 1])
+        old_x, old_z = position[c, middle]
+        for i in range(middle + 1, length):
+            left = 1.0 - (i - middle) / middle
+            share = 1.0 - left**bias_position
+            step_x, step_z = position[c, i, 0] - old_x, position[c, i, 1] - old_z
+            old_x, old_z = position[c, i]
+            position[c, i, 0] = position[c, i - 1, 0] + step_x + share * (velocity[c, 0] - step_x)
+            position[c, i, 1] = position[c, i - 1, 1] + step_z + share * (velocity[c, 1] - step_z)
+            share = 1.0 - left**bias_direction
+            yaw = np.arctan2(direction[c, i, 0], direction[c, i, 1])
+            yaw += share * wrap(goal - yaw)
+            direction[c, i, 0], direction[c, i, 1] = np.sin(yaw), np.cos(yaw)
+            for k in range(gait.shape[2]):
+                gait[c, i, k] = gait[c, middle, k]
+
+
+@njit(cache=True)
+def sample_points(position: Any, direction: Any, step: int, side: float, points: Any) -> None:
+    """Where the ground is looked up: points (C, samples, 3, 2) to the left, on the path and to the right."""
+    for c in range(points.shape[0]):
+        for s in range(points.shape[1]):
+            x, z = position[c, s * step]
+            dx, dz = direction[c, s * step]
+            points[c, s, 0, 0], points[c, s, 0, 1] = x + side * dz, z - side * dx
+            points[c, s, 1, 0], points[c, s, 1, 1] = x, z
+            points[c, s, 2, 0], points[c, s, 2, 1] = x - side * dz, z + side * dx
+
+
+@njit(cache=True)
+def advance(y: Any, at: Any, position: Any, direction: Any, gait: Any, phase: Any) -> None:
+    """One frame on: shift the past, move and turn the root, take the predicted future, advance the phase.
+
+    y: (C, outputs) prediction; at: columns of y (root velocity, turn, phase change, position, direction) and
+    the future samples and step. A standing figure is held: movement is scaled by (1 - stand)^.25.
+    The predicted yaw velocity is that of the world seen from the root, so the root turns by its negative.
+    """
+    length = position.shape[1]
+    middle = length // 2
+    future, step = at[5], at[6]
+    for c in range(y.shape[0]):
+        for i in range(middle):
+            for k in range(2):
+                position[c, i, k] = position[c, i + 1, k]
+                direction[c, i, k] = direction[c, i + 1, k]
+            for k in range(gait.shape[2]):
+                gait[c, i, k] = gait[c, i + 1, k]
+        moving = max(0.0, 1.0 - gait[c, middle, 0]) ** 0.25
+        yaw = np.arctan2(direction[c, middle, 0], direction[c, middle, 1])
+        sin, cos = np.sin(yaw), np.cos(yaw)
+        vx, vz = y[c, at[0]], y[c, at[0] + 1]
+        position[c, middle, 0] += moving * (vx * cos + vz * sin)
+        position[c, middle, 1] += moving * (vz * cos - vx * sin)
+        yaw -= moving * y[c, at[1]]
+        sin, cos = np.sin(yaw), np.cos(yaw)
+        direction[c, middle, 0], direction[c, middle, 1] = sin, cos
+        for i in range(middle + 1, length):
+            # Past the last predicted sample the line through the last two goes on.
+            place = (i - middle) / step
+            k = min(int(place), future - 2)
+            m = place - k
+            p, d = at[3] + k, at[4] + k
+            x = (1 - m) * y[c, p] + m * y[c, p + 1]
+            z = (1 - m) * y[c, p + future] + m * y[c, p + future + 1]
+            position[c, i, 0] = position[c, middle, 0] + x * cos + z * sin
+            position[c, i, 1] = position[c, middle, 1] + z * cos - x * sin
+            x = (1 - m) * y[c, d] + m * y[c, d + 1]
+            z = (1 - m) * y[c, d + future] + m * y[c, d + future + 1]
+            norm = max(np.sqrt(x * x + z * z), 1e-6)
+            direction[c, i, 0] = (x * cos + z * sin) / norm
+            direction[c, i, 1] = (z * cos - x * sin) / norm
+        change = (0.9 * moving + 0.1) * y[c, at[2]]
+        phase[c] = phase[c] + change - np.floor(phase[c] + change)
+
+
+def advance_columns(layout: RowLayout) -> np.ndarray:
+    """The columns that `advance` reads, as the integers it takes."""
+    blocks = (
+        layout.y_root_velocity, layout.y_turn, layout.y_phase_change, layout.y_position, layout.y_direction
+    )  # fmt: skip
+    return np.array([*(b.start for b in blocks), layout.future, layout.step], np.int64)

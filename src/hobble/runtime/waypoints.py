@@ -1,0 +1,87 @@
+"""Following a track of waypoints: where to go, how fast, in which gait, facing where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hobble.core.quat import Array
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """A place to reach: ground position x, z in cm, gait and speed (cm a frame) on the way there.
+
+    facing: world direction (x, z) to look in on the way (strafing); None looks ahead.
+    """
+
+    position: tuple[float, float]
+    gait: str
+    speed: float
+    facing: tuple[float, float] | None = None
+
+
+# The track of Segerstedt 2021, positions given there in metres.
+TRACK = (
+    Waypoint((-3000.0, 4000.0), "walk", 2.5),
+    Waypoint((-5000.0, 0.0), "walk", 2.5, (-0.5, -0.5)),
+    Waypoint((-2500.0, -2500.0), "jog", 10.5),
+    Waypoint((2500.0, -4000.0), "jog", 10.5),
+    Waypoint((1000.0, -1000.0), "crouch", 2.0),
+    Waypoint((2500.0, 5000.0), "walk", 2.5, (0.0, -1.0)),
+)
+ARRIVED = 100.0  # centimetres from a waypoint at which it counts as reached
+
+
+class Follower:
+    """Leads C characters around a closed track, each at its own place on it.
+
+    Every character starts toward waypoint 0, coming from the last one. `reached` (C,) counts waypoints;
+    `off_path` (C,) is the present distance in cm from the straight line between the two waypoints it is
+    between.
+    """
+
+    def __init__(
+        self, track: Sequence[Waypoint] = TRACK, characters: int = 1, arrived: float = ARRIVED
+    ) -> None:
+        if len(track) < 2:
+            raise ValueError("a track has two waypoints or more")
+        self.track, self.arrived = tuple(track), arrived
+        self.places = np.array([w.position for w in self.track], float)
+        self.reached = np.zeros(characters, int)
+        self.off_path = np.zeros(characters)
+
+    @property
+    def start(self) -> tuple[Array, float]:
+        """Where a lap begins, (2,) cm, and the yaw that looks toward waypoint 0."""
+        way = self.places[0] - self.places[-1]
+        return self.places[-1].copy(), float(np.arctan2(way[0], way[1]))
+
+    def lead(self, position: Array) -> tuple[Array, list[Waypoint]]:
+        """Velocities (C, 2) toward the present waypoints of characters at ground positions (C, 2), and
+        those."""
+        velocity = np.zeros_like(position)
+        heading = []
+        for c, place in enumerate(position):
+            n = self.reached[c] % len(self.track)
+            x, z = self.places[n] - place
+            distance = (x * x + z * z) ** 0.5
+            if distance < self.arrived:
+                self.reached[c] += 1
+                n = (n + 1) % len(self.track)
+                x, z = self.places[n] - place
+                distance = (x * x + z * z) ** 0.5
+            self.off_path[c] = _distance_to_line(place, self.places[n - 1], self.places[n])
+            scale = self.track[n].speed / max(distance, 1e-6)
+            velocity[c] = x * scale, z * scale
+            heading.append(self.track[n])
+        return velocity, heading
+
+
+def _distance_to_line(p: Array, a: Array, b: Array) -> float:
+    """Distance in cm of point p from the stretch from a to b, each (2,)."""
+    ax, az, bx, bz = p[0] - a[0], p[1] - a[1], b[0] - a[0], b[1] - a[1]
+    t = min(max((ax * bx + az * bz) / max(bx * bx + bz * bz, 1e-9), 0.0), 1.0)
+    return float(((ax - t * bx) ** 2 + (az - t * bz) ** 2) ** 0.5)

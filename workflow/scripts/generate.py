@@ -1,0 +1,14 @@
+"""Creates the generated motion of each scripted scenario (npz and BVH) from a trained network."""
+
+from hobble.runtime.network import load_network
+from hobble.runtime.scenarios import generate
+from hobble.workflow.job import job
+
+with job(snakemake) as log:
+    generate(
+        load_network(snakemake.input.weights),
+        snakemake.output.scenarios,
+        snakemake.output.bvh,
+        **snakemake.params.runtime,
+    )
+    log.info("wrote %s and %s", snakemake.output.scenarios, snakemake.output.bvh)
