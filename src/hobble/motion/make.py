@@ -17,6 +17,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.decode import Decoded, decode, frame_rate
 from hobble.motion.read import Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
+from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import Match, Target, clean_names, leg_length, load_skeleton, match_rig, unit_of
 
 STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
@@ -48,9 +49,9 @@ def make_clip(
 
     skeleton: the target's file. maps: the folder of the skeleton files. clip: the name of the clip made.
     options: the `motion` section of a data set (fps, source_fps, unit, up, proportions, defects).
-    Returns the clip and its report (`motion/<clip>.json` of docs/artefacts.md).
-    Raises InputError for a file that cannot be read, for another skeleton, and for what is broken beyond repair
-    or, with defects: refuse, broken at all.
+    Returns the clip and its report: `motion/<clip>.json` of docs/artefacts.md.
+    Raises InputError for a file that cannot be read, for another skeleton, and for what is broken beyond
+    repair or, with defects: refuse, broken at all.
     """
     target = load_skeleton(skeleton, skeleton_name)
     file = read_bvh(bvh)
@@ -137,7 +138,11 @@ def fit_skeleton(clip: Clip, match: Match, target: Skeleton, proportions: str) -
             return replace(own, skeleton=target), []
         if proportions == "clip":
             return own, []
-    raise NotImplementedError
+    made = retarget_clip(clip, plan(clip.skeleton, target, match.sources))
+    notes = []
+    if clip.translations is not None:
+        notes.append("Joints' motion in their parents is lost: the clip was put on another skeleton.")
+    return made, notes
 
 
 def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
