@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -79,6 +79,38 @@ class ClipRows:
                 raise InputError(where, f"{name} is not a number", frame=int(self.frame[np.argmax(bad)]))
         if not (np.isfinite(self.heights).all() and np.isfinite(self.mean).all()):
             raise InputError(where, "terrain heights are not numbers")
+
+
+class Pairs(NamedTuple):
+    """n (frame, fit) pairs as the original has its rows, float32: x (n, X), y (n, Y), p (n,).
+
+    row: (n,) index of the row; weight: (n,) 1 / fits of the row, so that every frame counts the same.
+    """
+
+    x: Array
+    y: Array
+    p: Array
+    row: np.ndarray
+    weight: Array
+
+
+def expanded(rows: ClipRows, links: bool, batch: int = 2048) -> Iterator[Pairs]:
+    """Every (frame, fit) pair of a clip in raw units, about `batch` at a time; with `links`, severities too."""
+    layout = rows.layout
+    first = rows.first_fit
+    start = 0
+    while start < len(rows):
+        stop = max(start + 1, int(np.searchsorted(first, first[start] + batch)))
+        fits = rows.fits[start:stop]
+        row = np.repeat(np.arange(start, stop), fits)
+        ground = slice(int(first[start]), int(first[stop - 1] + fits[-1]))
+        severity = rows.severity[row] if links else rows.severity[row, :0]
+        x = np.concatenate([rows.x[row], rows.heights[ground], severity], axis=1, dtype=np.float32)
+        y = rows.y[row].astype(np.float32)
+        for values, joints in ((x, layout.x_joint_position), (y, layout.y_joint_position)):
+            values[:, joints.start + 1 : joints.stop : 3] -= rows.mean[ground, None]
+        yield Pairs(x, y, rows.p[row], row, 1.0 / rows.fits[row])
+        start = stop
 
 
 def save_clip_rows(path: str | Path, rows: ClipRows) -> None:

@@ -1,0 +1,1 @@
+"""The `evaluation` stage: accuracy, responsivity and injury response, as JSON and CSV."""

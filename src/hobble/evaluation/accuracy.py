@@ -1,0 +1,144 @@
+"""How near one-step predictions come to the truth, per clip and for training and held-out clips.
+
+Segerstedt (2021), eq. 3.1: the mean over frames and joints of |t - p| / |t|, Euclidean norms of joint
+positions in the root frame, with its standard deviation over the same. The network is given the true input
+of every frame.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.database.clip_rows import ClipRows, expanded, load_clip_rows
+from hobble.database.layout import RowLayout
+from hobble.database.statistics import Moments
+from hobble.evaluation.predict import Weights, load_weights, predict
+
+LEAST = 1e-3  # cm; below this a joint stands at the root itself and a relative error says nothing
+SPLITS = ("train", "held_out")
+REFERENCE = "holden31"
+COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm")
+
+log = logging.getLogger("hobble")
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Relative error and position error (cm) over `frames` frames; a frame's fits share its weight."""
+
+    frames: int = 0
+    moments: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
+
+    def __add__(self, other: Errors) -> Errors:
+        return Errors(self.frames + other.frames, self.moments + other.moments)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data; None where there was no frame."""
+        if not self.frames:
+            return {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}
+        mean, sd = self.moments.mean, self.moments.std
+        return {
+            "frames": self.frames,
+            "mean": float(mean[0]),
+            "sd": float(sd[0]),
+            "position_error_cm": float(mean[1]),
+        }
+
+
+def joint_errors(layout: RowLayout, truth: Array, predicted: Array, joints: Sequence[int]) -> Array:
+    """(n, joints, 2): |t - p| / |t| and |t - p| in cm, of outputs Y (n, Y)."""
+    block = layout.y_joint_position
+    t = truth[:, block].reshape(len(truth), -1, 3)[:, joints].astype(np.float64)
+    p = predicted[:, block].reshape(len(truth), -1, 3)[:, joints]
+    distance = np.linalg.norm(t - p, axis=-1)
+    return np.stack([distance / np.maximum(np.linalg.norm(t, axis=-1), LEAST), distance], axis=-1)
+
+
+def clip_errors(network: Weights, rows: ClipRows, joints: Sequence[int]) -> Errors:
+    """The errors over every frame and fit of a clip, a batch at a time."""
+    layout = network.layout
+    total = Moments.nothing(2)
+    for pairs in expanded(rows, links=layout.links > 0):
+        errors = joint_errors(layout, pairs.y, predict(network, pairs.x, pairs.p), joints)
+        weights = np.repeat(pairs.weight / len(joints), len(joints))
+        total = total + Moments.of(errors.reshape(-1, 2), weights)
+    return Errors(len(rows), total)
+
+
+def measure(
+    weights: str | Path,
+    clips: Mapping[str, str | Path],
+    splits: Mapping[str, str],
+    configuration: str,
+    equivalents: Sequence[str] | None = None,
+) -> dict[str, Any]:
+    """accuracy.json: `train` and `held_out` over their frames, and `clips`, one entry a clip in name order.
+
+    clips: name -> file of rows. equivalents: names of the joints to measure; all by default.
+    `mean_of_clips` is the mean over clips that the published tables print. Raises InputError where rows and
+    network differ.
+    """
+    network = load_weights(weights)
+    joints = joint_indices(list(network.meta["skeleton"]["joints"]), equivalents)
+    entries = []
+    totals = dict.fromkeys(SPLITS, Errors())
+    for name in sorted(clips):
+        rows = load_clip_rows(clips[name])
+        _check(clips[name], rows, network)
+        errors = clip_errors(network, rows, joints)
+        totals[splits[name]] += errors
+        entries.append({"clip": name, "split": splits[name], **errors.to_dict()})
+        log.info("%s: %s", name, entries[-1])
+    result: dict[str, Any] = {"configuration": configuration, "joints": len(joints), "clips": entries}
+    for split in SPLITS:
+        means = [e["mean"] for e in entries if e["split"] == split and e["frames"]]
+        result[split] = {**totals[split].to_dict(), "clips": len(means)}
+        result[split]["mean_of_clips"] = float(np.mean(means)) if means else None
+    return result
+
+
+def equivalent_joints(skeleton: Mapping[str, Any], of: str = REFERENCE) -> list[str] | None:
+    """Names of the joints that have a counterpart on the skeleton `of`; None (all) without such a map.
+
+    skeleton: as config/skeletons/<name>.yaml holds it.
+    """
+    counterparts = skeleton.get("maps", {}).get(of)
+    return None if counterparts is None else list(counterparts)
+
+
+def joint_indices(joints: Sequence[str], equivalents: Sequence[str] | None) -> list[int]:
+    """Indices of the joints to measure, in their order."""
+    chosen = [i for i, name in enumerate(joints) if equivalents is None or name in equivalents]
+    if not chosen:
+        raise InputError("evaluation.joints", "none of the equivalent joints is in the network's skeleton")
+    return chosen
+
+
+def _check(where: str | Path, rows: ClipRows, network: Weights) -> None:
+    layout = network.layout
+    same = (layout.joints, layout.window, layout.step) == (
+        rows.layout.joints,
+        rows.layout.window,
+        rows.layout.step,
+    )
+    if not same or layout.links not in (0, rows.layout.links):
+        raise InputError(where, f"its rows ({rows.layout}) are not those the network has learnt ({layout})")
+
+
+def to_csv(result: Mapping[str, Any]) -> str:
+    """The clips' entries as CSV."""
+    text = io.StringIO()
+    table = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    table.writeheader()
+    table.writerows(result["clips"])
+    return text.getvalue()
