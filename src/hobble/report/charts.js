@@ -1,0 +1,87 @@
+// Charts: drawn when they come near the window, in the colours of the page's tokens, again when the theme changes.
+"use strict";
+const Hobble = { material: JSON.parse(document.getElementById("material").textContent), onTheme: [] };
+
+Hobble.colour = (() => {
+  // A custom property may hold light-dark(...), which only a real property resolves; so a hidden element wears it.
+  const probe = document.createElement("span");
+  probe.hidden = true;
+  document.body.append(probe);
+  let known = new Map();
+  Hobble.onTheme.push(() => { known = new Map(); });
+  return (token) => {
+    if (!known.has(token)) {
+      probe.style.color = `var(--${token})`;
+      known.set(token, getComputedStyle(probe).color);
+    }
+    return known.get(token);
+  };
+})();
+
+// The numbers [r, g, b] of a token, for blending.
+Hobble.rgb = (token) => (Hobble.colour(token).match(/[\d.]+/g) || [0, 0, 0]).slice(0, 3).map(Number);
+
+(() => {
+  const resolve = (value) => {
+    if (typeof value === "string") return value[0] === "@" ? Hobble.colour(value.slice(1)) : value;
+    if (Array.isArray(value)) return value.map(resolve);
+    if (value && typeof value === "object") {
+      return Object.fromEntries(Object.entries(value).map(([key, item]) => [key, resolve(item)]));
+    }
+    return value;
+  };
+  const merge = (base, over) => {
+    const out = { ...base };
+    for (const [key, value] of Object.entries(over || {})) {
+      const both = value && typeof value === "object" && !Array.isArray(value) && out[key];
+      out[key] = both ? merge(out[key], value) : value;
+    }
+    return out;
+  };
+  const axis = () => ({
+    gridcolor: "@line", zerolinecolor: "@line", linecolor: "@line", tickcolor: "@line", automargin: true,
+    title: { standoff: 10, font: { size: 12, color: "@soft" } }, tickfont: { size: 11.5, color: "@soft" },
+  });
+  const layout = (spec, narrow) => resolve(merge({
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", autosize: true,
+    font: { family: getComputedStyle(document.body).fontFamily, size: 12.5, color: "@ink" },
+    margin: { l: narrow ? 44 : 56, r: narrow ? 12 : 24, t: 30, b: 48 },
+    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 12, color: "@soft" } },
+    hoverlabel: { bgcolor: "@raised", bordercolor: "@line", font: { color: "@ink" } },
+    colorway: ["@accent", "@muted"], dragmode: narrow ? false : "zoom", bargap: 0.3,
+    xaxis: axis(), yaxis: axis(),
+  }, spec.layout));
+  const drawn = new Map();
+
+  const draw = (element) => {
+    const spec = Hobble.material.charts[element.dataset.chart];
+    if (!spec) return;
+    const narrow = element.clientWidth < 520;
+    const chosen = spec.options.length ? spec.options[drawn.get(element) || 0] : null;
+    const config = {
+      displaylogo: false, responsive: true, displayModeBar: narrow ? false : "hover",
+      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+      toImageButtonOptions: { format: "svg", filename: spec.name },
+    };
+    const traces = resolve(chosen ? chosen.traces : spec.traces);
+    const shape = layout(chosen && chosen.layout ? merge(spec, { layout: chosen.layout }) : spec, narrow);
+    if (!drawn.has(element)) drawn.set(element, 0);
+    Plotly.react(element, traces, shape, config);
+  };
+  Hobble.drawAll = () => document.querySelectorAll("[data-chart]").forEach(draw);
+
+  document.querySelectorAll("[data-chooses]").forEach((select) => {
+    select.addEventListener("change", () => {
+      const element = document.querySelector(`[data-chart="${CSS.escape(select.dataset.chooses)}"]`);
+      drawn.set(element, select.selectedIndex);
+      draw(element);
+    });
+  });
+  const near = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      if (entry.isIntersecting) { near.unobserve(entry.target); draw(entry.target); }
+    }
+  }, { rootMargin: "600px" });
+  document.querySelectorAll("[data-chart]").forEach((element) => near.observe(element));
+  Hobble.onTheme.push(() => { for (const element of drawn.keys()) draw(element); });
+})();

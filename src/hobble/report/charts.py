@@ -1,0 +1,73 @@
+"""Charts as plain plotly figures. Colours are names of the page's tokens ("@accent"), so that a theme can change them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+Trace = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A chart: what the page draws, and how to read it.
+
+    traces: plotly traces. options: alternatives to `traces`, by name, among which a chooser called `choose` picks.
+    """
+
+    name: str
+    title: str
+    caption: str
+    traces: Sequence[Trace] = field(repr=False, default=())
+    layout: Mapping[str, Any] = field(repr=False, default_factory=dict)
+    height: int = 340
+    choose: str | None = None
+    options: Mapping[str, Sequence[Trace]] = field(repr=False, default_factory=dict)
+
+    def spec(self) -> dict[str, Any]:
+        """What the page's script needs."""
+        traces = list(self.traces) or list(next(iter(self.options.values()), ()))
+        return {
+            "name": self.name,
+            "traces": _escaped(traces),
+            "layout": _escaped({"height": self.height, **self.layout}),
+            "options": [
+                {"label": key, "traces": _escaped(list(value))} for key, value in self.options.items()
+            ],
+        }
+
+
+def _escaped(value: Any) -> Any:
+    """The same with "<" and "&" of every text as entities: plotly reads texts as a kind of HTML.
+
+    Hover templates are left alone: they are ours, and reach into the data only by reference.
+    """
+    if isinstance(value, Mapping):
+        return {k: v if k == "hovertemplate" else _escaped(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_escaped(item) for item in value]
+    return value.replace("&", "&amp;").replace("<", "&lt;") if isinstance(value, str) else value
+
+
+def axis(title: str, **more: Any) -> dict[str, Any]:
+    """An axis with a title."""
+    return {"title": {"text": title}, **more}
+
+
+def line(name: str, x: Sequence, y: Sequence, colour: str, **more: Any) -> Trace:
+    """A line; `dash` and `width` go to its stroke."""
+    stroke = {"color": colour, "width": more.pop("width", 2), "dash": more.pop("dash", "solid")}
+    mode = more.pop("mode", "lines")
+    return {"type": "scatter", "mode": mode, "name": name, "x": list(x), "y": list(y), "line": stroke, **more}
+
+
+def mark(value: float, text: str, vertical: bool = True, colour: str = "@soft") -> tuple[dict, dict]:
+    """A dashed line across the plot at `value`, with its text at the end: (shape, annotation)."""
+    across = {"type": "line", "line": {"color": colour, "width": 1, "dash": "dot"}}
+    note = {"text": text, "showarrow": False, "font": {"size": 11, "color": colour}}
+    if vertical:
+        shape = {**across, "x0": value, "x1": value, "yref": "paper", "y0": 0, "y1": 1}
+        return shape, {**note, "x": value, "yref": "paper", "y": 1, "yanchor": "bottom"}
+    shape = {**across, "y0": value, "y1": value, "xref": "paper", "x0": 0, "x1": 1}
+    return shape, {**note, "y": value, "xref": "paper", "x": 1, "xanchor": "right", "yanchor": "bottom"}

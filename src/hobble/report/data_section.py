@@ -1,0 +1,151 @@
+"""The data: which clips, how much of each gait and of each injury, what was repaired, where it came from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hobble.report.charts import Chart, Trace, axis
+from hobble.report.formats import number, size
+from hobble.report.gather import Material
+from hobble.report.tables import Column, Table
+
+GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
+SPLIT_NAMES = {"train": "training", "held_out": "held out"}
+
+
+def gait_chart(material: Material) -> Chart | None:
+    """Seconds of each gait, training and held-out."""
+    traces: list[Trace] = []
+    for split, colour in (("train", "@muted"), ("held_out", "@accent")):
+        totals = {gait: 0.0 for gait in GAIT_COLOURS}
+        for report in material.labels:
+            if material.split(report["clip"]) == split:
+                for gait, seconds in (report.get("seconds") or {}).items():
+                    totals[gait] = totals.get(gait, 0.0) + seconds
+        if any(totals.values()):
+            traces.append(
+                {
+                    "type": "bar",
+                    "name": SPLIT_NAMES[split],
+                    "x": list(totals),
+                    "y": list(totals.values()),
+                    "marker": {"color": colour},
+                    "hovertemplate": "%{x}: %{y:.1f} s<extra></extra>",
+                }
+            )
+    if not traces:
+        return None
+    caption = (
+        "Seconds of each gait, mirrors counted. A gait with a low bar is one the network has hardly seen."
+    )
+    layout = {"barmode": "stack", "xaxis": {"type": "category"}, "yaxis": axis("seconds", rangemode="tozero")}
+    return Chart("gaits", "How much of each gait", caption, traces, layout, 300)
+
+
+def hurt_seconds(report: dict[str, Any]) -> dict[str, tuple[float, float]]:
+    """Link -> (seconds hurt, highest severity) of an injury report."""
+    hurt = report.get("hurt") or {}
+    return {link: (float(value["seconds"]), float(value["highest"])) for link, value in hurt.items()}
+
+
+def injury_coverage(material: Material) -> Chart | None:
+    """Seconds in which each link is hurt, by the highest severity of the clip."""
+    cells: dict[str, dict[float, float]] = {}
+    for report in material.injuries:
+        for link, (seconds, severity) in hurt_seconds(report).items():
+            row = cells.setdefault(link, {})
+            row[severity] = row.get(severity, 0.0) + seconds
+    if not cells:
+        return None
+    levels = sorted({level for row in cells.values() for level in row})
+    links = list(cells)[::-1]
+    trace = {
+        "type": "heatmap",
+        "x": [f"{level:g}" for level in levels],
+        "y": links,
+        "z": [[cells[link].get(level) for level in levels] for link in links],
+        "colorscale": [[0, "@hurt-low"], [1, "@hurt-high"]],
+        "xgap": 3,
+        "ygap": 3,
+        "colorbar": {"title": {"text": "s"}, "thickness": 10, "outlinewidth": 0},
+        "hovertemplate": "%{y} at %{x}: %{z:.1f} s<extra></extra>",
+    }
+    layout = {"xaxis": axis("highest severity", type="category"), "yaxis": {"automargin": True}}
+    caption = (
+        "Seconds of data for each link and severity, mirrors counted. Where there is no cell the network has seen "
+        "nothing and can only interpolate."
+    )
+    return Chart(
+        "injury-coverage", "What is hurt, and how much", caption, [trace], layout, 120 + 24 * len(links)
+    )
+
+
+def clip_table(material: Material) -> Table:
+    """Every clip: its file, length, split, repairs and checksum."""
+    labels = {report["clip"]: report for report in material.labels}
+    columns = [
+        Column("clip"),
+        Column("split", lambda value: SPLIT_NAMES.get(value, value)),
+        Column("file"),
+        Column.number("frames", 6),
+        Column.number("source fps", 4),
+        Column.number("seconds", 4),
+        Column.number("cycles", 4),
+        Column("labels from"),
+        Column("size", lambda v: size(float(v)), "n"),
+        Column("SHA-256", lambda v: str(v)[:12], "hash"),
+    ]
+    rows = []
+    for report in material.motion:
+        label = labels.get(report["clip"], {})
+        rows.append(
+            [
+                report["clip"],
+                material.split(report["clip"]),
+                report.get("source"),
+                report.get("frames"),
+                report.get("source_fps"),
+                report.get("seconds"),
+                label.get("cycles"),
+                label.get("phase_source"),
+                report.get("bytes"),
+                report.get("sha256"),
+            ]
+        )
+    return Table(f"{material.name}-clips", columns, rows, f"All {number(len(rows), 4)} clips, with checksums")
+
+
+def remarks_table(material: Material) -> Table | None:
+    """Every repair and warning."""
+    rows = []
+    for stage, reports, key in (
+        ("motion", material.motion, "repairs"),
+        ("labels", material.labels, "warnings"),
+        ("injury", material.injuries, "warnings"),
+    ):
+        for report in reports:
+            rows += [[report["clip"], stage, sentence] for sentence in report.get(key) or ()]
+    if not rows:
+        return None
+    columns = [Column("clip"), Column("stage"), Column("what", kind="long")]
+    return Table(f"{material.name}-remarks", columns, rows, f"{len(rows)} repairs and warnings")
+
+
+def strips(material: Material) -> list[dict[str, Any]]:
+    """The label strip of each clip that has one, with what hurts along it."""
+    injuries = {report["clip"]: report for report in material.injuries}
+    lengths = {report["clip"]: report.get("seconds") for report in material.motion}
+    out = []
+    for report in material.labels:
+        strip = report.get("strip")
+        if not strip or not strip.get("seconds"):
+            continue
+        clip = report["clip"]
+        length = lengths.get(clip) or strip["seconds"][-1]
+        hurt = (injuries.get(clip) or {}).get("hurt") or {}
+        status = [
+            {"name": link, "spans": value.get("spells") or [[0, length, value["highest"]]]}
+            for link, value in hurt.items()
+        ]
+        out.append({**strip, "clip": clip, "length": length, "status": status})
+    return out

@@ -1,0 +1,240 @@
+"""The minute's summary: key figures, and what the numbers suggest to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hobble.report.formats import duration, number, size
+from hobble.report.gather import Material
+
+FRAME_BUDGET_MS = 1000 / 60
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number that a reader should take away, and what it stands beside."""
+
+    label: str
+    value: str
+    unit: str = ""
+    beside: str = ""
+
+
+@dataclass(frozen=True)
+class Hint:
+    """A plain sentence drawn from the numbers; kind is "good", "warn" or "note"."""
+
+    kind: str
+    head: str
+    text: str
+
+
+def published(material: Material, what: str) -> dict | None:
+    """The published entry for this configuration's network, if there is one."""
+    rows = material.published.get(what, ())
+    return next((row for row in rows if row["configuration"] == material.name), None)
+
+
+def lead(material: Material) -> str:
+    """What was trained on what, in a sentence or two."""
+    training = (material.resolved.get("configuration") or {}).get("training") or {}
+    clips = [report["clip"] for report in material.motion]
+    kept = sum(material.split(clip) == "held_out" for clip in clips)
+    frames = sum(report.get("frames", 0) for report in material.motion)
+    passes = training.get("passes")
+    network = material.network
+    text = (
+        f"A phase-functioned network of {len(network['sizes']) - 2} hidden layers and {network['control_points']} "
+        f"control points, with {network['sizes'][0]} inputs and {network['sizes'][-1]} outputs, trained"
+    )
+    text += f" for {passes} passes" if passes else ""
+    text += f" on {len(clips) - kept} clips of {material.dataset}"
+    text += f" and tried on {kept} that it never saw" if kept else ""
+    return f"{text}: {frames:,} frames at 60 Hz in all."
+
+
+def key_figures(material: Material) -> list[Figure]:
+    """The numbers on top of the page, most important first."""
+    accuracy, figures = material.accuracy, []
+    for split, label in (("held_out", "Error on held-out clips"), ("train", "Error on training clips")):
+        part = accuracy.get(split)
+        if part and part.get("mean") is not None:
+            error = part.get("position_error_cm")
+            beside = f"{number(error)} cm a joint on average" if error is not None else ""
+            theirs = published(material, "accuracy") if split == "held_out" else None
+            if theirs:
+                beside += f"; {theirs['label']} was published at {100 * theirs['mean']:.2f} %"
+            figures.append(Figure(label, f"{100 * part['mean']:.2f}", "%", beside))
+    milliseconds = frame_milliseconds(material)
+    if milliseconds is not None:
+        theirs = published(material, "responsivity")
+        beside = f"{FRAME_BUDGET_MS / milliseconds:,.0f} characters at 60 Hz on one core"
+        if theirs:
+            beside += f"; published {theirs['milliseconds']} ms"
+        figures.append(Figure("Time for a frame", number(milliseconds, 2), "ms", beside))
+    seconds = sum(report.get("seconds", 0) for report in material.motion)
+    if seconds:
+        kept = sum(material.split(report["clip"]) == "held_out" for report in material.motion)
+        beside = f"{len(material.motion)} clips, {kept} of them held out"
+        value, _, unit = duration(seconds).partition(" ")
+        figures.append(Figure("Motion learnt from", value, unit, beside))
+    network = material.network
+    figures.append(
+        Figure(
+            "Network",
+            number(network["parameters"] / 1e6, 3),
+            "M",
+            f"parameters a phase: {'–'.join(map(str, network['sizes']))}; {size(network['bytes'])} on disk",
+        )
+    )
+    total = material.pipeline.get("total_seconds")
+    if total:
+        value, _, unit = duration(total).partition(" ")
+        beside = f"of computing from clips to figures, {size(material.pipeline.get('total_bytes'))} written"
+        figures.append(Figure("Whole pipeline", value, unit, beside))
+    return figures
+
+
+def frame_milliseconds(material: Material) -> float | None:
+    """Milliseconds of one frame, all steps together, over all laps."""
+    value = material.responsivity.get("milliseconds")
+    if isinstance(value, dict):
+        value = value.get("total", sum(v for v in value.values() if isinstance(v, (int, float))))
+    return float(value) if isinstance(value, (int, float)) else None
+
+
+def hints(material: Material) -> list[Hint]:
+    """What to do next, most pressing first."""
+    found = [
+        *_generalisation(material),
+        *_curve(material),
+        *_worst_clips(material),
+        *_coverage(material),
+        *_speed(material),
+        *_repairs(material),
+        *_costs(material),
+    ]
+    order = {"warn": 0, "note": 1, "good": 2}
+    return sorted(found, key=lambda hint: order[hint.kind])
+
+
+def _generalisation(material: Material) -> Iterator[Hint]:
+    train, held_out = (material.accuracy.get(split) or {} for split in ("train", "held_out"))
+    if held_out.get("mean") is None:
+        yield Hint(
+            "warn",
+            "Nothing was held out.",
+            "The accuracy below says how well the clips were memorised. Name a few under held_out in the data set.",
+        )
+        return
+    ratio = held_out["mean"] / train["mean"] if train.get("mean") else float("nan")
+    if ratio > 1.5:
+        yield Hint(
+            "warn",
+            f"Held-out clips are predicted {ratio:.1f} times worse than training clips.",
+            "The network has learnt these clips more than motion as such: add clips that differ "
+            "(speeds, turns, performers) before adding units or passes.",
+        )
+    elif ratio < 1.2:
+        yield Hint(
+            "good",
+            f"Held-out clips are predicted about as well as training clips ({ratio:.2f} times the error).",
+            "There is room for a larger network or more passes.",
+        )
+    else:
+        yield Hint(
+            "note", f"Held-out clips have {ratio:.2f} times the error of training clips.", "That is usual."
+        )
+
+
+def _curve(material: Material) -> Iterator[Hint]:
+    losses = [v for v in material.history.get("held_out_mse", ()) if v is not None]
+    passes = [p for p in material.history.get("pass", ()) if p is not None]
+    if len(losses) < 8 or len(passes) < len(losses):
+        return
+    best = int(np.argmin(losses))
+    if losses[-1] > 1.05 * losses[best]:
+        yield Hint(
+            "warn",
+            f"The held-out error was lowest in pass {passes[best]:.0f} and has risen since.",
+            "Fewer passes, more dropout or more data would serve the held-out clips better.",
+        )
+        return
+    quarter = max(1, len(losses) // 4)
+    before, after = np.mean(losses[-2 * quarter : -quarter]), np.mean(losses[-quarter:])
+    fall = 1 - after / before
+    if fall > 0.03:
+        yield Hint(
+            "note",
+            f"The held-out error was still falling, by {100 * fall:.0f} % over the last quarter.",
+            "More passes will help; a configuration that continues this one starts from its last checkpoint.",
+        )
+    else:
+        yield Hint("good", "Training has settled.", "More passes alone will change little.")
+
+
+def _worst_clips(material: Material) -> Iterator[Hint]:
+    rows = [row for row in material.accuracy.get("clips", ()) if row.get("mean") is not None]
+    if len(rows) < 4:
+        return
+    median = float(np.median([row["mean"] for row in rows]))
+    worst = max(rows, key=lambda row: row["mean"])
+    if worst["mean"] > 1.8 * median:
+        yield Hint(
+            "note",
+            f"{worst['clip']} is the hardest clip,",
+            f"with {worst['mean'] / median:.1f} times the error of the middle one. "
+            "See in its label strip whether the labels are right, and among the repairs whether its frames are whole.",
+        )
+
+
+def _coverage(material: Material) -> Iterator[Hint]:
+    totals: dict[str, float] = {}
+    for report in material.labels:
+        for gait, seconds in (report.get("seconds") or {}).items():
+            totals[gait] = totals.get(gait, 0.0) + seconds
+    everything = sum(totals.values())
+    thin = [g for g, s in totals.items() if 0 < s < 0.03 * everything and g not in ("jump", "bump")]
+    if thin:
+        yield Hint(
+            "note",
+            f"There is little data of {' and '.join(sorted(thin))}:",
+            "under three per cent of the seconds. Expect those gaits to be the least steady.",
+        )
+
+
+def _speed(material: Material) -> Iterator[Hint]:
+    milliseconds = frame_milliseconds(material)
+    if milliseconds is None:
+        return
+    if milliseconds > FRAME_BUDGET_MS:
+        yield Hint("warn", f"A frame takes {milliseconds:.1f} ms, too long for 60 Hz.", "Try mode: linear.")
+    else:
+        share = milliseconds / FRAME_BUDGET_MS
+        yield Hint(
+            "good", f"A frame uses {100 * share:.1f} % of its time at 60 Hz.", "Fast enough for a game."
+        )
+
+
+def _repairs(material: Material) -> Iterator[Hint]:
+    repaired = [report["clip"] for report in material.motion if report.get("repairs")]
+    warned = {r["clip"] for r in (*material.labels, *material.injuries) if r.get("warnings")}
+    if repaired or warned:
+        yield Hint(
+            "note",
+            f"{len(repaired)} clips were repaired and {len(warned)} have warnings.",
+            "They are listed under Data; look at them before you trust those clips.",
+        )
+
+
+def _costs(material: Material) -> Iterator[Hint]:
+    stages = material.pipeline.get("stages") or []
+    total = material.pipeline.get("total_seconds") or 0
+    if stages and total:
+        slowest = max(stages, key=lambda stage: stage["seconds"])
+        share = slowest["seconds"] / total
+        if share > 0.5:
+            yield Hint("note", f"{slowest['stage'].capitalize()} took {100 * share:.0f} % of the time.", "")

@@ -1,0 +1,83 @@
+"""Numbers as people read them, and data as a page can carry it safely."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+
+def duration(seconds: float | None) -> str:
+    """Seconds as a person says them.
+
+    >>> duration(0.42), duration(93), duration(5400), duration(154800), duration(None)
+    ('0.42 s', '1 min 33 s', '1 h 30 min', '43 h', '–')
+    """
+    if seconds is None:
+        return "–"
+    if seconds < 60:
+        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest} s" if rest else f"{minutes} min"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if minutes and hours < 24 else f"{hours} h"
+
+
+def size(count: float | None) -> str:
+    """Bytes in powers of a thousand.
+
+    >>> size(512), size(7_120_000_000), size(606e6), size(None)
+    ('512 B', '7.12 GB', '606 MB', '–')
+    """
+    if count is None:
+        return "–"
+    for unit in ("B", "kB", "MB", "GB"):
+        if count < 1000 or unit == "GB":
+            return f"{count:.0f} B" if unit == "B" else f"{count:.3g} {unit}"
+        count /= 1000
+    raise AssertionError
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number to so many significant digits, thousands apart; an en dash where there is none.
+
+    >>> number(0.04391), number(20000, 5), number(1234.5), number(None), number(float("nan")), number(0)
+    ('0.0439', '20,000', '1,234', '–', '–', '0')
+    """
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:,.{places}f}"
+
+
+def plain(value: Any) -> Any:
+    """The same value made of dicts, lists, strings and finite numbers only; NaN and infinities become null."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value
+
+
+def embedded(value: Any) -> Markup:
+    """JSON that can stand inside a <script> element whatever its strings say.
+
+    With every "<" written as an escape, no string can end the element or open a comment.
+
+    >>> embedded({"clip": "</script><b>"})
+    Markup('{"clip":"\\\\u003c/script\\\\u003e\\\\u003cb\\\\u003e"}')
+    """
+    text = json.dumps(plain(value), separators=(",", ":"), allow_nan=False, ensure_ascii=True)
+    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))

@@ -1,0 +1,130 @@
+"""Everything the page tells, read from the artefacts into plain data once."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from hobble.core.errors import InputError
+from hobble.core.files import read_json
+
+PUBLISHED = Path(__file__).with_name("published.yaml")
+COUNTED = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
+
+
+@dataclass(frozen=True)
+class Material:
+    """What one configuration left behind.
+
+    history: column -> values, one per section of training; None where a cell is empty.
+    motion, labels, injuries: the reports of the clips, in one order. splits: clip -> "train" or "held_out".
+    """
+
+    name: str
+    dataset: str
+    title: str | None
+    splits: Mapping[str, str] = field(repr=False)
+    resolved: Mapping[str, Any] = field(repr=False)
+    accuracy: Mapping[str, Any] = field(repr=False)
+    responsivity: Mapping[str, Any] = field(repr=False)
+    injury: Mapping[str, Any] = field(repr=False)
+    pipeline: Mapping[str, Any] = field(repr=False)
+    history: Mapping[str, list[float | None]] = field(repr=False)
+    network: Mapping[str, Any] = field(repr=False)
+    motion: list[dict[str, Any]] = field(repr=False)
+    labels: list[dict[str, Any]] = field(repr=False)
+    injuries: list[dict[str, Any]] = field(repr=False)
+    published: Mapping[str, Any] = field(repr=False)
+
+    def split(self, clip: str) -> str:
+        """ "train" or "held_out"."""
+        return self.splits.get(clip, "train")
+
+    @property
+    def blocks(self) -> list[str]:
+        """Columns of the history that hold the held-out error of one block of Y."""
+        return [name for name in self.history if name not in COUNTED]
+
+
+def gather(
+    *,
+    name: str,
+    dataset: str,
+    title: str | None,
+    splits: Mapping[str, str],
+    configuration: str,
+    accuracy: str,
+    responsivity: str,
+    injury: str,
+    pipeline: str,
+    history: str,
+    weights: str,
+    motion: Iterable[str],
+    labels: Iterable[str],
+    injuries: Iterable[str],
+) -> Material:
+    """Read the files a report is made from. Raises InputError naming the one that cannot be read."""
+    return Material(
+        name=name,
+        dataset=dataset,
+        title=title,
+        splits=dict(splits),
+        resolved=yaml.safe_load(Path(configuration).read_text(encoding="utf-8")) or {},
+        accuracy=read_json(accuracy),
+        responsivity=read_json(responsivity),
+        injury=read_json(injury),
+        pipeline=read_json(pipeline),
+        history=read_history(history),
+        network=describe_network(weights),
+        motion=[read_json(path) for path in motion],
+        labels=[read_json(path) for path in labels],
+        injuries=[read_json(path) for path in injuries],
+        published=yaml.safe_load(PUBLISHED.read_text(encoding="utf-8")),
+    )
+
+
+def read_history(path: str | Path) -> dict[str, list[float | None]]:
+    """Columns of a CSV of numbers; an empty cell is None. Raises InputError with the line of anything else."""
+    columns: dict[str, list[float | None]] = {}
+    with open(path, encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            for key, text in row.items():
+                columns.setdefault(key, []).append(_cell(path, key, text))
+    return columns
+
+
+def _cell(path: str | Path, key: str, text: str | None) -> float | None:
+    if text is None or not text.strip():
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        raise InputError(path, f"column {key} holds {text!r}, which is no number") from None
+    return value if np.isfinite(value) else None
+
+
+def describe_network(path: str | Path) -> dict[str, Any]:
+    """Layer sizes, control points and parameters of a weights file, from its shapes; its skeleton and links."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            shapes = {key: file[key].shape for key in file.files if key[:1] in "Wb" and key[1:].isdigit()}
+            meta = json.loads(str(file["meta"])) if "meta" in file.files else {}
+    except (OSError, ValueError) as error:
+        raise InputError(path, f"not a network's weights ({error})", fix="Train again.") from error
+    layers = sorted(int(key[1:]) for key in shapes if key[0] == "W")
+    sizes = [shapes[f"W{layers[0]}"][2]] + [shapes[f"W{i}"][1] for i in layers]
+    return {
+        "sizes": sizes,
+        "control_points": shapes["W0"][0],
+        "parameters": int(sum(np.prod(shape[1:]) for shape in shapes.values())),
+        "bytes": Path(path).stat().st_size,
+        "skeleton": meta.get("skeleton") or {},
+        "links": meta.get("links") or [],
+    }

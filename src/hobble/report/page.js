@@ -1,0 +1,49 @@
+// The page itself: theme, printing, and the mark in the contents of where the reader is.
+"use strict";
+(() => {
+  const root = document.documentElement, button = document.getElementById("theme");
+  const themes = ["auto", "light", "dark"];
+  const remembered = () => { try { return localStorage.getItem("hobble-theme"); } catch { return null; } };
+  const remember = (name) => { try { localStorage.setItem("hobble-theme", name); } catch { /* not from disk */ } };
+  const recolour = () => Hobble.onTheme.forEach((react) => react());
+  const show = (name) => {
+    if (name === "auto") delete root.dataset.theme; else root.dataset.theme = name;
+    button.textContent = `Theme: ${name}`;
+    recolour();
+  };
+  const asked = new URLSearchParams(location.search).get("theme");
+  let theme = [asked, remembered()].find((name) => themes.includes(name)) || "auto";
+  if (theme !== "auto") show(theme);
+  button.addEventListener("click", () => {
+    theme = themes[(themes.indexOf(theme) + 1) % themes.length];
+    remember(theme);
+    show(theme);
+  });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
+
+  // Paper gets everything: charts not yet scrolled to are drawn, folded tables opened, colours light.
+  document.getElementById("print").addEventListener("click", () => print());
+  let opened = [];
+  addEventListener("beforeprint", () => {
+    root.dataset.theme = "light";
+    opened = [...document.querySelectorAll("details:not([open])")].filter((d) => d.querySelectorAll("tr").length < 120);
+    opened.forEach((details) => { details.open = true; });
+    recolour();
+    Hobble.drawAll();
+  });
+  addEventListener("afterprint", () => {
+    opened.forEach((details) => { details.open = false; });
+    show(theme);
+  });
+
+  const links = new Map([...document.querySelectorAll("nav a")].map((a) => [a.hash.slice(1), a]));
+  const seen = new Set();
+  const watch = new IntersectionObserver((entries) => {
+    for (const entry of entries) seen[entry.isIntersecting ? "add" : "delete"](entry.target.id);
+    const here = [...links.keys()].find((id) => seen.has(id));
+    links.forEach((link, id) => {
+      if (id === here) link.setAttribute("aria-current", "true"); else link.removeAttribute("aria-current");
+    });
+  }, { rootMargin: "-20% 0px -60%" });
+  document.querySelectorAll("main section[id]").forEach((section) => watch.observe(section));
+})();

@@ -1,0 +1,111 @@
+"""The page: sections in the order of a reader's questions, rendered into one file that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import yaml
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
+from markupsafe import Markup
+
+from hobble.report import accuracy_section, cost_section, data_section, findings, training_section
+from hobble.report.charts import Chart
+from hobble.report.formats import duration, embedded, number, plain, size
+from hobble.report.gather import Material
+from hobble.report.provenance import commit, machine, versions
+
+TEMPLATES = Path(__file__).parent
+SCRIPTS = ("charts.js", "tables.js", "figure.js", "strips.js", "page.js")
+
+
+def render(material: Material, scenes: Mapping[str, Any] | None = None) -> str:
+    """The report as one HTML document.
+
+    Every value is escaped where it stands; data for the scripts is JSON in which no "<" is left.
+    """
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=select_autoescape(default=True, default_for_string=True),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(duration=duration, size=size, number=number)
+    sections = _sections(material)
+    strips = data_section.strips(material)
+    scenes = dict(scenes or {})
+    data = {"charts": _specs(sections), "scenes": scenes, "strips": strips}
+    return environment.get_template("page.html.j2").render(
+        material=material,
+        title=material.title or material.name,
+        figures=findings.key_figures(material),
+        hints=findings.hints(material),
+        lead=findings.lead(material),
+        embedded=embedded(data),
+        scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
+        strips=[strip["clip"] for strip in strips],
+        style=_text("page.css"),
+        scripts=[_text(name) for name in SCRIPTS],
+        configuration=yaml.safe_dump(plain(dict(material.resolved)), sort_keys=False, allow_unicode=True),
+        plotly=plotly_js(),
+        provenance={"commit": commit(TEMPLATES), "machine": machine(), "versions": versions()},
+        **sections,
+    )
+
+
+def _sections(material: Material) -> dict[str, dict[str, Any]]:
+    """Charts and tables by section; None where there is nothing to show."""
+    accuracy, costs, data, training = accuracy_section, cost_section, data_section, training_section
+    return {
+        "training": {
+            "curve": training.learning_curve(material),
+            "blocks": training.block_curves(material),
+            "table": training.history_table(material),
+        },
+        "accuracy": {
+            "bars": accuracy.clip_bars(material),
+            "boxes": accuracy.clip_boxes(material),
+            "table": accuracy.accuracy_table(material),
+            "published": accuracy.beside_published(material),
+        },
+        "speed": {"laps": costs.lap_chart(material), "table": costs.lap_table(material)},
+        "injury": {"applies": material.injury.get("applies", False), "charts": [], "table": None},
+        "terrain": {"charts": [], "table": None},
+        "stages": {
+            **dict(zip(("seconds", "bytes"), costs.stage_charts(material), strict=True)),
+            "table": costs.stage_table(material),
+        },
+        "data": {
+            "gaits": data.gait_chart(material),
+            "hurt": data.injury_coverage(material),
+            "clips": data.clip_table(material),
+            "remarks": data.remarks_table(material),
+        },
+    }
+
+
+def _specs(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """What the scripts need of every chart, wherever in a section it stands."""
+    found: dict[str, Any] = {}
+    for section in sections.values():
+        for item in section.values():
+            charts = item if isinstance(item, list) else [item]
+            found.update({chart.name: chart.spec() for chart in charts if isinstance(chart, Chart)})
+    return found
+
+
+def _text(name: str) -> Markup:
+    """Our own CSS or script, which is trusted; it must not end its own element."""
+    text = (TEMPLATES / name).read_text(encoding="utf-8")
+    if "</script" in text.lower() or "</style" in text.lower():
+        raise ValueError(f"{name} holds the end of the element it is put into")
+    return Markup(text)
+
+
+def plotly_js() -> Markup:
+    """The plotly.js that plotly's Python package carries."""
+    text = files("plotly").joinpath("package_data", "plotly.min.js").read_text(encoding="utf-8")
+    return Markup(text.replace("</script", "<\\/script"))

@@ -1,0 +1,44 @@
+"""Tables that the page can sort and hand out as CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from hobble.report.formats import number
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its heading, and how a value is shown (numbers are aligned right and sorted as numbers)."""
+
+    label: str
+    show: Callable[[Any], str] = str
+    kind: str = "text"
+
+    @classmethod
+    def number(cls, label: str, digits: int = 3) -> Column:
+        """A column of numbers shown to so many significant digits; the CSV has them whole."""
+        return cls(label, lambda value: number(value, digits), "n")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table by name: the CSV is called <name>.csv."""
+
+    name: str
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Any]] = field(repr=False)
+    title: str = "The numbers"
+
+    @property
+    def cells(self) -> list[list[tuple[str, str, str]]]:
+        """Rows of (kind, raw value, text shown)."""
+        return [
+            [
+                (c.kind, "" if v is None else str(v), "–" if v is None else c.show(v))
+                for c, v in zip(self.columns, row, strict=True)
+            ]
+            for row in self.rows
+        ]

@@ -1,0 +1,297 @@
+"""Made-up artefacts in the documented formats: a walker by formula, and plausible numbers, from a seed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from hobble.core import quat
+from hobble.core.files import save_npz, write_json, write_text
+from hobble.core.skeleton import Skeleton, forward_kinematics
+
+GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
+STAGES = (
+    "synthetic",
+    "motion",
+    "labels",
+    "injury",
+    "terrain",
+    "database",
+    "training",
+    "runtime",
+    "evaluation",
+)
+CLIPS = ("walk_straight", "walk_turns", "jog", "crouch", "stand", "strafe", "hurt_left_knee", "hurt_back")
+HELD_OUT = ("walk_turns", "hurt_back")
+
+
+def walker(skeleton: Skeleton, frames: int, speed: float, limp: float = 0.0) -> dict[str, np.ndarray]:
+    """Positions (F, J, 3), contacts (F, 4) and phase (F,) of a figure that swings its legs and arms along an arc."""
+    t = np.arange(frames)
+    phase = (t * 0.017) % 1.0
+    angle = 2 * np.pi * phase
+    rotations = np.tile(quat.IDENTITY, (frames, len(skeleton.joints), 1))
+
+    def turn(role: str, axis: tuple[int, int, int], radians: np.ndarray) -> None:
+        j = skeleton.role(role)
+        rotations[:, j] = quat.mul(rotations[:, j], quat.from_axis_angle(np.array(axis), radians))
+
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        reach = 0.45 * (1 - 0.5 * limp * (side == "left"))
+        turn(f"{side}_hip", (1, 0, 0), -reach * sign * np.sin(angle))
+        turn(
+            f"{side}_knee",
+            (1, 0, 0),
+            0.9 * np.clip(sign * np.cos(angle), 0, 1) ** 2 * (1 - 0.8 * limp * (side == "left")),
+        )
+        turn(f"{side}_shoulder", (0, 0, 1), np.full(frames, -sign * 1.25))
+        turn(f"{side}_shoulder", (0, 1, 0), 0.35 * np.sin(angle))
+        turn(f"{side}_elbow", (0, 1, 0), np.full(frames, -0.35 * sign))
+    heading = 0.004 * np.maximum(0, t - frames // 3)
+    rotations[:, 0] = quat.mul(
+        quat.yaw(heading), quat.from_axis_angle(np.array([0, 0, 1.0]), 0.1 * limp * np.sin(angle))
+    )
+    step = speed * np.stack([np.sin(heading), np.zeros(frames), np.cos(heading)], axis=1)
+    root = np.cumsum(step, axis=0) + np.array([0, 91.0, 0])
+    root[:, 1] += 2 * np.cos(2 * angle)
+    _, positions = forward_kinematics(skeleton, rotations, root)
+    left = np.sin(angle + 0.4) < 0
+    contacts = np.stack([left, left, ~left, ~left], axis=1).astype(float)
+    return {"positions": positions, "contacts": contacts, "phase": phase}
+
+
+def scenarios(path: Path, skeleton: Skeleton, hurt: bool = True) -> None:
+    """runtime/scenarios.npz with three or four scenarios."""
+    arrays: dict[str, Any] = {}
+    plans = {"walk": (600, 2.2, ""), "jog": (600, 5.0, ""), "stop_and_go": (300, 0.0, "")}
+    if hurt:
+        plans["left_knee"] = (480, 1.6, "LeftUpLeg-LeftLeg")
+    for name, (frames, speed, link) in plans.items():
+        made = walker(skeleton, frames, speed, 0.8 if link else 0.0)
+        for key, value in made.items():
+            arrays[f"{name}/{key}"] = value.astype(np.float32)
+        arrays[f"{name}/severity"] = (10 * np.arange(frames) / frames * bool(link)).astype(np.float32)
+        arrays[f"{name}/hurt"] = np.array(link)
+        arrays[f"{name}/gait"] = np.array(["walk"] * frames)
+    save_npz(
+        path,
+        names=np.array(list(plans)),
+        joints=np.array(skeleton.joints),
+        parents=np.array(skeleton.parents),
+        fps=np.array(60.0),
+        **arrays,
+    )
+
+
+def weights(path: Path, skeleton: Skeleton, units: int = 16, links: bool = True) -> None:
+    """network/weights.npz of a small network."""
+    rng = np.random.default_rng(0)
+    sizes = (342 + (len(skeleton.links) if links else 0), units, units, 311)
+    arrays: dict[str, Any] = {}
+    for i, (a, b) in enumerate(zip(sizes, sizes[1:], strict=False)):
+        arrays[f"W{i}"] = rng.normal(size=(4, b, a)).astype(np.float32)
+        arrays[f"b{i}"] = np.zeros((4, b), np.float32)
+    meta = {
+        "skeleton": skeleton.to_dict(),
+        "links": list(skeleton.link_names) if links else [],
+        "gaits": list(GAITS),
+    }
+    save_npz(path, **arrays, meta=np.array(json.dumps(meta)))
+
+
+def accuracy(clips: tuple[str, ...], rng: np.random.Generator) -> dict[str, Any]:
+    """evaluation/accuracy.json."""
+    rows = []
+    for clip in clips:
+        for name in (clip, f"{clip}_mirror"):
+            held_out = clip in HELD_OUT
+            mean = float(rng.uniform(0.03, 0.05) * (1.5 if held_out else 1))
+            quantiles = [mean * k for k in (0.3, 0.6, 0.9, 1.2, 2.1)]
+            rows.append(
+                {
+                    "clip": name,
+                    "split": "held_out" if held_out else "train",
+                    "frames": int(rng.integers(400, 1600)),
+                    "mean": mean,
+                    "sd": mean * 0.7,
+                    "position_error_cm": 55 * mean,
+                    "quantiles": quantiles,
+                }
+            )
+    out: dict[str, Any] = {"configuration": "example", "joints": 31, "clips": rows}
+    for split in ("train", "held_out"):
+        chosen = [row for row in rows if row["split"] == split]
+        mean = float(np.mean([row["mean"] for row in chosen]))
+        out[split] = {
+            "frames": 9000,
+            "mean": mean,
+            "sd": mean * 0.7,
+            "position_error_cm": 55 * mean,
+            "clips": len(chosen),
+        }
+    return out
+
+
+def history(path: Path, passes: int = 20, sections: int = 10) -> None:
+    """network/history.csv: errors that fall and settle."""
+    rng = np.random.default_rng(3)
+    blocks = (
+        "root_velocity",
+        "turn",
+        "phase_change",
+        "contacts",
+        "joint_position",
+        "joint_velocity",
+        "joint_rotation",
+    )
+    lines = [
+        "pass,section,samples,seconds,train_mse,held_out_mse," + ",".join(f"held_out_{b}" for b in blocks)
+    ]
+    for i in range(passes * sections):
+        base = 0.22 + 0.9 * np.exp(-i / 12) + 0.25 * np.exp(-i / 70)
+        values = [base * rng.uniform(0.97, 1.03), base * 1.06 * rng.uniform(0.99, 1.01)]
+        values += [base * k * rng.uniform(0.98, 1.02) for k in (0.9, 1.6, 1.1, 0.8, 0.5, 1.3, 0.6)]
+        numbers = ",".join(f"{v:.5f}" for v in values)
+        lines.append(
+            f"{i // sections + 1},{i % sections + 1},{(i + 1) * 20000},{(i + 1) * 4.1:.1f},{numbers}"
+        )
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def strip(seconds: float) -> dict[str, Any]:
+    """The label strip of a clip that stands a second, then walks."""
+    t = np.linspace(0, seconds, 300)
+    phase = [None if s < 1 else round((s * 1.02) % 1, 3) for s in t]
+    walk = np.clip((t - 1) * 2, 0, 1)
+    steps = np.arange(1, seconds - 1, 1 / 1.02)
+    spans = {
+        "right_heel": [[round(a, 2), round(a + 0.55, 2)] for a in steps],
+        "right_toe": [[round(a + 0.08, 2), round(a + 0.62, 2)] for a in steps],
+        "left_heel": [[round(a + 0.49, 2), round(a + 1.04, 2)] for a in steps],
+        "left_toe": [[round(a + 0.57, 2), round(a + 1.11, 2)] for a in steps],
+    }
+    return {
+        "seconds": [round(float(s), 3) for s in t],
+        "contacts": {role: spans[role] for role in ("left_heel", "left_toe", "right_heel", "right_toe")},
+        "landings": {"right": [float(a) for a in steps], "left": [float(a + 0.49) for a in steps]},
+        "phase": phase,
+        "gait": {"stand": [round(float(1 - w), 3) for w in walk], "walk": [round(float(w), 3) for w in walk]},
+        "speed": [round(float(1.3 * w + 0.05 * np.sin(6 * s)), 3) for w, s in zip(walk, t, strict=True)],
+    }
+
+
+def clip_reports(folder: Path, clips: tuple[str, ...]) -> dict[str, list[str]]:
+    """motion/, labels/ and injury/<clip>.json of every clip and its mirror; returns their paths."""
+    rng = np.random.default_rng(5)
+    paths: dict[str, list[str]] = {"motion": [], "labels": [], "injuries": []}
+    for clip in clips:
+        for i, name in enumerate((clip, f"{clip}_mirror")):
+            safe = f"{len(paths['motion']):03d}"
+            frames = int(rng.integers(600, 1500))
+            motion = {
+                "clip": name,
+                "source": f"{clip}.bvh",
+                "sha256": f"{rng.integers(1 << 62):016x}" * 4,
+                "bytes": frames * 1200,
+                "source_frames": 2 * frames,
+                "source_fps": 120.0,
+                "frames": frames,
+                "seconds": frames / 60,
+                "unit": "5.6444 cm",
+                "up": "Y",
+                "repairs": ["frames 2331-2335: the root jumps by 212 cm; the clip ends before."]
+                * (clip == "jog" and not i),
+            }
+            gait = next((g for g in ("jog", "crouch", "stand") if g in clip), "walk")
+            labels = {
+                "clip": name,
+                "phase_source": "file",
+                "gait_source": "file",
+                "phase_zero": "right",
+                "seconds": {g: 0.0 for g in GAITS} | {"stand": 1.0, gait: frames / 60 - 1},
+                "cycles": frames // 60,
+                "cycles_dropped": 1,
+                "warnings": ["2 steps are shorter than 5 frames and were dropped."] * (clip == "strafe"),
+                "strip": strip(frames / 60),
+            }
+            side = "Right" if i else "Left"
+            hurt = {
+                "hurt_left_knee": {f"{side}UpLeg-{side}Leg": {"seconds": frames / 60, "highest": 7.0}},
+                "hurt_back": {"Hips-LowerBack": {"seconds": frames / 90, "highest": 5.0}},
+            }.get(clip, {})
+            injury = {"clip": name, "hurt": hurt, "warnings": []}
+            for key, value in (("motion", motion), ("labels", labels), ("injuries", injury)):
+                path = folder / key / f"{safe}.json"
+                write_json(path, value)
+                paths[key].append(str(path))
+    return paths
+
+
+def costs() -> dict[str, Any]:
+    """pipeline.json."""
+    seconds = (4.2, 9.5, 6.1, 3.0, 38.0, 21.0, 700.0, 12.0, 44.0)
+    sizes = (3.1e7, 1.9e7, 4e6, 3e6, 8.2e7, 1.4e8, 1.2e7, 9e6, 4e5)
+    stages = [
+        {
+            "stage": stage,
+            "jobs": 1 if s > 30 else 16,
+            "seconds": s,
+            "longest": s / 3,
+            "cpu_seconds": s,
+            "max_rss_mb": 300.0,
+            "files": 16,
+            "bytes": int(b),
+            "rules": [],
+        }
+        for stage, s, b in zip(STAGES, seconds, sizes, strict=True)
+    ]
+    return {
+        "configuration": "example",
+        "stages": stages,
+        "total_seconds": sum(seconds),
+        "total_bytes": int(sum(sizes)),
+        "missing": ["results/example/benchmarks/runtime"],
+        "machine": {"system": "Linux x86_64", "processor": "a processor", "cores": 2, "memory_gb": 24.0},
+        "versions": {"python": "3.11.2"},
+    }
+
+
+def write_all(
+    folder: Path, skeleton: Skeleton, clips: tuple[str, ...] = CLIPS, injury: bool = True
+) -> dict[str, Any]:
+    """Every input of the report under `folder`; returns the arguments of `hobble.report.gather.gather`."""
+    rng = np.random.default_rng(1)
+    paths = clip_reports(folder, clips)
+    splits = {
+        name: "held_out" if clip in HELD_OUT else "train"
+        for clip in clips
+        for name in (clip, f"{clip}_mirror")
+    }
+    resolved = {
+        "name": "example",
+        "configuration": {"training": {"passes": 20}},
+        "dataset": {"name": "made_up"},
+    }
+    write_text(folder / "configuration.yaml", yaml.safe_dump(resolved))
+    write_json(folder / "accuracy.json", accuracy(clips, rng))
+    write_json(folder / "responsivity.json", {"configuration": "example"})
+    write_json(folder / "injury.json", {"configuration": "example", "applies": injury})
+    write_json(folder / "pipeline.json", costs())
+    history(folder / "history.csv")
+    weights(folder / "weights.npz", skeleton, links=injury)
+    scenarios(folder / "scenarios.npz", skeleton, injury)
+    return {
+        "name": "example",
+        "dataset": "made_up",
+        "title": None,
+        "splits": splits,
+        "configuration": str(folder / "configuration.yaml"),
+        **{k: str(folder / f"{k}.json") for k in ("accuracy", "responsivity", "injury", "pipeline")},
+        "history": str(folder / "history.csv"),
+        "weights": str(folder / "weights.npz"),
+        **paths,
+    }

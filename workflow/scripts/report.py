@@ -1,0 +1,29 @@
+"""Creates results/<configuration>/report.html from the evaluation, the reports of every clip and the motion generated."""
+
+from hobble.core.files import write_text
+from hobble.report.gather import gather
+from hobble.report.page import render
+from hobble.report.scenes import scenes
+from hobble.workflow.job import job
+
+with job(snakemake):
+    given, asked = snakemake.input, snakemake.params
+    material = gather(
+        name=asked.configuration,
+        dataset=asked.dataset,
+        title=asked.title,
+        splits=asked.splits,
+        configuration=given.configuration,
+        accuracy=given.accuracy,
+        responsivity=given.responsivity,
+        injury=given.injury,
+        pipeline=given.pipeline,
+        history=given.history,
+        weights=given.weights,
+        motion=given.motion,
+        labels=given.labels,
+        injuries=given.injuries,
+    )
+    network = material.network
+    play = scenes(given.scenarios, network["skeleton"], network["links"])
+    write_text(snakemake.output.html, render(material, play))
