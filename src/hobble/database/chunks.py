@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ import numpy as np
 
 from hobble.core.errors import InputError
 
+MOST_PARTS = 16  # of one vectored read: what POSIX has every system take
 TYPES = {"<f2": "F16", "<f4": "F32", "<i4": "I32"}
 HINT = "Delete the database's folder; the next run makes it again."
 
@@ -51,53 +52,57 @@ def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Ch
         place = end
     text = json.dumps(header).encode()
     text += b" " * (-len(text) % 8)
-    parts = [len(text).to_bytes(8, "little"), text, *(np.ascontiguousarray(a).data for a in arrays.values())]
-    crc = 0
+    head = np.frombuffer(len(text).to_bytes(8, "little") + text, np.uint8)
+    bytes_of = (np.ascontiguousarray(array).reshape(-1).view(np.uint8) for array in arrays.values())
+    parts = [memoryview(part) for part in (head, *bytes_of)]
     path = folder / file
     path.parent.mkdir(parents=True, exist_ok=True)
     with open(path, "wb") as out:
-        for part in parts:
-            out.write(part)
-            crc = zlib.crc32(part, crc)
+        out.writelines(parts)
         out.flush()
         os.fsync(out.fileno())
-    return Chunk(file, len(arrays["frames"]), len(arrays["fits"]), 8 + len(text) + place, crc)
+    rows, fits = len(arrays["frames"]), len(arrays["fits"])
+    return Chunk(file, rows, fits, sum(len(part) for part in parts), _checksum(parts))
 
 
-def read_chunk(folder: Path, chunk: Chunk, verify: bool = True) -> dict[str, np.ndarray]:
-    """The arrays of a chunk, as views of one buffer.
+def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], verify: bool = True) -> None:
+    """Read a chunk straight into `arrays`: those it was written from, by name and in that order.
 
-    Raises InputError, naming the file, where it is missing, of another length or, with `verify`, of another
-    checksum.
+    Each must be contiguous and of the shape and type that was written. Raises InputError, naming the file,
+    where it is missing, of another length or, with `verify`, of another checksum.
     """
     path = folder / chunk.file
-    buffer = np.empty(chunk.bytes, np.uint8)
+    header = np.empty(chunk.bytes - sum(array.nbytes for array in arrays.values()), np.uint8)
+    parts = [memoryview(array.reshape(-1).view(np.uint8)) for array in (header, *arrays.values())]
     try:
         with open(path, "rb", buffering=0) as file:
             size = os.fstat(file.fileno()).st_size
             if size != chunk.bytes:
                 problem = f"{size} bytes where the manifest says {chunk.bytes}"
                 raise InputError(path, f"truncated or overwritten: {problem}", fix=HINT)
-            _fill(file.fileno(), buffer)
+            _fill(file.fileno(), parts)
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", fix=HINT) from error
-    if verify and zlib.crc32(buffer.data) != chunk.crc32:
+    if verify and _checksum(parts) != chunk.crc32:
         raise InputError(path, "damaged: its checksum is not the manifest's", fix=HINT)
-    length = int.from_bytes(buffer[:8].tobytes(), "little")
-    header = json.loads(buffer[8 : 8 + length].tobytes())
-    return {name: _view(buffer[8 + length :], entry) for name, entry in header.items()}
 
 
-def _fill(descriptor: int, buffer: np.ndarray) -> None:
-    done = 0
-    while done < len(buffer):
-        count = os.preadv(descriptor, [buffer[done:].data], done)
+def _fill(descriptor: int, parts: Sequence[memoryview]) -> None:
+    """One system call, or as many as it takes."""
+    left, place = [part for part in parts if len(part)], 0
+    while left:
+        count = os.preadv(descriptor, left[:MOST_PARTS], place)
         if count == 0:
             raise OSError(0, "the file ended early")
-        done += count
+        place += count
+        while left and count >= len(left[0]):
+            count -= len(left.pop(0))
+        if count:
+            left[0] = left[0][count:]
 
 
-def _view(data: np.ndarray, entry: Mapping[str, Any]) -> np.ndarray:
-    start, end = entry["data_offsets"]
-    dtype = next(t for t, name in TYPES.items() if name == entry["dtype"])
-    return data[start:end].view(dtype).reshape(entry["shape"])
+def _checksum(parts: Sequence[memoryview]) -> int:
+    crc = 0
+    for part in parts:
+        crc = zlib.crc32(part, crc)
+    return crc

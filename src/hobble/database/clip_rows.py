@@ -95,7 +95,7 @@ class Pairs(NamedTuple):
 
 
 def expanded(rows: ClipRows, links: bool, batch: int = 2048) -> Iterator[Pairs]:
-    """Every (frame, fit) pair of a clip in raw units, about `batch` at a time; with `links`, severities too."""
+    """A clip's (frame, fit) pairs in raw units, `batch` or so at a time; severities only with `links`."""
     layout = rows.layout
     first = rows.first_fit
     start = 0

@@ -49,6 +49,8 @@ def picks(count: np.ndarray, visits: int, seed: int, pass_index: int, layer: int
 
     No count may be above `visits`.
     """
+    if np.all(count <= 1):
+        return np.zeros(len(count), np.int64)
     draws = generator(seed, FITS, pass_index, chunk).random((len(count), visits))
     place = layer % np.maximum(count, 1)
     out = np.zeros(len(count), np.int64)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,15 +14,15 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.database import order
-from hobble.database.chunks import Chunk, read_chunk
-from hobble.database.compose import compose
+from hobble.database.chunks import read_chunk
+from hobble.database.compose import compose, fit_columns, frame_columns
 from hobble.database.layout import RowLayout
 from hobble.database.manifest import STATISTICS, Manifest
 from hobble.database.statistics import Statistics
 
 Item = TypeVar("Item")
 BLOCK_ROWS = 4096
-LEAST_WINDOW = 2
+BLOCKS = 3  # in memory at a time: being made, waiting, in use
 
 
 class Block(NamedTuple):
@@ -40,13 +40,15 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True)
 class Window:
-    """The rows of some chunks, in memory one after another. first: (R,) where each row's fits begin."""
+    """The rows of some chunks, in memory one after another.
 
-    chunks: Sequence[int]
+    rows: of each chunk. first: (R,) where each row's fits begin in `fits`. The rest is what chunks hold.
+    """
+
     rows: Sequence[int]
+    first: np.ndarray
     frames: Array
     fits: Array
-    first: np.ndarray
     count: np.ndarray
     clip: np.ndarray
     frame: np.ndarray
@@ -68,8 +70,8 @@ class Database:
     def open(cls, path: str | Path, memory_mb: int = 512) -> Database:
         """Open the database folder `path`.
 
-        memory_mb: most memory held at a time for its rows. A split that fits is loaded once; a larger one
-        is read again and again, chunk by chunk. Raises InputError where there is no whole database.
+        memory_mb: most memory held at a time for its rows. A database that fits is loaded once; a larger
+        one is read again and again, chunk by chunk. Raises InputError where there is no whole database.
         """
         path = Path(path)
         manifest = Manifest.load(path)
@@ -124,59 +126,63 @@ class Database:
             raise HobbleError(f"there is no section {section} in a pass of {sections}")
         if self.rows(split) == 0:
             return iter(())
-        visits = order.spans(self.rows(split), self.manifest.visits, section, sections)
-        parts = (part for span in visits for part in self._parts(split, pass_index, seed, span))
+        spans = order.spans(self.rows(split), self.manifest.visits, section, sections)
+        window = self.window(split, block_rows)
+        parts = (part for span in spans for part in self._parts(split, pass_index, seed, span, window))
         total = self.section_pairs(split, section, sections)
         return ahead(self._composed(parts, total, block_rows))
 
     def _parts(
-        self, split: str, pass_index: int, seed: int, span: tuple[int, int, int]
+        self, split: str, pass_index: int, seed: int, span: tuple[int, int, int], window: int
     ) -> Iterator[tuple[Window, np.ndarray, np.ndarray]]:
         """Windows, the rows of them to show in order, and the fit of each: a layer from place to place."""
         layer, start, stop = span
-        chunks = self.manifest.chunks[split]
-        if self._fits_memory(split):
-            wanted = [(0, range(len(chunks)), start, stop)]
-            load: Callable[[Sequence[int]], Window] = lambda _: self._whole(split)  # noqa: E731
+        every = range(len(self.manifest.chunks[split]))
+        if window >= len(every):
+            wanted: list[tuple[int, Sequence[int], int, int]] = [(0, every, start, stop)]
+            windows = iter([self._whole(split)])
         else:
-            wanted = list(self._wanted(split, pass_index, seed, layer, start, stop))
-            load = lambda some: self._load(split, some)  # noqa: E731
-        windows = ahead(load(some) for _, some, _, _ in wanted)
-        for window, (group, some, low, high) in zip(windows, wanted, strict=True):
-            rows = order.row_order(sum(window.rows), seed, pass_index, layer, group)[low:high]
+            wanted = list(self._wanted(split, pass_index, seed, layer, start, stop, window))
+            windows = ahead(self._load(split, some) for _, some, _, _ in wanted)
+        for loaded, (group, some, low, high) in zip(windows, wanted, strict=True):
+            rows = order.row_order(sum(loaded.rows), seed, pass_index, layer, group)[low:high]
             args = (self.manifest.visits, seed, pass_index, layer)
-            ends = np.cumsum(window.rows)
+            ends = np.cumsum(loaded.rows)
             picked = [
-                order.picks(window.count[end - n : end], *args, int(chunk))
-                for chunk, n, end in zip(some, window.rows, ends, strict=True)
+                order.picks(loaded.count[end - n : end], *args, int(chunk))
+                for chunk, n, end in zip(some, loaded.rows, ends, strict=True)
             ]
-            yield window, rows, window.first[rows] + np.concatenate(picked)[rows]
+            yield loaded, rows, loaded.first[rows] + np.concatenate(picked)[rows]
 
     def _wanted(
-        self, split: str, pass_index: int, seed: int, layer: int, start: int, stop: int
+        self, split: str, pass_index: int, seed: int, layer: int, start: int, stop: int, window: int
     ) -> Iterator[tuple[int, Sequence[int], int, int]]:
         """The groups of chunks with places start to stop of a layer, and the part of each that is meant."""
         rows = [chunk.rows for chunk in self.manifest.chunks[split]]
         done = 0
-        for group, some in enumerate(order.groups(rows, self._window(split), seed, pass_index, layer)):
+        for group, some in enumerate(order.groups(rows, window, seed, pass_index, layer)):
             n = sum(rows[i] for i in some)
             low, high = max(start - done, 0), min(stop - done, n)
             if low < high:
                 yield group, some.tolist(), low, high
             done += n
 
-    def _fits_memory(self, split: str) -> bool:
-        return sum(chunk.bytes for chunk in self.manifest.chunks[split]) <= self._budget()
+    def block_rows(self, batch: int = 1) -> int:
+        """A good length for blocks: a multiple of `batch`, about 4,096 rows, a quarter of the memory."""
+        row = 4 * (self.layout.x_size + self.layout.y_size)
+        most = min(BLOCK_ROWS, (self.memory_mb << 20) // (4 * BLOCKS * row))
+        return batch * max(1, most // batch)
 
-    def _budget(self) -> int:
-        """Bytes for rows: what is stated less the three blocks that are being made, waiting and in use."""
-        block = BLOCK_ROWS * 4 * (self.layout.x_size + self.layout.y_size)
-        return max((self.memory_mb << 20) - 3 * block, (self.memory_mb << 20) // 4)
+    def window(self, split: str, block_rows: int) -> int:
+        """Chunks held at a time: all, where both splits fit into memory; else as many as fit in twice.
 
-    def _window(self, split: str) -> int:
-        """Chunks mixed at a time: the one in use and the one being read both have to fit."""
-        largest = max(chunk.bytes for chunk in self.manifest.chunks[split])
-        return max(LEAST_WINDOW, self._budget() // (2 * largest))
+        Twice, since while one window is in use the next is read. Off the memory go the blocks being made,
+        waiting and in use. Never less than one chunk.
+        """
+        memory = self.memory_mb << 20
+        memory -= BLOCKS * block_rows * 4 * (self.layout.x_size + self.layout.y_size)
+        sizes = [chunk.bytes for chunk in self.manifest.chunks[split]]
+        return len(sizes) if self.manifest.bytes <= memory else max(1, memory // (2 * max(sizes)))
 
     def _whole(self, split: str) -> Window:
         if split not in self._kept:
@@ -184,26 +190,31 @@ class Database:
         return self._kept[split]
 
     def _load(self, split: str, some: Sequence[int]) -> Window:
-        """Chunks, one after another in one table; each is copied there as it is read."""
+        """Chunks, one after another, read straight into one table; checksums verified the first time."""
         chunks = [self.manifest.chunks[split][i] for i in some]
-        tables: dict[str, np.ndarray] = {}
+        tables = self._tables(sum(c.rows for c in chunks), sum(c.fits for c in chunks))
         row = fit = 0
         for chunk in chunks:
-            for name, array in self._read(chunk).items():
-                if name not in tables:
-                    total = sum(c.fits if name == "fits" else c.rows for c in chunks)
-                    tables[name] = np.empty((total, *array.shape[1:]), array.dtype)
-                at = fit if name == "fits" else row
-                tables[name][at : at + len(array)] = array
-            row, fit = row + chunk.rows, fit + chunk.fits
-        count = tables["count"].astype(np.int64)
-        return Window(some, [c.rows for c in chunks], first=np.cumsum(count) - count, **tables)
+            rows, fits = slice(row, row + chunk.rows), slice(fit, fit + chunk.fits)
+            parts = {name: table[fits if name == "fits" else rows] for name, table in tables.items()}
+            folder = self.path / self.manifest.folder
+            read_chunk(folder, chunk, parts, verify=chunk.file not in self._verified)
+            self._verified.add(chunk.file)
+            row, fit = rows.stop, fits.stop
+        first = np.cumsum(tables["count"], dtype=np.int64) - tables["count"]
+        return Window([c.rows for c in chunks], first, **tables)
 
-    def _read(self, chunk: Chunk) -> dict[str, np.ndarray]:
-        """A chunk, its checksum verified the first time."""
-        arrays = read_chunk(self.path / self.manifest.folder, chunk, chunk.file not in self._verified)
-        self._verified.add(chunk.file)
-        return arrays
+    def _tables(self, rows: int, fits: int) -> dict[str, np.ndarray]:
+        """Empty arrays for what chunks hold, in their order."""
+        floats = np.dtype(self.manifest.dtype)
+        return {
+            "frames": np.empty((rows, frame_columns(self.layout)), floats),
+            "fits": np.empty((fits, fit_columns(self.layout)), floats),
+            "count": np.empty(rows, np.int32),
+            "clip": np.empty(rows, np.int32),
+            "frame": np.empty(rows, np.int32),
+            "phase": np.empty(rows, np.float32),
+        }
 
     def _composed(
         self, parts: Iterator[tuple[Window, np.ndarray, np.ndarray]], total: int, block_rows: int

@@ -20,7 +20,7 @@ BINS = 50  # phases for which the original stores its weights in its constant mo
 
 @dataclass(frozen=True)
 class Weights:
-    """What network/weights.npz holds: weights (K, out, in) and biases (K, out) of K control points a layer."""
+    """What network/weights.npz holds: weights (K, out, in), biases (K, out) of K control points a layer."""
 
     weights: tuple[Array, ...] = field(repr=False)
     biases: tuple[Array, ...] = field(repr=False)
