@@ -1,7 +1,7 @@
 rule configuration:
     """The resolved configuration and data set, as they determine the results."""
     output:
-        "results/{configuration}/configuration.yaml",
+        yaml="results/{configuration}/configuration.yaml",
     log:
         "results/{configuration}/logs/report/configuration.log",
     resources:
@@ -45,7 +45,7 @@ rule report:
         injury=rules.injury_response.output.json,
         pipeline=rules.pipeline_summary.output.json,
         scenarios=rules.generate.output.scenarios,
-        configuration=rules.configuration.output,
+        configuration=rules.configuration.output.yaml,
         weights=lambda w: project.network(w.configuration, "weights.npz"),
         history=lambda w: project.network(w.configuration, "history.csv"),
         motion=lambda w: project.of_dataset(w.configuration, "motion/{clip}.json"),

@@ -6,4 +6,4 @@ from hobble.core.files import write_text
 from hobble.workflow.job import job
 
 with job(snakemake):
-    write_text(snakemake.output[0], yaml.safe_dump(snakemake.params.resolved, sort_keys=False))
+    write_text(snakemake.output.yaml, yaml.safe_dump(snakemake.params.resolved, sort_keys=False))
