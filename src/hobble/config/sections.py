@@ -154,6 +154,7 @@ class Evaluation(Section):
         "all", description="`equivalent`: only the joints that the 31-joint skeleton has too"
     )
     laps: Positive = 19
+    lap_seconds: PositiveFloat = Field(400.0, description="a lap that takes longer is ended there")
     seconds: PositiveFloat = Field(8.0, description="length of each injury response walk")
 
 

@@ -10,7 +10,7 @@ from numba import njit
 from hobble.core.skeleton import Skeleton
 from hobble.runtime.network import Network
 
-LOCK_AT = 0.8  # predicted toe contact from which a foot is held
+LOCK_AT = 0.5  # predicted toe contact from which a foot is held
 RELEASE = 0.075  # share of the hold given up each frame afterwards
 HEIGHT_MIX = 0.5
 SOLE = (5.0, 4.0)  # centimetres of heel and toe joint above the ground under a standing foot
@@ -100,8 +100,9 @@ def place_feet(
             if not locking:
                 lock[c, f] = 0.0
             elif contact[c, 2 * f + 1] >= LOCK_AT:
-                if lock[c, f] <= 0.0:
-                    hold[c, f] = position[c, toe]
+                if lock[c, f] < 1.0:
+                    # Where the foot is seen now, so that contact found again midway does not pull it back.
+                    hold[c, f] = position[c, toe] + lock[c, f] * (hold[c, f] - position[c, toe])
                 lock[c, f] = 1.0
             else:
                 lock[c, f] = max(0.0, lock[c, f] - RELEASE)

@@ -1,0 +1,126 @@
+"""What can be measured of generated motion: slide, turns, gait events, angles. Centimetres, 60 Hz, degrees.
+
+Functions take frames first; where they serve many characters at once, those come second: (F, C, ...).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+
+STANCE = 0.5  # predicted contact from which a foot counts as standing
+SHORTEST_STANCE = 4  # frames; shorter contacts are flickers, not steps
+
+
+def runs(on: Array) -> Array:
+    """(N, 2) first frame and end (exclusive) of each stretch in which `on` (F,) is true.
+
+    >>> runs(np.array([False, True, True, False, True])).tolist()
+    [[1, 3], [4, 5]]
+    """
+    edges = np.diff(np.concatenate([[0], np.asarray(on, np.int8), [0]]))
+    return np.flatnonzero(edges).reshape(-1, 2)
+
+
+def stance(contacts: Array) -> Array:
+    """(F, 2) whether the left and the right foot stand, by heel or toe, of contacts (F, 4)."""
+    return np.maximum(contacts[:, ::2], contacts[:, 1::2]) >= STANCE
+
+
+def foot_slide(toes: Array, contacts: Array) -> Array:
+    """(N,) how far the toe slides on the ground in each stance, cm; toes (F, 2, 3), contacts (F, 4)."""
+    out = []
+    for side in range(2):
+        step = np.linalg.norm(np.diff(toes[:, side, ::2], axis=0), axis=1)
+        for a, b in runs(contacts[:, 2 * side + 1] >= STANCE):
+            if b - a >= SHORTEST_STANCE:
+                out.append(step[a : b - 1].sum())
+    return np.array(out)
+
+
+def largest_turn(rotations: Array) -> float:
+    """Degrees that any joint turns at most from one frame to the next; rotations (F, J, 4) world."""
+    if len(rotations) < 2:
+        return 0.0
+    dot = np.abs(np.sum(rotations[1:] * rotations[:-1], axis=-1, dtype=float))
+    return float(np.degrees(2 * np.arccos(np.minimum(1.0, dot.min()))))
+
+
+def acceleration(positions: Array) -> Array:
+    """(F - 2, ...) size of the second difference of positions (F, ..., 3), cm per frame squared."""
+    return np.linalg.norm(np.diff(positions, n=2, axis=0), axis=-1)
+
+
+def bend(a: Array, b: Array, c: Array) -> Array:
+    """(...) degrees by which the joint at b (..., 3) is bent between a and c; 0 is straight."""
+    u, v = b - a, c - b
+    cosine = np.sum(u * v, axis=-1) / np.maximum(
+        np.linalg.norm(u, axis=-1) * np.linalg.norm(v, axis=-1), 1e-9
+    )
+    return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+
+
+def in_root_frame(positions: Array, root: Array, yaw: Array) -> Array:
+    """World positions (..., J, 3) relative to root (..., 3), turned so that the facing `yaw` (...) is +Z."""
+    p = positions - root[..., None, :]
+    sin, cos = np.sin(yaw)[..., None], np.cos(yaw)[..., None]
+    x, z = p[..., 0] * cos - p[..., 2] * sin, p[..., 0] * sin + p[..., 2] * cos
+    return np.stack([x, p[..., 1], z], axis=-1)
+
+
+def asymmetry(left: float | None, right: float | None) -> float | None:
+    """(left - right) / their mean: 0 is even, positive where the left is larger; None without both."""
+    if left is None or right is None or left + right == 0:
+        return None
+    return 2 * (left - right) / (left + right)
+
+
+def gait_measures(
+    skeleton: Skeleton, local: Array, contacts: Array, travelled: Array
+) -> dict[str, float | None]:
+    """One character's walk in numbers.
+
+    local: (F, J, 3) positions in the root frame; contacts: (F, 4); travelled: (F, 3) world root positions.
+    Returns speed (cm/s over the straight distance), stance shares, step lengths (cm the landing heel is ahead
+    of the other), knee and arm ranges (degrees, 5th to 95th percentile), trunk lean (degrees, forward and to
+    the left), hip height (cm) and asymmetries; None where nothing of the kind happened.
+    """
+    role = skeleton.role
+    seconds = (len(local) - 1) / 60
+    standing = stance(contacts)
+    heels = local[:, [role("left_heel"), role("right_heel")], 2]
+    steps: list[list[float]] = [[], []]
+    for side in range(2):
+        for a, b in runs(standing[:, side]):
+            if a > 0 and b - a >= SHORTEST_STANCE:
+                steps[side].append(heels[a, side] - heels[a, 1 - side])
+    length = [float(np.mean(s)) if s else None for s in steps]
+    share = [float(s) for s in standing.mean(axis=0)]
+    out: dict[str, Any] = {
+        "speed": float(np.linalg.norm((travelled[-1] - travelled[0])[::2]) / seconds),
+        "stance_left": share[0],
+        "stance_right": share[1],
+        "stance_asymmetry": asymmetry(*share),
+        "step_left": length[0],
+        "step_right": length[1],
+        "step_asymmetry": asymmetry(*length),
+    }
+    for side in ("left", "right"):
+        hip, knee, heel = (local[:, role(f"{side}_{part}")] for part in ("hip", "knee", "heel"))
+        arm = local[:, role(f"{side}_wrist")] - local[:, role(f"{side}_shoulder")]
+        out[f"knee_{side}"] = _range(bend(hip, knee, heel))
+        out[f"arm_{side}"] = _range(np.degrees(np.arctan2(arm[:, 2], -arm[:, 1])))
+    trunk = (local[:, role("neck")] - local[:, role("hips")]).mean(axis=0)
+    out["lean_forward"] = float(np.degrees(np.arctan2(trunk[2], trunk[1])))
+    out["lean_left"] = float(np.degrees(np.arctan2(trunk[0], trunk[1])))
+    out["hip_height"] = float(local[:, role("hips"), 1].mean())
+    return out
+
+
+def _range(angles: Array) -> float:
+    low, high = np.percentile(angles, [5, 95])
+    return float(high - low)

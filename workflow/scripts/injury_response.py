@@ -1,0 +1,18 @@
+"""Creates the injury response measurements (JSON, CSV) from a trained network."""
+
+from hobble.core.files import write_json
+from hobble.evaluation.injury import injury_response
+from hobble.evaluation.tables import write_csv
+from hobble.runtime.network import load_network
+from hobble.workflow.job import job
+
+with job(snakemake) as log:
+    result = injury_response(
+        load_network(snakemake.input.weights),
+        configuration=snakemake.params.configuration,
+        runtime=snakemake.params.runtime,
+        seconds=snakemake.params.evaluation["seconds"],
+    )
+    write_json(snakemake.output.json, result)
+    write_csv(snakemake.output.csv, result.get("rows", []))
+    log.info("%s", result.get("summary", result.get("reason")))
