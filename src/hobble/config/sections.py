@@ -76,8 +76,14 @@ class Terrain(Section):
     height_scale: PositiveFloat = 3.0
     highest: PositiveFloat = Field(50.0, description="a patch that goes further from its mean is dropped")
     smoothing: Annotated[float, Field(ge=0)] = Field(0.1, description="regularisation of the residual's RBF")
-    heel_height: float = 5.0
-    toe_height: float = 4.0
+    heel_height: Literal["auto"] | float = Field(
+        "auto", description="of the heel joint above its sole, cm; the original has 5, `auto` asks the clip"
+    )
+    toe_height: Literal["auto"] | float = Field("auto", description="likewise; the original has 4")
+    sole: float = Field(4.0, description="`auto` on ground that is not flat: below the toe joint, cm")
+    deepest: PositiveFloat | None = Field(
+        1.0, description="no foot goes further below the ground, cm; null as in the original: not looked at"
+    )
     seed: int = 1
 
 
@@ -87,6 +93,10 @@ class Heightmap(Section):
     kind: Literal["fractal", "hills", "stairs", "slope", "boxes", "beams", "elevation", "file"]
     path: str | None = Field(None, description="for kind: file; relative to the mocap folder")
     seed: int = 0
+    cell: PositiveFloat | None = Field(None, description="centimetres a cell, where not terrain.cell")
+    height_scale: PositiveFloat | None = Field(
+        None, description="for files instead of terrain.height_scale; other kinds are multiplied by it"
+    )
 
     @model_validator(mode="after")
     def _path_for_files(self) -> Heightmap:

@@ -1,0 +1,117 @@
+"""Generated ground: fractal noise, hills, stairs, slopes, boxes and beams, seeded.
+
+Heights are such that most patches of five by five metres stay within half a metre of their mean.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+
+import numpy as np
+
+from hobble.core.quat import Array
+
+CELLS = 400
+
+
+def generate(kind: str, seed: int, cell: float) -> Array:
+    """Heights (400, 400) in cm of one kind of ground; `cell` in cm. Equal seeds give equal ground."""
+    rng = np.random.default_rng([zlib.crc32(kind.encode()), seed])
+    return KINDS[kind](rng, cell)
+
+
+def fractal(rng: np.random.Generator, cell: float) -> Array:
+    """Noise whose amplitude falls with the square of its frequency: rough soil, no wave longer than 8 m."""
+    frequency = np.hypot(np.fft.fftfreq(CELLS, cell)[:, None], np.fft.rfftfreq(CELLS, cell))
+    amplitude = 1 / np.maximum(frequency, 1 / 800) ** 2
+    amplitude[0, 0] = 0
+    noise = np.fft.irfft2(amplitude * np.fft.rfft2(rng.normal(size=(CELLS, CELLS))), (CELLS, CELLS))
+    return noise / noise.std() * rng.uniform(12, 18)
+
+
+def hills(rng: np.random.Generator, cell: float) -> Array:
+    """Round hills and hollows, 0.6 to 2 m in radius, up to 35 cm high."""
+    x, z = _grid(cell)
+    heights = np.zeros_like(x)
+    for _ in range(60):
+        centre = rng.uniform(0, CELLS * cell, 2)
+        radius, height = rng.uniform(60, 200), rng.uniform(-35, 35)
+        heights += height * np.exp(-((x - centre[0]) ** 2 + (z - centre[1]) ** 2) / (2 * (radius / 2) ** 2))
+    return heights
+
+
+def stairs(rng: np.random.Generator, cell: float) -> Array:
+    """Flights of three to five steps up and down again between landings, in lanes side by side."""
+    heights = np.zeros((CELLS, CELLS))
+    along = np.arange(CELLS) * cell
+    lane = 0
+    while lane < CELLS:
+        width = int(rng.uniform(200, 400) / cell)
+        edges, levels, level = [], [], 0.0
+        at = -rng.uniform(0, 300)
+        while at < CELLS * cell:
+            tread, riser = rng.uniform(28, 42), rng.uniform(8, 17) * rng.choice([-1, 1])
+            for sign in (1, -1):
+                for _ in range(rng.integers(3, 6)):
+                    if abs(level + sign * riser) > 60:
+                        break
+                    at, level = at + tread, level + sign * riser
+                    edges.append(at)
+                    levels.append(level)
+                at += rng.uniform(80, 250)
+        steps = np.concatenate([[0.0], levels])[np.searchsorted(edges, along)]
+        heights[lane : lane + width] = steps
+        lane += width
+    return heights
+
+
+def slope(rng: np.random.Generator, cell: float) -> Array:
+    """Ramps of up to 12 degrees, with bends every one to four metres, and a fall of up to 5 degrees across."""
+    along = np.arange(CELLS) * cell
+    knots, levels = [0.0], [0.0]
+    while knots[-1] < along[-1]:
+        length, steepness = rng.uniform(100, 400), np.tan(np.radians(rng.uniform(2, 12)))
+        up = -np.sign(levels[-1]) if abs(levels[-1]) > 30 else rng.choice([-1, 1])
+        knots.append(knots[-1] + length)
+        levels.append(levels[-1] + up * steepness * length)
+    across = along * np.tan(np.radians(rng.uniform(-5, 5)))
+    return np.interp(along, knots, levels)[:, None] + across[None]
+
+
+def boxes(rng: np.random.Generator, cell: float) -> Array:
+    """Boxes of 5 to 45 cm to step and jump on, on a floor that is otherwise flat."""
+    heights = np.zeros((CELLS, CELLS))
+    for _ in range(110):
+        rows, columns = (rng.uniform(40, 180, 2) / cell).astype(int)
+        i, j = rng.integers(0, CELLS, 2)
+        heights[i : i + rows, j : j + columns] = rng.uniform(5, 45)
+    return heights
+
+
+def beams(rng: np.random.Generator, cell: float) -> Array:
+    """Beams 20 to 35 cm wide, 45 to 55 cm above the floor, lying across one another."""
+    x, z = _grid(cell)
+    heights = np.zeros_like(x)
+    for _ in range(9):
+        angle, height = rng.uniform(0, np.pi), rng.uniform(45, 55)
+        centre = rng.uniform(0, CELLS * cell, 2)
+        distance = (x - centre[0]) * np.cos(angle) + (z - centre[1]) * np.sin(angle)
+        heights[np.abs(distance) < rng.uniform(20, 35) / 2] = height
+    return heights
+
+
+def _grid(cell: float) -> tuple[Array, Array]:
+    along = np.arange(CELLS) * cell
+    x, z = np.meshgrid(along, along, indexing="ij")
+    return x, z
+
+
+KINDS: dict[str, Callable[[np.random.Generator, float], Array]] = {
+    "fractal": fractal,
+    "hills": hills,
+    "stairs": stairs,
+    "slope": slope,
+    "boxes": boxes,
+    "beams": beams,
+}

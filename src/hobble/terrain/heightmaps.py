@@ -1,0 +1,148 @@
+"""Heightmaps: from files, from matplotlib's real elevation model, or generated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.terrain.generate import generate
+
+
+@dataclass(frozen=True)
+class Heightmap:
+    """Heights (rows, columns) in cm, a cell being `cell` centimetres wide; nan where the map has a hole."""
+
+    name: str
+    heights: Array = field(repr=False)
+    cell: float
+
+
+def heightmaps(
+    entries: Sequence[Mapping[str, Any]], files: Sequence[str | Path], *, cell: float, height_scale: float
+) -> list[Heightmap]:
+    """The heightmaps that a data set lists.
+
+    entries: `kind`, `seed`, and `cell` and `height_scale` where they differ from the general ones. files: those
+    of the entries of kind `file`, in their order. cell: cm a cell. height_scale: what the heights of files
+    are multiplied by to make them cm. Raises InputError for a file that cannot be used.
+    """
+    given = iter(files)
+    out = []
+    for entry in entries:
+        width = entry.get("cell") or cell
+        scale = entry.get("height_scale")
+        if entry["kind"] == "file":
+            path = next(given)
+            heights = read_heights(path) * (scale or height_scale)
+            out.append(Heightmap(str(path), heights, width))
+        elif entry["kind"] == "elevation":
+            out.append(Heightmap("elevation", elevation(width) * (scale or 1.0), width))
+        else:
+            name = f"{entry['kind']} (seed {entry['seed']})"
+            heights = generate(entry["kind"], entry["seed"], width) * (scale or 1.0)
+            out.append(Heightmap(name, heights, width))
+    return out
+
+
+def elevation(cell: float) -> Array:
+    """The elevation model of a real landscape that matplotlib carries, true to scale: cm.
+
+    Its 3 arc seconds are 92.6 m north to south and 74.3 m east to west at 36.6 degrees north; columns are resampled
+    so that cells are square, and one cell becomes `cell` centimetres. Slopes reach 36 degrees.
+    """
+    from matplotlib import cbook
+
+    with cbook.get_sample_data("jacksboro_fault_dem.npz") as data:
+        metres = data["elevation"].astype(float)
+        latitude = (float(data["ymin"]) + float(data["ymax"])) / 2
+    narrow = np.cos(np.radians(latitude))
+    columns = np.arange(metres.shape[1])
+    wanted = np.arange(0, metres.shape[1] - 1, 1 / narrow)
+    square = np.stack([np.interp(wanted, columns, row) for row in metres])
+    north_south = 1852.0 / 60 * 3
+    return (square - square.mean()) * cell / north_south
+
+
+def read_heights(path: str | Path) -> Array:
+    """Heights (rows, columns) as a file has them: a text matrix, an image, a NumPy array.
+
+    .txt .csv .dat .asc: numbers in rows, apart by spaces, commas or semicolons. .npy; .npz: its only array of two
+    dimensions, or the one called `heights` or `elevation`. .png .tif .tiff: grey values. Raises InputError.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, "no such heightmap", fix="See terrain.heightmaps of the data set.")
+    readers = {".npz": _npz, ".npy": _npy, ".png": _image, ".tif": _image, ".tiff": _image}
+    heights = np.asarray(readers.get(path.suffix.lower(), _text)(path))
+    if heights.ndim != 2 or min(heights.shape) < 2:
+        raise InputError(path, f"a heightmap has rows and columns, this has shape {heights.shape}")
+    if heights.dtype.kind not in "fiub":
+        raise InputError(path, f"heights are numbers, not {heights.dtype}")
+    heights = heights.astype(float)
+    if not np.isfinite(heights).any():
+        raise InputError(path, "holds no finite height")
+    return np.where(np.isfinite(heights), heights, np.nan)
+
+
+def _text(path: Path) -> Array:
+    rows: list[list[float]] = []
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except UnicodeDecodeError as error:
+        raise InputError(
+            path, "not text", fix="Heightmaps are text, .png, .tif, .npy or .npz files."
+        ) from error
+    for number, line in enumerate(lines, 1):
+        words = line.split("#")[0].replace(",", " ").replace(";", " ").split()
+        if not words:
+            continue
+        try:
+            rows.append([float(word) for word in words])
+        except ValueError as error:
+            raise InputError(
+                path, f"not a number: {str(error).split(':')[-1].strip()}", line=number
+            ) from error
+        if len(rows[-1]) != len(rows[0]):
+            problem = f"{len(rows[-1])} heights where the rows above have {len(rows[0])}"
+            raise InputError(path, problem, line=number)
+    if not rows:
+        raise InputError(path, "holds no heights")
+    return np.array(rows)
+
+
+def _npy(path: Path) -> Array:
+    try:
+        return np.load(path, allow_pickle=False)
+    except (ValueError, OSError, EOFError) as error:
+        raise InputError(path, f"not an array file ({error})") from error
+
+
+def _npz(path: Path) -> Array:
+    from hobble.core.files import load_npz
+
+    arrays = {name: a for name, a in load_npz(path).items() if a.ndim == 2}
+    for name in ("heights", "elevation", *arrays):
+        if name in arrays and (len(arrays) == 1 or name in ("heights", "elevation")):
+            return arrays[name]
+    raise InputError(
+        path,
+        f"which array holds the heights? There are: {', '.join(arrays) or 'none of two dimensions'}",
+        fix="Name it `heights`.",
+    )
+
+
+def _image(path: Path) -> Array:
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as image:
+            grey = image if image.mode in ("L", "I", "F", "I;16", "I;16B", "1") else image.convert("L")
+            return np.asarray(grey, float)
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+        raise InputError(path, f"not an image that can be read ({error})") from error

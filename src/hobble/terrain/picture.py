@@ -1,0 +1,59 @@
+"""What a picture of a fit needs: the ground as a grid, the feet over time, and the figure at three moments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.core.quat import Array
+from hobble.terrain.feet import Feet
+from hobble.terrain.ground import Ground
+
+GRID = 24
+MARGIN = 60.0
+MOST = 2
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One fit, the best, of one cycle; centimetres in the clip's world.
+
+    x, z: (G,) of the grid; ground: (G, G) heights at x[i], z[j]. soles: (T, 4, 3), contacts: (T, 4). pose: (3, J, 3)
+    joints at the beginning, the middle and the end of the cycle; parents: (J,).
+    """
+
+    cycle: int
+    x: Array = field(repr=False)
+    z: Array = field(repr=False)
+    ground: Array = field(repr=False)
+    soles: Array = field(repr=False)
+    contacts: Array = field(repr=False)
+    pose: Array = field(repr=False)
+    parents: np.ndarray = field(repr=False)
+
+
+def picture_cycles(cycles: int) -> set[int]:
+    """Which cycles of a clip are shown: one from its first half and one from its second."""
+    return {cycles // 4, (3 * cycles) // 4} if cycles > 1 else set(range(cycles))
+
+
+def picture_of(clip: Clip, cycle: int, ground: Ground, feet: Feet, around: slice) -> Picture:
+    """The best fit of a cycle, whose frames with the window on either side are `around`."""
+    soles = feet.soles[around]
+    low, high = soles[..., [0, 2]].min(axis=(0, 1)) - MARGIN, soles[..., [0, 2]].max(axis=(0, 1)) + MARGIN
+    x, z = np.linspace(low[0], high[0], GRID), np.linspace(low[1], high[1], GRID)
+    points = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
+    heights = ground.at(points)[0].reshape(GRID, GRID)
+    frames = np.linspace(around.start, around.stop - 1, 5).astype(int)[1:4]
+    return Picture(
+        cycle,
+        x.astype(np.float32),
+        z.astype(np.float32),
+        heights.astype(np.float32),
+        soles.astype(np.float32),
+        feet.contacts[around],
+        clip.positions[frames].astype(np.float32),
+        np.array(clip.skeleton.parents, np.int32),
+    )
