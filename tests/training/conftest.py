@@ -89,4 +89,5 @@ def training() -> dict[str, object]:
         "memory_mb": 64,
         "continues": None,
         "device": "cpu",
+        "precision": "auto",
     }

@@ -146,6 +146,9 @@ class Training(Section):
     memory_mb: Positive = Field(512, description="largest part of the database held in memory")
     continues: str | None = Field(None, description="a configuration whose last checkpoint is the start")
     device: Literal["auto", "cpu", "cuda"] = "auto"
+    precision: Literal["auto", "float32", "bfloat16"] = Field(
+        "auto", description="factors of the products; auto: bfloat16 from batch 256 on where the CPU has it"
+    )
 
 
 class Runtime(Section):

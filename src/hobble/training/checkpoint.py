@@ -12,7 +12,7 @@ import torch
 
 from hobble.core.errors import InputError
 from hobble.core.files import save_npz
-from hobble.training.network import Network, shapes_of
+from hobble.training.network import Network
 from hobble.training.optimiser import Adam
 
 
@@ -84,10 +84,8 @@ def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
 
 
 def _described(sizes: tuple[int, ...], control_points: int) -> str:
-    parameters = sum(int(np.prod(s)) for s in shapes_of(sizes, control_points))
-    return (
-        f"{'-'.join(map(str, sizes))} units and {control_points} control points ({parameters:,} parameters)"
-    )
+    units, numbers = "-".join(map(str, sizes)), parameters(sizes, control_points)
+    return f"{units} units and {control_points} control points ({numbers:,} parameters)"
 
 
 def _copied(flat: torch.Tensor) -> np.ndarray:

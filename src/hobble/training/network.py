@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from math import prod
 
 import numpy as np
 import torch
@@ -14,13 +13,12 @@ from torch import Tensor
 
 @dataclass(frozen=True)
 class Network:
-    """Layers of `sizes` units whose weights are cyclic cubic splines of the phase.
+    """Layers of `sizes` units whose weights and biases are cyclic cubic splines of the phase.
 
-    sizes: units from the input to the output, such as (342, 512, 512, 311).
-    control_points: K knots of the spline, equally spaced over a cycle.
-    flat: every parameter in one buffer: the weights of each layer (K, in, out), then the biases (K, out). One
-        buffer, so that the optimiser is one sweep; inputs first, so that a layer is one product over
-        phase-expanded inputs, (B, K in) x (K in, out).
+    sizes: units from the input to the output, such as (342, 512, 512, 311). control_points: K knots of the
+    spline, equally spaced over a cycle. flat: every parameter in one buffer, layer by layer (out, K, in + 1),
+    the last column being the bias. So the
+        optimiser is one sweep, and a layer one product with inputs expanded by a 1 and by the phase.
     """
 
     sizes: tuple[int, ...]
@@ -28,51 +26,47 @@ class Network:
     flat: Tensor
 
     @cached_property
-    def weights(self) -> list[Tensor]:
-        """(K, in, out) views of `flat`, one for each layer."""
-        return self.views(self.flat)[0]
+    def layers(self) -> list[Tensor]:
+        """(out, K, in + 1) views of `flat`, one for each layer."""
+        return self.views(self.flat)
 
-    @cached_property
-    def biases(self) -> list[Tensor]:
-        """(K, out) views of `flat`, one for each layer."""
-        return self.views(self.flat)[1]
+    def views(self, flat: Tensor) -> list[Tensor]:
+        """The layers of a buffer laid out like `self.flat`: of a gradient, of a moment."""
+        views, start = [], 0
+        for size, out in pairwise(self.sizes):
+            shape = (out, self.control_points, size + 1)
+            views.append(flat[start : start + out * shape[1] * shape[2]].view(shape))
+            start += views[-1].numel()
+        return views
 
-    def views(self, flat: Tensor) -> tuple[list[Tensor], list[Tensor]]:
-        """Weights and biases as views of a buffer laid out like `self.flat`: a gradient, a moment."""
-        shapes = shapes_of(self.sizes, self.control_points)
-        parts = torch.split(flat, [prod(s) for s in shapes])
-        views = [part.view(shape) for part, shape in zip(parts, shapes, strict=True)]
-        layers = len(self.sizes) - 1
-        return views[:layers], views[layers:]
-
-    def to(self, device: torch.device, dtype: torch.dtype | None = None) -> Network:
-        """The same network elsewhere, or in another type."""
+    def to(self, device: torch.device | str, dtype: torch.dtype | None = None) -> Network:
+        """A copy elsewhere, or in another type."""
         return Network(self.sizes, self.control_points, self.flat.to(device, dtype, copy=True))
 
     def __call__(self, x: Tensor, p: Tensor) -> Tensor:
         """Standardised outputs (B, Y) of standardised inputs (B, X) at phases (B,), without dropout."""
         c = coefficients(p, self.control_points)
-        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
-            if layer:
+        for number, layer in enumerate(self.layers):
+            if number:
                 x = torch.nn.functional.elu(x)
-            x = torch.addmm(c @ bias, expand(x, c), weight.flatten(0, 1))
+            x = expand(x, c) @ layer.flatten(1).T
         return x
 
 
-def shapes_of(sizes: tuple[int, ...], control_points: int) -> list[tuple[int, ...]]:
-    """Shapes of the parameters in the order of `Network.flat`."""
-    pairs = list(pairwise(sizes))
-    return [(control_points, a, b) for a, b in pairs] + [(control_points, b) for _, b in pairs]
+def parameters(sizes: tuple[int, ...], control_points: int) -> int:
+    """How many numbers a network is: the length of `Network.flat`."""
+    return control_points * sum((size + 1) * out for size, out in pairwise(sizes))
 
 
 def initialise(sizes: tuple[int, ...], control_points: int, seed: int) -> Network:
     """Weights uniform within +-sqrt(6 / (in * out)), biases 0 (Holden et al. 2017, as released)."""
     generator = np.random.default_rng([seed, 0])
-    parts = []
-    for shape in shapes_of(sizes, control_points):
-        bound = np.sqrt(6.0 / (shape[1] * shape[2])) if len(shape) == 3 else 0.0
-        parts.append(generator.uniform(-bound, bound, prod(shape)).astype(np.float32))
-    return Network(tuple(sizes), control_points, torch.from_numpy(np.concatenate(parts)))
+    network = Network(tuple(sizes), control_points, torch.zeros(parameters(sizes, control_points)))
+    for layer in network.layers:
+        out, k, size = layer.shape
+        bound = (6.0 / ((size - 1) * out)) ** 0.5
+        layer[:, :, :-1] = torch.from_numpy(generator.uniform(-bound, bound, (out, k, size - 1)))
+    return network
 
 
 def coefficients(p: Tensor, control_points: int) -> Tensor:
@@ -98,5 +92,5 @@ def coefficients(p: Tensor, control_points: int) -> Tensor:
 
 
 def expand(x: Tensor, c: Tensor) -> Tensor:
-    """(B, K n): each row of x (B, n) times each of its coefficients (B, K)."""
-    return (c[:, :, None] * x[:, None, :]).flatten(1)
+    """(B, K (n + 1)): each row of x (B, n), with a 1 behind it, times each of its coefficients (B, K)."""
+    return torch.cat([c[:, :, None] * x[:, None, :], c[:, :, None]], dim=2).flatten(1)

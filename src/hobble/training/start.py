@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,17 +17,21 @@ from hobble.core.files import load_npz
 from hobble.database.manifest import FILE
 from hobble.database.reader import Database
 from hobble.training.checkpoint import State, unpack
-from hobble.training.network import initialise
+from hobble.training.fused import FusedStep
+from hobble.training.network import Network, initialise
 from hobble.training.optimiser import Adam
+from hobble.training.products import bfloat16_is_fast
+from hobble.training.step import Step
 
 log = logging.getLogger("hobble.training")
 
 NOT_IN_THE_NAME = ("passes", "continues", "device")
+HALF_FROM = 256  # batch from which the products take most of the time
 
 
 def use_threads(threads: int) -> None:
     """Use as many threads in PyTorch and numba, and only algorithms that give the same bits again."""
-    threads = max(1, min(threads, os.cpu_count() or 1))
+    threads = max(1, min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
     torch.set_num_threads(threads)
     numba.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)
@@ -91,3 +94,12 @@ def device(wanted: str) -> torch.device:
     if wanted == "cuda" and not there:
         raise HobbleError("training.device is cuda, but PyTorch finds no CUDA device here; use auto or cpu")
     return torch.device("cuda" if there and wanted != "cpu" else "cpu")
+
+
+def step_for(network: Network, training: Mapping[str, Any]) -> Step:
+    """The way to find gradients that suits the device, the precision wanted and the size of a batch."""
+    on_cpu = network.flat.device.type == "cpu"
+    half = training["precision"] == "bfloat16"
+    if training["precision"] == "auto" and training["batch"] >= HALF_FROM:
+        half = bfloat16_is_fast() if on_cpu else torch.cuda.is_bf16_supported()
+    return (FusedStep if on_cpu else Step)(network, training["dropout"], half)

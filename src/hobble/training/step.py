@@ -1,10 +1,12 @@
-"""One batch: outputs, loss and gradient by hand, as few large products.
+"""One batch: loss and gradient by hand, as three large products for each layer.
 
-With e the inputs of a layer times the K spline coefficients, (B, K in), and W its weights, (K in, out):
+With e the inputs of a layer, a 1 behind them, times each of the K spline coefficients: (B, K (in + 1)), and W
+its weights and biases, (out, K (in + 1)):
 
-    a = e W + c b        dW = e' da        db = c' da        de = da W'        dx = sum_k c_k de_k
+    a = e W'        dW = da' e        de = da W        dx = sum_k c_k de_k
 
-which is the network with weights blended for each sample, since sum_k c_k (W_k x) = (sum_k c_k W_k) x.
+This is the network whose weights are blended for each sample, since sum_k c_k (W_k x) = (sum_k c_k W_k) x, at
+a fraction of the memory traffic.
 """
 
 from __future__ import annotations
@@ -13,50 +15,77 @@ import torch
 from torch import Tensor
 
 from hobble.training.network import Network, coefficients, expand
+from hobble.training.products import product
 
 
 class Step:
-    """The gradient of the mean squared error of a network under dropout.
+    """The gradient of the mean squared error of a network under dropout, in PyTorch, on any device.
 
-    network: what is trained; read anew at every call. dropout: share of units dropped before each layer, the
-    input included; the rest is scaled up to make up for it.
+    network: what is trained; read anew at every call.
+    dropout: share of units dropped before each layer, the input included; the rest is scaled up to make up
+    for it. half: round the factors of the products to bfloat16; their sums, and all else, stay float32.
+    gradients: of the last call, (out, K (in + 1)) for each layer, in bfloat16 with `half`.
     """
 
-    def __init__(self, network: Network, dropout: float) -> None:
+    def __init__(self, network: Network, dropout: float, half: bool = False) -> None:
         self.network = network
         self.keep = 1.0 - dropout
-        self.gradient = torch.zeros_like(network.flat)
-        self.weight_gradients, self.bias_gradients = network.views(self.gradient)
-
-    def masks(self, rows: int, generator: torch.Generator) -> list[Tensor]:
-        """What each layer's inputs are multiplied by: 0 with the probability `dropout`, else 1 / keep."""
-        widths = self.network.sizes[:-1]
-        flat = self.network.flat
-        drawn = torch.rand(rows * sum(widths), generator=generator, device=flat.device, dtype=flat.dtype)
-        drawn = (drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep)
-        parts = torch.split(drawn, [rows * w for w in widths])
-        return [part.view(rows, w) for part, w in zip(parts, widths, strict=True)]
+        self.half = half
+        self.factors = network.flat.to(torch.bfloat16) if half else network.flat
+        self.generator = torch.Generator(network.flat.device)
+        self.gradients: list[Tensor] = []
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
-        """Fill `self.gradient` for x (B, X), y (B, Y), p (B,); returns the loss, a scalar tensor."""
-        network = self.network
-        c = coefficients(p, network.control_points)
-        units, expanded = [], []
-        for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
-            if layer:
-                x = torch.nn.functional.elu(x)
-            units.append(x)
-            expanded.append(expand(x * masks[layer], c))
-            x = torch.addmm(c @ bias, expanded[-1], weight.flatten(0, 1))
-        error = x - y
-        loss = torch.mean(error * error)
-        d = error.mul_(2.0 / error.numel())
-        for layer in range(len(network.weights) - 1, -1, -1):
-            torch.mm(expanded[layer].T, d, out=self.weight_gradients[layer].flatten(0, 1))
-            torch.mm(c.T, d, out=self.bias_gradients[layer])
-            if layer:
-                de = torch.mm(d, network.weights[layer].flatten(0, 1).T)
-                d = torch.einsum("bk,bki->bi", c, de.view(len(c), network.control_points, -1))
-                d *= masks[layer]
-                d *= torch.clamp(units[layer] + 1, max=1)  # the slope of ELU, e^a below 0, from its value
-        return loss
+        """Find `gradients` for x (B, X), y (B, Y), p (B,); returns the mean squared error, a scalar tensor.
+
+        masks: one for each layer, as `masks` draws them.
+        """
+        if self.half:
+            self.factors.copy_(self.network.flat)
+        weights = [layer.flatten(1) for layer in self.network.views(self.factors)]
+        c = self.coefficients(p)
+        expanded, slopes = [], []
+        for number, weight in enumerate(weights):
+            x = torch.nn.functional.elu(x) if number else x
+            e, slope = self.expanded(number, x, c, masks[number])
+            expanded.append(e)
+            slopes.append(slope)
+            x = product(e, weight).to(y.dtype)
+        error = x.sub_(y)
+        d = error * (2.0 / error.numel())
+        self.gradients = [d] * len(weights)
+        for number in range(len(weights) - 1, -1, -1):
+            d = d.to(self.factors.dtype)
+            self.gradients[number] = product(d.T, expanded[number].T)
+            if number:
+                d = self.contracted(number, product(d, weights[number].T), c, slopes[number])
+        return torch.mean(error.mul_(error))
+
+    def seed(self, seed: int) -> None:
+        """Begin a new sequence of dropout masks, 0 <= seed < 2^63."""
+        self.generator.manual_seed(seed)
+
+    def masks(self, rows: int) -> list[Tensor]:
+        """What each layer's inputs (rows, in) are multiplied by: 0 for those dropped, 1 / keep for others."""
+        flat = self.network.flat
+        masks = []
+        for width in self.network.sizes[:-1]:
+            drawn = torch.rand(rows, width, generator=self.generator, device=flat.device)
+            masks.append((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep))
+        return masks
+
+    def coefficients(self, p: Tensor) -> Tensor:
+        """(B, K) of phases (B,)."""
+        return coefficients(p, self.network.control_points)
+
+    def expanded(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
+        """Layer `number`'s inputs x (B, n) under its mask, expanded (B, K (n + 1)), and the slopes (B, n).
+
+        The slope is that of the ELU which gave x, found from its value (e^a = x + 1 below 0), times the mask.
+        """
+        return expand(x * mask, c).to(self.factors.dtype), mask * torch.clamp(x + 1, max=1)
+
+    def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
+        """(B, n): the gradient before layer `number`'s ELU, from that of what is expanded, (B, K (n + 1))."""
+        parts = de.to(c.dtype).view(len(c), c.shape[1], -1)[:, :, :-1]
+        return torch.bmm(c[:, None, :], parts)[:, 0, :] * slope

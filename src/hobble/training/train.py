@@ -17,8 +17,7 @@ from hobble.training.batches import TRAIN, Watch, batches
 from hobble.training.checkpoint import Saver, State, pack
 from hobble.training.held_out import HeldOut
 from hobble.training.history import duration
-from hobble.training.start import begin, recipe_hash, use_threads
-from hobble.training.step import Step
+from hobble.training.start import begin, recipe_hash, step_for, use_threads
 
 log = logging.getLogger("hobble.training")
 
@@ -53,19 +52,18 @@ def train(
 def _run(state: State, database: Database, training: Mapping[str, Any], saver: Saver) -> None:
     passes, sections, seed = training["passes"], training["sections"], training["seed"]
     device = state.network.flat.device
-    step = Step(state.network, training["dropout"])
+    step = step_for(state.network, training)
     held_out = HeldOut(database, device, database.pairs(TRAIN) // sections)
-    generator = torch.Generator(device)
     progress = Progress(state, passes * database.pairs(TRAIN))
     for turn in range(state.sections, passes * sections):
         pass_index, section = divmod(turn, sections)
         where = f"pass {pass_index + 1} of {passes}, section {section + 1} of {sections}"
         watch = Watch(where, database.clips)
-        generator.manual_seed(section_seed(seed, turn))
+        step.seed(section_seed(seed, turn))
         for batch in batches(database, pass_index, section, sections, seed, training["batch"]):
             x, y, p = (torch.from_numpy(array).to(device) for array in batch[:3])
-            watch.add(step(x, y, p, step.masks(len(x), generator)), batch)
-            state.adam.step(step.gradient)
+            watch.add(step(x, y, p, step.masks(len(x))), batch)
+            state.adam.step(step.gradients)
             progress.bar.update(len(p))
         train_mse = watch.mean()
         state.sections, state.samples = turn + 1, state.samples + watch.samples

@@ -28,9 +28,10 @@ def write_weights(
     facts: numbers about the training that go into `meta` as they are. Equal networks give equal bytes.
     """
     arrays: dict[str, np.ndarray] = {}
-    for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
-        arrays[f"W{layer}"] = np.ascontiguousarray(weight.cpu().numpy().transpose(0, 2, 1))
-        arrays[f"b{layer}"] = bias.cpu().numpy()
+    for number, layer in enumerate(network.layers):
+        values = layer.cpu().numpy()
+        arrays[f"W{number}"] = np.ascontiguousarray(values[:, :, :-1].swapaxes(0, 1))
+        arrays[f"b{number}"] = np.ascontiguousarray(values[:, :, -1].T)
     s = database.statistics
     arrays |= {"Xmean": s.x_mean, "Xstd": s.x_std, "Ymean": s.y_mean, "Ystd": s.y_std}
     save_npz(path, **arrays, meta=np.array(meta(network, database, configuration, facts)))

@@ -1,0 +1,30 @@
+"""Matrix products at the speed of the machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import torch
+from torch import Tensor
+
+_ONEDNN = torch.backends.mkldnn.is_available() and hasattr(torch.ops.mkldnn, "_linear_pointwise")
+
+
+def product(a: Tensor, b: Tensor) -> Tensor:
+    """a @ b.T for a (m, n) and b (k, n).
+
+    On a CPU, float32 goes to oneDNN: PyTorch gives it to MKL, which knows no 512-bit kernels for processors
+    other than Intel's and runs at half the speed (220 against 470 GFLOP/s on two cores of an EPYC 9005).
+    """
+    if _ONEDNN and a.dtype == torch.float32 and a.device.type == "cpu":
+        return torch.ops.mkldnn._linear_pointwise(a, b, None, "none", [], "")
+    return torch.mm(a, b.T)
+
+
+def bfloat16_is_fast() -> bool:
+    """Whether this CPU multiplies bfloat16 in hardware (AVX-512 BF16 or AMX), twice as fast as float32."""
+    try:
+        flags = Path("/proc/cpuinfo").read_text()
+    except OSError:
+        return False
+    return "avx512_bf16" in flags or "amx_bf16" in flags
