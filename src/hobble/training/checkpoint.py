@@ -12,7 +12,7 @@ import torch
 
 from hobble.core.errors import InputError
 from hobble.core.files import save_npz
-from hobble.training.network import Network
+from hobble.training.network import Network, parameters
 from hobble.training.optimiser import Adam
 
 
