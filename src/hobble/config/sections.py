@@ -40,6 +40,9 @@ class Motion(Section):
     source_fps: PositiveFloat | None = Field(None, description="overrules the files' Frame Time")
     unit: Literal["auto"] | PositiveFloat = Field("auto", description="centimetres per unit of the file")
     up: Literal["auto", "Y", "Z"] = "auto"
+    handedness: Literal["auto", "right", "left"] = Field(
+        "auto", description="of the file's coordinates; a left-handed file has x negated"
+    )
     proportions: Literal["skeleton", "clip"] = Field(
         "skeleton", description="retarget onto the skeleton's bone lengths, or keep each clip's own"
     )

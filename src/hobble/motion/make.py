@@ -14,7 +14,9 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.motion.axes import Axes, straighten
 from hobble.motion.decode import Decoded, decode, frame_rate
+from hobble.motion.defects import repair
 from hobble.motion.read import Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.retarget import plan, retarget_clip
@@ -32,7 +34,7 @@ class Source:
     match: Match
     unit: float
     unit_name: str
-    up: str
+    axes: Axes
     first_frame: int
     notes: list[str]
 
@@ -48,7 +50,7 @@ def make_clip(
     """Read a BVH file, check it, and put it on the skeleton at the frame rate of `options`.
 
     skeleton: the target's file. maps: the folder of the skeleton files. clip: the name of the clip made.
-    options: the `motion` section of a data set (fps, source_fps, unit, up, proportions, defects).
+    options: the `motion` section of a data set (fps, source_fps, unit, up, handedness, proportions, defects).
     Returns the clip and its report: `motion/<clip>.json` of docs/artefacts.md.
     Raises InputError for a file that cannot be read, for another skeleton, and for what is broken beyond
     repair or, with defects: refuse, broken at all.
@@ -73,7 +75,12 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[st
     notes += decoded.notes
     fps = options["source_fps"] or frame_rate(file.frame_time, file.frame_time_text)
     clip = _scaled(file.path.stem, rig, decoded, fps, unit)
-    return Source(clip, match, unit, unit_name, "Y", 0, notes)
+    clip, axes = straighten(clip, options["up"], options["handedness"])
+    repaired = repair(clip)
+    if repaired.sentences and options["defects"] == "refuse":
+        raise InputError(file.path, repaired.sentences[0], fix="Set motion.defects: repair to mend it so.")
+    notes += repaired.sentences
+    return Source(repaired.clip, match, unit, unit_name, axes, repaired.first, notes)
 
 
 def _rig(file: Bvh) -> Skeleton:
@@ -166,7 +173,9 @@ def _report(file: Bvh, source: Source, made: Clip, repairs: list[str]) -> dict[s
         "seconds": round(len(made) / made.fps, 3),
         "unit": source.unit,
         "unit_name": source.unit_name,
-        "up": source.up,
+        "up": source.axes.up,
+        "handedness": source.axes.handedness,
+        "rest_facing": source.axes.facing,
         "rig": source.match.rig,
         "repairs": repairs,
     }

@@ -19,7 +19,8 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.ik import aim, two_bone_knee
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, forward_kinematics, local_rotations
+from hobble.core.skeleton import Skeleton, local_rotations
+from hobble.motion.axes import rest_frame, rest_positions
 from hobble.motion.rig import leg_length
 
 # Joints that point along a limb: role -> the role at the other end of the bone.
@@ -28,7 +29,6 @@ STANDING = (
     0.8  # cm a frame at 60 Hz: a heel slower than this is treated as standing, at most where it is slow
 )
 MOST_TILT = np.radians(6.0) / 2  # half the angle by which a foot is tilted at most
-UPRIGHT = np.cos(np.radians(20.0))
 
 
 @dataclass(frozen=True)
@@ -47,31 +47,6 @@ class Retarget:
     turns: Array = field(repr=False)
     scale: float
     lift: float
-
-
-def rest_positions(skeleton: Skeleton) -> Array:
-    """(J, 3) joint positions with every rotation at identity and the root at the origin."""
-    rest = np.broadcast_to(quat.IDENTITY, (1, len(skeleton.joints), 4))
-    return forward_kinematics(skeleton, rest, np.zeros((1, 3)))[1][0]
-
-
-def rest_frame(skeleton: Skeleton) -> Array:
-    """(4,) rotation from left = X, up = Y, forward = Z to the body's own axes in the rest pose.
-
-    A rest pose that stands along the axes within 20 degrees is taken to stand along them exactly.
-    """
-    p = rest_positions(skeleton)
-    at = {role: p[skeleton.role(role)] for role in skeleton.roles}
-    across = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
-    left = across / np.linalg.norm(across)
-    up = at["head"] - at["hips"]
-    up = up - left * (up @ left)
-    up /= np.linalg.norm(up)
-    axes = np.stack([left, up, np.cross(left, up)], axis=1)
-    snapped = np.round(axes)
-    if np.all(np.abs(snapped).sum(axis=0) == 1) and np.sum(axes * snapped, axis=0).min() > UPRIGHT:
-        axes = snapped
-    return quat.from_matrix(axes)
 
 
 def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Retarget:
@@ -175,8 +150,8 @@ def _hold_heel(how: Retarget, rotations: Array, side: str, heel: Array, toe: Arr
         level = toe[here] - heel[here] - apart[here].mean(axis=0)
         level[:, 1] = 0.0
         across = np.linalg.norm(level, axis=1, keepdims=True)
-        level *= np.minimum(1.0, 0.99 * length / np.maximum(across, 1e-9))
-        level[:, 1] = np.sign(foot[here, 1]) * np.sqrt(length**2 - np.sum(level**2, axis=1))
+        level *= np.minimum(1.0, length / np.maximum(across, 1e-9))
+        level[:, 1] = np.sign(foot[here, 1]) * np.sqrt(np.maximum(length**2 - np.sum(level**2, axis=1), 0.0))
         wanted[here] = level
         share[here] = _eased(last - first, round(fps / 15), first == 0, last == len(heel))
     tilt = quat.log(quat.between(foot, wanted))
@@ -186,7 +161,7 @@ def _hold_heel(how: Retarget, rotations: Array, side: str, heel: Array, toe: Arr
 
 
 def standing_runs(point: Array, slow: float, shortest: int) -> list[tuple[int, int]]:
-    """Runs [first, last) of frames, `shortest` or more, in which a point (F, 3) moves less than `slow` a frame."""
+    """Runs [first, last) of `shortest` frames or more in which a point (F, 3) moves less than `slow` a frame."""
     speed = np.linalg.norm(np.diff(point, axis=0), axis=1)
     still = np.concatenate([[False], speed < slow, [False]])
     starts = np.flatnonzero(~still[:-1] & still[1:])
@@ -204,7 +179,7 @@ def _eased(frames: int, ramp: int, open_start: bool, open_end: bool) -> Array:
 
 
 def _reach(how: Retarget, rotations: Array, root: Array, side: str, toe: Array) -> None:
-    """Bend a leg so that the ball of the foot gets to `toe` (F, 3); foot and toes keep their world rotation."""
+    """Bend a leg so that the ball of the foot gets to `toe` (F, 3); the foot keeps its world rotation."""
     skeleton = how.target
     hip, knee, heel, ball = (skeleton.role(f"{side}_{part}") for part in ("hip", "knee", "heel", "toe"))
     start = _position(skeleton, rotations, root, hip)

@@ -12,7 +12,6 @@ import numpy as np
 import yaml
 
 from hobble.core.errors import InputError
-from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 
 # Centimetres per unit of the file; the CMU files count in inches / 0.45.
@@ -185,10 +184,3 @@ def unit_of(leg: float) -> tuple[float, str] | None:
         return None
     name = min(UNITS, key=lambda unit: abs(np.log(leg * UNITS[unit] / LEG)))
     return (UNITS[name], name) if LEG_RANGE[0] <= leg * UNITS[name] <= LEG_RANGE[1] else None
-
-
-def axis_name(direction: Array) -> tuple[str, float]:
-    """The axis nearest to a direction (3,), as "+Y" or "-X", and the cosine of the angle between them."""
-    unit = np.asarray(direction) / max(float(np.linalg.norm(direction)), 1e-9)
-    k = int(np.argmax(np.abs(unit)))
-    return ("+" if unit[k] > 0 else "-") + "XYZ"[k], float(abs(unit[k]))

@@ -1,0 +1,142 @@
+"""Which way is up, which hand is which, where the rest pose faces: found from the rig and its motion, then
+put right.
+
+Hobble's clips are right-handed with Y up, and their rest poses face +Z with the left at +X.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+
+FLIP = np.array([-1.0, 1.0, 1.0])
+MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
+UPRIGHT = np.cos(np.radians(20.0))
+DIRECTIONS = {
+    sign + axis: np.eye(3)["XYZ".index(axis)] * (1 if sign == "+" else -1) for sign in "+-" for axis in "XYZ"
+}
+
+
+@dataclass(frozen=True)
+class Axes:
+    """What was found or given: up ("+Y"), handedness ("right"), facing of the rest pose ("+Z", "oblique")."""
+
+    up: str
+    handedness: str
+    facing: str
+
+
+def nearest_axis(direction: Array) -> tuple[str, float]:
+    """The axis nearest to a direction (3,), such as "+Y", and the cosine of the angle to it."""
+    unit = direction / max(float(np.linalg.norm(direction)), 1e-9)
+    k = int(np.argmax(np.abs(unit)))
+    return ("+" if unit[k] > 0 else "-") + "XYZ"[k], float(abs(unit[k]))
+
+
+def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array]:
+    """Unit vectors (..., 3) to the left, up the trunk and, by the feet, forward; positions (..., J, 3)."""
+    at = {role: positions[..., skeleton.role(role), :] for role in skeleton.roles}
+    left = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
+    up = at["head"] - at["hips"]
+    feet = at["left_toe"] - at["left_heel"] + at["right_toe"] - at["right_heel"]
+    return _unit(left), _unit(up), _unit(feet)
+
+
+def _unit(v: Array) -> Array:
+    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
+
+
+def rest_positions(skeleton: Skeleton) -> Array:
+    """(J, 3) joint positions with every rotation at identity and the root at the origin."""
+    out = np.zeros_like(skeleton.offsets, dtype=float)
+    for j, p in enumerate(skeleton.parents):
+        if p >= 0:
+            out[j] = out[p] + skeleton.offsets[j]
+    return out
+
+
+def rest_frame(skeleton: Skeleton) -> Array:
+    """(4,) rotation from left = X, up = Y, forward = Z to the body's own axes in the rest pose.
+
+    A rest pose that stands along the axes within 20 degrees is taken to stand along them exactly.
+    """
+    left, up, _ = body_axes(skeleton, rest_positions(skeleton))
+    up = _unit(up - left * (up @ left))
+    axes = np.stack([left, up, np.cross(left, up)], axis=1)
+    snapped = np.round(axes)
+    if np.all(np.abs(snapped).sum(axis=0) == 1) and np.sum(axes * snapped, axis=0).min() > UPRIGHT:
+        axes = snapped
+    return quat.from_matrix(axes)
+
+
+def straighten(clip: Clip, up: str, handedness: str) -> tuple[Clip, Axes]:
+    """The clip right-handed with Y up, its rest pose facing +Z where that is a matter of whole axes.
+
+    up: "auto", "Y" or "Z". handedness: "auto", "right" or "left". What is `auto` is read off the motion: up
+    goes from the hips to the head and from the feet to the hips, and the feet point forward.
+    """
+    name = _up_of(clip) if up == "auto" else f"+{up}"
+    if handedness == "auto":
+        handedness = _hand_of(clip)
+    if handedness == "left":
+        clip = _other_hand(clip)
+        name = {"+X": "-X", "-X": "+X"}.get(name, name)
+    world = quat.between(DIRECTIONS[name], DIRECTIONS["+Y"])
+    rest = rest_frame(clip.skeleton)
+    facing, near = nearest_axis(quat.rotate(rest, np.array([0.0, 0.0, 1.0])))
+    turn = quat.inv(rest) if near > 1 - 1e-9 else quat.IDENTITY
+    return _turned(clip, world, turn), Axes(name, handedness, facing if near > 1 - 1e-9 else "oblique")
+
+
+def _up_of(clip: Clip) -> str:
+    at = {
+        role: clip.positions[:, clip.skeleton.role(role)]
+        for role in ("head", "hips", "left_toe", "right_toe")
+    }
+    trunk = _unit(at["head"] - at["hips"]).mean(axis=0)
+    legs = _unit(at["hips"] - 0.5 * (at["left_toe"] + at["right_toe"])).mean(axis=0)
+    return nearest_axis(trunk + legs)[0]
+
+
+def _hand_of(clip: Clip) -> str:
+    left, up, feet = body_axes(clip.skeleton, clip.positions)
+    return "left" if np.mean(np.sum(np.cross(left, up) * feet, axis=-1)) < -0.2 else "right"
+
+
+def _other_hand(clip: Clip) -> Clip:
+    """Negate x throughout: from left- to right-handed coordinates."""
+    ends = {name: (-x, y, z) for name, (x, y, z) in clip.skeleton.end_sites.items()}
+    return replace(
+        clip,
+        skeleton=replace(clip.skeleton, offsets=clip.skeleton.offsets * FLIP, end_sites=ends),
+        rotations=clip.rotations * MIRROR,
+        root=clip.root * FLIP,
+        translations=None if clip.translations is None else clip.translations * FLIP,
+    )
+
+
+def _turned(clip: Clip, world: Array, rest: Array) -> Clip:
+    """Turn the world by `world` and the rest pose, without moving anything, by `rest`."""
+    if np.allclose(world, quat.IDENTITY) and np.allclose(rest, quat.IDENTITY):
+        return clip
+    rotations = quat.mul(quat.mul(rest, clip.rotations), quat.inv(rest))
+    rotations[:, 0] = quat.mul(quat.mul(world, clip.rotations[:, 0]), quat.inv(rest))
+    ends = {
+        name: (float(x), float(y), float(z))
+        for name, offset in clip.skeleton.end_sites.items()
+        for x, y, z in [quat.rotate(rest, np.array(offset))]
+    }
+    offsets = quat.rotate(rest, clip.skeleton.offsets)
+    return replace(
+        clip,
+        skeleton=replace(clip.skeleton, offsets=offsets, end_sites=ends),
+        rotations=rotations,
+        root=quat.rotate(world, clip.root),
+        translations=None if clip.translations is None else quat.rotate(rest, clip.translations),
+    )

@@ -1,0 +1,203 @@
+"""Frames that are plainly broken: found, named, and cut off, bridged or smoothed over.
+
+A joint of a living figure changes its velocity little from one frame to the next. What jumps further than any
+movement does is an error of the file: a rest pose or zeros as first or last frame, a teleport, a jump at the
+seam of a loop, a single frame gone wrong. Sentences count frames from 1, the code from 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.quat import Array
+
+JUMP = 12.0  # cm further than the neighbouring frames lead to expect, were frames endlessly short
+JUMP_AT_30 = 30.0  # cm more at 30 Hz, where a fast limb's velocity changes more between frames
+GLITCH = 6.5  # cm that a single frame lies off the middle between its neighbours
+GLITCH_AT_30 = 8.0
+TELEPORT = 30.0  # cm: a jump of the root that is no seam of a loop
+HEAD, TAIL = 0.5, 1.0  # seconds: pieces up to this long before the first and after the last jump are cut off
+BRIDGE = 0.25  # seconds: pieces up to this long between two jumps are bridged
+BLEND = 0.1  # seconds to each side over which a jump in the pose is smoothed
+NO_POSE = 0.75  # share of joints without any rotation in a frame that holds no pose
+
+
+@dataclass(frozen=True)
+class Repaired:
+    """A clip without its broken frames, where it begins in its source (from 0), and what was done to it."""
+
+    clip: Clip
+    first: int
+    sentences: list[str]
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A jump between frame `after` and the next: its size in cm, the joint furthest off, the root's share."""
+
+    after: int
+    size: float
+    joint: str
+    root: float = field(default=0.0)
+
+    def __str__(self) -> str:
+        between = f"between frames {self.after + 1} and {self.after + 2}"
+        return f"{self.joint} jumps by {self.size:.0f} cm {between}"
+
+
+def repair(clip: Clip) -> Repaired:
+    """Find broken frames and mend what can be mended; a sound clip comes back as it is."""
+    clip, sentences = _mend_glitches(clip)
+    jumps = find_jumps(clip)
+    first, last, said = _sound_part(clip, jumps)
+    sentences += said
+    inner = [jump for jump in jumps if first <= jump.after < last]
+    inner, bridges = _short_pieces(inner, clip.fps)
+    for start, end, jump in bridges:
+        clip = _interpolate(clip, start, end)
+        frames = f"frames {start + 1} to {end + 1}" if end > start else f"frame {start + 1}"
+        sentences.append(f"{jump}; {frames} were bridged by interpolation.")
+    for jump in inner:
+        clip = _smooth(clip, jump.after)
+        sentences.append(f"{jump}; the motion was blended over {BLEND:g} s to each side.")
+    return Repaired(_cut(clip, first, last), first, sentences)
+
+
+def find_jumps(clip: Clip) -> list[Jump]:
+    """Transitions in which some joint moves much further than in the three before and the three after."""
+    if len(clip) < 3:
+        return []
+    step = np.diff(clip.positions, axis=0)
+    off = np.linalg.norm(step - _running_median(step, 3), axis=-1)
+    limit = JUMP + JUMP_AT_30 * (30.0 / clip.fps) ** 2
+    return [
+        Jump(int(i), float(off[i].max()), clip.skeleton.joints[int(off[i].argmax())], float(off[i, 0]))
+        for i in np.flatnonzero(off.max(axis=1) > limit)
+    ]
+
+
+def _running_median(values: Array, reach: int) -> Array:
+    """Median over `reach` frames to either side of (F, ...) values, mirrored at the ends."""
+    index = np.abs(np.arange(-reach, len(values) + reach))
+    index = np.where(index >= len(values), 2 * (len(values) - 1) - index, index)
+    padded = values[np.clip(index, 0, len(values) - 1)]
+    windows = np.stack([padded[k : k + len(values)] for k in range(2 * reach + 1)])
+    return np.median(windows, axis=0)
+
+
+def _mend_glitches(clip: Clip) -> tuple[Clip, list[str]]:
+    """Replace single frames that lie far off the middle between their neighbours by that middle."""
+    if len(clip) < 5:
+        return clip, []
+    p = clip.positions
+    off = np.linalg.norm(p[1:-1] - 0.5 * (p[:-2] + p[2:]), axis=-1)
+    size = np.concatenate([[0.0], off.max(axis=1), [0.0]])
+    limit = GLITCH + GLITCH_AT_30 * (30.0 / clip.fps) ** 2
+    # A step in the motion raises two frames alike; a single wrong frame raises itself twice its neighbours.
+    alone = size[1:-1] > 1.5 * np.maximum(size[:-2], size[2:])
+    alone[[0, -1]] = False
+    sentences = []
+    for i in np.flatnonzero((size[1:-1] > limit) & alone) + 1:
+        joint = clip.skeleton.joints[int(off[i - 1].argmax())]
+        clip = _interpolate(clip, int(i), int(i))
+        sentences.append(
+            f"Frame {i + 1} is off by {size[i]:.0f} cm at {joint}; the middle of its neighbours replaces it."
+        )
+    return clip, sentences
+
+
+def _sound_part(clip: Clip, jumps: list[Jump]) -> tuple[int, int, list[str]]:
+    """First and last frame worth keeping, and a sentence for what is not."""
+    first, last = 0, len(clip) - 1
+    head = [j for j in jumps if j.after + 1 <= HEAD * clip.fps and 2 * (j.after + 1) <= len(clip)]
+    if head:
+        first = head[-1].after + 1
+    tail = [j for j in jumps if last - j.after <= TAIL * clip.fps and j.after - first > len(clip) // 2]
+    if tail:
+        last = tail[0].after
+    teleports = [j.after for j in jumps if first <= j.after < last and j.root > TELEPORT]
+    edges = [first - 1, *teleports, last]
+    start, end = max(pairwise(edges), key=lambda piece: piece[1] - piece[0])
+    first, last = start + 1, end
+    sentences = []
+    if first > 0:
+        sentences.append(_cut_sentence(clip, 0, first - 1, jumps, first - 1))
+    if last < len(clip) - 1:
+        sentences.append(_cut_sentence(clip, last + 1, len(clip) - 1, jumps, last))
+    return first, last, sentences
+
+
+def _cut_sentence(clip: Clip, start: int, end: int, jumps: list[Jump], after: int) -> str:
+    jump = next(j for j in jumps if j.after == after)
+    still = np.abs(quat.positive(clip.rotations[start : end + 1]) - quat.IDENTITY).max(axis=-1) < 1e-6
+    what = " (no pose)" if still.mean() > NO_POSE else ""
+    frames = f"Frames {start + 1} to {end + 1}" if end > start else f"Frame {start + 1}"
+    return f"{frames}{what} cut off: {jump}."
+
+
+def _short_pieces(jumps: list[Jump], fps: float) -> tuple[list[Jump], list[tuple[int, int, Jump]]]:
+    """Part jumps into those left and pairs that enclose a few broken frames: (first, last, jump)."""
+    left: list[Jump] = []
+    bridges = []
+    i = 0
+    while i < len(jumps):
+        near = i + 1 < len(jumps) and jumps[i + 1].after - jumps[i].after <= BRIDGE * fps
+        if near:
+            bridges.append((jumps[i].after + 1, jumps[i + 1].after, jumps[i]))
+        else:
+            left.append(jumps[i])
+        i += 2 if near else 1
+    return left, bridges
+
+
+def _interpolate(clip: Clip, start: int, end: int) -> Clip:
+    """Replace the frames start..end by what leads from the frame before to the frame after."""
+    a, b = start - 1, end + 1
+    share = (np.arange(start, end + 1) - a) / (b - a)
+    rotations, root = clip.rotations.copy(), clip.root.copy()
+    rotations[start : end + 1] = quat.slerp(rotations[a][None], rotations[b][None], share[:, None])
+    root[start : end + 1] = root[a] + (root[b] - root[a]) * share[:, None]
+    translations = None
+    if clip.translations is not None:
+        translations = clip.translations.copy()
+        step = translations[b] - translations[a]
+        translations[start : end + 1] = translations[a] + step * share[:, None, None]
+    return replace(clip, rotations=rotations, root=root, translations=translations)
+
+
+def _smooth(clip: Clip, after: int) -> Clip:
+    """Blend a jump in the pose away: half of it, fading out, is added before it and taken off after it.
+
+    What the root jumps sideways is taken off all that follows, so that the path goes on where it was.
+    """
+    a, b = after, after + 1
+    reach = max(2, round(BLEND * clip.fps))
+    apart = quat.log(quat.mul(quat.inv(clip.rotations[a]), clip.rotations[b]))
+    n = np.arange(len(clip))
+    fade = np.clip(1 - np.where(n <= a, a - n, n - b) / reach, 0.0, 1.0)
+    weight = np.where(n <= a, 0.5, -0.5) * fade * fade * (3 - 2 * fade)
+    rotations = quat.mul(clip.rotations, quat.exp(weight[:, None, None] * apart))
+    root = clip.root.copy()
+    near = np.diff(root[max(0, a - 3) : b + 4], axis=0)
+    jump = root[b] - root[a] - np.median(near, axis=0)
+    root += weight[:, None] * jump * [0, 1, 0]
+    root[b:] -= jump * [1, 0, 1]
+    return replace(clip, rotations=quat.continuous(rotations), root=root)
+
+
+def _cut(clip: Clip, first: int, last: int) -> Clip:
+    if first == 0 and last == len(clip) - 1:
+        return clip
+    part = slice(first, last + 1)
+    moved = clip.translations
+    return replace(
+        clip,
+        rotations=clip.rotations[part],
+        root=clip.root[part],
+        translations=None if moved is None else moved[part],
+    )
