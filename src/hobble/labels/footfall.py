@@ -1,8 +1,8 @@
 """Where each foot lands, found from the motion alone: a foot that swings and then stays.
 
-A foot is down while heel and toe are slow, by the two speeds of the facts page, or no faster than a factor
-times what they are at the slowest moment between two swings, which is how a jogging or a dragged foot, which
-never quite rests, is met. Landings of the right and the left foot then take turns.
+A foot is down while its heel or its toe rests: heels roll while the toe still stands and the other way round. What
+rest means is measured in units of the two speeds of the facts page and follows the foot's own swings, so that a
+slow shuffle, a jog whose feet never quite rest and a dragged leg all have theirs.
 """
 
 from __future__ import annotations
@@ -17,19 +17,33 @@ from hobble.core.quat import Array
 from hobble.labels.contacts import foot_positions
 
 RIGHT, LEFT = 0, 1
-SHORTEST_STANCE = 3
-LEAST_PATH = 8.0
-SLOWEST_VALLEY = 4.0
+END_OF_BOUT = (np.nan, -1)
+
+# Shares of the unit speeds and of the swings to either side; they were set once, on the hand-made labels of the
+# original release and on generated walks whose landings are exact.
+SLOWEST_REST = 0.4
+REST_OF_SWING = 0.12
+DIP_OF_SWING = 0.35
+LEAST_PATH = 6.0
+SAME_SWING = 12
+LESSER_SWING = 0.4
 LONGEST_REST = 60
+SETTLING = 10.0
+LAST_FRAMES = 2
 
 
 @dataclass(frozen=True)
-class Swings:
-    """The n swings of one foot: it leaves at `start`, lands at `end`, and its toe goes `path` cm."""
+class Swing:
+    """A foot in the air: it leaves at frame `start`, is down again from `end` on.
 
-    start: Array
-    end: Array
-    path: Array
+    path: how far its toe goes, cm. peak: the toe's highest speed, cm a frame.
+    """
+
+    foot: int
+    start: int
+    end: int
+    path: float
+    peak: float
 
 
 def foot_speeds(clip: Clip) -> Array:
@@ -41,77 +55,116 @@ def foot_speeds(clip: Clip) -> Array:
     return np.concatenate([speed, speed[-1:]])
 
 
-def find_swings(heel: Array, toe: Array, heel_speed: float, toe_speed: float, valley_factor: float) -> Swings:
-    """The swings of a foot with heel and toe speeds (F,), cm a frame.
+def find_swings(clip: Clip, heel_speed: float, toe_speed: float, valley_factor: float) -> list[Swing]:
+    """The swings of both feet, in the order in which they end.
 
-    heel_speed, toe_speed: below both the foot is down (at 60 Hz). valley_factor: or below so many times the
-    speed at a valley.
-    """
-    relative = np.maximum(heel / heel_speed, toe / toe_speed)
-    limit = np.maximum(1.0, valley_factor * _valley(relative))
-    up = _without_short(relative >= limit, SHORTEST_STANCE)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], up, [False]])))
-    start, end = edges[::2], edges[1::2]
-    path = np.array([toe[a:b].sum() for a, b in zip(start, end, strict=True)])
-    real = path >= LEAST_PATH
-    return Swings(start[real], end[real], path[real])
-
-
-def find_landings(
-    clip: Clip, heel_speed: float, toe_speed: float, valley_factor: float, shortest_step: int
-) -> list[tuple[float, int]]:
-    """Landings (frame, foot), foot 0 right and 1 left, taking turns; foot -1 ends a bout of steps.
-
-    Speeds in cm a frame at 120 Hz and steps in frames at 120 Hz, as the facts page has them.
+    heel_speed, toe_speed: the unit speeds, cm a frame at 120 Hz. valley_factor: a foot that never rests between
+    two swings is down while it is no faster than so many times its slowest.
     """
     speed = foot_speeds(clip)
-    swings = [
-        find_swings(speed[:, h], speed[:, t], 2 * heel_speed, 2 * toe_speed, valley_factor)
-        for h, t in ((2, 3), (0, 1))
-    ]
-    frames = len(clip)
-    events = [
-        (int(s), int(e), foot, float(p))
-        for foot in (RIGHT, LEFT)
-        for s, e, p in zip(swings[foot].start, swings[foot].end, swings[foot].path, strict=True)
-        if e < frames
-    ]
-    return _taking_turns(sorted(events, key=lambda e: (e[1], e[2])), shortest_step / 2)
+    swings = []
+    for foot, heel, toe in ((RIGHT, 2, 3), (LEFT, 0, 1)):
+        relative = np.minimum(speed[:, heel] / (2 * heel_speed), speed[:, toe] / (2 * toe_speed))
+        for start, end in _times_up(relative, valley_factor):
+            path, peak = speed[start:end, toe].sum(), speed[start:end, toe].max()
+            swings.append(Swing(foot, start, end, float(path), float(peak)))
+    real = sorted((s for s in swings if s.path >= LEAST_PATH), key=lambda s: (s.end, s.foot))
+    return _one_swing_a_step(real)
 
 
-def _taking_turns(events: list[tuple[int, int, int, float]], shortest: float) -> list[tuple[float, int]]:
-    landings: list[tuple[float, int]] = []
-    resting_since = -1.0
-    for start, end, foot, _ in events:
-        if landings and start - resting_since > LONGEST_REST:
-            landings.append((np.nan, -1))
-        if landings and landings[-1][1] == 1 - foot and end - landings[-1][0] <= shortest:
+def feet_up(swings: list[Swing], frames: int) -> Array:
+    """(frames, 2) bool: whether the right, the left foot is in a swing."""
+    up = np.zeros((frames, 2), bool)
+    for swing in swings:
+        up[swing.start : swing.end, swing.foot] = True
+    return up
+
+
+def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tuple[float, int]]:
+    """Landings (frame, foot) that take turns; END_OF_BOUT stands between bouts of walking.
+
+    shortest_step: a landing so soon after one of the other foot, in frames at 120 Hz, is left out.
+    The frame is that of first contact, and later after slow swings, which a person marks when the weight comes
+    down: by the time in which the toe at its fastest goes SETTLING cm.
+    """
+    out: list[tuple[float, int]] = []
+    resting_since = -1
+    for swing in swings:
+        if swing.end >= frames - LAST_FRAMES:
             continue
-        landings.append((float(end), foot))
-        resting_since = max(resting_since, end)
-    return landings
-
-
-def _valley(relative: Array) -> Array:
-    """(F,) for each frame the lowest value between the peaks around it, or 0 where no foot rests."""
-    from scipy.signal import find_peaks
-
-    peaks, _ = find_peaks(np.concatenate([[0.0], relative, [0.0]]), prominence=2.0)
-    bounds = np.concatenate([[0], peaks - 1, [len(relative)]])
-    out = np.zeros(len(relative))
-    for a, b in itertools.pairwise(bounds):
-        if b > a:
-            least = relative[a:b].min()
-            out[a:b] = least if least < SLOWEST_VALLEY else 0.0
+        if out and swing.start - resting_since > LONGEST_REST:
+            out.append(END_OF_BOUT)
+        when = swing.end + SETTLING / max(swing.peak, 1.5)
+        resting_since = max(resting_since, swing.end)
+        if out and out[-1][1] == 1 - swing.foot and when - out[-1][0] <= shortest_step / 2:
+            continue
+        out.append((when, swing.foot))
     return out
 
 
-def _without_short(up: Array, shortest: int) -> Array:
-    """Runs of either value shorter than `shortest` frames take the value around them."""
-    out = up.copy()
-    for value in (False, True):
-        edges = np.flatnonzero(np.diff(np.concatenate([[not value], out, [not value]]).astype(int)))
-        for a, b in zip(edges[::2], edges[1::2], strict=True):
-            if b - a < shortest and a > 0 and b < len(out):
-                out[a:b] = not value
+def _times_up(relative: Array, valley_factor: float) -> Array:
+    """(n, 2) first frame up, first frame down again, of a foot with the `relative` speed (F,)."""
+    from scipy.ndimage import median_filter
+
+    relative = median_filter(relative, 3, mode="nearest")
+    peaks = _swing_peaks(relative)
+    up = relative >= _rest_limit(relative, peaks, valley_factor)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], up, [False]]))).reshape(-1, 2)
+    holds_peak = np.searchsorted(peaks, edges[:, 0]) < np.searchsorted(peaks, edges[:, 1])
+    return edges[holds_peak]
+
+
+def _swing_peaks(relative: Array) -> Array:
+    """Frames of the fastest moment of each swing: peaks that are parted by a real dip."""
+    from scipy.signal import find_peaks
+
+    found, _ = find_peaks(np.concatenate([[0.0], relative, [0.0]]), height=2 * SLOWEST_REST)
+    kept: list[int] = []
+    for peak in found - 1:
+        while kept:
+            lower = min(relative[kept[-1]], relative[peak])
+            if relative[kept[-1] : peak + 1].min() <= max(SLOWEST_REST, DIP_OF_SWING * lower):
+                kept.append(peak)
+                break
+            if relative[kept[-1]] >= relative[peak]:
+                break
+            kept.pop()
+        else:
+            kept.append(peak)
+    return np.array(kept, int)
+
+
+def _rest_limit(relative: Array, peaks: Array, valley_factor: float) -> Array:
+    """(F,) the relative speed below which the foot is down: between two swings a share of the lesser one."""
+    frames = len(relative)
+    limit = np.full(frames, SLOWEST_REST)
+    for a, b in itertools.pairwise([0, *peaks, frames]):
+        if b <= a:
+            continue
+        beside = min((relative[p] for p in (a, b) if p in peaks), default=0.0)
+        slowest = relative[a:b].min()
+        limit[a:b] = max(SLOWEST_REST, REST_OF_SWING * beside)
+        if slowest > limit[a] and beside:
+            limit[a:b] = min(valley_factor * slowest, 0.6 * beside)
+    return limit
+
+
+def _one_swing_a_step(swings: list[Swing]) -> list[Swing]:
+    """Join what is one swing of a foot with a short touch in it; drop small moves between a foot's steps."""
+    out: list[Swing] = []
+    for swing in swings:
+        last = out[-1] if out else None
+        if last is None or last.foot != swing.foot:
+            out.append(swing)
+            continue
+        main = max(last, swing, key=lambda s: s.path)
+        lesser = min(last.path, swing.path) < LESSER_SWING * main.path
+        if swing.start - last.end <= SAME_SWING:
+            end = last.end if lesser and main is last else swing.end
+            peak = max(last.peak, swing.peak)
+            out[-1] = Swing(swing.foot, last.start, end, last.path + swing.path, peak)
+        elif lesser:
+            out[-1] = main
+        else:
+            out.append(swing)
     return out

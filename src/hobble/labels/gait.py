@@ -6,9 +6,22 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
+from hobble.labels.footfall import Swing, feet_up
 from hobble.labels.model import GAITS
 
-CROUCH = GAITS.index("crouch")
+STAND, WALK, JOG, CROUCH = range(4)
+GRAVITY = 981.0 / 3600.0
+
+# Each is where the evidence for a gait outweighs that for walking; set once on the labelled clips.
+STANDING_SPEED = 0.15
+JOG_BOUNCE = 0.25
+JOG_FLIGHT = 0.4
+CROUCHED_HEAD = 0.8
+CROUCHED_HIPS = 0.85
+SAID = 0.3
+SWITCH = 12.0
+FADE = 31
+PASSING = 75
 
 
 def overwrite_crouch(gait: Array, clip: Clip) -> Array:
@@ -22,18 +35,104 @@ def overwrite_crouch(gait: Array, clip: Clip) -> Array:
     return out
 
 
-def automatic_gait(clip: Clip, footsteps: Array, dominant: str | None) -> Array:
-    """Gait shares (F, 6) from how fast the body goes and how low the head is."""
+def automatic_gait(clip: Clip, swings: list[Swing], dominant: str | None) -> Array:
+    """Gait shares (F, 6), which add up to 1, of a clip whose feet swing as `swings` say.
+
+    dominant: the gait it mostly shows, which tips the balance where walk and jog are alike. A jump or a bump is
+    not recognised; where `dominant` is one of them, every frame but those that stand is that.
+    """
+    gait = _likeliest_path(_evidence(clip, swings, dominant), SWITCH)
+    shares = _fade(_without_passing(gait), len(GAITS))
+    if dominant in ("jump", "bump"):
+        shares[:, GAITS.index(dominant)] = 1 - shares[:, STAND]
+        shares[:, [WALK, JOG, CROUCH]] = 0.0
+    return shares
+
+
+def _evidence(clip: Clip, swings: list[Swing], dominant: str | None) -> Array:
+    """(F, 4) how much more each of the first four gaits fits a frame than walking does, -1 to 1."""
     from scipy.ndimage import gaussian_filter1d
 
     frames = len(clip)
-    root = gaussian_filter1d(clip.root[:, [0, 2]], 6.0, axis=0, mode="nearest")
-    speed = np.linalg.norm(np.gradient(root, axis=0), axis=1) if frames > 1 else np.zeros(frames)
-    speed = gaussian_filter1d(speed, 15.0, mode="nearest")
-    share = np.zeros((frames, len(GAITS)))
-    walking = np.clip((speed - 0.15) / 0.3, 0.0, 1.0)
-    jogging = np.clip((speed - 3.3) / 0.8, 0.0, 1.0)
-    share[:, 0] = 1 - walking
-    share[:, 1] = walking * (1 - jogging)
-    share[:, 2] = walking * jogging
-    return share
+    speed, bounce = _speed_and_bounce(clip)
+    flight = gaussian_filter1d(feet_up(swings, frames).all(axis=1).astype(float), 15.0, mode="nearest")
+    jog = bounce / JOG_BOUNCE + flight / JOG_FLIGHT + 0.15 * np.clip(speed - 2.0, -1.0, 2.0) - 2.0
+    jog += {"jog": SAID, "walk": -SAID}.get(dominant or "", 0.0)
+    stand = np.clip((STANDING_SPEED - speed) / 0.15, -1.0, 1.0)
+    head, hips = _relative_heights(clip)
+    low = np.clip(np.minimum(CROUCHED_HEAD - head, CROUCHED_HIPS - hips) / 0.08, -1.0, 1.0)
+    stand = np.where(low > 0, -1.0, stand)
+    return np.stack([stand, np.zeros(frames), np.clip(jog, -1.0, 1.0), low], axis=1)
+
+
+def _speed_and_bounce(clip: Clip) -> tuple[Array, Array]:
+    """(F,) speed of the hips along the ground, cm a frame, and root mean square of their vertical acceleration, g.
+
+    Jogging bounces the hips by a third of a gravity and more, on the spot too; walking by a quarter and less.
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    if len(clip) < 3:
+        return np.zeros(len(clip)), np.zeros(len(clip))
+    hips = clip.positions[:, clip.skeleton.role("hips")]
+    ground = gaussian_filter1d(hips[:, [0, 2]], 3.0, axis=0, mode="nearest")
+    speed = np.linalg.norm(np.gradient(ground, axis=0), axis=1)
+    height = gaussian_filter1d(hips[:, 1], 2.0, mode="nearest")
+    vertical = np.clip(np.gradient(np.gradient(height)) / GRAVITY, -2.0, 2.0)
+    bounce = np.sqrt(gaussian_filter1d(vertical**2, 15.0, mode="nearest"))
+    return gaussian_filter1d(speed, 10.0, mode="nearest"), bounce
+
+
+def _relative_heights(clip: Clip) -> tuple[Array, Array]:
+    """(F,) heights of head and hips over the feet's lowest about then, relative to the lengths of the bones."""
+    from scipy.ndimage import minimum_filter1d
+
+    skeleton, y = clip.skeleton, clip.positions[..., 1]
+    toes = y[:, [skeleton.role("left_toe"), skeleton.role("right_toe")]]
+    floor = minimum_filter1d(toes, 61, axis=0, mode="nearest").mean(axis=1)
+    lengths = np.linalg.norm(skeleton.offsets, axis=1)
+    leg = lengths[skeleton.role("left_knee")] + lengths[skeleton.role("left_heel")]
+    trunk, joint = 0.0, skeleton.role("head")
+    while joint != skeleton.role("hips") and skeleton.parents[joint] >= 0:
+        trunk += lengths[joint]
+        joint = skeleton.parents[joint]
+    head = (y[:, skeleton.role("head")] - floor) / (leg + trunk)
+    return head, (y[:, skeleton.role("hips")] - floor) / leg
+
+
+def _likeliest_path(evidence: Array, switch: float) -> Array:
+    """(F,) the gaits with the most evidence (F, G) in all, less `switch` for every change (Viterbi's algorithm)."""
+    frames, gaits = evidence.shape
+    if not frames:
+        return np.zeros(0, int)
+    best, came_from = evidence[0].copy(), np.zeros((frames, gaits), int)
+    own = np.arange(gaits)
+    for i in range(1, frames):
+        top = int(np.argmax(best))
+        stay = best >= best[top] - switch
+        came_from[i] = np.where(stay, own, top)
+        best = np.where(stay, best, best[top] - switch) + evidence[i]
+    path = np.empty(frames, int)
+    path[-1] = np.argmax(best)
+    for i in range(frames - 1, 0, -1):
+        path[i - 1] = came_from[i, path[i]]
+    return path
+
+
+def _without_passing(gait: Array) -> Array:
+    """Gaits (F,) in which a short walk from standing into a jog, or back, is halved between the two."""
+    out = gait.copy()
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(gait)) + 1, [len(gait)]])
+    for a, b in zip(edges[1:-2], edges[2:-1], strict=True):
+        before, after = gait[a - 1], gait[b]
+        if gait[a] == WALK and {before, after} == {STAND, JOG} and b - a <= PASSING:
+            middle = (a + b) // 2
+            out[a:middle], out[middle:b] = before, after
+    return out
+
+
+def _fade(gait: Array, count: int) -> Array:
+    """Shares (F, count) of gaits (F,) with a linear fade of FADE frames at every change."""
+    from scipy.ndimage import uniform_filter1d
+
+    return np.clip(uniform_filter1d(np.eye(count)[gait], FADE, axis=0, mode="nearest"), 0.0, 1.0)

@@ -15,7 +15,7 @@ from hobble.core.quat import Array
 from hobble.labels import files as label_files
 from hobble.labels.contacts import foot_contacts
 from hobble.labels.files import SourceTime
-from hobble.labels.footfall import find_landings
+from hobble.labels.footfall import Swing, find_swings, landings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
 from hobble.labels.model import GAITS, LabelReport, Labels
 from hobble.labels.phase import (
@@ -45,10 +45,11 @@ def label_clip(
     Raises InputError for a file that cannot be used.
     """
     given = _by_kind(files) if options["files"] else {}
-    time = SourceTime(motion["source_frames"], motion["source_fps"], motion.get("first_frame", 0))
+    time = SourceTime(motion["source_frames"], motion["source_fps"], motion.get("source_start", 0))
     warnings: list[str] = []
-    phase, known, footsteps = _phase(clip, given, time, options)
-    shares = _gait(clip, given, time, footsteps, gait)
+    swings = find_swings(clip, options["heel_speed"], options["toe_speed"], options["valley_factor"])
+    phase, known, footsteps = _phase(clip, given, time, swings, options["shortest_step"])
+    shares = _gait(clip, given, time, swings, gait)
     if ground == "flat":
         shares = overwrite_crouch(shares, clip)
     known &= ~dropped_frames(footsteps, len(clip))
@@ -124,7 +125,7 @@ def _by_kind(files: Iterable[str | Path]) -> dict[str, Path]:
 
 
 def _phase(
-    clip: Clip, given: Mapping[str, Path], time: SourceTime, options: Mapping[str, Any]
+    clip: Clip, given: Mapping[str, Path], time: SourceTime, swings: list[Swing], shortest_step: int
 ) -> tuple[Array, Array, Array]:
     """Phase with the right foot at 0, where it is known, and footsteps."""
     frames = len(clip)
@@ -135,17 +136,16 @@ def _phase(
         found, known = footsteps_of_phase(phase)
         return phase, known, footsteps if "footsteps" in given else found
     if "footsteps" not in given:
-        names = ("heel_speed", "toe_speed", "valley_factor", "shortest_step")
-        footsteps = rows_of_landings(find_landings(clip, **{n: options[n] for n in names}))
+        footsteps = rows_of_landings(landings(swings, frames, shortest_step))
     phase, known = phase_of_footsteps(footsteps, frames)
     return phase, known, footsteps
 
 
 def _gait(
-    clip: Clip, given: Mapping[str, Path], time: SourceTime, footsteps: Array, dominant: str | None
+    clip: Clip, given: Mapping[str, Path], time: SourceTime, swings: list[Swing], dominant: str | None
 ) -> Array:
     if "gait" in given:
         return label_files.read_gait(given["gait"], time, len(clip))
     if "gait_keys" in given:
         return label_files.read_gait_keys(given["gait_keys"], time, len(clip))
-    return automatic_gait(clip, footsteps, dominant)
+    return automatic_gait(clip, swings, dominant)
