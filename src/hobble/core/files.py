@@ -7,7 +7,7 @@ import errno
 import json
 import os
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -74,14 +74,17 @@ def save_npz(path: str | Path, **arrays: Any) -> None:
         np.savez(file, allow_pickle=False, **arrays)
 
 
-def load_npz(path: str | Path) -> dict[str, np.ndarray]:
-    """Read every array of an npz (checksums verified); raises InputError where it is missing or damaged."""
+def load_npz(path: str | Path, names: Iterable[str] | None = None) -> dict[str, np.ndarray]:
+    """Read every array of an npz, or those of `names`; checksums are verified.
+
+    Raises InputError where the file or one of the arrays is missing or damaged.
+    """
     try:
         with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
+            return {name: file[name] for name in (file.files if names is None else names)}
     except FileNotFoundError as error:
         raise InputError(path, "no such file") from error
-    except (zipfile.BadZipFile, ValueError, EOFError, OSError) as error:
+    except (zipfile.BadZipFile, KeyError, ValueError, EOFError, OSError) as error:
         raise InputError(
             path, f"damaged or not an npz file ({error})", fix="Delete it; the next run makes it again."
         ) from error

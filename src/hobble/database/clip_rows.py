@@ -121,11 +121,32 @@ def save_clip_rows(path: str | Path, rows: ClipRows) -> None:
         path,
         clip=np.array(rows.clip),
         layout=np.array(json.dumps(rows.layout.to_dict(), sort_keys=True)),
-        skeleton=np.array(json.dumps(rows.skeleton, sort_keys=True)),
+        skeleton=np.array(json.dumps(rows.skeleton)),  # not sorted: its joints are in the columns' order
         visits=np.array(rows.visits),
         **floats,
         **integers,
     )
+
+
+class Outline(NamedTuple):
+    """What a merge needs to know of a clip's rows before it reads them. fits: (R,)."""
+
+    layout: RowLayout
+    skeleton: Mapping[str, Any]
+    fits: np.ndarray
+    visits: int
+
+
+def outline(source: ClipRows | str | Path) -> Outline:
+    """The outline of rows, or of a file of them, of which only a few kilobytes are read."""
+    if isinstance(source, ClipRows):
+        return Outline(source.layout, source.skeleton, source.fits, source.visits)
+    data = load_npz(source, ("layout", "skeleton", "fits", "visits"))
+    try:
+        layout = RowLayout.from_dict(json.loads(str(data["layout"])))
+        return Outline(layout, json.loads(str(data["skeleton"])), data["fits"], int(data["visits"]))
+    except (TypeError, ValueError) as error:
+        raise InputError(source, f"not a file of rows ({error})", fix=HINT) from error
 
 
 def load_clip_rows(path: str | Path) -> ClipRows:

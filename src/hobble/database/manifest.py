@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,6 +47,9 @@ class Manifest:
         """Write manifest.json into the database's folder, whole or not at all."""
         values = {**vars(self), "format": "hobble database", "version": VERSION}
         values["layout"] = self.layout.to_dict()
+        values["skeleton"] = json.dumps(
+            self.skeleton
+        )  # a text, since keys get sorted and its joints must not
         values["chunks"] = {split: [c.to_dict() for c in chunks] for split, chunks in self.chunks.items()}
         write_json(path / FILE, values)
 
@@ -62,6 +66,7 @@ class Manifest:
             if values.pop("format") != "hobble database" or values.pop("version") != VERSION:
                 raise InputError(file, f"not a database of version {VERSION}", fix=HINT)
             values["layout"] = RowLayout.from_dict(values["layout"])
+            values["skeleton"] = json.loads(values["skeleton"])
             chunks = values["chunks"]
             values["chunks"] = {split: [Chunk(**chunk) for chunk in chunks[split]] for split in SPLITS}
             return cls(**values)

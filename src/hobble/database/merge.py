@@ -20,15 +20,17 @@ import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import explained, save_npz
+from hobble.core.quat import Array
 from hobble.database.buckets import INDEX, Buckets
 from hobble.database.chunks import Chunk, write_chunk
-from hobble.database.clip_rows import ClipRows, load_clip_rows
+from hobble.database.clip_rows import ClipRows, Outline, load_clip_rows, outline
 from hobble.database.compose import fit_columns, frame_columns, split_rows
 from hobble.database.layout import RowLayout
-from hobble.database.manifest import SPLITS, STATISTICS, Manifest
+from hobble.database.manifest import FILE, SPLITS, STATISTICS, Manifest
 from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
 
 CHUNK_BYTES = 4 << 20  # what a reader takes in one go: long enough for any disk, short enough for any memory
+PART_ROWS = 8192  # of a clip that are scattered at a time
 BUCKET_BYTES = 64 << 20  # the memory of pass 2, a few times over
 
 Source = ClipRows | str | Path
@@ -107,26 +109,26 @@ def _sweep(path: Path, keep: str | None) -> None:
     for entry in path.iterdir():
         if entry.is_dir() and (entry.name.startswith("part-") or (keep is not None and entry.name != keep)):
             shutil.rmtree(entry, ignore_errors=True)
+    for entry in path.glob(f".{FILE}.*.part"):
+        entry.unlink()
 
 
 def _plan(
     clips: Mapping[str, Source], splits: Mapping[str, str], injury: bool, item: int, chunk_bytes: int
 ) -> Plan:
     entries: list[dict[str, Any]] = []
-    first: ClipRows | None = None
+    first: Outline | None = None
     visits, pairs, rows = 1, 0, 0
     for name in sorted(clips):
-        clip = _load(clips[name])
-        if first is None:
-            first = replace(clip, **{f: getattr(clip, f)[:0] for f in ("x", "y", "severity", "heights")})
-        elif clip.layout != first.layout or list(clip.skeleton["joints"]) != list(first.skeleton["joints"]):
+        one = outline(clips[name])
+        first = first or one
+        if one.layout != first.layout or list(one.skeleton["joints"]) != list(first.skeleton["joints"]):
             where = clips[name] if isinstance(clips[name], str | Path) else name
-            raise InputError(where, f"its rows are not laid out as those of {first.clip}")
-        entries.append(
-            {"clip": name, "split": splits[name], "rows": len(clip), "pairs": int(clip.fits.sum())}
-        )
-        visits = max(visits, clip.visits, int(clip.fits.max(initial=1)))
-        rows, pairs = rows + len(clip), pairs + int(clip.fits.sum())
+            raise InputError(where, f"its rows are not laid out as those of {min(clips)}")
+        fits = int(one.fits.sum())
+        entries.append({"clip": name, "split": splits[name], "rows": len(one.fits), "pairs": fits})
+        visits = max(visits, one.visits, int(one.fits.max(initial=1)))
+        rows, pairs = rows + len(one.fits), pairs + fits
     if first is None or not any(e["rows"] for e in entries if e["split"] == "train"):
         raise HobbleError(
             "There is nothing to train on: no clip of the training part has a locomotion cycle "
@@ -164,13 +166,23 @@ def _scatter(
         index["place"] = places[split][done[split] : done[split] + len(clip)]
         index["count"], index["clip"] = clip.fits, number
         index["frame"], index["phase"] = clip.frame, clip.p
-        frames = np.concatenate([clip.x, clip.severity[:, : layout.links], clip.y], axis=1)
-        fits = np.concatenate([clip.heights, clip.mean[:, None]], axis=1)
-        buckets[split].add(frames, fits, index)
+        for start in range(0, len(clip), PART_ROWS):
+            buckets[split].add(
+                *_tables(clip, slice(start, start + PART_ROWS), layout.links),
+                index[start : start + PART_ROWS],
+            )
         done[split] += len(clip)
     assert x is not None
     assert y is not None
     return buckets, (x, y)
+
+
+def _tables(clip: ClipRows, part: slice, links: int) -> tuple[Array, Array]:
+    """The frames and fits of a part of a clip's rows, raw."""
+    frames = np.concatenate([clip.x[part], clip.severity[part, :links], clip.y[part]], axis=1)
+    first = clip.first_fit[part]
+    ground = slice(int(first[0]), int(first[-1] + clip.fits[part][-1]))
+    return frames, np.concatenate([clip.heights[ground], clip.mean[ground, None]], axis=1)
 
 
 def _chunks(
@@ -214,7 +226,11 @@ def _publish(path: Path, work: Path, manifest: Manifest) -> None:
     """Give the finished build its name, let the manifest point to it, then remove the build before."""
     for leftover in work.glob("buckets-*"):
         leftover.rmdir()
-    if not (path / manifest.folder).exists():
-        os.rename(work, path / manifest.folder)
+    final = path / manifest.folder
+    if final.exists():  # the same rows were built before: put each file in its place, whole or damaged
+        for file in sorted(p for p in work.rglob("*") if p.is_file()):
+            os.replace(file, final / file.relative_to(work))
+    else:
+        os.rename(work, final)
     manifest.save(path)
     _sweep(path, keep=manifest.folder)

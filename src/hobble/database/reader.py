@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -128,7 +129,7 @@ class Database:
             return iter(())
         spans = order.spans(self.rows(split), self.manifest.visits, section, sections)
         window = self.window(split, block_rows)
-        parts = (part for span in spans for part in self._parts(split, pass_index, seed, span, window))
+        parts = chain.from_iterable(self._parts(split, pass_index, seed, span, window) for span in spans)
         total = self.section_pairs(split, section, sections)
         return ahead(self._composed(parts, total, block_rows))
 
@@ -144,15 +145,24 @@ class Database:
         else:
             wanted = list(self._wanted(split, pass_index, seed, layer, start, stop, window))
             windows = ahead(self._load(split, some) for _, some, _, _ in wanted)
-        for loaded, (group, some, low, high) in zip(windows, wanted, strict=True):
-            rows = order.row_order(sum(loaded.rows), seed, pass_index, layer, group)[low:high]
-            args = (self.manifest.visits, seed, pass_index, layer)
-            ends = np.cumsum(loaded.rows)
-            picked = [
-                order.picks(loaded.count[end - n : end], *args, int(chunk))
-                for chunk, n, end in zip(some, loaded.rows, ends, strict=True)
-            ]
-            yield loaded, rows, loaded.first[rows] + np.concatenate(picked)[rows]
+        for (
+            group,
+            some,
+            low,
+            high,
+        ) in wanted:  # no name is left to hold a window while the next but one is read
+            yield self._shown(next(windows), some, (seed, pass_index, layer), group, slice(low, high))
+
+    def _shown(
+        self, window: Window, some: Sequence[int], of: tuple[int, int, int], group: int, part: slice
+    ) -> tuple[Window, np.ndarray, np.ndarray]:
+        rows = order.row_order(sum(window.rows), *of, group)[part]
+        ends = np.cumsum(window.rows)
+        picked = [
+            order.picks(window.count[end - n : end], self.manifest.visits, *of, int(chunk))
+            for chunk, n, end in zip(some, window.rows, ends, strict=True)
+        ]
+        return window, rows, window.first[rows] + np.concatenate(picked)[rows]
 
     def _wanted(
         self, split: str, pass_index: int, seed: int, layer: int, start: int, stop: int, window: int
@@ -242,6 +252,7 @@ class Database:
                     yield block
                     total -= filled
                     block, filled = self._empty(min(block_rows, total)), 0
+            del window, rows, fit  # the next window needs the room
 
     def _empty(self, rows: int) -> Block:
         x = np.empty((rows, self.layout.x_size), np.float32)

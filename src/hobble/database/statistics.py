@@ -49,13 +49,14 @@ class Moments:
     @classmethod
     def of(cls, values: Array, weights: Array | None = None) -> Moments:
         """Of values (N, C), each row weighing 1 or its entry of `weights` (N,)."""
-        values = np.asarray(values, np.float64)
+        values = np.asarray(values, np.float64, order="C")
         if not len(values):
             return cls.nothing(values.shape[1])
-        w = np.ones(len(values)) if weights is None else np.asarray(weights, np.float64)
+        w = np.ones((len(values), 1)) if weights is None else np.asarray(weights, np.float64)[:, None]
         total = float(w.sum())
-        mean = w @ values / total
-        return cls(total, mean, w @ (values - mean) ** 2)
+        # sums and not products of matrices, whose last bits change with where the arrays lie in memory
+        mean = (w * values).sum(axis=0) / total
+        return cls(total, mean, (w * (values - mean) ** 2).sum(axis=0))
 
 
 @dataclass(frozen=True)

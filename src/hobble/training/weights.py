@@ -53,6 +53,5 @@ def meta(network: Network, database: Database, configuration: str, facts: Mappin
             "network": "y = W2 elu(W1 elu(W0 x + b0) + b1) + b2 on standardised x and y; W and b are cyclic "
             "Catmull-Rom splines of the phase through their control points at k / control_points",
             **facts,
-        },
-        sort_keys=True,
-    )
+        }
+    )  # not sorted: the order of the skeleton's joints is that of the columns

@@ -1,0 +1,237 @@
+"""Building: the same bytes from the same rows, whole or not at all, small, in bounded memory."""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+import signal
+import time
+import tracemalloc
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import HobbleError, InputError
+from hobble.database import merge
+from hobble.database.buckets import INDEX, Buckets
+from hobble.database.clip_rows import load_clip_rows, save_clip_rows
+from hobble.database.layout import RowLayout
+from hobble.database.merge import write_database
+from hobble.database.reader import Database
+
+OPTIONS = {"injury": True, "joint_weight": 0.1, "chunk_bytes": 40_000}
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    return {str(f.relative_to(path)): f.read_bytes() for f in sorted(path.rglob("*")) if f.is_file()}
+
+
+def read_all(path: Path) -> np.ndarray:
+    """Every row of a database, checksums and all, in the order of clip and frame."""
+    db = Database.open(path, 4096)
+    parts = [b for split in ("train", "held_out") for b in db.blocks(split, 0, 0, 10, 1)]
+    rows = np.concatenate([np.column_stack([b.clip, b.frame]) for b in parts])
+    return rows[np.lexsort(rows.T[::-1])]
+
+
+def test_rows_survive_their_file_and_files_merge_as_rows_do(rows_of, tmp_path):
+    rows = {name: rows_of(name, 40, None, seed=i) for i, name in enumerate("abc")}
+    splits = {"a": "train", "b": "held_out", "c": "train"}
+    for name, clip in rows.items():
+        save_clip_rows(tmp_path / f"{name}.npz", clip)
+        back = load_clip_rows(tmp_path / f"{name}.npz")
+        assert back.layout == clip.layout
+        assert (back.clip, back.visits, back.skeleton) == (name, 10, clip.skeleton)
+        assert list(back.skeleton["joints"]) == ["Hips", "Spine", "Head"]  # in the order of the columns
+        for field in ("x", "y", "p", "severity", "frame", "cycle", "fits", "heights", "mean"):
+            np.testing.assert_array_equal(getattr(back, field), getattr(clip, field))
+    write_database(tmp_path / "one", rows, splits, **OPTIONS)
+    files = {name: tmp_path / f"{name}.npz" for name in reversed("abc")}  # in any order
+    write_database(tmp_path / "two", files, splits, **OPTIONS)
+    assert contents(tmp_path / "one") == contents(tmp_path / "two")
+    assert list(Database.open(tmp_path / "two").skeleton["joints"]) == ["Hips", "Spine", "Head"]
+
+
+def test_every_row_is_there_once_wherever_the_buckets_cut(rows_of, tmp_path, monkeypatch):
+    monkeypatch.setattr(merge, "BUCKET_BYTES", 90_000)
+    monkeypatch.setattr(merge, "PART_ROWS", 17)
+    rows = {name: rows_of(name, 150, None, seed=i) for i, name in enumerate("ab")}
+    manifest = write_database(tmp_path / "db", rows, {"a": "train", "b": "held_out"}, **OPTIONS)
+    chunks = manifest.chunks["train"]
+    assert len({chunk.rows for chunk in chunks[:-1]}) == 1  # all but the last are of one length
+    expected = [(clip, frame) for clip in range(2) for frame in range(60, 210)]
+    np.testing.assert_array_equal(read_all(tmp_path / "db"), expected)
+
+
+def test_buckets_bring_rows_and_their_fits_into_the_final_order(tmp_path):
+    rng = np.random.default_rng(0)
+    count = rng.choice([1, 3], 100)
+    index = np.zeros(100, INDEX)
+    index["place"], index["count"] = rng.permutation(100), count
+    index["frame"] = index["place"]
+    frames = index["place"][:, None].astype(np.float32)
+    fits = np.repeat(frames, count, axis=0) + np.concatenate([np.arange(n) for n in count])[:, None] / 10
+    buckets = Buckets(tmp_path / "b", 100, 30, 1, 1)
+    for start in range(0, 100, 40):
+        part, first = slice(start, start + 40), count[:start].sum()
+        buckets.add(frames[part], fits[first : first + count[part].sum()], index[part])
+    got = list(buckets.drain())
+    assert [len(i) for _, _, i in got] == [30, 30, 30, 10]
+    np.testing.assert_array_equal(np.concatenate([f for f, _, _ in got])[:, 0], np.arange(100))
+    fits_of = np.concatenate([np.floor(g[:, 0]) for _, g, _ in got])
+    np.testing.assert_array_equal(fits_of, np.repeat(np.arange(100), count[np.argsort(index["place"])]))
+    assert not any((tmp_path / "b").iterdir())
+
+
+def test_rows_are_shuffled_globally(rows_of, tmp_path):
+    rows = {name: rows_of(name, 300, 1, seed=i) for i, name in enumerate("abcd")}
+    write_database(tmp_path / "db", rows, dict.fromkeys("abcd", "train"), **OPTIONS)
+    db = Database.open(tmp_path / "db")
+    window = db._load("train", range(len(db.manifest.chunks["train"])))
+    clip = window.clip
+    assert abs(np.corrcoef(clip[1:], clip[:-1])[0, 1]) < 0.1
+    assert abs(np.corrcoef(clip, np.arange(len(clip)))[0, 1]) < 0.1
+
+
+def test_size_against_the_original_layout(rows_of, tmp_path):
+    """31 joints: at most 27% of the original's bytes in float32, half of that in float16."""
+    layout = RowLayout(31, links=30)
+    rng = np.random.default_rng(0)
+    joints = {f"j{i}": {} for i in range(31)}
+
+    def clip(name: str, fits: int):
+        n = 300
+        return replace(
+            rows_of(name, n, fits),
+            layout=layout,
+            skeleton={"name": "s", "joints": joints},
+            x=rng.normal(size=(n, layout.x_terrain.start)).astype(np.float32),
+            y=rng.normal(size=(n, layout.y_size)).astype(np.float32),
+            severity=np.zeros((n, 30), np.float32),
+        )
+
+    for fits in (1, 10):
+        clips = {"a": clip("a", fits)}
+        sizes = {}
+        for dtype in ("float32", "float16"):
+            options = {**OPTIONS, "injury": False, "dtype": dtype}
+            manifest = write_database(tmp_path / f"{dtype}{fits}", clips, {"a": "train"}, **options)
+            assert manifest.original_bytes == 300 * 10 * (342 + 311 + 1) * 4
+            files = (tmp_path / f"{dtype}{fits}").rglob("*")
+            sizes[dtype] = sum(f.stat().st_size for f in files if f.is_file()) / manifest.original_bytes
+        assert sizes["float32"] < 0.17
+        assert sizes["float16"] < 0.55 * sizes["float32"]
+
+
+def test_memory_does_not_grow_with_the_number_of_clips(rows_of, tmp_path, monkeypatch):
+    monkeypatch.setattr(merge, "BUCKET_BYTES", 200_000)
+    files = {}
+    for i in range(12):
+        files[f"c{i}"] = tmp_path / f"c{i}.npz"
+        save_clip_rows(files[f"c{i}"], rows_of(f"c{i}", 400, 10, seed=i))
+    peaks = []
+    for n in (3, 12):
+        some = dict(list(files.items())[:n])
+        tracemalloc.start()
+        write_database(tmp_path / f"db{n}", some, dict.fromkeys(some, "train"), **OPTIONS)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.1 * peaks[0]
+
+
+def test_a_build_killed_at_any_moment_leaves_the_old_database_or_the_new_one(rows_of, tmp_path):
+    old = {"a": rows_of("a", 60, None, seed=1)}
+    new = {**old, "b": rows_of("b", 900, 10, seed=2)}
+    splits = {"a": "train", "b": "train"}
+    path = tmp_path / "db"
+    started = time.monotonic()
+    write_database(tmp_path / "timed", new, splits, **OPTIONS)
+    whole = time.monotonic() - started
+    expected = {len(read_all(tmp_path / "timed")), 60}
+    chance = random.Random(1)
+    killed, seen = 0, set()
+    for attempt in range(20):
+        before = old if attempt % 2 == 0 else None
+        if before:
+            write_database(path, before, splits, **OPTIONS)
+        child = os.fork()
+        if child == 0:
+            write_database(path, new, splits, **OPTIONS)
+            os._exit(0)
+        time.sleep(chance.random() * 1.2 * whole)
+        os.kill(child, signal.SIGKILL)
+        killed += os.waitpid(child, 0)[1] != 0
+        rows = read_all(path)
+        assert len(rows) in expected
+        seen.add(len(rows))
+    assert killed >= 5
+    write_database(path, new, splits, **OPTIONS)
+    assert contents(path) == contents(tmp_path / "timed")  # and nothing is left lying about
+
+
+def test_a_full_disk_is_said_and_the_database_before_stays(rows_of, tmp_path, monkeypatch):
+    rows = {"a": rows_of("a", 60)}
+    write_database(tmp_path / "db", rows, {"a": "train"}, **OPTIONS)
+    before = contents(tmp_path / "db")
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(merge, "write_chunk", full)
+    with pytest.raises(HobbleError, match="disk is full"):
+        write_database(tmp_path / "db", {"a": rows_of("a", 61)}, {"a": "train"}, **OPTIONS)
+    assert contents(tmp_path / "db") == before
+
+
+def test_a_damaged_database_is_mended_by_building_it_again(rows_of, tmp_path):
+    rows = {"a": rows_of("a", 60)}
+    manifest = write_database(tmp_path / "db", rows, {"a": "train"}, **OPTIONS)
+    before = contents(tmp_path / "db")
+    (tmp_path / "db" / manifest.folder / manifest.chunks["train"][0].file).write_bytes(b"")
+    write_database(tmp_path / "db", rows, {"a": "train"}, **OPTIONS)
+    assert contents(tmp_path / "db") == before
+
+
+def test_what_cannot_be_merged_is_refused(rows_of, tmp_path):
+    a = rows_of("a", 30)
+    with pytest.raises(HobbleError, match="nothing to train on"):
+        write_database(tmp_path / "db", {"a": a}, {"a": "held_out"}, **OPTIONS)
+    empty = rows_of("b", 0)
+    with pytest.raises(HobbleError, match="nothing to train on"):
+        write_database(tmp_path / "db", {"b": empty}, {"b": "train"}, **OPTIONS)
+    other = replace(a, layout=RowLayout(3, window=30, links=2))
+    with pytest.raises(InputError, match=r"^z: its rows are not laid out as those of a"):
+        write_database(tmp_path / "db", {"a": a, "z": other}, {"a": "train", "z": "train"}, **OPTIONS)
+    assert not any((tmp_path / "db").iterdir())
+
+
+def test_clips_without_rows_are_no_obstacle(rows_of, tmp_path):
+    rows = {"a": rows_of("a", 30), "b": rows_of("b", 0), "c": rows_of("c", 0)}
+    splits = {"a": "train", "b": "train", "c": "held_out"}
+    write_database(tmp_path / "db", rows, splits, **OPTIONS)
+    assert len(read_all(tmp_path / "db")) == 30
+
+
+@pytest.mark.parametrize(
+    ("field", "change", "message"),
+    [
+        ("x", lambda v: v[:, :-1], "x is"),
+        ("y", lambda v: np.where(np.arange(len(v))[:, None] == 4, np.nan, v), "frame 64: y is not a number"),
+        ("fits", lambda v: np.where(np.arange(len(v)) == 7, 0, v), "heights is"),
+        ("mean", lambda v: v * np.inf, "terrain heights"),
+        ("layout", lambda v: np.array("{}"), "not a file of rows"),
+    ],
+)
+def test_a_bad_file_of_rows_is_named(rows_of, tmp_path, field, change, message):
+    save_clip_rows(tmp_path / "a.npz", rows_of("a", 30))
+    with np.load(tmp_path / "a.npz") as file:
+        data = dict(file)
+    data[field] = change(data[field])
+    np.savez(tmp_path / "a.npz", **data)
+    with pytest.raises(InputError, match=r"a\.npz.*" + message):
+        load_clip_rows(tmp_path / "a.npz")
+    with pytest.raises(InputError, match=r"a\.npz"):
+        write_database(tmp_path / "db", {"a": tmp_path / "a.npz"}, {"a": "train"}, **OPTIONS)

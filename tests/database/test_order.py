@@ -1,0 +1,55 @@
+"""The order of a pass: every pair once, sections near equal, nothing shared between passes."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.database import order
+
+
+@given(st.integers(1, 50), st.integers(1, 12), st.integers(1, 15))
+@settings(max_examples=60, deadline=None)
+def test_sections_cut_the_layers_into_near_equal_parts(rows, visits, sections):
+    seen = np.zeros((visits, rows), int)
+    sizes = []
+    for section in range(sections):
+        parts = list(order.spans(rows, visits, section, sections))
+        sizes.append(sum(stop - start for _, start, stop in parts))
+        for layer, start, stop in parts:
+            assert 0 <= start < stop <= rows
+            seen[layer, start:stop] += 1
+    assert (seen == 1).all()
+    assert max(sizes) - min(sizes) <= 1
+
+
+@given(st.integers(1, 40), st.integers(0, 99), st.integers(0, 5))
+@settings(max_examples=30, deadline=None)
+def test_over_the_layers_each_row_shows_each_fit_once(rows, seed, pass_index):
+    count = np.random.default_rng(seed).choice([1, 2, 5, 10], rows)
+    shown = np.stack([order.picks(count, 10, seed, pass_index, layer, 3) for layer in range(10)], axis=1)
+    for fits, of_row in zip(count, shown, strict=True):
+        np.testing.assert_array_equal(np.bincount(of_row, minlength=fits), np.full(fits, 10 // fits))
+
+
+def test_a_rows_fits_come_in_an_order_of_their_own():
+    shown = np.stack([order.picks(np.full(500, 10), 10, 1, 0, layer, 0) for layer in range(10)], axis=1)
+    assert len(np.unique(shown, axis=0)) > 480
+    again = np.stack([order.picks(np.full(500, 10), 10, 1, 1, layer, 0) for layer in range(10)], axis=1)
+    assert (shown == again).mean() < 0.15  # a tenth by chance
+
+
+def test_windows_hold_every_chunk_once_in_another_order_each_layer():
+    groups = order.groups([5] * 37, 8, seed=1, pass_index=0, layer=0)
+    assert [len(g) for g in groups] == [8, 8, 8, 8, 5]
+    np.testing.assert_array_equal(np.sort(np.concatenate(groups)), np.arange(37))
+    other = order.groups([5] * 37, 8, seed=1, pass_index=0, layer=1)
+    assert not np.array_equal(np.concatenate(groups), np.concatenate(other))
+
+
+def test_what_is_drawn_depends_on_every_number_and_on_nothing_else():
+    base = order.row_order(1000, 1, 2, 3, 4)
+    np.testing.assert_array_equal(base, order.row_order(1000, 1, 2, 3, 4))
+    for other in ((9, 2, 3, 4), (1, 9, 3, 4), (1, 2, 9, 4), (1, 2, 3, 9)):
+        assert (base == order.row_order(1000, *other)).mean() < 0.02

@@ -1,0 +1,260 @@
+"""Reading back: the same pairs as were written, each once a pass, well mixed, in bounded memory, checked."""
+
+from __future__ import annotations
+
+import json
+import os
+import tracemalloc
+from collections import Counter
+from itertools import islice, pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.core.errors import HobbleError, InputError
+from hobble.database.clip_rows import expanded
+from hobble.database.merge import write_database
+from hobble.database.reader import Block, Database, ahead
+
+MEMORY = 4096  # MB: everything at once
+DISK = 0  # MB: one chunk at a time
+
+
+@pytest.fixture(scope="module")
+def sources(rows_of):
+    return {
+        "flat": rows_of("flat", 90, 1, seed=1),
+        "mixed": rows_of("mixed", 70, None, seed=2),
+        "rocky": rows_of("rocky", 40, 10, seed=3),
+        "kept": rows_of("kept", 30, 10, seed=4),
+    }
+
+
+@pytest.fixture(scope="module")
+def path(sources, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("database") / "all"
+    splits = {name: "held_out" if name == "kept" else "train" for name in sources}
+    write_database(path, sources, splits, injury=True, joint_weight=0.1, seed=3, chunk_bytes=40_000)
+    return path
+
+
+def whole_pass(
+    db: Database, split: str, pass_index: int, sections: int, seed: int = 1, rows: int = 32
+) -> Block:
+    blocks = [
+        block
+        for section in range(sections)
+        for block in db.blocks(split, pass_index, section, sections, seed, rows)
+    ]
+    return Block(*(np.concatenate(parts) for parts in zip(*blocks, strict=True)))
+
+
+def keys(block: Block) -> list[tuple[int, int, bytes]]:
+    """What tells pairs apart: the clip, the frame and the terrain under it."""
+    return [
+        (int(c), int(f), row.tobytes())
+        for c, f, row in zip(block.clip, block.frame, block.x.round(4), strict=True)
+    ]
+
+
+@pytest.mark.parametrize("memory", [MEMORY, DISK])
+def test_a_pass_is_every_pair_standardised_and_a_flat_one_ten_times(path, sources, memory):
+    db = Database.open(path, memory)
+    assert len(db.manifest.chunks["train"]) > 5
+    s = db.statistics
+    for split, names in (("train", ("flat", "mixed", "rocky")), ("held_out", ("kept",))):
+        got = whole_pass(db, split, 0, 10)
+        assert len(got.p) == db.pairs(split) == 10 * db.rows(split)
+        for name in names:
+            rows = sources[name]
+            mine = got.clip == db.clips.index(name)
+            found: dict[int, list[int]] = {}
+            for i in np.flatnonzero(mine):
+                found.setdefault(int(got.frame[i]), []).append(i)
+            for pairs in expanded(rows, links=True):
+                x, y = (pairs.x - s.x_mean) / s.x_std, (pairs.y - s.y_mean) / s.y_std
+                for k, row in enumerate(pairs.row):
+                    at = found[int(rows.frame[row])]
+                    same = [i for i in at if np.abs(got.x[i] - x[k]).max() < 2e-5]
+                    assert len(same) == 10 // rows.fits[row], (name, row)
+                    np.testing.assert_allclose(got.y[same[0]], y[k], atol=2e-5)
+                    assert got.p[same[0]] == rows.p[row]
+
+
+@given(st.integers(1, 13), st.integers(0, 3), st.integers(1, 70), st.sampled_from([MEMORY, DISK]))
+@settings(max_examples=25, deadline=None)
+def test_each_pair_comes_once_whatever_the_sections_and_blocks(path, sections, pass_index, rows, memory):
+    db = Database.open(path, memory)
+    got = whole_pass(db, "train", pass_index, sections, rows=rows)
+    assert Counter(keys(got)) == Counter(keys(whole_pass(db, "train", 7, 10)))
+
+
+@pytest.mark.parametrize("memory", [MEMORY, DISK])
+def test_no_section_of_a_usual_pass_shows_a_frame_twice(path, memory):
+    db = Database.open(path, memory)
+    for section in range(10):
+        blocks = list(db.blocks("train", 0, section, 10, 1, 64))
+        assert [len(b.p) for b in blocks] == [64, 64, 64, 8]
+        seen = [(c, f) for b in blocks for c, f in zip(b.clip, b.frame, strict=True)]
+        assert len(seen) == len(set(seen)) == 200
+
+
+@pytest.mark.parametrize("memory", [MEMORY, DISK])
+def test_passes_share_no_order_and_a_section_does_not_depend_on_what_was_read(path, memory):
+    db = Database.open(path, memory)
+    first, second = (whole_pass(db, "train", i, 10) for i in range(2))
+    places = first.clip * 1000 + first.frame, second.clip * 1000 + second.frame
+    assert (places[0] == places[1]).mean() < 0.03
+    other = whole_pass(db, "train", 0, 10, seed=2)
+    assert (places[0] == other.clip * 1000 + other.frame).mean() < 0.03
+    resumed = Database.open(path, memory)  # as after a kill: straight to section 6 of pass 1
+    straight = list(resumed.blocks("train", 1, 6, 10, 1, 32))
+    np.testing.assert_array_equal(np.concatenate([b.x for b in straight]), second.x[1200:1400])
+
+
+def test_rows_are_mixed_like_independent_draws(rows_of, tmp_path):
+    """A feature that is constant per clip: variance of batch means, and correlation from row to row."""
+    clips = {f"c{i:02d}": rows_of(f"c{i:02d}", 400, 1, seed=i) for i in range(40)}
+    splits = dict.fromkeys(clips, "train")
+    write_database(tmp_path / "db", clips, splits, injury=False, joint_weight=0.1, chunk_bytes=200_000)
+    db = Database.open(tmp_path / "db", 1)
+    assert 1 <= db.window("train", 32) <= len(db.manifest.chunks["train"]) // 20
+    feature = np.concatenate([b.clip for s in range(3) for b in db.blocks("train", 0, s, 10, 1, 32)])
+    feature = (feature - 19.5) / np.sqrt((40**2 - 1) / 12)
+    n = len(feature)
+    assert abs(np.mean(feature[1:] * feature[:-1])) < 4 / np.sqrt(n)
+    means = feature.reshape(-1, 32).mean(axis=1)
+    assert 0.85 < means.var() * 32 < 1.15  # 1 for independent draws; rows in the clips' order give 32
+
+
+def test_memory_stays_within_what_is_stated(rows_of, tmp_path):
+    clips = {f"c{i:02d}": rows_of(f"c{i:02d}", 2500, 10, seed=i) for i in range(16)}
+    splits = dict.fromkeys(clips, "train")
+    write_database(tmp_path / "db", clips, splits, injury=True, joint_weight=0.1, chunk_bytes=300_000)
+    size = sum(f.stat().st_size for f in (tmp_path / "db").rglob("*") if f.is_file())
+    stated = 8
+    assert size > 10 * (stated << 20)
+    db = Database.open(tmp_path / "db", stated)
+    rows = db.block_rows(32)
+    assert rows % 32 == 0
+    next(db.blocks("train", 0, 0, 10, 1, rows))  # compile first
+    tracemalloc.start()
+    seen = sum(len(block.p) for block in db.blocks("train", 0, 1, 10, 1, rows))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert seen == 40_000
+    assert peak < stated << 20
+    assert peak > (stated << 20) / 3  # and makes use of it
+
+
+def test_severities_are_columns_only_where_they_are_inputs(path, sources, tmp_path):
+    splits = dict.fromkeys(sources, "train")
+    write_database(tmp_path / "db", sources, splits, injury=False, joint_weight=0.1)
+    healthy, injured = Database.open(tmp_path / "db"), Database.open(path)
+    assert healthy.layout.x_size == injured.layout.x_size - 2
+    block = next(iter(healthy.blocks("train", 0, 0, 10, 1)))
+    assert block.x.shape[1] == healthy.layout.x_size == len(healthy.statistics.x_mean)
+    assert healthy.rows("held_out") == healthy.pairs("held_out") == 0
+    assert list(healthy.blocks("held_out", 0, 0, 10, 1)) == []
+
+
+def test_half_precision_takes_half_the_bytes_and_hardly_moves_a_value(path, sources, tmp_path):
+    splits = {name: "held_out" if name == "kept" else "train" for name in sources}
+    half = write_database(
+        tmp_path / "db",
+        sources,
+        splits,
+        injury=True,
+        joint_weight=0.1,
+        seed=3,
+        dtype="float16",
+        chunk_bytes=40_000,
+    )
+    full = Database.open(path, MEMORY)
+    assert half.bytes < 0.56 * full.manifest.bytes  # phase, clip and frame stay whole numbers of four bytes
+    for memory in (MEMORY, DISK):
+        a = whole_pass(Database.open(tmp_path / "db", memory), "train", 0, 10)
+        b = whole_pass(full, "train", 0, 10)
+        order_a, order_b = (np.lexsort((m.x[:, -3], m.frame, m.clip)) for m in (a, b))
+        assert a.x.dtype == np.float32
+        np.testing.assert_allclose(a.x[order_a][:, :20], b.x[order_b][:, :20], rtol=1e-3, atol=1e-3)
+        np.testing.assert_allclose(np.sort(a.y, axis=0), np.sort(b.y, axis=0), rtol=2e-3, atol=5e-3)
+
+
+@pytest.mark.parametrize("harm", ["flip", "cut", "gone", "longer"])
+def test_a_damaged_chunk_is_named(sources, tmp_path, harm):
+    manifest = write_database(
+        tmp_path / "db",
+        sources,
+        dict.fromkeys(sources, "train"),
+        injury=True,
+        joint_weight=0.1,
+        chunk_bytes=40_000,
+    )
+    file = manifest.chunks["train"][3].file
+    chunk = tmp_path / "db" / manifest.folder / file
+    data = bytearray(chunk.read_bytes())
+    if harm == "flip":
+        data[len(data) // 2] ^= 1
+    chunk.write_bytes({"cut": data[:-100], "longer": data + b"1234"}.get(harm, data))
+    if harm == "gone":
+        chunk.unlink()
+    for memory in (MEMORY, DISK):
+        with pytest.raises(InputError, match=file):
+            whole_pass(Database.open(tmp_path / "db", memory), "train", 0, 10)
+
+
+def test_half_a_database_is_none(path, tmp_path):
+    with pytest.raises(InputError, match="did not finish"):
+        Database.open(tmp_path)
+    manifest = json.loads((path / "manifest.json").read_text())
+    (tmp_path / "manifest.json").write_text(json.dumps({**manifest, "version": 0}))
+    with pytest.raises(InputError, match="version"):
+        Database.open(tmp_path)
+    del manifest["chunks"]
+    (tmp_path / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(InputError, match="chunks"):
+        Database.open(tmp_path)
+
+
+def test_a_section_that_is_not_there_is_refused(path):
+    with pytest.raises(HobbleError, match="no section 10"):
+        Database.open(path).blocks("train", 0, 10, 10, 1)
+
+
+def test_reading_can_stop_at_any_block(path):
+    db = Database.open(path, DISK)
+    for count in range(4):
+        assert len(list(islice(db.blocks("train", 0, 0, 10, 1, 32), count))) == count
+
+
+def test_ahead_keeps_order_and_passes_errors_on():
+    assert list(ahead(iter(range(100)))) == list(range(100))
+
+    def breaking():
+        yield 1
+        raise ValueError("here")
+
+    items = ahead(breaking())
+    assert next(items) == 1
+    with pytest.raises(ValueError, match="here"):
+        next(items)
+
+
+def test_a_chunk_is_a_file_that_other_tools_open(path):
+    """By the description of safetensors: header length, header, arrays."""
+    db = Database.open(path)
+    chunk = db.manifest.chunks["train"][0]
+    data = (path / db.manifest.folder / chunk.file).read_bytes()
+    length = int.from_bytes(data[:8], "little")
+    header = json.loads(data[8 : 8 + length])
+    assert header["frames"]["dtype"] == "F32"
+    assert header["frames"]["shape"][0] == header["phase"]["shape"][0] == chunk.rows
+    ends = sorted(entry["data_offsets"] for entry in header.values())
+    assert ends[0][0] == 0
+    assert all(a[1] == b[0] for a, b in pairwise(ends))
+    assert ends[-1][1] == len(data) - 8 - length
+    assert os.path.getsize(path / db.manifest.folder / chunk.file) == chunk.bytes

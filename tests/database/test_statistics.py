@@ -1,0 +1,122 @@
+"""Statistics against plain numpy on every pair written out, and the grouping of the original."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.database.clip_rows import ClipRows, expanded
+from hobble.database.layout import RowLayout
+from hobble.database.statistics import (
+    SILENT,
+    UNSEEN,
+    Moments,
+    clip_moments,
+    finish,
+    grouped,
+    severity_std,
+    x_groups,
+)
+
+
+def written_out(rows: ClipRows) -> tuple[np.ndarray, np.ndarray]:
+    """Every pair as often as the original has it: a flat row's one fit ten times."""
+    x, y = [], []
+    for pairs in expanded(rows, links=True, batch=7):
+        times = rows.visits // rows.fits[pairs.row]
+        x.append(np.repeat(pairs.x, times, axis=0))
+        y.append(np.repeat(pairs.y, times, axis=0))
+    return np.concatenate(x).astype(float), np.concatenate(y).astype(float)
+
+
+@given(st.integers(1, 40), st.integers(0, 99), st.sampled_from([1, 10, None]))
+@settings(max_examples=15, deadline=None)
+def test_moments_are_those_of_every_pair_written_out(rows_of, size, seed, fits):
+    rows = rows_of(rows=size, fits=fits, seed=seed)
+    for moments, values in zip(clip_moments(rows), written_out(rows), strict=True):
+        assert moments.weight == size
+        np.testing.assert_allclose(moments.mean, values.mean(0), rtol=1e-6, atol=1e-5)
+        np.testing.assert_allclose(moments.std, values.std(0), rtol=1e-6, atol=1e-5)
+
+
+@given(st.lists(st.integers(0, 9), min_size=1, max_size=6), st.integers(0, 99))
+@settings(max_examples=25, deadline=None)
+def test_parts_merge_into_the_whole_in_any_cut(cuts, seed):
+    rng = np.random.default_rng(seed)
+    parts = [rng.normal(1e6, 1.0, (n, 3)) for n in cuts]
+    weights = [rng.random(n) + 0.1 for n in cuts]
+    total = Moments.nothing(3)
+    for part, weight in zip(parts, weights, strict=True):
+        total = total + Moments.of(part, weight)
+    whole = Moments.of(np.concatenate(parts), np.concatenate(weights))
+    assert total.weight == pytest.approx(whole.weight)
+    np.testing.assert_allclose(total.mean, whole.mean, rtol=1e-12)
+    np.testing.assert_allclose(total.squares, whole.squares, rtol=1e-6, atol=1e-9)
+
+
+def test_batches_of_a_long_clip_do_not_show(rows_of, monkeypatch):
+    rows = rows_of(rows=60, fits=None)
+    whole = clip_moments(rows)
+    monkeypatch.setattr("hobble.database.statistics.BATCH", 7)
+    for a, b in zip(clip_moments(rows), whole, strict=True):
+        np.testing.assert_allclose(a.squares, b.squares, rtol=1e-9)
+
+
+def test_deviations_are_shared_in_the_originals_groups_and_weighed(rows_of, layout):
+    rows = rows_of(rows=300, fits=10)
+    x, y = clip_moments(rows)
+    s = finish(layout, x, y, 0.1, [1])
+    n = layout.samples
+    for start in (0, n, 2 * n, 3 * n):  # tx, tz, dx, dz each on their own
+        np.testing.assert_allclose(s.x_std[start : start + n], x.std[start : start + n].mean(), rtol=1e-6)
+    for block in (layout.x_gait, layout.x_terrain):
+        np.testing.assert_allclose(s.x_std[block], x.std[block].mean(), rtol=1e-6)
+    for block in (layout.x_joint_position, layout.x_joint_velocity):
+        seen = x.std[block].mean() / 0.1
+        expected = np.repeat([seen, seen / UNSEEN, seen], 3)
+        np.testing.assert_allclose(s.x_std[block], expected, rtol=1e-6)
+    cuts = [0, 2, 3, 4, 8, 20, 32, 41, 50, 59]  # the facts' 0:2, 2, 3, 4:8, 8:20, 20:32, three joint blocks
+    for start, stop in pairwise(cuts):
+        np.testing.assert_allclose(s.y_std[start:stop], y.std[start:stop].mean(), rtol=1e-6)
+    assert cuts[-1] == layout.y_size
+    assert all(v.dtype == np.float32 for v in (s.x_mean, s.x_std, s.y_mean, s.y_std))
+
+
+def test_groups_cover_every_column_of_x_once_but_the_severities():
+    layout = RowLayout(31, links=30)
+    columns = np.concatenate([np.arange(layout.x_size)[g] for g in x_groups(layout)])
+    np.testing.assert_array_equal(np.sort(columns), np.arange(342))
+
+
+def test_nothing_is_ever_divided_by_zero(rows_of, layout):
+    still = rows_of(rows=20, fits=1)
+    for name in ("x", "y", "severity", "heights", "mean"):
+        getattr(still, name)[...] = 0.0
+    s = finish(layout, *clip_moments(still), 0.1, [1])
+    for std in (s.x_std, s.y_std):
+        assert (std > 0).all()
+        assert np.isfinite(std).all()
+    assert (s.x_std[layout.x_terrain] == np.float32(SILENT)).all()  # always flat: heights mean nothing yet
+
+
+def test_a_gait_never_seen_takes_its_groups_deviation(layout):
+    std = np.ones(layout.x_size)
+    std[layout.x_gait] = np.repeat([0.6, 0.6, 0, 0, 0, 0], layout.samples)
+    np.testing.assert_allclose(grouped(std, x_groups(layout), SILENT)[layout.x_gait], 0.2)
+
+
+def test_severities_share_one_deviation_and_unknown_ones_are_silent():
+    out = severity_std(np.array([3.0, 0.0, 4.0]))
+    np.testing.assert_allclose(out, [5.0, SILENT, 5.0])
+    np.testing.assert_allclose(severity_std(np.array([0.01, 0.0])), [1.0, SILENT])
+
+
+def test_without_links_the_severities_leave_no_trace(rows_of, layout):
+    moments = clip_moments(rows_of(rows=30))
+    healthy = RowLayout(layout.joints)
+    s = finish(healthy, *moments, 0.1, [])
+    assert s.x_mean.shape == s.x_std.shape == (healthy.x_size,)
