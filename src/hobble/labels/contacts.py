@@ -14,7 +14,7 @@ def foot_positions(clip: Clip) -> Array:
     return clip.positions[:, [clip.skeleton.role(role) for role in CONTACT_ROLES]]
 
 
-def foot_contacts(clip: Clip, threshold: float) -> Array:
+def foot_contacts(clip: Clip, threshold: float) -> np.ndarray:
     """(F, 4) bool: whether a joint moves less than the root of `threshold` (cm2) to the next frame.
 
     There is no test of height (`pfnn-facts`, Labels). The last frame repeats the one before it.

@@ -1,8 +1,8 @@
 """Where each foot lands, found from the motion alone: a foot that swings and then stays.
 
-A foot is down while its heel or its toe rests: heels roll while the toe still stands and the other way round. What
-rest means is measured in units of the two speeds of the facts page and follows the foot's own swings, so that a
-slow shuffle, a jog whose feet never quite rest and a dragged leg all have theirs.
+A foot is down while its heel or its toe rests: heels roll while the toe still stands and the other way round.
+What rest means is measured in units of the two speeds of the facts page and follows the foot's own swings, so
+that a slow shuffle, a jog whose feet never quite rest and a dragged leg all have theirs.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.labels.contacts import foot_positions
+from hobble.labels.smooth import median_of_three
 
 RIGHT, LEFT = 0, 1
 END_OF_BOUT = (np.nan, -1)
 
-# Shares of the unit speeds and of the swings to either side; they were set once, on the hand-made labels of the
-# original release and on generated walks whose landings are exact.
+# In shares of the unit speeds and of the swings to either side, in cm and in frames at 60 Hz; set once, on
+# the hand-made labels of the original release and on generated walks whose landings are exact.
 SLOWEST_REST = 0.4
 REST_OF_SWING = 0.12
 DIP_OF_SWING = 0.35
@@ -58,8 +59,8 @@ def foot_speeds(clip: Clip) -> Array:
 def find_swings(clip: Clip, heel_speed: float, toe_speed: float, valley_factor: float) -> list[Swing]:
     """The swings of both feet, in the order in which they end.
 
-    heel_speed, toe_speed: the unit speeds, cm a frame at 120 Hz. valley_factor: a foot that never rests between
-    two swings is down while it is no faster than so many times its slowest.
+    heel_speed, toe_speed: the unit speeds, cm a frame at 120 Hz. valley_factor: a foot that never rests
+    between two swings is down while it is no faster than so many times its slowest.
     """
     speed = foot_speeds(clip)
     swings = []
@@ -72,7 +73,7 @@ def find_swings(clip: Clip, heel_speed: float, toe_speed: float, valley_factor: 
     return _one_swing_a_step(real)
 
 
-def feet_up(swings: list[Swing], frames: int) -> Array:
+def feet_up(swings: list[Swing], frames: int) -> np.ndarray:
     """(frames, 2) bool: whether the right, the left foot is in a swing."""
     up = np.zeros((frames, 2), bool)
     for swing in swings:
@@ -84,8 +85,8 @@ def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tup
     """Landings (frame, foot) that take turns; END_OF_BOUT stands between bouts of walking.
 
     shortest_step: a landing so soon after one of the other foot, in frames at 120 Hz, is left out.
-    The frame is that of first contact, and later after slow swings, which a person marks when the weight comes
-    down: by the time in which the toe at its fastest goes SETTLING cm.
+    The frame is that of first contact, and later after slow swings, which a person marks when the weight
+    comes down: by the time in which the toe at its fastest goes SETTLING cm.
     """
     out: list[tuple[float, int]] = []
     resting_since = -1
@@ -102,11 +103,9 @@ def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tup
     return out
 
 
-def _times_up(relative: Array, valley_factor: float) -> Array:
+def _times_up(relative: Array, valley_factor: float) -> np.ndarray:
     """(n, 2) first frame up, first frame down again, of a foot with the `relative` speed (F,)."""
-    from scipy.ndimage import median_filter
-
-    relative = median_filter(relative, 3, mode="nearest")
+    relative = median_of_three(relative)
     peaks = _swing_peaks(relative)
     up = relative >= _rest_limit(relative, peaks, valley_factor)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], up, [False]]))).reshape(-1, 2)
@@ -114,13 +113,10 @@ def _times_up(relative: Array, valley_factor: float) -> Array:
     return edges[holds_peak]
 
 
-def _swing_peaks(relative: Array) -> Array:
+def _swing_peaks(relative: Array) -> np.ndarray:
     """Frames of the fastest moment of each swing: peaks that are parted by a real dip."""
-    from scipy.signal import find_peaks
-
-    found, _ = find_peaks(np.concatenate([[0.0], relative, [0.0]]), height=2 * SLOWEST_REST)
     kept: list[int] = []
-    for peak in found - 1:
+    for peak in _local_highs(relative, 2 * SLOWEST_REST):
         while kept:
             lower = min(relative[kept[-1]], relative[peak])
             if relative[kept[-1] : peak + 1].min() <= max(SLOWEST_REST, DIP_OF_SWING * lower):
@@ -134,7 +130,16 @@ def _swing_peaks(relative: Array) -> Array:
     return np.array(kept, int)
 
 
-def _rest_limit(relative: Array, peaks: Array, valley_factor: float) -> Array:
+def _local_highs(values: Array, least: float) -> np.ndarray:
+    """Frames where `values` (F,) are `least` or more and higher than on both sides; mid-plateau."""
+    steps = np.diff(np.concatenate([[0.0], values, [0.0]]))
+    moves = np.flatnonzero(steps)
+    tops = np.flatnonzero((steps[moves[:-1]] > 0) & (steps[moves[1:]] < 0))
+    frames = (moves[tops] + moves[tops + 1] - 1) // 2
+    return frames[values[frames] >= least]
+
+
+def _rest_limit(relative: Array, peaks: np.ndarray, valley_factor: float) -> Array:
     """(F,) the relative speed below which the foot is down: between two swings a share of the lesser one."""
     frames = len(relative)
     limit = np.full(frames, SLOWEST_REST)

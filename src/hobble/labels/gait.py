@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.labels.footfall import Swing, feet_up
 from hobble.labels.model import GAITS
+from hobble.labels.smooth import gaussian, lowest, mean
 
 STAND, WALK, JOG, CROUCH = range(4)
 GRAVITY = 981.0 / 3600.0
@@ -38,8 +41,8 @@ def overwrite_crouch(gait: Array, clip: Clip) -> Array:
 def automatic_gait(clip: Clip, swings: list[Swing], dominant: str | None) -> Array:
     """Gait shares (F, 6), which add up to 1, of a clip whose feet swing as `swings` say.
 
-    dominant: the gait it mostly shows, which tips the balance where walk and jog are alike. A jump or a bump is
-    not recognised; where `dominant` is one of them, every frame but those that stand is that.
+    dominant: the gait it mostly shows, which tips the balance where walk and jog are alike. A jump or a bump
+    is not recognised; where `dominant` is one of them, every frame but those that stand is that.
     """
     gait = _likeliest_path(_evidence(clip, swings, dominant), SWITCH)
     shares = _fade(_without_passing(gait), len(GAITS))
@@ -51,11 +54,9 @@ def automatic_gait(clip: Clip, swings: list[Swing], dominant: str | None) -> Arr
 
 def _evidence(clip: Clip, swings: list[Swing], dominant: str | None) -> Array:
     """(F, 4) how much more each of the first four gaits fits a frame than walking does, -1 to 1."""
-    from scipy.ndimage import gaussian_filter1d
-
     frames = len(clip)
     speed, bounce = _speed_and_bounce(clip)
-    flight = gaussian_filter1d(feet_up(swings, frames).all(axis=1).astype(float), 15.0, mode="nearest")
+    flight = gaussian(feet_up(swings, frames).all(axis=1).astype(float), 15.0)
     jog = bounce / JOG_BOUNCE + flight / JOG_FLIGHT + 0.15 * np.clip(speed - 2.0, -1.0, 2.0) - 2.0
     jog += {"jog": SAID, "walk": -SAID}.get(dominant or "", 0.0)
     stand = np.clip((STANDING_SPEED - speed) / 0.15, -1.0, 1.0)
@@ -66,30 +67,27 @@ def _evidence(clip: Clip, swings: list[Swing], dominant: str | None) -> Array:
 
 
 def _speed_and_bounce(clip: Clip) -> tuple[Array, Array]:
-    """(F,) speed of the hips along the ground, cm a frame, and root mean square of their vertical acceleration, g.
+    """(F,) speed of the hips along the ground, cm a frame, and root mean square of their vertical
+    acceleration, g.
 
     Jogging bounces the hips by a third of a gravity and more, on the spot too; walking by a quarter and less.
     """
-    from scipy.ndimage import gaussian_filter1d
-
     if len(clip) < 3:
         return np.zeros(len(clip)), np.zeros(len(clip))
     hips = clip.positions[:, clip.skeleton.role("hips")]
-    ground = gaussian_filter1d(hips[:, [0, 2]], 3.0, axis=0, mode="nearest")
+    ground = gaussian(hips[:, [0, 2]], 3.0)
     speed = np.linalg.norm(np.gradient(ground, axis=0), axis=1)
-    height = gaussian_filter1d(hips[:, 1], 2.0, mode="nearest")
+    height = gaussian(hips[:, 1], 2.0)
     vertical = np.clip(np.gradient(np.gradient(height)) / GRAVITY, -2.0, 2.0)
-    bounce = np.sqrt(gaussian_filter1d(vertical**2, 15.0, mode="nearest"))
-    return gaussian_filter1d(speed, 10.0, mode="nearest"), bounce
+    bounce = np.sqrt(gaussian(vertical**2, 15.0))
+    return gaussian(speed, 10.0), bounce
 
 
 def _relative_heights(clip: Clip) -> tuple[Array, Array]:
-    """(F,) heights of head and hips over the feet's lowest about then, relative to the lengths of the bones."""
-    from scipy.ndimage import minimum_filter1d
-
+    """(F,) heights of head and hips over the feet's lowest about then, in lengths of the bones below them."""
     skeleton, y = clip.skeleton, clip.positions[..., 1]
     toes = y[:, [skeleton.role("left_toe"), skeleton.role("right_toe")]]
-    floor = minimum_filter1d(toes, 61, axis=0, mode="nearest").mean(axis=1)
+    floor = lowest(toes, 61).mean(axis=1)
     lengths = np.linalg.norm(skeleton.offsets, axis=1)
     leg = lengths[skeleton.role("left_knee")] + lengths[skeleton.role("left_heel")]
     trunk, joint = 0.0, skeleton.role("head")
@@ -101,7 +99,7 @@ def _relative_heights(clip: Clip) -> tuple[Array, Array]:
 
 
 def _likeliest_path(evidence: Array, switch: float) -> Array:
-    """(F,) the gaits with the most evidence (F, G) in all, less `switch` for every change (Viterbi's algorithm)."""
+    """(F,) the gaits with most evidence (F, G) in all, less `switch` for each change (Viterbi)."""
     frames, gaits = evidence.shape
     if not frames:
         return np.zeros(0, int)
@@ -123,7 +121,7 @@ def _without_passing(gait: Array) -> Array:
     """Gaits (F,) in which a short walk from standing into a jog, or back, is halved between the two."""
     out = gait.copy()
     edges = np.concatenate([[0], np.flatnonzero(np.diff(gait)) + 1, [len(gait)]])
-    for a, b in zip(edges[1:-2], edges[2:-1], strict=True):
+    for a, b in itertools.pairwise(edges[1:-1]):
         before, after = gait[a - 1], gait[b]
         if gait[a] == WALK and {before, after} == {STAND, JOG} and b - a <= PASSING:
             middle = (a + b) // 2
@@ -133,6 +131,4 @@ def _without_passing(gait: Array) -> Array:
 
 def _fade(gait: Array, count: int) -> Array:
     """Shares (F, count) of gaits (F,) with a linear fade of FADE frames at every change."""
-    from scipy.ndimage import uniform_filter1d
-
-    return np.clip(uniform_filter1d(np.eye(count)[gait], FADE, axis=0, mode="nearest"), 0.0, 1.0)
+    return np.clip(mean(np.eye(count)[gait], FADE), 0.0, 1.0)

@@ -126,7 +126,7 @@ def _by_kind(files: Iterable[str | Path]) -> dict[str, Path]:
 
 def _phase(
     clip: Clip, given: Mapping[str, Path], time: SourceTime, swings: list[Swing], shortest_step: int
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, np.ndarray, Array]:
     """Phase with the right foot at 0, where it is known, and footsteps."""
     frames = len(clip)
     if "footsteps" in given:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
 
@@ -25,12 +27,12 @@ class Labels:
     walking. cycles: (C, 2) int, first and last frame of each cycle kept, inclusive.
     """
 
-    contacts: Array = field(repr=False)
+    contacts: np.ndarray = field(repr=False)
     phase: Array = field(repr=False)
-    phase_known: Array = field(repr=False)
+    phase_known: np.ndarray = field(repr=False)
     gait: Array = field(repr=False)
     footsteps: Array = field(repr=False)
-    cycles: Array = field(repr=False)
+    cycles: np.ndarray = field(repr=False)
 
     def __len__(self) -> int:
         return len(self.phase)

@@ -19,7 +19,7 @@ FASTEST = 0.25
 WINDOW = 60
 
 
-def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, Array]:
+def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray]:
     """Phase (frames,) in 0..1, right foot = 0, linear from landing to landing, and where it is known.
 
     Where it is not, it creeps on by about a tenth of the mean of .017 cycles a frame, as the runtime does for
@@ -41,7 +41,7 @@ def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, Array]:
     return np.where(phase > 1 - 1e-9, 0.0, phase), known
 
 
-def dropped_frames(footsteps: Array, frames: int) -> Array:
+def dropped_frames(footsteps: Array, frames: int) -> np.ndarray:
     """(frames,) bool: inside a line of footsteps that is marked as not to be used."""
     out = np.zeros(frames, bool)
     for line, following in itertools.pairwise(footsteps):
@@ -50,7 +50,7 @@ def dropped_frames(footsteps: Array, frames: int) -> Array:
     return out
 
 
-def footsteps_of_phase(phase: Array) -> tuple[Array, Array]:
+def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
     """Footsteps (N, 3) where a hand-made phase (F,) passes 0 and .5, and (F,) where it moves at all."""
     step = np.diff(phase) % 1.0
     moving = np.concatenate([[False], (step > 0) & (step < FASTEST), [False]])
@@ -91,7 +91,7 @@ def rows_of_landings(events: list[tuple[float, int]]) -> Array:
     return np.array(rows, float).reshape(-1, 3)
 
 
-def find_cycles(footsteps: Array, frames: int, zero: str, window: int = WINDOW) -> tuple[Array, int]:
+def find_cycles(footsteps: Array, frames: int, zero: str, window: int = WINDOW) -> tuple[np.ndarray, int]:
     """Cycles (C, 2) from one landing of the foot `zero` to its next, both frames included, and how many are
     left out.
 
@@ -134,9 +134,11 @@ def mirrored_footsteps(footsteps: Array) -> Array:
     return rows
 
 
-def _landings(footsteps: Array) -> tuple[Array, Array, Array]:
+def _landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
     """Frames and phases (0 or .5) of all landings, and (n - 1,) whether the next is of the same bout."""
-    when, value, joined = [], [], []
+    when: list[float] = []
+    value: list[float] = []
+    joined: list[bool] = []
     apart = True
     for right, left, _ in footsteps:
         if np.isnan(right) and np.isnan(left):
@@ -151,7 +153,7 @@ def _landings(footsteps: Array) -> tuple[Array, Array, Array]:
     return np.array(when, float), np.array(value, float), np.array(joined, bool)
 
 
-def _climbing(when: Array, value: Array, joined: Array) -> Array:
+def _climbing(when: Array, value: Array, joined: np.ndarray) -> Array:
     """Phase of each landing without wrapping: half a cycle a step, and over a gap about the idle rate."""
     level = [value[0]]
     for i, together in enumerate(joined):

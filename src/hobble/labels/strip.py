@@ -9,6 +9,7 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.labels.model import CONTACT_ROLES, GAITS, Labels
+from hobble.labels.smooth import mean
 
 POINTS = 400
 
@@ -42,13 +43,11 @@ def strip(labels: Labels, clip: Clip, points: int = POINTS) -> dict[str, Any]:
 
 def _speed(clip: Clip) -> Array:
     """(F,) speed of the root along the ground in m/s, over a fifth of a second."""
-    from scipy.ndimage import uniform_filter1d
-
     ground = clip.root[:, [0, 2]]
     if len(ground) < 2:
         return np.zeros(len(ground))
     step = np.linalg.norm(np.gradient(ground, axis=0), axis=1)
-    return uniform_filter1d(step, 12, mode="nearest") * clip.fps / 100
+    return mean(step, 13) * clip.fps / 100
 
 
 def _runs(flags: Array, fps: float) -> list[list[float]]:

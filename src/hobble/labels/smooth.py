@@ -1,0 +1,43 @@
+"""Filters over time, the ends held, on (F, ...) arrays; numpy alone, so that a job per clip starts fast."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.core.quat import Array
+
+
+def gaussian(values: Array, sigma: float) -> Array:
+    """Weighted mean with a Gaussian of `sigma` frames, cut off at four of them."""
+    reach = int(4 * sigma + 0.5)
+    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
+    return _weighted(values, weights / weights.sum())
+
+
+def mean(values: Array, width: int) -> Array:
+    """Mean over `width` frames, an odd number, the present one in the middle."""
+    return _weighted(values, np.full(width, 1.0 / width))
+
+
+def lowest(values: Array, width: int) -> Array:
+    """The least value within `width` frames, an odd number, the present one in the middle."""
+    return _windows(values, width).min(axis=-1)
+
+
+def median_of_three(values: Array) -> Array:
+    """The middle one of the values before, at and after each frame: a spike of one frame is gone."""
+    return np.median(_windows(values, 3), axis=-1)
+
+
+def _weighted(values: Array, weights: Array) -> Array:
+    columns = np.reshape(values, (len(values), -1)).T
+    reach = len(weights) // 2
+    padded = np.pad(columns, ((0, 0), (reach, reach)), mode="edge")
+    smooth = [np.convolve(column, weights, mode="valid") for column in padded]
+    return np.stack(smooth, axis=1).reshape(np.shape(values))
+
+
+def _windows(values: Array, width: int) -> Array:
+    """(F, ..., width) the values around each frame."""
+    reach = [(width // 2, width // 2)] + [(0, 0)] * (np.ndim(values) - 1)
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), width, axis=0)
