@@ -32,7 +32,7 @@ def injury_response(
     seconds: float,
     links: Sequence[str] | None = None,
 ) -> dict[str, Any]:
-    """Sweep each of `links` (default: those hurt in training where the network tells, else all).
+    """Sweep each of `links` (default: those that were hurt in training).
 
     runtime: options of ProceduralAnimation; seconds: length of each walk. Returns `rows`, one for each gait,
     link and severity, `responses`, one for each gait and link: how monotonic each measure is with severity
@@ -41,7 +41,7 @@ def injury_response(
     """
     if not network.links:
         return {"configuration": configuration, "applies": False, "reason": REASON}
-    links = list(links or network.meta.get("hurt_links") or network.links)
+    links = list(links or network.hurt_links)
     rows: list[dict[str, Any]] = []
     responses = []
     for gait in GAITS:

@@ -99,7 +99,7 @@ class Controller:
         self, velocity: Array, direction: Array, strafe: Array, gait: Array, ground: Ground | None
     ) -> None:
         c = self.character
-        _prepare(
+        trajectory.prepare(
             velocity, direction, strafe, gait, c.target_velocity, c.target_direction, c.strafe, c.gait,
             c.position, c.direction, c.severity, c.severity_target, self.severity_step,
             self.layout.step, self.side, self._points,
@@ -139,23 +139,6 @@ class Controller:
     def _update(self) -> None:
         c = self.character
         trajectory.advance(self.y, self._y_columns, c.position, c.direction, c.gait, c.phase)
-
-
-@njit(cache=True)
-def _prepare(
-    wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, velocity: Any, target: Any,
-    strafe: Any, gait: Any, position: Any, direction: Any, severity: Any, severity_target: Any, severity_step:
-    float, step: int, side: float, points: Any,
-) -> None:  # fmt: skip
-    trajectory.follow_wish(
-        wish_velocity, wish_direction, wish_strafe, wish_gait, velocity, target, strafe, gait
-    )
-    trajectory.blend_future(velocity, target, strafe, position, direction, gait)
-    trajectory.sample_points(position, direction, step, side, points)
-    for c in range(severity.shape[0]):
-        for k in range(severity.shape[1]):
-            change = severity_target[c, k] - severity[c, k]
-            severity[c, k] += min(max(change, -severity_step), severity_step)
 
 
 @njit(cache=True)

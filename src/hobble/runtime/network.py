@@ -47,6 +47,12 @@ class Network:
         return len(self.weights[0])
 
     @property
+    def hurt_links(self) -> tuple[str, ...]:
+        """Links that were ever hurt in training, as the mean of their inputs tells; all where none is told."""
+        means = self.x_mean[self.layout.x_injury]
+        return tuple(name for name, mean in zip(self.links, means, strict=True) if mean > 0) or self.links
+
+    @property
     def sizes(self) -> tuple[int, ...]:
         """Units of each layer, the input first: (342, 512, 512, 311)."""
         return (self.weights[0].shape[2], *(w.shape[1] for w in self.weights))

@@ -88,6 +88,25 @@ def sample_points(position: Any, direction: Any, step: int, side: float, points:
 
 
 @njit(cache=True)
+def prepare(
+    wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any,
+    velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
+    severity: Any, severity_target: Any, severity_step: float, step: int, side: float, points: Any,
+) -> None:  # fmt: skip
+    """All of the above in one call, and severities (C, L) move toward their targets by `severity_step` at most.
+
+    In this file because compiled code is kept on disk and renewed when its own file changes, not its callees'.
+    """
+    follow_wish(wish_velocity, wish_direction, wish_strafe, wish_gait, velocity, target, strafe, gait)
+    blend_future(velocity, target, strafe, position, direction, gait)
+    sample_points(position, direction, step, side, points)
+    for c in range(severity.shape[0]):
+        for k in range(severity.shape[1]):
+            change = severity_target[c, k] - severity[c, k]
+            severity[c, k] += min(max(change, -severity_step), severity_step)
+
+
+@njit(cache=True)
 def advance(y: Any, at: Any, position: Any, direction: Any, gait: Any, phase: Any) -> None:
     """One frame on: shift the past, move and turn the root, take the predicted future, advance the phase.
 
