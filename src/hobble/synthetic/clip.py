@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path as FilePath
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -15,19 +15,19 @@ from hobble.core.skeleton import Skeleton
 from hobble.synthetic import files, injury
 from hobble.synthetic.feet import move_foot
 from hobble.synthetic.footsteps import landings, phase_curve, stances
-from hobble.synthetic.gait import LEFT, RIGHT, healthy_style
-from hobble.synthetic.ground import make_ground
-from hobble.synthetic.path import gait_keys, margin, walk_path
+from hobble.synthetic.gait import LEFT, RIGHT, Style, healthy_style
+from hobble.synthetic.ground import Ground, make_ground
+from hobble.synthetic.path import Path, gait_keys, margin, walk_path
 from hobble.synthetic.pose import pose
-from hobble.synthetic.recipes import GROUND, generator, plan
+from hobble.synthetic.recipes import GROUND, INJURED, Segment, generator, plan
 
 
 @dataclass(frozen=True)
 class Walk:
     """A generated clip and its labels; frames count from 0 at the clip's rate.
 
-    right, left: frames in which a foot lands. gait: (frame, label) keys. status: (first frame, severity) of each
-    stretch of the hurt `link`, which is None in a healthy clip.
+    right, left: frames in which a foot lands. gait: (frame, label) keys. status: (first frame, severity) of
+    each stretch of the hurt `link`, which is None in a healthy clip. ground: what it walks on.
     """
 
     clip: Clip
@@ -36,6 +36,7 @@ class Walk:
     gait: list[tuple[int, str]]
     link: str | None
     status: list[tuple[int, int]]
+    ground: Ground
 
 
 def generate(
@@ -52,31 +53,39 @@ def generate(
 
     Raises HobbleError for an unknown recipe or a link that cannot be hurt.
     """
+    recipe = recipe or (INJURED if injured else "walk-straight")
     total = round(frames * fps / 60)
-    first = margin(fps)
-    recipe = recipe or ("injured" if injured else "walk-straight")
     segments = plan(recipe, total, fps, seed, clip)
-    severity = slowing = None
     status = [(0, 0)]
     if injured:
         injury.check_link(injured, clip)
         status = injury.schedule(total)
-        severity = injury.smoothed(status, total, first, fps)
-        slowing = injury.slowing(severity, injured)
-    path = walk_path(segments, total, fps, slowing, severity)
-    style = healthy_style(path)
-    if injured:
-        style = injury.hurt(style, path.severity, injured)
+    for _ in range(3 if injured else 1):
+        # Severity changes as a foot lands, which depends on severity: the landings settle in a round or two.
+        path, style = _styled(segments, total, fps, injured, status)
+        phase = phase_curve(style, fps, generator(seed, clip, "phase").random())
+        right, left = (_frames(landings(phase, style, side), path.first, total) for side in (RIGHT, LEFT))
+        if injured:
+            status = injury.at_footsteps(status, sorted(right + left))
     rng = generator(seed, clip, "walk")
     terrain = make_ground(GROUND.get(recipe, "flat"), rng)
-    phase = phase_curve(style, fps, rng.random())
     steps = stances(path, style, phase, terrain, rng)
     feet = tuple(move_foot(steps[side], style, side, terrain) for side in (LEFT, RIGHT))
     rotations, root = pose(skeleton, path, style, phase, feet, terrain, rng)
-    part = slice(first, first + total)
+    part = slice(path.first, path.first + total)
     motion = Clip(clip, skeleton, fps, rotations[part], root[part])
-    right, left = (_frames(landings(phase, style, side), first, total) for side in (RIGHT, LEFT))
-    return Walk(motion, right, left, gait_keys(segments, total, fps), injured, status)
+    return Walk(motion, right, left, gait_keys(segments, total, fps), injured, status, terrain)
+
+
+def _styled(
+    segments: list[Segment], total: int, fps: float, injured: str | None, status: list[tuple[int, int]]
+) -> tuple[Path, Style]:
+    if injured is None:
+        path = walk_path(segments, total, fps)
+        return path, healthy_style(path)
+    severity = injury.smoothed(status, total, margin(fps), fps)
+    path = walk_path(segments, total, fps, injury.slowing(severity, injured))
+    return path, injury.hurt(healthy_style(path), severity, injured)
 
 
 def _frames(at: np.ndarray, first: int, total: int) -> list[int]:
@@ -93,10 +102,10 @@ def write_clip(
     ground: str,
     options: dict[str, Any],
     *,
-    bvh: str | FilePath,
-    footsteps: str | FilePath,
-    gait: str | FilePath,
-    status: str | FilePath,
+    bvh: str | PathLike[str],
+    footsteps: str | PathLike[str],
+    gait: str | PathLike[str],
+    status: str | PathLike[str],
 ) -> None:
     """Generate a clip and write it as a user's folder would hold it. skeleton: as `Skeleton.to_dict`.
 

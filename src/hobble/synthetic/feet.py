@@ -1,10 +1,12 @@
-"""Where the ankle is and how the foot is turned in every frame: rolling in stance, swinging between stances."""
+"""Where the ankle is and how the foot is turned: rolling in stance, swinging from one stance to the next."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from hobble.core import quat
 from hobble.core.quat import Array
@@ -13,27 +15,31 @@ from hobble.synthetic.gait import SIGN, Style
 from hobble.synthetic.ground import Ground
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
+HEEL = np.array([0.0, -4.2, -3.0])  # the back of the sole from the ankle, nearly
+ROLL = 2.8  # the heel rises slowly at first, then fast
+READY = 0.85  # share of the swing after which the foot is pitched for its landing
+FOLLOW = 0.55  # share of the pitch rate at which it leaves that the foot keeps
+SPEED_LEFT = 0.3  # share of its mean speed over ground that the foot has left as it lands
+EARLY = 0.8  # below 1 the foot has most of its way behind it before half of its time
 SOLE_HEIGHT = 2.0  # a moving joint of the foot keeps at least this and the clearance over the ground
 
 
 @dataclass(frozen=True)
 class Foot:
-    """One foot over F frames: ankle (F, 3), foot (F, 4) and toes (F, 4) in the world; support: (F,) 1 in stance."""
+    """One foot over F frames in the world: ankle (F, 3), foot (F, 4), toes (F, 4)."""
 
     ankle: Array
     foot: Array
     toes: Array
-    support: Array
 
 
 def move_foot(steps: list[Stance], style: Style, side: int, ground: Ground) -> Foot:
     """The path of one foot through its stances. Frames before the first and after the last one stay zero."""
     frames = len(style.lag)
-    foot = Foot(
-        np.zeros((frames, 3)), np.tile(quat.IDENTITY, (frames, 1)), np.zeros((frames, 4)), np.zeros(frames)
-    )
+    turns = np.tile(quat.IDENTITY, (frames, 1))
+    foot = Foot(np.zeros((frames, 3)), turns, turns.copy())
     rolls = [_Roll.of(step, style, side) for step in steps]
-    for i, (here, there) in enumerate(zip(rolls, rolls[1:], strict=False)):
+    for i, (here, there) in enumerate(pairwise(rolls)):
         rests = not there.step.swings
         leave = there.step.land if rests else here.step.leave
         t = _frames(here.step.land, leave)
@@ -55,6 +61,7 @@ class _Roll:
     step: Stance
     land: float
     off: float
+    rest: Array
     flat: float
     heel_off: float
 
@@ -65,15 +72,28 @@ class _Roll:
         off = np.interp(step.leave, t, style.off_pitch[:, side])
         flat = np.interp(step.land, t, style.flat)
         heel_off = np.interp((step.land + step.leave) / 2, t, style.heel_off[:, side])
-        return cls(step, np.radians(land), np.radians(off), float(flat), float(heel_off))
+        return cls(
+            step,
+            np.radians(land),
+            np.radians(off),
+            np.radians(style.rest_pitch),
+            float(flat),
+            float(heel_off),
+        )
 
     def pitch(self, t: Array, lands: bool = True, leaves: bool = True) -> Array:
         """Radians, + toe up, at frames `t` within or just outside of the stance."""
         u = (np.asarray(t, float) - self.step.land) / (self.step.leave - self.step.land)
-        down = np.clip(u / self.flat, 0, 1)
+        down = u / self.flat
         rise = np.clip((u - self.heel_off) / (1 - self.heel_off), 0, None)
-        landing = self.land * (1 - down**2 * (3 - 2 * down)) if lands else 0.0
-        return landing + (self.off * rise**1.8 if leaves else 0.0)
+        rest = np.interp(t, np.arange(len(self.rest)), self.rest)
+        landing = (self.land - rest) * (1 - _ease(down)) if lands else 0.0
+        return rest + landing + ((self.off - rest) * rise**ROLL if leaves else 0.0)
+
+    def toe(self, pitch: float) -> Array:
+        """(3,) the toe joint: still where the heel is up, on an arc about the ankle where the toe is up."""
+        turned = quat.mul(self.step.turn, quat.from_axis_angle(X_AXIS, -max(pitch, 0.0)))
+        return self.step.ankle + quat.rotate(turned, FOOT)
 
     def ankle(self, pitch: Array) -> Array:
         """(..., 3): still where the toe is up, on an arc about the still toe joint where the heel is up."""
@@ -85,7 +105,6 @@ def _stand(foot: Foot, t: np.ndarray, roll: _Roll, pitch: Array) -> None:
     foot.ankle[t] = roll.ankle(pitch)
     foot.foot[t] = quat.mul(roll.step.turn, quat.from_axis_angle(X_AXIS, -pitch))
     foot.toes[t] = quat.mul(roll.step.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0)))
-    foot.support[t] = 1.0
 
 
 def _swing(foot: Foot, here: _Roll, there: _Roll, style: Style, side: int, ground: Ground) -> None:
@@ -93,48 +112,53 @@ def _swing(foot: Foot, here: _Roll, there: _Roll, style: Style, side: int, groun
     t = _frames(start, end)
     if not len(t):
         return
-    u = ((t - start) / (end - start))[:, None]
-    length = end - start
-    step = 0.01
+    u = (t - start) / (end - start)
+    bump = np.sin(np.pi * u) ** 2
     p0, p1 = here.pitch(start), there.pitch(end)
-    v0 = (p0 - here.pitch(start - step)) / step * length
-    v1 = (there.pitch(end + step) - p1) / step * length
-    pitch = _hermite(p0, v0 * 0.6, p1, v1, u)[:, 0]
-    a0, a1 = here.ankle(p0), there.ankle(p1)
-    w0 = (a0 - here.ankle(here.pitch(start - step))) / step * length
-    w1 = (there.ankle(there.pitch(end + step)) - a1) / step * length
-    ankle = _hermite(a0, w0, a1, w1, u)
-    ease = (u * u * (3 - 2 * u))[:, 0]
-    turn = quat.slerp(here.step.turn, there.step.turn, ease)
-    bump = np.sin(np.pi * u[:, 0]) ** 2
-    ankle[:, 1] += np.interp(t, np.arange(len(style.lag)), style.lift[:, side]) * bump
-    out = quat.rotate(turn, np.array([SIGN[side], 0.0, 0.0]))
-    ankle += out * (style.swing_out[t, side] * bump)[:, None]
+    rate = (p0 - here.pitch(start - 0.01)) / 0.01 * (end - start) * READY
+    pitch = _hermite(p0, rate * FOLLOW, p1, 0.0, np.minimum(u / READY, 1))
+    turn = quat.slerp(here.step.turn, there.step.turn, _ease(u))
     rotation = quat.mul(turn, quat.from_axis_angle(X_AXIS, -pitch))
-    early, late = np.clip(u[:, 0] / 0.4, 0, 1), np.clip((u[:, 0] - 0.7) / 0.3, 0, 1)
-    bend = min(p0, 0.0) * (1 - early**2 * (3 - 2 * early)) + min(p1, 0.0) * late
+    bend = np.minimum(pitch, 0) * (1 - 0.4 * bump)
     toes = quat.mul(rotation, quat.from_axis_angle(X_AXIS, bend))
-    ankle[:, 1] += _clear(ankle, rotation, toes, bump, style.clearance[t, side], ground) * bump
-    foot.ankle[t], foot.foot[t], foot.toes[t] = ankle, rotation, toes
+    # The toe joint starts from rest and is stopped by the ground; the ankle follows from it and the pitch.
+    going = _hermite(0.0, 0.0, 1.0, SPEED_LEFT / EARLY, u**EARLY)
+    share = np.stack([going, _ease(u), going], axis=1)
+    toe = here.toe(p0) + (there.toe(p1) - here.toe(p0)) * share
+    toe[:, 1] += style.lift[t, side] * bump
+    toe += quat.rotate(turn, np.array([SIGN[side], 0.0, 0.0])) * (style.swing_out[t, side] * bump)[:, None]
+    toe[:, 1] += (
+        _lack(toe, rotation, toes, style.clearance[t, side] * bump, ground)
+        * _ease(u / 0.25)
+        * _ease((1 - u) / 0.1)
+    )
+    foot.ankle[t], foot.foot[t], foot.toes[t] = toe - quat.rotate(rotation, FOOT), rotation, toes
 
 
-def _clear(
-    ankle: Array, rotation: Array, toes: Array, bump: Array, clearance: Array, ground: Ground
-) -> float:
-    """How much higher the swing must bulge for heel, toe joint and toe tip to clear the ground."""
-    most = 0.0
-    toe = ankle + quat.rotate(rotation, FOOT)
+def _lack(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Ground) -> Array:
+    """(N,) how much higher the swing must go for heel, toe joint and toe tip to clear the ground."""
     tip = toe + quat.rotate(toes, np.array([0.0, 0.0, 6.0]))
-    heel = ankle + quat.rotate(rotation, np.array([0.0, -5.0, -3.0]))
-    middle = bump > 0.2
-    if middle.any():
-        for point in (toe, tip, heel):
-            need = ground(point[:, 0], point[:, 2]) + SOLE_HEIGHT + clearance * bump - point[:, 1]
-            most = max(most, float(np.max(need[middle] / bump[middle])))
-    return most
+    heel = toe + quat.rotate(rotation, HEEL - FOOT)
+    lack = np.zeros(len(toe))
+    for point in (toe, tip, heel):
+        lack = np.maximum(lack, ground(point[:, 0], point[:, 2]) + SOLE_HEIGHT + clearance - point[:, 1])
+    return smooth_above(lack, max(1, len(toe) // 18))
+
+
+def smooth_above(values: Array, frames: int) -> Array:
+    """A smooth curve nowhere below `values`: their running maximum, averaged over as wide a window."""
+    wide = maximum_filter1d(values, 4 * frames + 1, mode="nearest")
+    kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
+    return np.convolve(np.pad(wide, 2 * frames, mode="edge"), kernel / kernel.sum(), mode="valid")
+
+
+def _ease(u: Array) -> Array:
+    """From 0 to 1 with no speed at either end."""
+    u = np.clip(u, 0, 1)
+    return u * u * (3 - 2 * u)
 
 
 def _hermite(a: Array, da: Array, b: Array, db: Array, u: Array) -> Array:
-    """Cubic from a to b with slopes da and db; u (N, 1)."""
+    """Cubic from a to b with slopes da and db."""
     u2, u3 = u * u, u * u * u
     return a * (2 * u3 - 3 * u2 + 1) + da * (u3 - 2 * u2 + u) + b * (3 * u2 - 2 * u3) + db * (u3 - u2)

@@ -24,7 +24,7 @@ def gait_text(keys: Sequence[tuple[int, str]]) -> str:
 
 
 def status_text(frames: int, link: str | None, changes: Sequence[tuple[int, int]]) -> str:
-    """`frames:N`, then `A-B link[severity];` for each stretch that hurts; frames from 0 in, from 1 in the file."""
+    """`frames:N`, then `A-B link[severity];` a stretch that hurts; frames from 0 in, from 1 in the file."""
     lines = [f"frames:{frames}"]
     ends = [*(start for start, _ in changes[1:]), frames]
     for (start, severity), end in zip(changes, ends, strict=True):

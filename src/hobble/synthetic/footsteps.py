@@ -15,15 +15,16 @@ from hobble.synthetic.path import Path
 ANKLE_HEIGHT = 7.0  # of the ankle joint over the sole; the toe joint is 4.5 cm lower on the skeleton
 FOOT = np.array([0.0, -4.5, 13.5])  # from ankle to toe joint in a foot that stands flat
 STAY = (3.0, np.radians(5.0))  # a standing figure leaves its foot where it would move less than this
-SOLE = np.array([-6.0, 0.0, 6.0, 13.5, 20.5])  # points of the sole along the foot, from below the ankle
-SHIFTS = sorted(np.arange(-16.0, 17.0, 2.0), key=abs)  # how far a foot is moved to keep it off an edge
+STILL = 12.0  # cm/s; slower than this the figure stands
+SOLE = np.array([-11.0, -5.0, 0.0, 6.0, 13.5, 20.5, 27.0])  # along the foot from below the ankle, with room
+SHIFTS = sorted(np.arange(-20.0, 21.0, 2.0), key=abs)  # how far a foot is moved to keep it off an edge
 
 
 @dataclass(frozen=True)
 class Stance:
     """A foot on the ground from frame `land` to frame `leave` (fractions of frames, of the padded path).
 
-    ankle: (3,) of the flat foot. turn: (4,) its world rotation. swings: whether the foot was lifted to get here.
+    ankle: (3,) of the flat foot. turn: (4,) its world rotation. swings: was it lifted to get here?
     """
 
     land: float
@@ -60,11 +61,11 @@ def _of_side(
     out: list[Stance] = []
     for land in at[:-1]:
         here = np.interp(land, frames, phase)
-        duty = np.interp(land, frames, style.duty[:, side])
-        leave = np.interp(here + duty, phase, frames)
-        middle = np.interp(here + duty / 2, phase, frames)
+        # The share on the ground is that of the moment of leaving: who speeds up leaves sooner.
+        leave = np.interp(here, phase - style.duty[:, side], frames)
+        middle = np.interp((here + np.interp(leave, frames, phase)) / 2, phase, frames)
         ankle, turn = _footprint(path, style, ground, side, middle, rng)
-        standing = np.interp(middle, frames, path.gait[:, 0]) > 0.5
+        standing = np.interp(middle, frames, path.speed) < STILL
         if out and standing and _close(out[-1], ankle, turn):
             ankle, turn = out[-1].ankle, out[-1].turn
             out.append(Stance(land, leave, ankle, turn, swings=False))
@@ -84,10 +85,9 @@ def _footprint(
 
     moving = 1 - value(path.gait[:, 0])
     facing = value(path.facing)
-    ahead = value(path.velocity[:, 1]) / 130
     toe_out = np.radians(value(style.toe_out[:, side]))
     out = SIGN[side] * value(style.width) + moving * rng.normal(0, 0.6)
-    along = value(style.shift[:, side]) - 4.0 - 11.0 * ahead + moving * rng.normal(0, 0.8)
+    along = value(style.shift[:, side]) - value(style.behind) + moving * rng.normal(0, 0.8)
     yaw = facing + SIGN[side] * toe_out
     x = value(path.position[:, 0]) + out * np.cos(facing) + along * np.sin(facing)
     z = value(path.position[:, 1]) - out * np.sin(facing) + along * np.cos(facing)

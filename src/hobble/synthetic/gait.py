@@ -16,22 +16,24 @@ from hobble.synthetic.path import GAITS, Path
 # name: for each gait (value at the gait's reference speed, change per m/s). Degrees, centimetres, shares.
 REFERENCE_SPEED = (0.0, 1.3, 2.8, 0.8)
 TABLE: dict[str, tuple[tuple[float, float], ...]] = {
-    "duty": ((0.80, 0), (0.60, -0.06), (0.37, -0.05), (0.64, -0.06)),  # share of the cycle on the ground
-    "land_pitch": ((0, 0), (20, 6), (8, 2), (4, 0)),  # of the foot as it lands, + toe up
-    "off_pitch": ((-15, 0), (-58, -10), (-58, -4), (-38, -8)),  # as it leaves
-    "flat": ((0.15, 0), (0.14, 0), (0.18, 0), (0.15, 0)),  # share of stance until the toe is down
-    "heel_off": ((0.6, 0), (0.52, -0.04), (0.42, 0), (0.60, 0)),  # share of stance when the heel leaves
-    "lift": ((2, 0), (1.5, 1), (9, 3), (7, 0)),  # of the swinging foot over the line of its ends
+    "duty": ((0.64, 0), (0.60, -0.06), (0.335, -0.045), (0.64, -0.06)),  # share of the cycle on the ground
+    "land_pitch": ((0, 0), (16, 6), (8, 2), (-20, 0)),  # of the foot as it lands, + toe up
+    "off_pitch": ((-15, 0), (-57.5, -13), (-54, -6), (-58, -8)),  # as it leaves
+    "rest_pitch": ((0, 0), (0, 0), (0, 0), (-20, 0)),  # while it stands
+    "flat": ((0.15, 0), (0.13, 0), (0.18, 0), (0.15, 0)),  # share of stance until the toe is down
+    "heel_off": ((0.6, 0), (0.46, -0.05), (0.30, 0), (0.45, 0)),  # share of stance when the heel leaves
+    "lift": ((2, 0), (0.8, 1), (8, 3), (4, 0)),  # of the swinging foot over the line of its ends
     "clearance": ((1, 0), (1.5, 0), (3, 0), (2, 0)),  # least height of the swinging sole
+    "behind": ((4, 0), (12, 5.5), (12, 5), (10, 5)),  # of an ankle behind the body in mid-stance
     "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # of an ankle from the path
     "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),
-    "height": ((94.6, 0), (92.6, -1.0), (89.5, -0.5), (56, 0)),  # of the hips above the ground
-    "bob": ((0, 0), (1.9, 1.2), (-3.6, 0.3), (0.8, 0)),  # + highest in mid-stance, - lowest
+    "height": ((94.6, 0), (93.7, -1.0), (91.5, -0.5), (62, 0)),  # of the hips above the ground
+    "bob": ((0, 0), (1.8, 1.2), (-3.0, 0.3), (0.8, 0)),  # + highest in mid-stance, - lowest
     "sway": ((1.6, 0), (2.2, -0.8), (0.8, 0), (2.5, 0)),
-    "pelvis_yaw": ((0.3, 0), (5, 2), (6, 1), (5, 0)),
+    "pelvis_yaw": ((0.3, 0), (6, 2), (6, 1), (5, 0)),
     "pelvis_list": ((1.0, 0), (4, 1), (4, 0), (3, 0)),
     "pelvis_tilt": ((3, 0), (4, 1), (9, 1), (24, 0)),
-    "lean": ((1, 0), (3, 2), (10, 2), (52, 0)),  # of the trunk, forward
+    "lean": ((1, 0), (3, 2), (10, 2), (58, 0)),  # of the trunk, forward
     "chest_yaw": ((0.3, 0), (4, 2), (9, 2), (4, 0)),
     "arm_swing": ((0.8, 0), (17, 12), (27, 4), (9, 0)),
     "arm_mean": ((1, 0), (-1, 0), (-8, 0), (14, 0)),  # + forward
@@ -49,19 +51,21 @@ SIGN = (1.0, -1.0)  # +X is the figure's left
 class Style:
     """How the figure moves in each of F frames: (F,), or (F, 2) left and right. See TABLE; and, beside it:
 
-    frequency: cycles a second. lag: phase from the right foot's landing to the left's. shift: (F, 2) cm that a
-    footprint lies ahead. swing_out: (F, 2) cm of a swinging foot sideways. hike: (F, 2) degrees the pelvis is
-    raised over a swinging leg. side_lean: (F, 2) degrees of the trunk over the stance leg. twist: (F, 2)
+    frequency: cycles a second. lag: phase from the right foot's landing to the left's. shift: (F, 2) cm that
+    a footprint lies ahead. swing_out: (F, 2) cm of a swinging foot sideways. hike: (F, 2) degrees the pelvis
+    is raised over a swinging leg. side_lean: (F, 2) degrees of the trunk over the stance leg. twist: (F, 2)
     degrees of an upper arm inward.
     """
 
     duty: Array
     land_pitch: Array
     off_pitch: Array
+    rest_pitch: Array
     flat: Array
     heel_off: Array
     lift: Array
     clearance: Array
+    behind: Array
     width: Array
     toe_out: Array
     height: Array
@@ -119,7 +123,7 @@ def healthy_style(path: Path) -> Style:
 def _frequencies(speed: Array) -> Array:
     """(F, 4) cycles a second of each gait: cadence grows with the square root of walking speed."""
     stand = np.full_like(speed, 1 / 1.5)
-    walk = 0.935 * np.sqrt(np.maximum(speed, 0.5) / 1.3)
+    walk = 0.965 * np.sqrt(np.maximum(speed, 0.5) / 1.3)
     jog = 1.34 + 0.10 * (np.clip(speed, 1.5, 5.0) - 2.8)
     crouch = 0.80 * np.sqrt(np.maximum(speed, 0.5) / 0.8)
     assert len(GAITS) == 4
@@ -139,9 +143,10 @@ def _directed(style: Style, path: Path) -> Style:
         land_pitch=style.land_pitch * forward - 16 * back - 8 * side,
         off_pitch=style.off_pitch * forward + 8 * back - 16 * side,
         # Feet that do not cross: the step between them, half a stride, opens and closes about this width.
-        width=style.width + 0.26 * stride * sideways,
+        width=style.width + 0.25 * stride / (1 + 0.6 * sideways) * sideways,
+        behind=4 + (style.behind - 4) * ahead,
         lift=style.lift + 3 * (back + side),
-        frequency=style.frequency * (1 + 0.22 * sideways + 0.1 * back[:, 0]),
+        frequency=style.frequency * (1 + 0.6 * sideways + 0.15 * back[:, 0]),
         lean=style.lean * (1 - 0.6 * back[:, 0]),
         pelvis_yaw=style.pelvis_yaw * ahead,
         arm_swing=style.arm_swing * (0.25 + 0.75 * forward),

@@ -54,9 +54,9 @@ def _waves(
 
 
 def _steps(rng: np.random.Generator) -> Ground:
-    """Steps up and down across the way, 7 to 16 cm high and 50 to 130 cm deep, in flights of up to four."""
+    """Steps up and down across the way, 7 to 16 cm high and 62 to 130 cm deep, in flights of up to four."""
     count = 400
-    edges = np.cumsum(rng.uniform(50, 130, count))
+    edges = np.cumsum(rng.uniform(62, 130, count))
     edges -= edges[count // 2]
     flights = np.repeat(np.where(np.arange(count) % 2 == 0, 1.0, -1.0), rng.integers(1, 5, count))[:count]
     levels = np.concatenate([[0.0], np.cumsum(flights * rng.uniform(7, 16, count))])

@@ -1,4 +1,4 @@
-"""From segments to curves over time: where the body goes, where it faces, in which gait, how much it hurts."""
+"""From segments to curves over time: where the body goes, where it faces, in which gait."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Path:
     """F frames at `fps`; the clip itself is frames `first` to F - `first`, the rest lets steps begin and end.
 
     position: (F, 2) x and z in cm. facing: (F,) radians, + to the left. velocity: (F, 2) cm/s to the left and
-    forward of the facing direction. gait: (F, 4) shares of GAITS. severity: (F,) 0 to 10.
+    forward of the facing direction. gait: (F, 4) shares of GAITS.
     """
 
     fps: float
@@ -29,7 +29,6 @@ class Path:
     facing: Array
     velocity: Array
     gait: Array
-    severity: Array
 
     def __len__(self) -> int:
         return len(self.facing)
@@ -40,10 +39,8 @@ class Path:
         return np.linalg.norm(self.velocity, axis=1)
 
 
-def walk_path(
-    segments: Sequence[Segment], frames: int, fps: float, slowing: Array | None, severity: Array | None
-) -> Path:
-    """Integrate the plan. slowing, severity: (frames + 2 * margin,) factor on the speed, and 0 to 10."""
+def walk_path(segments: Sequence[Segment], frames: int, fps: float, slowing: Array | float = 1.0) -> Path:
+    """Integrate the plan. slowing: factor on the speed, one or (frames + 2 * margin,)."""
     first = margin(fps)
     total = frames + 2 * first
     which = _segment_of_frame(segments, frames, fps)
@@ -56,9 +53,8 @@ def walk_path(
     sigma = BLEND * fps
     velocity = gaussian_filter1d(wanted, sigma, axis=0, mode="nearest")
     turning = gaussian_filter1d(turning, sigma * 0.8, mode="nearest")
-    if slowing is not None:
-        velocity = velocity * slowing[:, None]
-        turning = turning * slowing
+    velocity = (velocity.T * slowing).T
+    turning = turning * slowing
     facing = np.cumsum(turning) / fps
     facing -= facing[first]
     sin, cos = np.sin(facing), np.cos(facing)
@@ -73,7 +69,6 @@ def walk_path(
         facing,
         velocity,
         gaussian_filter1d(gait, sigma, axis=0, mode="nearest"),
-        np.zeros(total) if severity is None else severity,
     )
 
 
@@ -94,7 +89,7 @@ def gait_keys(segments: Sequence[Segment], frames: int, fps: float) -> list[tupl
     labels = [segments[i].gait for i in which]
     half = round(1.6 * BLEND * fps)
     keys = [(0, labels[0])]
-    for i in np.flatnonzero([a != b for a, b in zip(labels[1:], labels[:-1], strict=True)]) + 1:
+    for i in (i for i in range(1, frames) if labels[i] != labels[i - 1]):
         start = max(i - half, keys[-1][0] + 1)
         end = min(max(i + half, start + 1), frames - 1)
         if start < end:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+from scipy.ndimage import gaussian_filter1d
 
 from hobble.core import quat
 from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
-from hobble.synthetic.feet import Foot
+from hobble.synthetic.feet import Foot, smooth_above
 from hobble.synthetic.gait import LEFT, RIGHT, SIGN, Style
 from hobble.synthetic.ground import Ground
 from hobble.synthetic.path import Path
 
 X, Y, Z = np.eye(3)
-STRETCH = 0.995  # of the leg's length, at most: the knee keeps 11 degrees of bend
+STRETCH = 0.9975  # of the leg's length, at most: the knee keeps 8 degrees of bend
 
 
 def _turn(axis: Array, degrees: Array) -> Array:
@@ -96,7 +96,7 @@ def _root(
     hips: Array,
     noise: Array,
 ) -> Array:
-    """Hip positions: along the path, swaying and bobbing, never so high that a leg would be at full stretch."""
+    """Hip positions: along the path, swaying and bobbing, so low that no leg is at full stretch."""
     sway = style.sway * (_wave(phase, _centre(style, LEFT)) - _wave(phase, _centre(style, RIGHT))) / 2
     sway = sway + 0.3 * noise[:, 3]
     x = path.position[:, 0] + sway * np.cos(path.facing)
@@ -108,7 +108,7 @@ def _root(
     excess = np.zeros(len(path))
     for side, name in ((LEFT, "Left"), (RIGHT, "Right")):
         excess = np.maximum(excess, _too_high(skeleton, root, hips, feet[side], name))
-    return root - np.stack([0 * x, _smooth_above(excess, round(0.07 * path.fps)), 0 * x], axis=1)
+    return root - np.stack([0 * x, smooth_above(excess, round(0.07 * path.fps)), 0 * x], axis=1)
 
 
 def _too_high(skeleton: Skeleton, root: Array, hips: Array, foot: Foot, side: str) -> Array:
@@ -119,13 +119,6 @@ def _too_high(skeleton: Skeleton, root: Array, hips: Array, foot: Foot, side: st
     level = np.minimum(away[:, 0] ** 2 + away[:, 2] ** 2, (0.9 * (upper + lower)) ** 2)
     highest = np.sqrt((STRETCH * (upper + lower)) ** 2 - level)
     return np.maximum(away[:, 1] - highest, 0.0)
-
-
-def _smooth_above(values: Array, frames: int) -> Array:
-    """A smooth curve that is nowhere below `values`: their running maximum, averaged over as wide a window twice."""
-    wide = maximum_filter1d(values, 4 * frames + 1)
-    kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
-    return np.convolve(np.pad(wide, 2 * frames, mode="edge"), kernel / kernel.sum(), mode="valid")
 
 
 def leg_lengths(skeleton: Skeleton, side: str) -> tuple[float, float]:

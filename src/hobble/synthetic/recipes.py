@@ -1,4 +1,4 @@
-"""What each clip does: a recipe is a sequence of segments, each a gait at a velocity and a turn for a time."""
+"""What each clip does: a recipe is a sequence of segments, each a gait, a velocity and a turn for a time."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from hobble.core.errors import HobbleError
 
 STAND, WALK, JOG, CROUCH = "stand", "walk", "jog", "crouch"
+INJURED = "injured"
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ RECIPES: dict[str, tuple[Segment, ...]] = {
         *(_walk(120, 0, 2.5), _crouch(80, 0, 3)),
     ),
     "strafe": (
-        *(_walk(110, 0, 1.8), _walk(70, 0, 2.6, 90), _walk(70, 0, 2.6, -90), _walk(110, 0, 1.8)),
+        *(_walk(110, 0, 1.8), _walk(62, 0, 2.6, 90), _walk(62, 0, 2.6, -90), _walk(110, 0, 1.8)),
         *(_walk(90, 0, 2.4, 45), _walk(90, 0, 2.4, -45), _stand(1.6)),
     ),
     "backward": (
@@ -72,45 +73,52 @@ RECIPES: dict[str, tuple[Segment, ...]] = {
         *(_stand(1.6), _walk(65, 0, 2.2, 140), _walk(65, 0, 2.2, -140)),
     ),
     "stop-and-go": (
-        *(_stand(2.6), _walk(130, 0, 2.6), _stand(2.6), _walk(20, 90, 1.8), _walk(100, 0, 2.2)),
-        *(_stand(2.6), _walk(20, -90, 1.8), _jog(260, 0, 2.4), _stand(2.6)),
+        *(_stand(2.4), _walk(130, 0, 2.6), _stand(2.4), _walk(20, 90, 1.8), _walk(100, 0, 2.2)),
+        *(_stand(2.4), _walk(20, -90, 1.8), _jog(260, 0, 2.4), _stand(2.4)),
     ),
     "walk-jog-walk": (
         *(_walk(130, 0, 2.5), _jog(270, 0, 3), _walk(140, 15, 2.5), _jog(330, -15, 3)),
         *(_walk(90, 0, 2.5), _jog(240, 0, 2.5)),
     ),
     "slopes": (_walk(125, 0, 4), _walk(110, 60, 3), _walk(125, 0, 3), _walk(110, -60, 3), _jog(240, 0, 2.5)),
-    "steps": (_walk(95, 0, 4), _walk(80, 12, 3), _walk(110, -12, 3), _stand(1.8)),
+    "steps": (_walk(85, 0, 4), _walk(70, 12, 3), _walk(100, -12, 3), _stand(1.8)),
     "uneven": (_walk(115, 0, 3), _walk(95, 70, 3), _walk(125, -70, 3), _walk(70, 0, 2.5)),
-    "injured": (_walk(125, 0, 3), _walk(125, 30, 2.5), _walk(115, -30, 2.5)),
+    INJURED: (_walk(125, 0, 3), _walk(130, 40, 2), _walk(115, -40, 2), _jog(230, 0, 2)),
 }
 GROUND = {"slopes": "slopes", "steps": "steps", "uneven": "uneven"}  # the others are planned on flat ground
 
 
 def plan(recipe: str, frames: float, fps: float, seed: int, clip: str) -> list[Segment]:
-    """The segments of a clip of `frames` frames: the recipe over and over, the turns of every other round
-    mirrored, each segment a little different by the clip's own generator.
+    """The segments of a clip of `frames` frames, each a little different by the clip's own generator.
 
-    Raises HobbleError for a recipe that there is not.
+    The recipe is walked as often as fits best, at three quarters of its time or more, the turns of
+    every other round mirrored; an injured clip starts anywhere in it. Raises HobbleError for an unknown recipe.
     """
     if recipe not in RECIPES:
         raise HobbleError(f"clip {clip}: there is no recipe {recipe!r}. There are: {', '.join(RECIPES)}.")
     rng = generator(seed, clip, "plan")
-    out: list[Segment] = []
+    segments = RECIPES[recipe]
     side = 1.0 if rng.random() < 0.5 else -1.0
-    while sum(s.seconds for s in out) < frames / fps:
-        out += [_varied(segment, side, rng) for segment in RECIPES[recipe]]
+    start = int(rng.integers(len(segments))) if recipe == INJURED else 0
+    segments = segments[start:] + segments[:start]
+    seconds = frames / fps
+    once = sum(segment.seconds for segment in segments)
+    rounds = max(1, round(seconds / once))
+    pace = max(0.75, seconds / (rounds * once))
+    out: list[Segment] = []
+    while sum(s.seconds for s in out) < seconds:
+        out += [_varied(segment, side, pace, rng) for segment in segments]
         side = -side
     return out
 
 
-def _varied(segment: Segment, side: float, rng: np.random.Generator) -> Segment:
+def _varied(segment: Segment, side: float, pace: float, rng: np.random.Generator) -> Segment:
     speed, turn, seconds = rng.uniform([0.93, 0.9, 0.95], [1.07, 1.1, 1.05])
     return replace(
         segment,
         speed=segment.speed * speed,
         turn=segment.turn * turn * side,
-        seconds=segment.seconds * seconds,
+        seconds=segment.seconds * seconds * pace,
         heading=segment.heading * side,
     )
 
