@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +27,12 @@ STAGES = (
     "evaluation",
 )
 CLIPS = ("walk_straight", "walk_turns", "jog", "crouch", "stand", "strafe", "hurt_left_knee", "hurt_back")
+LINKS = ("LeftUpLeg-LeftLeg", "RightLeg-RightFoot", "Hips-LowerBack")
 HELD_OUT = ("walk_turns", "hurt_back")
 
 
 def walker(skeleton: Skeleton, frames: int, speed: float, limp: float = 0.0) -> dict[str, np.ndarray]:
-    """Positions (F, J, 3), contacts (F, 4) and phase (F,) of a figure that swings its legs and arms along an arc."""
+    """Positions (F, J, 3), contacts (F, 4) and phase (F,) of a figure swinging its legs and arms on an arc."""
     t = np.arange(frames)
     phase = (t * 0.017) % 1.0
     angle = 2 * np.pi * phase
@@ -92,7 +94,7 @@ def weights(path: Path, skeleton: Skeleton, units: int = 16, links: bool = True)
     rng = np.random.default_rng(0)
     sizes = (342 + (len(skeleton.links) if links else 0), units, units, 311)
     arrays: dict[str, Any] = {}
-    for i, (a, b) in enumerate(zip(sizes, sizes[1:], strict=False)):
+    for i, (a, b) in enumerate(pairwise(sizes)):
         arrays[f"W{i}"] = rng.normal(size=(4, b, a)).astype(np.float32)
         arrays[f"b{i}"] = np.zeros((4, b), np.float32)
     meta = {
@@ -212,7 +214,7 @@ def clip_reports(folder: Path, clips: tuple[str, ...]) -> dict[str, list[str]]:
                 "phase_source": "file",
                 "gait_source": "file",
                 "phase_zero": "right",
-                "seconds": {g: 0.0 for g in GAITS} | {"stand": 1.0, gait: frames / 60 - 1},
+                "seconds": dict.fromkeys(GAITS, 0.0) | {"stand": 1.0, gait: frames / 60 - 1},
                 "cycles": frames // 60,
                 "cycles_dropped": 1,
                 "warnings": ["2 steps are shorter than 5 frames and were dropped."] * (clip == "strafe"),
@@ -260,6 +262,139 @@ def costs() -> dict[str, Any]:
     }
 
 
+def responsivity(rng: np.random.Generator, laps: int = 19) -> dict[str, Any]:
+    """evaluation/responsivity.json."""
+    cost = {"prepare": 0.02, "input": 0.05, "insert": 0.01, "predict": 0.31, "output": 0.06, "update": 0.04}
+
+    def milliseconds() -> dict[str, Any]:
+        steps = {step: ms * float(rng.uniform(0.9, 1.1)) for step, ms in cost.items()}
+        total = sum(steps.values())
+        spread = {"sd": 0.05, "median": total, "p99": 1.4 * total, "whole_call": 1.1 * total}
+        return {**steps, "total": total, "spread": spread}
+
+    entries = [
+        {
+            "lap": n,
+            "finished": n != 4,
+            "frames": 6800,
+            "seconds": 113.3,
+            "waypoints_reached": 6 if n != 4 else 5,
+            "path_overshoot_cm": float(rng.uniform(80, 160)),
+            "path_distance_cm": float(rng.uniform(10, 20)),
+            "foot_slide_cm": float(rng.uniform(1, 2)),
+            "steps": 210,
+            "largest_turn_degrees": float(rng.uniform(8, 20)),
+            "milliseconds": milliseconds(),
+        }
+        for n in range(1, laps + 1)
+    ]
+    return {
+        "configuration": "example",
+        "mode": "cubic",
+        "track": {"waypoints": 6, "metres": 260.0},
+        "laps": entries,
+        "laps_finished": laps - 1,
+        "waypoints_reached": 6 * laps - 1,
+        "waypoints": 6 * laps,
+        "path_overshoot_cm": 160.0,
+        "foot_slide_cm": 1.4,
+        "largest_turn_degrees": 19.0,
+        "milliseconds": milliseconds(),
+    }
+
+
+def injury_sweep(rng: np.random.Generator, links: tuple[str, ...] = LINKS) -> dict[str, Any]:
+    """evaluation/injury.json: every measure drifts with severity."""
+    rows, responses = [], []
+    for gait, speed in (("walk", 140.0), ("jog", 400.0)):
+        for link in links:
+            strength = float(rng.uniform(0.2, 1.0))
+            sweep = []
+            for severity in range(11):
+                s = strength / (1 + np.exp(5 - severity))
+                side = 1 if link.startswith("L") else -1
+                row = {
+                    "severity": float(severity),
+                    "speed": speed * (1 - 0.5 * s),
+                    "stance_left": 0.62 - 0.15 * s * side,
+                    "stance_right": 0.62 + 0.05 * s * side,
+                    "step_left": 60 - 20 * s,
+                    "step_right": 60 - 12 * s,
+                    "knee_left": 60 - 30 * s * (side > 0),
+                    "knee_right": 60 - 30 * s * (side < 0),
+                    "arm_left": 40.0,
+                    "arm_right": 40 - 5 * s,
+                    "lean_forward": 3 + 4 * s,
+                    "lean_left": -4 * s * side,
+                    "hip_height": 91 - 2 * s,
+                    "from_healthy": 0.8 + 7 * s,
+                    "from_worst": 7.8 * strength - 7 * s,
+                    "largest_acceleration": 2 + s,
+                    "settle_seconds": 0.8,
+                }
+                sweep.append(row)
+            rows += [{"gait": gait, "link": link, **row} for row in sweep]
+            rho = {"from_healthy": 1.0, "speed": -1.0}
+            responses.append(
+                {
+                    "gait": gait,
+                    "link": link,
+                    "spearman": rho,
+                    "from_healthy_cm": sweep[-1]["from_healthy"] - sweep[0]["from_healthy"],
+                    "speed_share": sweep[-1]["speed"] / sweep[0]["speed"],
+                    "settle_seconds": 0.8,
+                    "acceleration_share": 1.3,
+                }
+            )
+    return {
+        "configuration": "example",
+        "applies": True,
+        "links": list(links),
+        "rows": rows,
+        "responses": responses,
+        "summary": {},
+    }
+
+
+def terrain(path: Path, skeleton: Skeleton, rng: np.random.Generator, flat: bool, frames: int = 300) -> str:
+    """terrain/clips/<clip>.npz: ten grounds that meet where a foot stands, or one that is flat."""
+    fits = 1 if flat else 10
+    t = np.arange(frames)[:, None] / 60
+    wave = 15 * np.sin(0.8 * t) + 4 * np.arange(fits) * np.sin(2 * np.pi * t) ** 2 * (not flat)
+    heights = np.repeat((wave * (not flat)).reshape(-1, 1), 36, axis=1).astype(np.float32)
+    cycles = frames // 60
+    pictures: dict[str, Any] = {}
+    if not flat:
+        made = walker(skeleton, 180, 2.2)
+        x, z = np.linspace(-150, 150, 24), np.linspace(-100, 500, 24)
+        ground = 12 * np.sin(x[:, None] / 60) + 10 * np.cos(z[None] / 80)
+        feet = [skeleton.role(r) for r in ("left_heel", "left_toe", "right_heel", "right_toe")]
+        values = {
+            "cycle": 1,
+            "x": x,
+            "z": z,
+            "ground": ground,
+            "soles": made["positions"][:, feet],
+            "contacts": made["contacts"],
+            "pose": made["positions"][[30, 90, 150]],
+            "parents": np.array(skeleton.parents),
+        }
+        pictures = {f"picture0_{key}": np.asarray(value) for key, value in values.items()}
+    save_npz(
+        path,
+        frame=np.arange(60, 60 + frames),
+        cycle=np.arange(frames) // 60,
+        fits=np.full(frames, fits),
+        heights=heights,
+        patch=np.zeros((cycles, 10), int),
+        error=np.sort(rng.uniform(0, 5, (cycles, 10)), axis=1),
+        foot_error=rng.uniform(0, 1, (cycles, 10, 2)),
+        pictures=np.array(len(pictures) and 1),
+        **pictures,
+    )
+    return str(path)
+
+
 def write_all(
     folder: Path, skeleton: Skeleton, clips: tuple[str, ...] = CLIPS, injury: bool = True
 ) -> dict[str, Any]:
@@ -278,8 +413,11 @@ def write_all(
     }
     write_text(folder / "configuration.yaml", yaml.safe_dump(resolved))
     write_json(folder / "accuracy.json", accuracy(clips, rng))
-    write_json(folder / "responsivity.json", {"configuration": "example"})
-    write_json(folder / "injury.json", {"configuration": "example", "applies": injury})
+    write_json(folder / "responsivity.json", responsivity(rng))
+    write_json(folder / "injury.json", injury_sweep(rng) if injury else {"applies": False, "reason": "none"})
+    grounds = [
+        terrain(folder / "terrain" / f"{clip}.npz", skeleton, rng, flat="hurt" in clip) for clip in clips
+    ]
     write_json(folder / "pipeline.json", costs())
     history(folder / "history.csv")
     weights(folder / "weights.npz", skeleton, links=injury)
@@ -294,4 +432,5 @@ def write_all(
         "history": str(folder / "history.csv"),
         "weights": str(folder / "weights.npz"),
         **paths,
+        "terrain": grounds,
     }

@@ -1,4 +1,4 @@
-"""Creates results/<configuration>/pipeline.json from the benchmark files and the sizes of every stage's artefacts."""
+"""Creates results/<configuration>/pipeline.json from each stage's benchmark files and artefact sizes."""
 
 from hobble.core.files import write_json
 from hobble.report.pipeline import summarise

@@ -1,4 +1,4 @@
-"""Creates results/<configuration>/report.html from the evaluation, the reports of every clip and the motion generated."""
+"""Creates results/<configuration>/report.html from evaluation, clip reports and generated motion."""
 
 from hobble.core.files import write_text
 from hobble.report.gather import gather
@@ -23,6 +23,7 @@ with job(snakemake):
         motion=given.motion,
         labels=given.labels,
         injuries=given.injuries,
+        terrain=given.terrain,
     )
     network = material.network
     play = scenes(given.scenarios, network["skeleton"], network["links"])

@@ -60,9 +60,9 @@ def clip_bars(material: Material) -> Chart | None:
     return Chart(
         "accuracy-clips",
         "Error of each clip",
-        "Bars: mean over frames and joints of the distance between predicted and true joint position, as a share of "
-        "the joint's distance from the root (eq. 3.1 of Segerstedt). Whiskers reach one standard deviation further. "
-        "Held-out clips, which the network never saw, stand first.",
+        "Bars: mean over frames and joints of the distance between predicted and true joint position, as a "
+        "share of the joint's distance from the root (eq. 3.1 of Segerstedt). Whiskers reach one standard "
+        "deviation further. Held-out clips, which the network never saw, stand first.",
         traces,
         {
             "xaxis": axis("relative error, %", rangemode="tozero"),
@@ -108,8 +108,9 @@ def clip_boxes(material: Material) -> Chart | None:
     return Chart(
         "accuracy-boxes",
         "Spread within each clip",
-        "Boxes hold the middle half of the errors of a clip, the line in them is the median; whiskers reach from the "
-        "5th to the 95th percentile. A long whisker with a low box means a few hard moments in an easy clip.",
+        "Boxes hold the middle half of the errors of a clip, the line in them is the median; whiskers reach "
+        "from the 5th to the 95th percentile. A long whisker with a low box means a few hard moments in an "
+        "easy clip.",
         traces,
         {
             "xaxis": axis("relative error, %", rangemode="tozero"),
@@ -139,7 +140,7 @@ def accuracy_table(material: Material) -> Table:
     columns = [
         Column("clip"),
         Column("split", lambda value: NAMES.get(value, value)),
-        Column.number("frames", 6),
+        Column.count("frames"),
         Column.number("mean"),
         Column.number("sd"),
         Column.number("position error, cm"),

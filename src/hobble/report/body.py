@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-# Capsules between the joints that play two roles, with radii in cm at both ends; of a figure of ordinary size.
+# Capsules between the joints that play two roles, with radii in cm at both ends.
 LIMBS = (
     ("left_hip", "right_hip", 9.0, 9.0),
     ("hips", "chest", 10.5, 12.0),
@@ -23,7 +23,7 @@ LIMBS = (
     ("right_knee", "right_heel", 5.4, 3.7),
     ("right_heel", "right_toe", 3.7, 2.9),
 )
-# Capsules that go on past a joint, away from another: (from, joint, cm beyond, radius, kept above the ground).
+# Capsules that go on past a joint: (from, joint, cm beyond, radius, kept above the ground).
 ENDS = (
     ("left_heel", "left_toe", 6.0, 2.6, True),
     ("right_heel", "right_toe", 6.0, 2.6, True),
@@ -38,9 +38,9 @@ def capsules(
 ) -> list[dict[str, Any]]:
     """Capsules as the page draws them.
 
-    Each has `a` and `b` (indices of joints), `ra` and `rb` (cm), `links` (indices of the links between a and b). A
-    capsule that goes on past b has `from` and `beyond`; `centre` makes it a ball. Where the roles of a body are
-    not all known, every bone gets a thin capsule instead.
+    Each has `a` and `b` (indices of joints), `ra` and `rb` (cm), `links` (indices of the links between a and
+    b). A capsule that goes on past b has `from` and `beyond`; `centre` makes it a ball. Where the roles of a
+    body are not all known, every bone gets a thin capsule instead.
     """
     at = {role: joints.index(name) for role, name in roles.items() if name in joints}
     pairs = _link_pairs(joints, links)

@@ -44,8 +44,9 @@ Hobble.rgb = (token) => (Hobble.colour(token).match(/[\d.]+/g) || [0, 0, 0]).sli
   });
   const layout = (spec, narrow) => resolve(merge({
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", autosize: true,
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: "@faint", activecolor: "@accent" },
     font: { family: getComputedStyle(document.body).fontFamily, size: 12.5, color: "@ink" },
-    margin: { l: narrow ? 44 : 56, r: narrow ? 12 : 24, t: 30, b: 48 },
+    margin: { l: narrow ? 40 : 56, r: narrow ? 12 : 24, t: 30, b: 48 },
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 12, color: "@soft" } },
     hoverlabel: { bgcolor: "@raised", bordercolor: "@line", font: { color: "@ink" } },
     colorway: ["@accent", "@muted"], dragmode: narrow ? false : "zoom", bargap: 0.3,
@@ -72,9 +73,11 @@ Hobble.rgb = (token) => (Hobble.colour(token).match(/[\d.]+/g) || [0, 0, 0]).sli
 
   document.querySelectorAll("[data-chooses]").forEach((select) => {
     select.addEventListener("change", () => {
-      const element = document.querySelector(`[data-chart="${CSS.escape(select.dataset.chooses)}"]`);
-      drawn.set(element, select.selectedIndex);
-      draw(element);
+      for (const name of select.dataset.chooses.split(" ")) {
+        const element = document.querySelector(`[data-chart="${CSS.escape(name)}"]`);
+        drawn.set(element, select.selectedIndex);
+        draw(element);
+      }
     });
   });
   const near = new IntersectionObserver((entries) => {

@@ -1,4 +1,4 @@
-"""Charts as plain plotly figures. Colours are names of the page's tokens ("@accent"), so that a theme can change them."""
+"""Charts as plain plotly figures; colours are names of the page's tokens ("@accent"), for themes to change."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ Trace = dict[str, Any]
 class Chart:
     """A chart: what the page draws, and how to read it.
 
-    traces: plotly traces. options: alternatives to `traces`, by name, among which a chooser called `choose` picks.
+    traces: plotly traces. options: alternatives to `traces`, by name, among which a chooser called `choose`
+    picks.
     """
 
     name: str
@@ -36,6 +37,17 @@ class Chart:
                 {"label": key, "traces": _escaped(list(value))} for key, value in self.options.items()
             ],
         }
+
+
+@dataclass(frozen=True)
+class Family:
+    """Small charts that share a title, a caption and a chooser; their options have the same names."""
+
+    name: str
+    title: str
+    caption: str
+    charts: Sequence[Chart] = field(repr=False)
+    choose: str = ""
 
 
 def _escaped(value: Any) -> Any:

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from hobble.report.charts import Chart, Trace, axis, mark
-from hobble.report.findings import published
+from hobble.report.findings import Figure, frame_milliseconds, published
 from hobble.report.formats import duration, number, size
 from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
 
-STEP_COLOURS = ("@g1", "@g2", "@g3", "@g4", "@g5", "@g0")
+# The steps of a frame in their order, and their colours.
+STEPS = {
+    "prepare": "@g0",
+    "input": "@g3",
+    "insert": "@g5",
+    "predict": "@accent",
+    "output": "@g2",
+    "update": "@muted",
+}
 
 
 def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
@@ -21,6 +30,10 @@ def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
     return {"frame": value} if isinstance(value, (int, float)) else {}
 
 
+def _place(step: str) -> int:
+    return list(STEPS).index(step) if step in STEPS else len(STEPS)
+
+
 def lap_chart(material: Material) -> Chart | None:
     """Milliseconds a frame of each step, stacked, lap by lap."""
     laps = material.responsivity.get("laps")
@@ -28,17 +41,17 @@ def lap_chart(material: Material) -> Chart | None:
     if not laps:
         return None
     numbers = [lap.get("lap", i + 1) for i, lap in enumerate(laps)]
-    steps = list(lap_steps(laps[0]))
+    steps = sorted(lap_steps(laps[0]), key=_place)
     traces: list[Trace] = [
         {
             "type": "bar",
             "name": step,
             "x": numbers,
             "y": [lap_steps(lap).get(step) for lap in laps],
-            "marker": {"color": STEP_COLOURS[i % len(STEP_COLOURS)]},
+            "marker": {"color": STEPS.get(step, "@g0")},
             "hovertemplate": "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>",
         }
-        for i, step in enumerate(steps)
+        for step in steps
     ]
     shapes, notes = [], []
     theirs = published(material, "responsivity")
@@ -48,9 +61,9 @@ def lap_chart(material: Material) -> Chart | None:
     return Chart(
         "laps",
         "Milliseconds a frame, lap by lap",
-        "Each bar is one lap of the six-waypoint track; its parts are the steps of a frame. The bars should be of one "
-        "height: a slow first lap is warming up, a slow one in between was another program's doing. "
-        "A frame at 60 Hz has 16.7 ms.",
+        "Each bar is one lap of the six-waypoint track; its parts are the steps of a frame. The bars should "
+        "be of one height: a slow first lap is warming up, a slow one in between was another program's "
+        "doing. A frame at 60 Hz has 16.7 ms.",
         traces,
         {
             "barmode": "stack",
@@ -68,12 +81,54 @@ def lap_table(material: Material) -> Table | None:
     if not isinstance(laps, list) or not laps:
         return None
     plain = [k for k, v in laps[0].items() if k != "milliseconds" and isinstance(v, (int, float, str))]
-    steps = list(lap_steps(laps[0]))
+    steps = sorted(lap_steps(laps[0]), key=_place)
     columns = [Column.number(k.replace("_", " "), 4) for k in plain] + [
         Column.number(f"{s}, ms") for s in steps
     ]
     rows = [[lap.get(k) for k in plain] + [lap_steps(lap).get(s) for s in steps] for lap in laps]
     return Table(f"{material.name}-responsivity", columns, rows)
+
+
+def track_figures(material: Material) -> list[Figure]:
+    """How the track was followed, in a few numbers."""
+    found = material.responsivity
+    if not isinstance(found.get("laps"), list):
+        return []
+    spread = (found.get("milliseconds") or {}).get("spread") or {}
+    reached = f"{found.get('waypoints_reached')} of {found.get('waypoints')}"
+    laps = f"{found.get('laps_finished')} of {len(found['laps'])} laps finished"
+    return [
+        Figure("Waypoints reached", reached, "", laps),
+        Figure("Furthest off the path", number(found.get("path_overshoot_cm")), "cm", "at the turns"),
+        Figure("Foot slide", number(found.get("foot_slide_cm")), "cm", "of the toe in a stance, on average"),
+        Figure(
+            "Largest turn of a joint",
+            number(found.get("largest_turn_degrees")),
+            "°",
+            "from a frame to the next",
+        ),
+        Figure("Slow frames", number(spread.get("p99")), "ms", "one frame in a hundred is slower"),
+    ]
+
+
+def speed_published(material: Material) -> Table | None:
+    """Our milliseconds with the published ones under them."""
+    ours = frame_milliseconds(material)
+    if ours is None:
+        return None
+    sources = material.published["sources"]
+    mode = material.responsivity.get("mode")
+    rows: list[list[Any]] = [
+        [f"{material.name}, {mode} phase" if mode else material.name, ours, "this report"]
+    ]
+    for entry in material.published["responsivity"]:
+        rows.append([entry["label"], entry["milliseconds"], sources[entry["source"]]])
+    for entry in material.published["modes"]:
+        rows.append(
+            [f"prediction alone, {entry['mode']} phase", entry["milliseconds"], sources[entry["source"]]]
+        )
+    columns = [Column("network"), Column.number("ms a frame"), Column("source")]
+    return Table(f"{material.name}-published-speed", columns, rows, "Beside the published figures")
 
 
 def stage_charts(material: Material) -> list[Chart]:
@@ -83,24 +138,26 @@ def stage_charts(material: Material) -> list[Chart]:
     charts = []
     for key, title, label, show, caption in (
         ("seconds", "Time of each stage", "seconds of computing", duration,
-         "Seconds added up over the jobs of a stage; with several cores the wait is shorter. Logarithmic."),
+         "Added up over the jobs of a stage; with several cores the wait is shorter. Each line is ten "
+         "times the one before."),
         ("bytes", "Size of each stage", "bytes", size,
-         "What each stage leaves on disk. Logarithmic."),
+         "What each stage leaves on disk."),
     ):  # fmt: skip
         values = [stage.get(key) or 0 for stage in stages]
         trace = {
-            "type": "bar",
-            "orientation": "h",
+            "type": "scatter",
+            "mode": "markers+text",
             "y": names,
             "x": [value or None for value in values],
-            "text": [show(value) if value else "nothing" for value in values],
-            "textposition": "auto",
-            "marker": {"color": "@accent"},
+            "text": [f"  {show(value)}" for value in values],
+            "textposition": "middle right",
+            "textfont": {"size": 11.5, "color": "@soft"},
+            "marker": {"color": "@accent", "size": 10},
             "hovertemplate": "%{y}: %{text}<extra></extra>",
             "cliponaxis": False,
         }
         layout = {
-            "xaxis": axis(label, type="log", tickformat="~s"),
+            "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),
             "yaxis": {"automargin": True, "categoryorder": "array", "categoryarray": names},
             "showlegend": False,
         }
@@ -108,16 +165,22 @@ def stage_charts(material: Material) -> list[Chart]:
     return charts
 
 
+def log_range(values: list[float]) -> list[float]:
+    """Whole decades around the values that are above zero, with room to the right for the last one's text."""
+    some = [math.log10(value) for value in values if value > 0] or [0.0, 1.0]
+    return [math.floor(min(some)), max(some) + 0.25 * (max(some) - math.floor(min(some)) + 1)]
+
+
 def stage_table(material: Material) -> Table:
     """A row per stage, the published figures beside ours."""
     theirs = {row["stage"]: row for row in material.published["stages"]}
     columns = [
         Column("stage"),
-        Column.number("jobs", 4),
+        Column.count("jobs"),
         Column("time", lambda v: duration(float(v)), "n"),
         Column("longest job", lambda v: duration(float(v)), "n"),
         Column("peak memory", lambda v: f"{number(v)} MB", "n"),
-        Column.number("files", 5),
+        Column.count("files"),
         Column("size", lambda v: size(float(v)), "n"),
         Column("published time", lambda v: duration(float(v)), "n"),
         Column("published size", lambda v: size(float(v)), "n"),

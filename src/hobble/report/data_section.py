@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hobble.report.charts import Chart, Trace, axis
-from hobble.report.formats import number, size
+from hobble.report.formats import size
 from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
 
@@ -17,7 +17,7 @@ def gait_chart(material: Material) -> Chart | None:
     """Seconds of each gait, training and held-out."""
     traces: list[Trace] = []
     for split, colour in (("train", "@muted"), ("held_out", "@accent")):
-        totals = {gait: 0.0 for gait in GAIT_COLOURS}
+        totals = dict.fromkeys(GAIT_COLOURS, 0.0)
         for report in material.labels:
             if material.split(report["clip"]) == split:
                 for gait, seconds in (report.get("seconds") or {}).items():
@@ -72,8 +72,8 @@ def injury_coverage(material: Material) -> Chart | None:
     }
     layout = {"xaxis": axis("highest severity", type="category"), "yaxis": {"automargin": True}}
     caption = (
-        "Seconds of data for each link and severity, mirrors counted. Where there is no cell the network has seen "
-        "nothing and can only interpolate."
+        "Seconds of data for each link and severity, mirrors counted. Where there is no cell the network has "
+        "seen nothing and can only interpolate."
     )
     return Chart(
         "injury-coverage", "What is hurt, and how much", caption, [trace], layout, 120 + 24 * len(links)
@@ -87,10 +87,10 @@ def clip_table(material: Material) -> Table:
         Column("clip"),
         Column("split", lambda value: SPLIT_NAMES.get(value, value)),
         Column("file"),
-        Column.number("frames", 6),
+        Column.count("frames"),
         Column.number("source fps", 4),
         Column.number("seconds", 4),
-        Column.number("cycles", 4),
+        Column.count("cycles"),
         Column("labels from"),
         Column("size", lambda v: size(float(v)), "n"),
         Column("SHA-256", lambda v: str(v)[:12], "hash"),
@@ -112,7 +112,7 @@ def clip_table(material: Material) -> Table:
                 report.get("sha256"),
             ]
         )
-    return Table(f"{material.name}-clips", columns, rows, f"All {number(len(rows), 4)} clips, with checksums")
+    return Table(f"{material.name}-clips", columns, rows, f"All {len(rows)} clips, with checksums")
 
 
 def remarks_table(material: Material) -> Table | None:

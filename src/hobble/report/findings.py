@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -47,13 +48,14 @@ def lead(material: Material) -> str:
     passes = training.get("passes")
     network = material.network
     text = (
-        f"A phase-functioned network of {len(network['sizes']) - 2} hidden layers and {network['control_points']} "
-        f"control points, with {network['sizes'][0]} inputs and {network['sizes'][-1]} outputs, trained"
+        f"A phase-functioned network of {len(network['sizes']) - 2} hidden layers and "
+        f"{network['control_points']} control points, with {network['sizes'][0]} inputs and "
+        f"{network['sizes'][-1]} outputs, trained"
     )
     text += f" for {passes} passes" if passes else ""
     text += f" on {len(clips) - kept} clips of {material.dataset}"
     text += f" and tried on {kept} that it never saw" if kept else ""
-    return f"{text}: {frames:,} frames at 60 Hz in all."
+    return f"{text}: {frames:,} frames at 60\u00a0Hz in all."
 
 
 def key_figures(material: Material) -> list[Figure]:
@@ -114,6 +116,8 @@ def hints(material: Material) -> list[Hint]:
         *_worst_clips(material),
         *_coverage(material),
         *_speed(material),
+        *_track(material),
+        *_injury(material),
         *_repairs(material),
         *_costs(material),
     ]
@@ -127,7 +131,8 @@ def _generalisation(material: Material) -> Iterator[Hint]:
         yield Hint(
             "warn",
             "Nothing was held out.",
-            "The accuracy below says how well the clips were memorised. Name a few under held_out in the data set.",
+            "The accuracy below says how well the clips were memorised. Name a few under held_out in the "
+            "data set.",
         )
         return
     ratio = held_out["mean"] / train["mean"] if train.get("mean") else float("nan")
@@ -187,7 +192,8 @@ def _worst_clips(material: Material) -> Iterator[Hint]:
             "note",
             f"{worst['clip']} is the hardest clip,",
             f"with {worst['mean'] / median:.1f} times the error of the middle one. "
-            "See in its label strip whether the labels are right, and among the repairs whether its frames are whole.",
+            "See in its label strip whether the labels are right, and among the repairs whether its frames "
+            "are whole.",
         )
 
 
@@ -219,14 +225,58 @@ def _speed(material: Material) -> Iterator[Hint]:
         )
 
 
+def _track(material: Material) -> Iterator[Hint]:
+    reached, asked = (material.responsivity.get(key) for key in ("waypoints_reached", "waypoints"))
+    if asked and reached is not None and reached < asked:
+        yield Hint(
+            "warn",
+            f"The character reached {reached} of {asked} waypoints.",
+            "Where it does not arrive, it circles or stands: look at Speed and response, lap by lap.",
+        )
+    turn = material.responsivity.get("largest_turn_degrees")
+    if turn is not None and turn > 60:
+        yield Hint(
+            "warn",
+            f"A joint turned by {turn:.0f} degrees in one frame.",
+            "That is a flip, and will be seen on a skinned figure.",
+        )
+
+
+def _injury(material: Material) -> Iterator[Hint]:
+    walks = [r for r in material.injury.get("responses") or () if r["gait"] == "walk"]
+    if not walks:
+        return
+    deaf = [r["link"] for r in walks if (r.get("from_healthy_cm") or 0) < 0.5]
+    if deaf:
+        yield Hint(
+            "note",
+            f"{len(deaf)} of {len(walks)} links hardly change the walk at severity 10",
+            f"(under half a centimetre a joint): {', '.join(deaf[:4])}{' and more' if len(deaf) > 4 else ''}.",
+        )
+    rough = [r["link"] for r in walks if _rho(r) < 0.7 and r["link"] not in deaf]
+    if rough:
+        yield Hint(
+            "note",
+            f"The pose does not follow severity steadily for {', '.join(rough[:4])}.",
+            "See whether its curve jumps: then in-between severities are missing from the data.",
+        )
+    if not deaf and not rough:
+        yield Hint("good", "Every link's severity shifts the walk, and steadily.", "")
+
+
+def _rho(response: Mapping[str, Any]) -> float:
+    value = (response.get("spearman") or {}).get("from_healthy")
+    return 0.0 if value is None else float(value)
+
+
 def _repairs(material: Material) -> Iterator[Hint]:
     repaired = [report["clip"] for report in material.motion if report.get("repairs")]
     warned = {r["clip"] for r in (*material.labels, *material.injuries) if r.get("warnings")}
     if repaired or warned:
         yield Hint(
             "note",
-            f"{len(repaired)} clips were repaired and {len(warned)} have warnings.",
-            "They are listed under Data; look at them before you trust those clips.",
+            f"Clips repaired: {len(repaired)}; clips with warnings: {len(warned)}.",
+            "They are listed under Data. Look at them before you trust those clips.",
         )
 
 

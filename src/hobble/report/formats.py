@@ -57,7 +57,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def plain(value: Any) -> Any:
-    """The same value made of dicts, lists, strings and finite numbers only; NaN and infinities become null."""
+    """The same made of dicts, lists, strings and finite numbers only; NaN and infinities become None."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -23,8 +23,9 @@ COUNTED = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 class Material:
     """What one configuration left behind.
 
-    history: column -> values, one per section of training; None where a cell is empty.
-    motion, labels, injuries: the reports of the clips, in one order. splits: clip -> "train" or "held_out".
+    history: column -> values, one per section of training; None where a cell is empty. motion, labels,
+    injuries: the reports of the clips, in one order. terrain: paths of their fits. splits: clip -> "train" or
+    "held_out".
     """
 
     name: str
@@ -41,6 +42,7 @@ class Material:
     motion: list[dict[str, Any]] = field(repr=False)
     labels: list[dict[str, Any]] = field(repr=False)
     injuries: list[dict[str, Any]] = field(repr=False)
+    terrain: list[str] = field(repr=False)
     published: Mapping[str, Any] = field(repr=False)
 
     def split(self, clip: str) -> str:
@@ -69,6 +71,7 @@ def gather(
     motion: Iterable[str],
     labels: Iterable[str],
     injuries: Iterable[str],
+    terrain: Iterable[str] = (),
 ) -> Material:
     """Read the files a report is made from. Raises InputError naming the one that cannot be read."""
     return Material(
@@ -86,12 +89,13 @@ def gather(
         motion=[read_json(path) for path in motion],
         labels=[read_json(path) for path in labels],
         injuries=[read_json(path) for path in injuries],
+        terrain=list(terrain),
         published=yaml.safe_load(PUBLISHED.read_text(encoding="utf-8")),
     )
 
 
 def read_history(path: str | Path) -> dict[str, list[float | None]]:
-    """Columns of a CSV of numbers; an empty cell is None. Raises InputError with the line of anything else."""
+    """Columns of a CSV of numbers; an empty cell is None. Raises InputError for anything else."""
     columns: dict[str, list[float | None]] = {}
     with open(path, encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
@@ -111,7 +115,7 @@ def _cell(path: str | Path, key: str, text: str | None) -> float | None:
 
 
 def describe_network(path: str | Path) -> dict[str, Any]:
-    """Layer sizes, control points and parameters of a weights file, from its shapes; its skeleton and links."""
+    """Layer sizes, control points and parameters of a weights file; its skeleton and links."""
     try:
         with np.load(path, allow_pickle=False) as file:
             shapes = {key: file[key].shape for key in file.files if key[:1] in "Wb" and key[1:].isdigit()}

@@ -11,14 +11,23 @@ import yaml
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
-from hobble.report import accuracy_section, cost_section, data_section, findings, training_section
-from hobble.report.charts import Chart
+from hobble.report import (
+    accuracy_section,
+    cost_section,
+    data_section,
+    findings,
+    injury_section,
+    terrain_section,
+    training_section,
+)
+from hobble.report.charts import Chart, Family
 from hobble.report.formats import duration, embedded, number, plain, size
 from hobble.report.gather import Material
+from hobble.report.ground_pictures import ground_pictures
 from hobble.report.provenance import commit, machine, versions
 
 TEMPLATES = Path(__file__).parent
-SCRIPTS = ("charts.js", "tables.js", "figure.js", "strips.js", "page.js")
+SCRIPTS = ("charts.js", "tables.js", "view.js", "figure.js", "ground.js", "strips.js", "page.js")
 
 
 def render(material: Material, scenes: Mapping[str, Any] | None = None) -> str:
@@ -37,7 +46,8 @@ def render(material: Material, scenes: Mapping[str, Any] | None = None) -> str:
     sections = _sections(material)
     strips = data_section.strips(material)
     scenes = dict(scenes or {})
-    data = {"charts": _specs(sections), "scenes": scenes, "strips": strips}
+    grounds = ground_pictures(material.terrain, material.network["skeleton"])
+    data = {"charts": _specs(sections), "scenes": scenes, "strips": strips, "grounds": grounds}
     return environment.get_template("page.html.j2").render(
         material=material,
         title=material.title or material.name,
@@ -46,6 +56,7 @@ def render(material: Material, scenes: Mapping[str, Any] | None = None) -> str:
         lead=findings.lead(material),
         embedded=embedded(data),
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
+        grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],
         style=_text("page.css"),
         scripts=[_text(name) for name in SCRIPTS],
@@ -71,9 +82,14 @@ def _sections(material: Material) -> dict[str, dict[str, Any]]:
             "table": accuracy.accuracy_table(material),
             "published": accuracy.beside_published(material),
         },
-        "speed": {"laps": costs.lap_chart(material), "table": costs.lap_table(material)},
-        "injury": {"applies": material.injury.get("applies", False), "charts": [], "table": None},
-        "terrain": {"charts": [], "table": None},
+        "speed": {
+            "figures": costs.track_figures(material),
+            "laps": costs.lap_chart(material),
+            "published": costs.speed_published(material),
+            "table": costs.lap_table(material),
+        },
+        "injury": injury_section.section(material),
+        "terrain": terrain_section.section(material.terrain),
         "stages": {
             **dict(zip(("seconds", "bytes"), costs.stage_charts(material), strict=True)),
             "table": costs.stage_table(material),
@@ -92,7 +108,7 @@ def _specs(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for section in sections.values():
         for item in section.values():
-            charts = item if isinstance(item, list) else [item]
+            charts = item.charts if isinstance(item, Family) else item if isinstance(item, list) else [item]
             found.update({chart.name: chart.spec() for chart in charts if isinstance(chart, Chart)})
     return found
 

@@ -15,11 +15,11 @@ from hobble.report.provenance import machine, versions
 def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]) -> dict[str, Any]:
     """The account of costs that `pipeline.json` holds.
 
-    stages: in the order of the pipeline, stage -> {"benchmarks": tsv files or folders of them, "files": artefacts
-    or folders of them}. What is not there is listed under `missing`, not refused: a stage may have been copied
-    from another machine without its benchmarks.
-    Returns `stages` (one entry each: jobs, seconds and longest in seconds, max_rss_mb, cpu_seconds, files, bytes,
-    and the same for each rule), `total_seconds`, `total_bytes`, `missing`, `machine`, `versions`.
+    stages: in the order of the pipeline, stage -> {"benchmarks": tsv files or folders of them, "files":
+    artefacts or folders of them}. What is not there is listed under `missing`, not refused: a stage may have
+    been copied from another machine without its benchmarks. Returns `stages` (one entry each: jobs, seconds
+    and longest in seconds, max_rss_mb, cpu_seconds, files, bytes, and the same for each rule),
+    `total_seconds`, `total_bytes`, `missing`, `machine`, `versions`.
     """
     missing: list[str] = []
     entries = []
@@ -71,7 +71,7 @@ def _number(text: str | None) -> float | None:
 
 
 def _jobs(paths: Iterable[str], missing: list[str]) -> list[tuple[str, dict[str, float]]]:
-    """(rule, measurement) of every benchmark at or below `paths`: <stage>/<rule>.tsv or <stage>/<rule>/<clip>.tsv."""
+    """(rule, measurement) of every benchmark at or below `paths`: <rule>.tsv or <rule>/<clip>.tsv."""
     found = []
     for root in map(Path, paths):
         if root.is_dir():
@@ -88,7 +88,7 @@ def _jobs(paths: Iterable[str], missing: list[str]) -> list[tuple[str, dict[str,
 
 
 def _sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
-    """Bytes of every file at or below `paths`, hidden ones (Snakemake's marks, half-written files) left out."""
+    """Bytes of every file at or below `paths`, hidden ones (half-written files) left out."""
     sizes = []
     for root in map(Path, paths):
         if root.is_dir():

@@ -63,24 +63,24 @@ def _scenario(data: Mapping[str, Array], name: str, stride: int, links: Sequence
     contacts, phase = data.get(f"{name}/contacts"), data.get(f"{name}/phase")
     if contacts is not None:
         bits = (np.asarray(contacts)[::stride, :4] > CONTACT) @ (1 << np.arange(4))
-        out["contacts"] = _text(bits.astype(np.uint8))
+        out["contacts"] = packed(bits.astype(np.uint8))
     if phase is not None:
-        out["phase"] = _text(np.round(255 * (np.asarray(phase)[::stride] % 1.0)).astype(np.uint8))
+        out["phase"] = packed(np.round(255 * (np.asarray(phase)[::stride] % 1.0)).astype(np.uint8))
     hurt = str(data.get(f"{name}/hurt", ""))
     if hurt in links:
         severity = np.asarray(data[f"{name}/severity"])[::stride]
         table = np.zeros((len(positions), len(links)), np.uint8)
         table[:, list(links).index(hurt)] = np.clip(np.round(25 * severity), 0, 250)
-        out["severity"] = _text(table)
+        out["severity"] = packed(table)
         out["description"] = f"Walks while {hurt} hurts more and more"
     return out
 
 
 def pack_positions(positions: Array) -> dict[str, str]:
-    """World positions (F, J, 3) in cm as `root` (float32) and `pose` (int16 steps of UNIT from the root joint)."""
+    """World positions (F, J, 3) in cm: `root` as float32, `pose` as int16 steps of UNIT from the root joint."""
     root = positions[:, 0].astype(np.float32)
     steps = np.round((positions - root[:, None].astype(float)) / UNIT)
-    return {"root": _text(root), "pose": _text(np.clip(steps, -32767, 32767).astype(np.int16))}
+    return {"root": packed(root), "pose": packed(np.clip(steps, -32767, 32767).astype(np.int16))}
 
 
 def readable(name: str) -> str:
@@ -92,7 +92,7 @@ def readable(name: str) -> str:
     return name.replace("_", " ").capitalize()
 
 
-def _text(array: Array) -> str:
-    """Little-endian bytes as base64."""
+def packed(array: Array) -> str:
+    """The little-endian bytes of an array as base64."""
     array = np.ascontiguousarray(array)
     return base64.b64encode(array.astype(array.dtype.newbyteorder("<")).tobytes()).decode("ascii")

@@ -22,6 +22,11 @@ class Column:
         """A column of numbers shown to so many significant digits; the CSV has them whole."""
         return cls(label, lambda value: number(value, digits), "n")
 
+    @classmethod
+    def count(cls, label: str) -> Column:
+        """A column of whole numbers."""
+        return cls(label, lambda value: f"{value:,.0f}", "n")
+
 
 @dataclass(frozen=True)
 class Table:

@@ -30,9 +30,9 @@ def learning_curve(material: Material) -> Chart:
     return Chart(
         "learning-curve",
         "Error over the passes",
-        "Mean squared error of the standardised output, on a logarithmic scale: 1 would be guessing the mean. "
-        "Training error is taken under dropout, so it can lie above the held-out error; what counts is whether the "
-        "held-out line still falls, is flat, or rises again.",
+        "Mean squared error of the standardised output, on a logarithmic scale: 1 would be guessing the "
+        "mean. Training error is taken under dropout, so it can lie above the held-out error; what counts "
+        "is whether the held-out line still falls, is flat, or rises again.",
         traces,
         {
             "xaxis": axis("pass", rangemode="tozero"),
@@ -56,8 +56,8 @@ def block_curves(material: Material) -> Chart | None:
     return Chart(
         "block-curves",
         "Held-out error by what is predicted",
-        "The same error for each part of the output: the parts that stay high are those the network finds hardest. "
-        "Click a name in the legend to hide its line, twice to see it alone.",
+        "The same error for each part of the output: the parts that stay high are those the network finds "
+        "hardest. Click a name in the legend to hide its line, twice to see it alone.",
         traces,
         {
             "xaxis": axis("pass", rangemode="tozero"),
@@ -70,6 +70,9 @@ def block_curves(material: Material) -> Chart | None:
 def history_table(material: Material) -> Table:
     """Every section of training, as in history.csv."""
     names = list(material.history)
-    columns = [Column.number(name.replace("_", " "), 6 if name == "samples" else 4) for name in names]
+    whole = ("pass", "section", "samples")
+    columns = [
+        Column.count(name) if name in whole else Column.number(name.replace("_", " "), 4) for name in names
+    ]
     rows = list(zip(*material.history.values(), strict=False))
     return Table(f"{material.name}-history", columns, rows, "Every section of training")

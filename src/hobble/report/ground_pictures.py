@@ -1,0 +1,59 @@
+"""Small pictures of terrain fits: the ground of a cycle, the soles on it, the figure at three moments."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.report.body import capsules
+from hobble.report.scenes import packed
+
+STEPS_PER_CM = 10  # everything is kept in 16-bit steps of a millimetre
+MOST = 24
+
+
+def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) -> dict[str, Any]:
+    """What the page draws of the pictures in `terrain/clips/<clip>.npz`; flat clips carry none.
+
+    skeleton: as the network's file carries it, for its roles.
+    """
+    pictures: list[dict[str, Any]] = []
+    joints = skeleton.get("joints") or {}
+    names = list(joints)
+    parents = [names.index(j["parent"]) if j["parent"] is not None else -1 for j in joints.values()]
+    for path in paths:
+        with np.load(path, allow_pickle=False) as data:
+            count = int(data["pictures"]) if "pictures" in data.files else 0
+            for k in range(min(count, MOST - len(pictures))):
+                part = {
+                    key: data[f"picture{k}_{key}"]
+                    for key in ("cycle", "x", "z", "ground", "soles", "contacts", "pose")
+                }
+                if part["pose"].shape[1] == len(names):
+                    pictures.append(
+                        {"name": f"{Path(path).stem}, cycle {int(part['cycle']) + 1}", **_packed(part)}
+                    )
+    shapes = capsules(names, parents, skeleton.get("roles") or {}) if names else []
+    return {"joints": len(names), "capsules": shapes, "pictures": pictures}
+
+
+def _packed(part: Mapping[str, Array]) -> dict[str, Any]:
+    """Relative to the figure in the middle, so that 16 bits reach wherever in the world the clip is."""
+    middle = part["pose"][1, 0] * np.array([1.0, 0.0, 1.0])
+    return {
+        "n": len(part["x"]),
+        "x": [float(part["x"][0] - middle[0]), float(part["x"][-1] - middle[0])],
+        "z": [float(part["z"][0] - middle[2]), float(part["z"][-1] - middle[2])],
+        "ground": _steps(part["ground"]),
+        "soles": _steps(part["soles"] - middle),
+        "contacts": packed(np.asarray(part["contacts"], np.uint8)),
+        "pose": _steps(part["pose"] - middle),
+    }
+
+
+def _steps(values: Array) -> str:
+    return packed(np.clip(np.round(values * STEPS_PER_CM), -32767, 32767).astype(np.int16))

@@ -1,0 +1,174 @@
+"""How the gait answers to injury: severity swept link by link."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from hobble.report.charts import Chart, Family, Trace, axis, line
+from hobble.report.gather import Material
+from hobble.report.tables import Column, Table
+
+GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
+SIDES = (("left", "@accent"), ("right", "@g2"))
+# Small charts: name, title, unit, lines as (column, label, colour), and whether the axis starts at 0.
+PANELS: tuple[tuple[str, str, str, tuple[tuple[str, str, str], ...], bool], ...] = (
+    (
+        "pose",
+        "Pose",
+        "cm",
+        (("from_healthy", "from healthy", "@accent"), ("from_worst", "from severity 10", "@muted")),
+        True,
+    ),
+    ("speed", "Speed", "cm/s", (("speed", "speed", "@accent"),), True),
+    ("stance", "Time on each foot", "share", tuple((f"stance_{s}", s, c) for s, c in SIDES), False),
+    ("step", "Step length", "cm", tuple((f"step_{s}", s, c) for s, c in SIDES), False),
+    ("knee", "Range of the knee", "degrees", tuple((f"knee_{s}", s, c) for s, c in SIDES), False),
+    ("arm", "Swing of the arm", "degrees", tuple((f"arm_{s}", s, c) for s, c in SIDES), False),
+    (
+        "lean",
+        "Lean of the trunk",
+        "degrees",
+        (("lean_forward", "forward", "@accent"), ("lean_left", "to the left", "@g2")),
+        False,
+    ),
+    ("hip", "Height of the hips", "cm", (("hip_height", "hips", "@accent"),), False),
+    (
+        "rough",
+        "Largest acceleration of a joint",
+        "cm per frame²",
+        (("largest_acceleration", "joint", "@accent"),),
+        True,
+    ),
+)
+
+
+def section(material: Material) -> dict[str, Any]:
+    """Charts and tables; `applies` is false for a network without severities."""
+    injury = material.injury
+    if not injury.get("applies"):
+        return {"applies": False}
+    rows, responses = injury.get("rows") or [], injury.get("responses") or []
+    return {
+        "applies": True,
+        "overview": overview(responses),
+        "curves": curves(rows) if rows else None,
+        "responses": response_table(material.name, responses),
+        "rows": sweep_table(material.name, rows),
+    }
+
+
+def curves(rows: Sequence[Mapping[str, Any]]) -> Family:
+    """A small chart for each measure over severity, for the gait and link chosen."""
+    sweeps: dict[str, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        sweeps.setdefault(f"{row['link']}, {row['gait']}", []).append(row)
+    charts = []
+    for name, title, unit, lines, from_zero in PANELS:
+        options: dict[str, list[Trace]] = {}
+        for sweep, some in sweeps.items():
+            x = [row["severity"] for row in some]
+            traces = [
+                line(label, x, [row.get(column) for row in some], colour, mode="lines+markers")
+                | {"marker": {"size": 5}}
+                for column, label, colour in lines
+            ]
+            options[sweep] = traces
+        layout = {
+            "xaxis": axis("severity", dtick=2, range=[-0.3, 10.3]),
+            "yaxis": axis(unit, **({"rangemode": "tozero"} if from_zero else {})),
+            "showlegend": len(lines) > 1,
+        }
+        charts.append(Chart(f"sweep-{name}", title, "", layout=layout, height=230, options=options))
+    return Family(
+        "sweeps",
+        "One link, hurt more and more",
+        "Every point is a walk of its own, healthy for a quarter and measured over its last half. Look for "
+        "lines that bend smoothly from left to right (a gradient), for left and right that part (a limp), "
+        "and for jumps between neighbours (the network switches between two gaits it knows). Pose distances "
+        "are means over joints at the same phase.",
+        charts,
+        "Link and gait",
+    )
+
+
+def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
+    """What severity 10 does to pose and speed, link by link."""
+    charts = []
+    for name, key, title, label, caption in (
+        (
+            "injury-pose",
+            "from_healthy_cm",
+            "How far the pose goes",
+            "cm from healthy at severity 10",
+            "Mean distance over joints, at the same phase, from the healthy walk. A dot at 0 is a link the "
+            "network does not feel.",
+        ),
+        (
+            "injury-speed",
+            "speed_share",
+            "What is left of the speed",
+            "share of the healthy speed at severity 10",
+            "1 means that the hurt character is as fast as the healthy one.",
+        ),
+    ):
+        traces: list[Trace] = []
+        for gait, colour in GAIT_COLOURS.items():
+            some = [r for r in responses if r["gait"] == gait and r.get(key) is not None][::-1]
+            if some:
+                traces.append(
+                    {
+                        "type": "scatter",
+                        "mode": "markers",
+                        "name": gait,
+                        "y": [r["link"] for r in some],
+                        "x": [r[key] for r in some],
+                        "marker": {"color": colour, "size": 9},
+                        "hovertemplate": "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>",
+                    }
+                )
+        links = len({r["link"] for r in responses})
+        layout = {"xaxis": axis(label, rangemode="tozero"), "yaxis": {"automargin": True, "type": "category"}}
+        if traces:
+            charts.append(Chart(name, title, caption, traces, layout, 130 + 21 * links))
+    return charts
+
+
+def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
+    """A row per gait and link."""
+    columns = [
+        Column("gait"),
+        Column("link"),
+        Column.number("pose at 10, cm"),
+        Column.number("speed share"),
+        Column.number("settles in, s"),
+        Column.number("acceleration share"),
+        Column.number("ρ pose"),
+        Column.number("ρ speed"),
+    ]
+    rows = [
+        [
+            r["gait"],
+            r["link"],
+            r.get("from_healthy_cm"),
+            r.get("speed_share"),
+            r.get("settle_seconds"),
+            r.get("acceleration_share"),
+            (r.get("spearman") or {}).get("from_healthy"),
+            (r.get("spearman") or {}).get("speed"),
+        ]
+        for r in responses
+    ]
+    title = "Every link at severity 10, and how steadily it gets there (ρ: Spearman's rank correlation)"
+    return Table(f"{name}-injury-responses", columns, rows, title)
+
+
+def sweep_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+    """Every walk of the sweep, as in injury.csv."""
+    if not rows:
+        return None
+    keys = list(rows[0])
+    columns = [Column(k) if isinstance(rows[0][k], str) else Column.number(k.replace("_", " ")) for k in keys]
+    return Table(
+        f"{name}-injury", columns, [[row.get(k) for k in keys] for row in rows], "Every walk measured"
+    )

@@ -1,0 +1,149 @@
+"""The ground fitted under the clips: how near it comes to the feet, and its shape along the path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.report.charts import Chart, Trace, axis, line
+from hobble.report.tables import Column, Table
+
+MOST_PICTURES = 10
+LONGEST = 900  # frames of a clip that its picture shows
+STRIDE = 3
+
+
+@dataclass(frozen=True)
+class Fits:
+    """The fits of one clip.
+
+    foot_error: (C, 10, 2) mean and largest distance of a standing foot from its ground, cm. error: (C, 10)
+    energy. frame: (S,) frames of the profile. profile: (S, K) height of the ground under the root for each
+    fit, cm.
+    """
+
+    clip: str
+    foot_error: Array = field(repr=False)
+    error: Array = field(repr=False)
+    frame: Array = field(repr=False)
+    profile: Array = field(repr=False)
+
+    @property
+    def flat(self) -> bool:
+        """Whether the clip has but one, flat fit."""
+        return self.profile.shape[1] < 2
+
+
+def read_fits(path: str | Path) -> Fits:
+    """Read `terrain/clips/<clip>.npz`. Raises InputError where an array is missing or counts disagree."""
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            fits, frame = data["fits"], data["frame"]
+            heights = data["heights"]
+            present = heights.shape[1] // 3 + heights.shape[1] // 6
+            least = int(fits.min()) if len(fits) else 1
+            first = np.concatenate([[0], np.cumsum(fits)[:-1]]).astype(int) if len(fits) else np.zeros(0, int)
+            rows = first[:, None] + np.arange(least)
+            profile = heights[:, present][rows[:LONGEST:STRIDE]] if len(fits) else np.zeros((0, 1))
+            return Fits(Path(path).stem, data["foot_error"], data["error"], frame[:LONGEST:STRIDE], profile)
+    except (OSError, ValueError, KeyError, IndexError) as error:
+        raise InputError(
+            path, f"not the terrain of a clip ({error})", fix="Delete it; it is made again."
+        ) from error
+
+
+def section(paths: Iterable[str | Path]) -> dict[str, Any]:
+    """Charts and a table of the fits."""
+    found = [fit for fit in map(read_fits, paths) if not fit.flat and len(fit.profile)]
+    if not found:
+        return {"charts": [], "table": None}
+    return {"charts": [profiles(found), distances(found)], "table": fit_table(found)}
+
+
+def profiles(found: list[Fits]) -> Chart:
+    """The ground under the root along each clip, for all its fits."""
+    options: dict[str, list[Trace]] = {}
+    for fit in found[:MOST_PICTURES]:
+        x = np.round(fit.frame / 60, 2)
+        # Between two cycles that do not follow one another there is no ground.
+        gaps = np.flatnonzero(np.diff(fit.frame) > STRIDE) + 1
+        count = fit.profile.shape[1]
+        traces = []
+        for k in range(count - 1, -1, -1):
+            y = np.insert(np.round(fit.profile[:, k].astype(float), 1), gaps, np.nan)
+            colour, width = ("@accent", 2.2) if k == 0 else ("@muted", 1)
+            name = "best fit" if k == 0 else f"fits 2 to {count}"
+            more: dict[str, Any] = {"legendgroup": name, "showlegend": k in (0, 1), "width": width}
+            times = [
+                None if not np.isfinite(v) else float(t)
+                for t, v in zip(np.insert(x, gaps, 0), y, strict=True)
+            ]
+            traces.append(
+                line(name, times, [None if not np.isfinite(v) else float(v) for v in y], colour, **more)
+            )
+        options[fit.clip] = traces
+    return Chart(
+        "terrain-profiles",
+        "The ground under the path",
+        "Height of the ground under the root along a clip, for every fit: one motion on so many grounds. "
+        "The lines meet where the feet stand and part where nothing touches the ground. They are drawn anew "
+        "for each cycle, so they may jump between two.",
+        layout={"xaxis": axis("seconds"), "yaxis": axis("height, cm")},
+        choose="Clip",
+        options=options,
+    )
+
+
+def distances(found: list[Fits]) -> Chart:
+    """How far standing feet are from the fitted ground, clip by clip."""
+    traces: list[Trace] = [
+        {
+            "type": "box",
+            "name": fit.clip,
+            "x": np.round(fit.foot_error[:, :, 0].ravel(), 3).tolist(),
+            "orientation": "h",
+            "boxpoints": False,
+            "line": {"color": "@accent", "width": 1.4},
+            "fillcolor": "@accent-wash",
+        }
+        for fit in found[::-1]
+    ]
+    return Chart(
+        "terrain-feet",
+        "Standing feet and their ground",
+        "Mean distance of a standing foot from the fitted ground, over cycles and fits, after the residual "
+        "is taken out. Under a centimetre cannot be seen.",
+        traces,
+        {"xaxis": axis("cm", rangemode="tozero"), "showlegend": False},
+        height=110 + 26 * len(found),
+    )
+
+
+def fit_table(found: list[Fits]) -> Table:
+    """A row per clip that does not stand on flat ground."""
+    columns = [
+        Column("clip"),
+        Column.count("cycles"),
+        Column.number("energy of the best fits"),
+        Column.number("energy of the last fits"),
+        Column.number("mean distance of a foot, cm"),
+        Column.number("largest, cm"),
+    ]
+    rows = [
+        [
+            fit.clip,
+            len(fit.error),
+            float(fit.error[:, 0].mean()),
+            float(fit.error[:, -1].mean()),
+            float(fit.foot_error[:, :, 0].mean()),
+            float(fit.foot_error[:, :, 1].max()),
+        ]
+        for fit in found
+    ]
+    return Table("terrain", columns, rows)
