@@ -15,7 +15,6 @@ with job(snakemake):
         snakemake.params.frames,
         snakemake.params.recipe,
         snakemake.params.injured,
-        snakemake.params.ground,
         snakemake.params.options,
         bvh=snakemake.output.bvh,
         footsteps=snakemake.output.footsteps,

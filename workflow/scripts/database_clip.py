@@ -1,0 +1,22 @@
+"""Creates the rows of one clip from its motion, labels, severities and terrain fits."""
+
+from hobble.core.clip import load_clip
+from hobble.core.files import load_npz
+from hobble.database.clip_rows import save_clip_rows
+from hobble.database.rows import clip_rows
+from hobble.workflow.job import job
+
+with job(snakemake) as log:
+    options = snakemake.params.options
+    rows = clip_rows(
+        snakemake.params.clip,
+        load_clip(snakemake.input.clip),
+        load_npz(snakemake.input.labels),
+        load_npz(snakemake.input.injury)["severity"],
+        load_npz(snakemake.input.terrain),
+        window=options["window"],
+        step=options["step"],
+        facing_sigma=options["facing_sigma"],
+    )
+    save_clip_rows(snakemake.output.rows, rows)
+    log.info("%d rows, %d fits", len(rows), rows.fits.sum())
