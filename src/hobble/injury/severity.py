@@ -27,9 +27,9 @@ def severity_matrix(status: Status, links: Sequence[str]) -> Array:
 
 
 def odd_ranges(status: Status, path: str | Path) -> list[str]:
-    """A sentence for each line whose range starts at 0, goes past the end, or lies there altogether."""
+    """A sentence for each range that starts at 0, leaves the clip, or changes what an earlier line says."""
     said = []
-    for spell in status.spells:
+    for i, spell in enumerate(status.spells):
         place = f"{path}, line {spell.line}: the range {spell.first}-{spell.last}"
         if spell.first > status.frames:
             said.append(f"{place} lies past the last of {status.frames} frames and says nothing.")
@@ -37,7 +37,18 @@ def odd_ranges(status: Status, path: str | Path) -> list[str]:
             said.append(f"{place} goes past the last of {status.frames} frames; it was cut there.")
         if spell.first == 0:
             said.append(f"{place} starts at 0; frames count from 1, so it was taken to start there.")
+        for earlier in status.spells[:i]:
+            if both := _contested(earlier, spell):
+                said.append(f"{place} overlaps that of line {earlier.line}; the later one counts for {both}.")
     return said
+
+
+def _contested(earlier: Spell, later: Spell) -> str:
+    """The links for which two spells say different things of the same frames, with commas between."""
+    if later.first > earlier.last or earlier.first > later.last:
+        return ""
+    said = dict(earlier.links)
+    return ", ".join(link for link, severity in later.links if said.get(link, severity) != severity)
 
 
 def clip_severity(
@@ -73,7 +84,7 @@ def source_rows(frames: int, rows: int, motion: Mapping[str, Any]) -> Array:
     fps = motion["source_fps"]
     whole = round(fps)
     ratio = (whole if math.isclose(fps, whole, rel_tol=5e-4) else fps) / 60.0
-    at = np.arange(frames) * ratio + motion.get("first_frame", 0)
+    at = np.arange(frames) * ratio + motion.get("source_start", 0)
     return np.clip(np.floor(at + 1e-6).astype(int), 0, rows - 1)
 
 

@@ -56,7 +56,7 @@ def read_status(path: str | Path, links: Sequence[str]) -> Status:
     path = Path(path)
     frames: int | None = None
     spells: list[Spell] = []
-    for number, line in enumerate(_text(path).splitlines(), 1):
+    for number, line in enumerate(read_text(path).splitlines(), 1):
         line = line.strip()
         if not line:
             continue
@@ -69,7 +69,9 @@ def read_status(path: str | Path, links: Sequence[str]) -> Status:
     return Status(frames, tuple(spells))
 
 
-def parse_links(text: str, links: Sequence[str], path: str | Path, line: int | None = None) -> tuple:
+def parse_links(
+    text: str, links: Sequence[str], path: str | Path, line: int | None = None
+) -> tuple[tuple[str, float], ...]:
     """The (link, severity) pairs of `A-B[4];C-D[8];`, as a status file or a data set's `status` writes them.
 
     Raises InputError that names `path` and `line`.
@@ -82,9 +84,8 @@ def parse_links(text: str, links: Sequence[str], path: str | Path, line: int | N
         if match is None:
             raise InputError(path, f"{part.strip()!r} does not read as Joint-Joint[severity]", line=line)
         name, value = match[1], match[2]
-        if name not in links:
-            raise InputError(path, f"no such link: {name}", line=line, fix=_hint(name, links))
-        pairs.append((name, _severity(path, line, name, value)))
+        check_link(path, line, name, links)
+        pairs.append((name, check_severity(path, line, name, value)))
     if not pairs:
         raise InputError(path, "names no link", line=line, fix="Write Joint-Joint[severity];")
     return tuple(pairs)
@@ -104,7 +105,8 @@ def write_status(path: str | Path, status: Status) -> None:
     write_text(path, format_status(status))
 
 
-def _text(path: Path) -> str:
+def read_text(path: Path) -> str:
+    """The whole of a text file, without a byte order mark; raises InputError where it is none."""
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
@@ -136,7 +138,14 @@ def _spell(path: Path, number: int, line: str, links: Sequence[str]) -> Spell:
     return Spell(first, last, parse_links(match[3], links, path, number), number)
 
 
-def _severity(path: str | Path, line: int | None, link: str, text: str) -> float:
+def check_link(path: str | Path, line: int | None, name: str, links: Sequence[str]) -> None:
+    """Raise InputError unless `name` is one of `links`."""
+    if name not in links:
+        raise InputError(path, f"no such link: {name}", line=line, fix=_hint(name, links))
+
+
+def check_severity(path: str | Path, line: int | None, link: str, text: str) -> float:
+    """The severity that `text` says; raises InputError unless it is a number from 0 to 10."""
     try:
         value = float(text)
     except ValueError:
