@@ -147,9 +147,10 @@ def test_a_build_killed_at_any_moment_leaves_the_old_database_or_the_new_one(row
     new = {**old, "b": rows_of("b", 900, 10, seed=2)}
     splits = {"a": "train", "b": "train"}
     path = tmp_path / "db"
-    started = time.monotonic()
-    write_database(tmp_path / "timed", new, splits, **OPTIONS)
-    whole = time.monotonic() - started
+    for _ in range(2):  # the first may be slow for reasons of its own
+        started = time.monotonic()
+        write_database(tmp_path / "timed", new, splits, **OPTIONS)
+        whole = time.monotonic() - started
     expected = {len(read_all(tmp_path / "timed")), 60}
     chance = random.Random(1)
     killed, seen = 0, set()

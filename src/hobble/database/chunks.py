@@ -53,8 +53,7 @@ def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Ch
     text = json.dumps(header).encode()
     text += b" " * (-len(text) % 8)
     head = np.frombuffer(len(text).to_bytes(8, "little") + text, np.uint8)
-    bytes_of = (np.ascontiguousarray(array).reshape(-1).view(np.uint8) for array in arrays.values())
-    parts = [memoryview(part) for part in (head, *bytes_of)]
+    parts = [_bytes(part) for part in (head, *map(np.ascontiguousarray, arrays.values()))]
     path = folder / file
     path.parent.mkdir(parents=True, exist_ok=True)
     with open(path, "wb") as out:
@@ -73,7 +72,7 @@ def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], ver
     """
     path = folder / chunk.file
     header = np.empty(chunk.bytes - sum(array.nbytes for array in arrays.values()), np.uint8)
-    parts = [memoryview(array.reshape(-1).view(np.uint8)) for array in (header, *arrays.values())]
+    parts = [_bytes(array) for array in (header, *arrays.values())]
     try:
         with open(path, "rb", buffering=0) as file:
             size = os.fstat(file.fileno()).st_size
@@ -85,6 +84,11 @@ def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], ver
         raise InputError(path, f"cannot be read ({error.strerror})", fix=HINT) from error
     if verify and _checksum(parts) != chunk.crc32:
         raise InputError(path, "damaged: its checksum is not the manifest's", fix=HINT)
+
+
+def _bytes(array: np.ndarray) -> memoryview:
+    """The bytes of a contiguous array, not copied."""
+    return array.reshape(-1).view(np.uint8).data
 
 
 def _fill(descriptor: int, parts: Sequence[memoryview]) -> None:

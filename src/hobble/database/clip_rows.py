@@ -73,8 +73,8 @@ class ClipRows:
             frame = int(self.frame[np.argmin(self.fits)])
             raise InputError(where, "a row has no terrain fit", frame=frame)
         for name in ("x", "y", "p", "severity"):
-            values = getattr(self, name).reshape(rows, -1)
-            bad = ~np.isfinite(values).all(axis=1)
+            finite = np.isfinite(getattr(self, name))
+            bad = ~(finite if finite.ndim == 1 else finite.all(axis=1))
             if bad.any():
                 raise InputError(where, f"{name} is not a number", frame=int(self.frame[np.argmax(bad)]))
         if not (np.isfinite(self.heights).all() and np.isfinite(self.mean).all()):

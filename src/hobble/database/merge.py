@@ -123,7 +123,8 @@ def _plan(
         one = outline(clips[name])
         first = first or one
         if one.layout != first.layout or list(one.skeleton["joints"]) != list(first.skeleton["joints"]):
-            where = clips[name] if isinstance(clips[name], str | Path) else name
+            source = clips[name]
+            where = name if isinstance(source, ClipRows) else source
             raise InputError(where, f"its rows are not laid out as those of {min(clips)}")
         fits = int(one.fits.sum())
         entries.append({"clip": name, "split": splits[name], "rows": len(one.fits), "pairs": fits})

@@ -84,7 +84,7 @@ def clip_moments(rows: ClipRows) -> tuple[Moments, Moments]:
         of_row = np.repeat(np.arange(len(fits)), fits)
         share = 1.0 / fits[of_row]
         mean = rows.mean[span].astype(np.float64)
-        row_mean = np.bincount(of_row, share * mean, len(fits))
+        row_mean: Array = np.bincount(of_row, share * mean, len(fits)).astype(np.float64)
         spread = float(np.sum(share * (mean - row_mean[of_row]) ** 2))
         heights = Moments.of(rows.heights[span], share)
         x_frame = _lowered(rows.x[part], layout.x_joint_position, row_mean, spread)

@@ -17,12 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from hobble.core.errors import InputError
+from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.database.clip_rows import ClipRows, expanded, load_clip_rows
 from hobble.database.layout import RowLayout
 from hobble.database.statistics import Moments
-from hobble.evaluation.predict import Weights, load_weights, predict
+from hobble.evaluation.predict import predict
+from hobble.runtime.network import Network, load_network
 
 LEAST = 1e-3  # cm; below this a joint stands at the root itself and a relative error says nothing
 SPLITS = ("train", "held_out")
@@ -64,7 +65,7 @@ def joint_errors(layout: RowLayout, truth: Array, predicted: Array, joints: Sequ
     return np.stack([distance / np.maximum(np.linalg.norm(t, axis=-1), LEAST), distance], axis=-1)
 
 
-def clip_errors(network: Weights, rows: ClipRows, joints: Sequence[int]) -> Errors:
+def clip_errors(network: Network, rows: ClipRows, joints: Sequence[int]) -> Errors:
     """The errors over every frame and fit of a clip, a batch at a time."""
     layout = network.layout
     total = Moments.nothing(2)
@@ -88,8 +89,8 @@ def measure(
     `mean_of_clips` is the mean over clips that the published tables print. Raises InputError where rows and
     network differ.
     """
-    network = load_weights(weights)
-    joints = joint_indices(list(network.meta["skeleton"]["joints"]), equivalents)
+    network = load_network(weights)
+    joints = joint_indices(network, equivalents)
     entries = []
     totals = dict.fromkeys(SPLITS, Errors())
     for name in sorted(clips):
@@ -116,15 +117,19 @@ def equivalent_joints(skeleton: Mapping[str, Any], of: str = REFERENCE) -> list[
     return None if counterparts is None else list(counterparts)
 
 
-def joint_indices(joints: Sequence[str], equivalents: Sequence[str] | None) -> list[int]:
-    """Indices of the joints to measure, in their order."""
-    chosen = [i for i, name in enumerate(joints) if equivalents is None or name in equivalents]
+def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[int]:
+    """Indices of the joints to measure, in their order: those of `names`, all of them by default."""
+    if names is None:
+        return list(range(network.layout.joints))
+    if network.skeleton is None:
+        raise HobbleError("The network's file names no joints, so none can be chosen.")
+    chosen = [i for i, name in enumerate(network.skeleton.joints) if name in names]
     if not chosen:
-        raise InputError("evaluation.joints", "none of the equivalent joints is in the network's skeleton")
+        raise HobbleError(f"None of {', '.join(names)} is a joint of {network.skeleton.name}.")
     return chosen
 
 
-def _check(where: str | Path, rows: ClipRows, network: Weights) -> None:
+def _check(where: str | Path, rows: ClipRows, network: Network) -> None:
     layout = network.layout
     same = (layout.joints, layout.window, layout.step) == (
         rows.layout.joints,

@@ -1,0 +1,252 @@
+"""Rows: those of the original database, and what they must be on motion known in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.database.clip_rows import ClipRows, expanded
+from hobble.database.layout import GAITS, RowLayout
+from hobble.database.rows import clip_rows, cycle_frames, cycle_phase, phase_change
+from hobble.labels.label import label_clip
+from hobble.motion.make import make_clip
+
+NAME = "LocomotionFlat09_000"
+OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0}
+MOTION = {
+    "fps": 60.0,
+    "source_fps": None,
+    "unit": 5.6444,
+    "up": "Y",
+    "handedness": "right",
+    "proportions": "clip",
+    "defects": "refuse",
+}
+LABELS = {
+    "files": True,
+    "contact_threshold": 0.02,
+    "phase_zero": "right",
+    "heel_speed": 0.375,
+    "toe_speed": 0.0875,
+    "valley_factor": 2.875,
+    "shortest_step": 5,
+}
+IN_CENTIMETRES = ("position", "joint_position")
+
+
+def original_level(clip: Clip, start: int, end: int) -> float:
+    """Where the original puts flat ground under a cycle: at the mean height of the soles in contact.
+
+    It looks at 60 frames to each side; the stretch's last frame has no velocity and repeats the contacts of
+    the one before. Soles are 5 cm below the heel joint and 4 cm below the toe joint.
+    """
+    joints = [clip.skeleton.role(f"{side}_{part}") for side in ("left", "right") for part in ("heel", "toe")]
+    feet = clip.positions[start - 60 : end + 61, joints]
+    moving = np.sum(np.diff(feet, axis=0) ** 2, axis=-1) >= 0.02
+    contacts = ~np.concatenate([moving, moving[-1:]])
+    return float((feet[..., 1] - [5, 4, 5, 4])[contacts].mean())
+
+
+def flat_terrain(cycles: np.ndarray, levels: np.ndarray) -> dict[str, np.ndarray]:
+    """Terrain fits of flat ground, as the terrain stage writes them."""
+    frame, cycle = cycle_frames(cycles)
+    return {
+        "frame": frame,
+        "cycle": cycle,
+        "fits": np.ones(len(frame), np.int32),
+        "heights": np.repeat(levels[cycle, None], 36, axis=1),
+        "patch": np.full((len(cycles), 10), -1),
+    }
+
+
+@pytest.fixture(scope="module")
+def original(shared: Path) -> dict[str, np.ndarray]:
+    with np.load(shared / "reference" / f"original_rows_{NAME}.npz") as file:
+        return dict(file)
+
+
+@pytest.fixture(scope="module")
+def rows(shared: Path, root: Path) -> ClipRows:
+    skeletons = root / "config" / "skeletons"
+    folder = shared / "mocap" / "pfnn"
+    clip, report = make_clip(
+        folder / f"{NAME}.bvh", skeletons / "holden31.yaml", skeletons, NAME, "holden31", MOTION
+    )
+    files = [folder / f"{NAME}{end}" for end in (".phase", ".gait", "_footsteps.txt", "_gait.txt")]
+    labels, _ = label_clip(clip, files, report, "walk", "flat", LABELS)
+    levels = np.array([original_level(clip, *cycle) for cycle in labels.cycles])
+    severity = np.zeros((len(clip), len(clip.skeleton.links)), np.float32)
+    return clip_rows(NAME, clip, vars(labels), severity, flat_terrain(labels.cycles, levels), **OPTIONS)
+
+
+@pytest.mark.shared
+def test_the_original_rows_column_by_column(rows, original):
+    layout = replace(rows.layout, links=0)
+    (pairs,) = expanded(rows, links=False)
+    np.testing.assert_array_equal(np.bincount(rows.cycle), original["cycle_length"])
+    np.testing.assert_allclose(pairs.p, original["P"], atol=1e-6)
+    differing = []
+    for prefix, ours, theirs in (("x", pairs.x, original["X"]), ("y", pairs.y, original["Y"])):
+        assert ours.shape == theirs.shape
+        for block, columns in layout.blocks(prefix).items():
+            allowed = 1e-2 if block in IN_CENTIMETRES else 1e-3
+            error = np.abs(ours[:, columns] - theirs[:, columns]).max(axis=0)
+            for i in np.flatnonzero(error > allowed):
+                at = f" ({rows_joint(rows, block, i)})" if block.startswith("joint") else ""
+                differing.append(f"{prefix} {block}{at}, column {columns.start + i}: off by {error[i]:.5f}")
+    assert not differing, "\n".join(differing)
+
+
+def rows_joint(rows: ClipRows, block: str, column: int) -> str:
+    return f"{list(rows.skeleton['joints'])[column // 3]} {'xyz'[column % 3]}"
+
+
+@pytest.mark.shared
+def test_the_comparison_would_notice_a_millimetre(rows, original):
+    column = rows.layout.y_joint_position.start + 5 * 3
+    moved = replace(rows, y=rows.y + 0.1 * (np.arange(rows.y.shape[1]) == column))
+    with pytest.raises(
+        AssertionError, match=r"y joint_position \(LeftToeBase x\), column 47: off by 0\.1000"
+    ):
+        test_the_original_rows_column_by_column(moved, original)
+
+
+@pytest.fixture(scope="module")
+def walk() -> Clip:
+    """A stiff figure that goes 2 cm a frame along +X while it turns by a hundredth of a radian a frame."""
+    names = ("Hips", "LeftUpLeg", "RightUpLeg", "LeftArm", "RightArm")
+    offsets = np.array([[0, 0, 0], [10, -5, 0], [-10, -5, 0], [20, 40, 3], [-20, 40, 3]], float)
+    roles = dict(
+        zip(("hips", "left_hip", "right_hip", "left_shoulder", "right_shoulder"), names, strict=True)
+    )
+    skeleton = Skeleton(
+        "stiff", names, (-1, 0, 0, 0, 0), offsets, roles, (("Hips", "LeftUpLeg"), ("Hips", "LeftArm"))
+    )
+    frames = 300
+    t = np.arange(frames)
+    rotations = np.tile(quat.IDENTITY, (frames, 5, 1))
+    rotations[:, 0] = quat.yaw(0.01 * t)
+    root = np.stack([2.0 * t, np.full(frames, 90.0), np.zeros(frames)], axis=1)
+    return Clip("walk", skeleton, 60.0, rotations, root)
+
+
+@pytest.fixture
+def labels() -> dict[str, np.ndarray]:
+    t = np.arange(300)
+    gait = np.zeros((300, 6))
+    gait[:, 1], gait[:, 4] = 1 - t / 300, t / 300
+    contacts = np.stack([t % 2 == 0, t % 3 == 0, t % 5 == 0, t % 7 == 0], axis=1)
+    return {
+        "cycles": np.array([[60, 100], [100, 130], [200, 239]]),
+        "phase": (t / 37) % 1,
+        "gait": gait,
+        "contacts": contacts,
+    }
+
+
+@pytest.fixture
+def terrain(labels) -> dict[str, np.ndarray]:
+    return flat_terrain(labels["cycles"], np.array([3.0, 4.0, 5.0]))
+
+
+def test_a_stiff_turning_figure_in_closed_form(walk, labels, terrain):
+    severity = np.random.default_rng(0).random((300, 2)) * 10
+    rows = clip_rows("walk", walk, labels, severity, terrain, **{**OPTIONS, "facing_sigma": 0.0})
+    layout, frame = rows.layout, rows.frame
+    assert layout == RowLayout(5, links=2)
+    np.testing.assert_array_equal(frame, np.r_[60:101, 100:131, 200:240])
+    (pairs,) = expanded(rows, links=True)
+    x, y = ({n: v[:, s] for n, s in layout.blocks(p).items()} for p, v in (("x", pairs.x), ("y", pairs.y)))
+    ahead = np.arange(-60, 60, 10)
+    turned = 0.01 * frame[:, None]  # facing (sin, 0, cos); the root's x axis is (cos, 0, -sin)
+    expected = np.concatenate([2 * ahead * np.cos(turned), 2 * ahead * np.sin(turned)], axis=1)
+    np.testing.assert_allclose(x["position"], expected, atol=1e-3)
+    direction = np.concatenate([np.sin(0.01 * ahead), np.cos(0.01 * ahead)])
+    np.testing.assert_allclose(x["direction"], np.tile(direction, (len(frame), 1)), atol=1e-4)
+    local = walk.skeleton.offsets + np.array([0, 90, 0])
+    local = np.tile(local, (len(frame), 1, 1))
+    local[..., 1] -= np.array([3.0, 4.0, 5.0])[rows.cycle][:, None]
+    np.testing.assert_allclose(x["joint_position"], local.reshape(len(frame), -1), atol=1e-3)
+    np.testing.assert_allclose(y["joint_position"], x["joint_position"], atol=1e-3)
+    np.testing.assert_allclose(y["joint_rotation"], 0, atol=1e-4)
+    along = np.stack([2 * np.cos(turned[:, 0]), 2 * np.sin(turned[:, 0])], axis=1)
+    np.testing.assert_allclose(y["root_velocity"], along, atol=1e-3)
+    np.testing.assert_allclose(y["turn"][:, 0], -0.01, atol=1e-4)  # the runtime applies its negative
+    before = np.stack([2 * np.cos(turned[:, 0] - 0.01), 2 * np.sin(turned[:, 0] - 0.01)], axis=1)
+    np.testing.assert_allclose(x["joint_velocity"][:, [0, 2]], before, atol=1e-3)
+    future = np.arange(0, 60, 10)
+    next_turn = turned + 0.01
+    expected = np.concatenate([2 * future * np.cos(next_turn), 2 * future * np.sin(next_turn)], axis=1)
+    np.testing.assert_allclose(y["position"], expected, atol=1e-3)
+    np.testing.assert_allclose(y["contacts"], labels["contacts"][frame])
+    np.testing.assert_allclose(x["injury"], severity[frame], rtol=1e-6)
+    np.testing.assert_allclose(x["terrain"], 0, atol=1e-5)
+    shares = x["gait"].reshape(len(frame), len(GAITS), 12)
+    np.testing.assert_allclose(shares[:, 4], (frame[:, None] + ahead) / 300, atol=1e-6)
+    np.testing.assert_allclose(shares[:, 1], 1 - shares[:, 4], atol=1e-6)
+    assert not shares[:, [0, 2, 3, 5]].any()
+    np.testing.assert_allclose(y["phase_change"][:, 0], 1 / 37, atol=1e-6)
+
+
+def test_phase_is_forced_at_the_ends_and_its_change_is_not(labels):
+    phase = cycle_phase(labels["phase"], labels["cycles"])
+    frame, cycle = cycle_frames(labels["cycles"])
+    first, last = frame == labels["cycles"][cycle, 0], frame == labels["cycles"][cycle, 1]
+    assert (phase[first] == 0).all()
+    assert (phase[last] == 1).all()
+    np.testing.assert_array_equal(phase[~first & ~last], labels["phase"][frame[~first & ~last]])
+    np.testing.assert_allclose(phase_change(labels["phase"]), 1 / 37)
+    np.testing.assert_allclose(phase_change(np.array([0.2, 0.2, 0.1])), [0, 0.9])
+
+
+def test_fits_of_a_row_share_its_frame_and_differ_in_the_ground(walk, labels, terrain):
+    rng = np.random.default_rng(1)
+    n = len(terrain["frame"])
+    hilly = {**terrain, "fits": np.full(n, 10), "heights": rng.normal(0, 9, (10 * n, 36))}
+    rows = clip_rows("walk", walk, labels, np.zeros((300, 2)), hilly, **OPTIONS)
+    layout = rows.layout
+    x, y = (np.concatenate(parts) for parts in list(zip(*expanded(rows, links=False), strict=True))[:2])
+    centre = hilly["heights"][:, 12:24].mean(axis=1)
+    np.testing.assert_allclose(x[:, layout.x_terrain], hilly["heights"] - centre[:, None], atol=1e-4)
+    hips = y[:, layout.y_joint_position.start + 1]
+    np.testing.assert_allclose(hips, 90 - centre, atol=1e-3)
+    np.testing.assert_allclose(y[::10, -5:], y[5::10, -5:])
+
+
+def test_a_clip_without_cycles_has_no_rows(walk, labels):
+    nothing = {**labels, "cycles": np.zeros((0, 2), int)}
+    rows = clip_rows(
+        "walk", walk, nothing, np.zeros((300, 2)), flat_terrain(nothing["cycles"], np.zeros(0)), **OPTIONS
+    )
+    rows.check("walk")
+    assert len(rows) == 0
+    assert list(expanded(rows, links=True)) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"phase": np.zeros(299)}, "labels of 299 frames for a clip of 300"),
+        ({"cycles": np.array([[60, 100], [100, 130], [200, 241]])}, "other cycles"),
+    ],
+)
+def test_files_that_do_not_belong_together_are_refused(walk, labels, terrain, change, message):
+    with pytest.raises(InputError, match=f"^walk: .*{message}"):
+        clip_rows("walk", walk, {**labels, **change}, np.zeros((300, 2)), terrain, **OPTIONS)
+
+
+def test_severities_and_windows_that_do_not_fit_are_refused(walk, labels, terrain):
+    with pytest.raises(InputError, match="severities of 3 links for a skeleton of 2"):
+        clip_rows("walk", walk, labels, np.zeros((300, 3)), terrain, **OPTIONS)
+    near = {**labels, "cycles": np.array([[59, 90]])}
+    with pytest.raises(InputError, match="walk, frame 59: a cycle lies within 60 frames"):
+        clip_rows(
+            "walk", walk, near, np.zeros((300, 2)), flat_terrain(near["cycles"], np.zeros(1)), **OPTIONS
+        )
