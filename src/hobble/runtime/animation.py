@@ -178,13 +178,13 @@ class ProceduralAnimation:
         v = np.asarray(vector, float)
         if v.shape[-1] == 2:
             if self.axes.native:
-                return np.array(np.broadcast_to(v, (self.characters, 2)))
+                return np.array(np.broadcast_to(v, (self.characters, 2)), order="C")
             full = np.zeros((*v.shape[:-1], 3))
             full[..., [k for k in range(3) if k != "XYZ".index(self.axes.up)]] = v
             v = full
         if not self.axes.native:
             v = convert(v)
-        return np.array(np.broadcast_to(v[..., ::2], (self.characters, 2)))
+        return np.array(np.broadcast_to(v[..., ::2], (self.characters, 2)), order="C")
 
     def _facing(self, velocity: Array, ahead: Array | None) -> tuple[Array, Array]:
         """How much each figure strafes (C,) and where it wants to look (C, 2)."""

@@ -17,7 +17,7 @@ class Character:
     position, direction: (C, T, 2) trajectory; gait: (C, T, 6). ground: (C, samples, 3) heights at left, path,
     right; root_height: (C,) mean of those on the path. joint_position, joint_velocity: (C, J, 3);
     joint_rotation: (C, J, 4) world: the network's own copy. phase: (C,). severity, severity_target: (C, L).
-    target_velocity, target_direction: (C, 2); strafe: (C,). foot_lock (C, 2), foot_hold (C, 2, 3), foot_lift
+    target_velocity, target_direction: (C, 2); strafe: (C,). foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift
     (C, 2): of `feet`.
     """
 
@@ -74,6 +74,6 @@ def standing(network: Network, characters: int, position: Array, yaw: Array) -> 
         target_direction=facing.copy(),
         strafe=np.zeros(count),
         foot_lock=np.zeros((count, 2)),
-        foot_hold=np.zeros((count, 2, 3)),
+        foot_hold=np.zeros((count, 2, 2)),
         foot_lift=np.zeros((count, 2)),
     )

@@ -131,7 +131,7 @@ class Controller:
         else:
             self._foot_ground[:] = 0.0
         feet.place_feet(
-            self.y[:, self.layout.y_contacts], self._foot_ground, self.foot_locking, self._legs,
+            self.y, self.layout.y_contacts.start, self._foot_ground, self.foot_locking, self._legs,
             self._carried, self._sole, c.foot_lock, c.foot_hold, c.foot_lift, self.pose_position,
             self.pose_rotation,
         )  # fmt: skip
@@ -212,5 +212,7 @@ def _take_output(
             rotations[c, j, 1] = half_cos * rx + half_sin * rz
             rotations[c, j, 2] = half_cos * ry + half_sin * w
             rotations[c, j, 3] = half_cos * rz - half_sin * rx
-        pose_position[c] = joints[c]
-        pose_rotation[c] = rotations[c]
+            for k in range(3):
+                pose_position[c, j, k] = joints[c, j, k]
+            for k in range(4):
+                pose_rotation[c, j, k] = rotations[c, j, k]

@@ -10,8 +10,10 @@ from numba import njit
 from hobble.core.skeleton import Skeleton
 from hobble.runtime.network import Network
 
-LOCK_AT = 0.5  # predicted toe contact from which a foot is held
+# Contact more likely than not. The original waits for .8, and a foot slides 4.8 cm a step before and after.
+LOCK_AT = 0.5
 RELEASE = 0.075  # share of the hold given up each frame afterwards
+TOO_FAR = 20.0  # centimetres the network may want a held foot elsewhere before it is let go
 HEIGHT_MIX = 0.5
 SOLE = (5.0, 4.0)  # centimetres of heel and toe joint above the ground under a standing foot
 
@@ -33,93 +35,106 @@ def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
     return np.minimum(SOLE, 0.6 * height[legs[:, 2:]].mean(axis=0).astype(float))
 
 
+# Vectors are written out by component below: compiling array expressions takes seconds, and calls allocate.
+
+
 @njit(cache=True)
-def _turn(rotation: Any, x0: Any, x1: Any) -> None:
-    """Turn the world rotation (4,) in place by the least rotation that takes direction x0 to x1."""
-    w = np.sqrt((x0 * x0).sum() * (x1 * x1).sum()) + (x0 * x1).sum()
-    cx = x0[1] * x1[2] - x0[2] * x1[1]
-    cy = x0[2] * x1[0] - x0[0] * x1[2]
-    cz = x0[0] * x1[1] - x0[1] * x1[0]
-    norm = np.sqrt(w * w + cx * cx + cy * cy + cz * cz)
+def _turn(rotation: Any, ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> None:
+    """Turn the world rotation (4,) in place by the least rotation that takes direction a to b."""
+    w = np.sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)) + ax * bx + ay * by + az * bz
+    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    norm = np.sqrt(w * w + x * x + y * y + z * z)
     if norm < 1e-9:
         return
-    w, cx, cy, cz = w / norm, cx / norm, cy / norm, cz / norm
+    w, x, y, z = w / norm, x / norm, y / norm, z / norm
     a, b, c, d = rotation[0], rotation[1], rotation[2], rotation[3]
-    rotation[0] = w * a - cx * b - cy * c - cz * d
-    rotation[1] = w * b + cx * a + cy * d - cz * c
-    rotation[2] = w * c - cx * d + cy * a + cz * b
-    rotation[3] = w * d + cx * c - cy * b + cz * a
+    rotation[0] = w * a - x * b - y * c - z * d
+    rotation[1] = w * b + x * a + y * d - z * c
+    rotation[2] = w * c - x * d + y * a + z * b
+    rotation[3] = w * d + x * c - y * b + z * a
 
 
 @njit(cache=True)
-def reach(position: Any, rotation: Any, hip: int, knee: int, heel: int, shift: Any) -> None:
-    """Move the heel of a pose, positions (J, 3), world rotations (J, 4), by `shift` (3,), bending the knee.
+def reach(
+    position: Any, rotation: Any, hip: int, knee: int, heel: int, sx: float, sy: float, sz: float
+) -> None:
+    """Move the heel of a pose, positions (J, 3), world rotations (J, 4), by (sx, sy, sz), bending the knee.
 
     Bone lengths stay; the knee keeps to the side it bends to; a target out of reach is approached to .1% of
     full stretch (the law of cosines, as `hobble.core.ik.two_bone_knee`). Thigh and shank turn by the least
     amount.
     """
-    top = position[hip].copy()
-    old_knee, old_heel = position[knee].copy(), position[heel].copy()
-    thigh, shank = old_knee - top, old_heel - old_knee
-    upper, lower = np.sqrt((thigh * thigh).sum()), np.sqrt((shank * shank).sum())
-    way = old_heel + shift - top
-    distance = np.sqrt((way * way).sum())
+    hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]
+    tx, ty, tz = position[knee, 0] - hx, position[knee, 1] - hy, position[knee, 2] - hz
+    lx, ly, lz = position[heel, 0] - hx - tx, position[heel, 1] - hy - ty, position[heel, 2] - hz - tz
+    upper, lower = np.sqrt(tx * tx + ty * ty + tz * tz), np.sqrt(lx * lx + ly * ly + lz * lz)
+    wx, wy, wz = tx + lx + sx, ty + ly + sy, tz + lz + sz
+    distance = np.sqrt(wx * wx + wy * wy + wz * wz)
     if distance < 1e-6 or upper < 1e-6 or lower < 1e-6:
         return
-    along = way / distance
+    wx, wy, wz = wx / distance, wy / distance, wz / distance
     distance = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * 0.999)
     cosine = (upper * upper + distance * distance - lower * lower) / (2 * upper * distance)
     cosine = min(max(cosine, -1.0), 1.0)
-    out = thigh - along * (thigh * along).sum()
-    size = np.sqrt((out * out).sum())
+    along = tx * wx + ty * wy + tz * wz
+    ox, oy, oz = tx - along * wx, ty - along * wy, tz - along * wz
+    size = np.sqrt(ox * ox + oy * oy + oz * oz)
     if size < 1e-6:
         return
-    position[knee] = top + upper * (along * cosine + out / size * np.sqrt(1 - cosine * cosine))
-    position[heel] = top + along * distance
-    _turn(rotation[hip], thigh, position[knee] - top)
-    _turn(rotation[knee], shank, position[heel] - position[knee])
+    sine = np.sqrt(1 - cosine * cosine) / size
+    kx = upper * (wx * cosine + ox * sine)
+    ky = upper * (wy * cosine + oy * sine)
+    kz = upper * (wz * cosine + oz * sine)
+    position[knee, 0], position[knee, 1], position[knee, 2] = hx + kx, hy + ky, hz + kz
+    position[heel, 0] = hx + wx * distance
+    position[heel, 1] = hy + wy * distance
+    position[heel, 2] = hz + wz * distance
+    _turn(rotation[hip], tx, ty, tz, kx, ky, kz)
+    _turn(rotation[knee], lx, ly, lz, wx * distance - kx, wy * distance - ky, wz * distance - kz)
 
 
 @njit(cache=True)
 def place_feet(
-    contact: Any, ground: Any, locking: bool, legs: Any, below: Any, sole: Any,
+    y: Any, first: int, ground: Any, locking: bool, legs: Any, below: Any, sole: Any,
     lock: Any, hold: Any, lift: Any, position: Any, rotation: Any,
 ) -> None:  # fmt: skip
     """Hold feet in contact and keep feet out of the ground; changes the pose and the state of the feet.
 
-    contact: (C, 4) predicted left heel, left toe, right heel, right toe; ground: (C, 4) heights under them.
-    legs: (2, 4) of `leg_joints`; below: (2, J) bool, joints that a heel carries (the toe);
-    sole: (2,) of `sole_heights`.
-    lock (C, 2) share of the hold; hold (C, 2, 3) where the toe landed; lift (C, 2) smoothed rise of the heel.
+    y: (C, outputs), whose columns from `first` on are the contacts of left heel, left toe, right heel, right
+    toe. ground: (C, 4) heights under them. legs: (2, 4) of `leg_joints`; below: (2, J) bool of `carried`;
+    sole: (2,) of `sole_heights`. lock (C, 2) share of the hold; hold (C, 2, 2) x, z where the toe landed;
+    lift (C, 2) smoothed rise of the heel.
     """
-    shift = np.zeros(3)
     for c in range(position.shape[0]):
         for f in range(2):
             hip, knee, heel, toe = legs[f, 0], legs[f, 1], legs[f, 2], legs[f, 3]
+            x, z = position[c, toe, 0], position[c, toe, 2]
+            away_x, away_z = hold[c, f, 0] - x, hold[c, f, 1] - z
+            far = lock[c, f] * np.sqrt(away_x * away_x + away_z * away_z)
             if not locking:
                 lock[c, f] = 0.0
-            elif contact[c, 2 * f + 1] >= LOCK_AT:
+            elif y[c, first + 2 * f + 1] >= LOCK_AT and far < TOO_FAR:
                 if lock[c, f] < 1.0:
                     # Where the foot is seen now, so that contact found again midway does not pull it back.
-                    hold[c, f] = position[c, toe] + lock[c, f] * (hold[c, f] - position[c, toe])
+                    away_x, away_z = lock[c, f] * away_x, lock[c, f] * away_z
+                    hold[c, f, 0], hold[c, f, 1] = x + away_x, z + away_z
                 lock[c, f] = 1.0
             else:
                 lock[c, f] = max(0.0, lock[c, f] - RELEASE)
-            shift[0] = lock[c, f] * (hold[c, f, 0] - position[c, toe, 0])
-            shift[2] = lock[c, f] * (hold[c, f, 2] - position[c, toe, 2])
             heel_sunk = ground[c, 2 * f] + sole[0] - position[c, heel, 1]
             toe_sunk = ground[c, 2 * f + 1] + sole[1] - position[c, toe, 1]
             lift[c, f] += HEIGHT_MIX * (max(0.0, heel_sunk, toe_sunk) - lift[c, f])
-            shift[1] = lift[c, f]
-            if abs(shift[0]) + abs(shift[1]) + abs(shift[2]) < 1e-4:
+            away_x, away_z = lock[c, f] * away_x, lock[c, f] * away_z
+            if abs(away_x) + abs(away_z) + lift[c, f] < 1e-4:
                 continue
-            before = position[c, heel].copy()
-            reach(position[c], rotation[c], hip, knee, heel, shift)
-            moved = position[c, heel] - before
+            x, up, z = position[c, heel, 0], position[c, heel, 1], position[c, heel, 2]
+            reach(position[c], rotation[c], hip, knee, heel, away_x, lift[c, f], away_z)
+            x, up, z = position[c, heel, 0] - x, position[c, heel, 1] - up, position[c, heel, 2] - z
             for j in range(position.shape[1]):
                 if below[f, j]:
-                    position[c, j] += moved
+                    position[c, j, 0] += x
+                    position[c, j, 1] += up
+                    position[c, j, 2] += z
 
 
 def carried(skeleton: Skeleton, legs: np.ndarray) -> np.ndarray:

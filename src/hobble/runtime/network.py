@@ -48,7 +48,7 @@ class Network:
 
     @property
     def hurt_links(self) -> tuple[str, ...]:
-        """Links that were ever hurt in training, as the mean of their inputs tells; all where none is told."""
+        """Links that were hurt in training, as the means of their inputs tell; all where none tells."""
         means = self.x_mean[self.layout.x_injury]
         return tuple(name for name, mean in zip(self.links, means, strict=True) if mean > 0) or self.links
 

@@ -234,7 +234,9 @@ def _layer_crowd(w: Any, s: Any, b: Any, index: Any, share: Any, x: Any, y: Any)
     """y (C, out) of x (C, in): point by point, the characters that blend it in blocks of four."""
     block_x, block_y = np.zeros((BLOCK, w.shape[2]), np.float32), np.zeros((BLOCK, w.shape[1]), np.float32)
     members, shares = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.float32)
-    y[:] = np.float32(0)
+    for c in range(y.shape[0]):
+        for r in range(y.shape[1]):
+            y[c, r] = np.float32(0)
     for point in range(w.shape[0]):
         waiting = 0
         for n in range(index.size + 1):
@@ -242,7 +244,8 @@ def _layer_crowd(w: Any, s: Any, b: Any, index: Any, share: Any, x: Any, y: Any)
                 if index.flat[n] != point:
                     continue
                 members[waiting], shares[waiting] = n // index.shape[1], share.flat[n]
-                block_x[waiting] = x[members[waiting]]
+                for r in range(w.shape[2]):
+                    block_x[waiting, r] = x[members[waiting], r]
                 waiting += 1
             if waiting == BLOCK or (n == index.size and waiting > 0):
                 if waiting > 2:

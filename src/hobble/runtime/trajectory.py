@@ -93,9 +93,9 @@ def prepare(
     velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
     severity: Any, severity_target: Any, severity_step: float, step: int, side: float, points: Any,
 ) -> None:  # fmt: skip
-    """All of the above in one call, and severities (C, L) move toward their targets by `severity_step` at most.
+    """All of the above in one call, and severities (C, L) move toward their targets, at most by a step.
 
-    In this file because compiled code is kept on disk and renewed when its own file changes, not its callees'.
+    In this file because compiled code kept on disk is renewed when its own file changes, not its callees'.
     """
     follow_wish(wish_velocity, wish_direction, wish_strafe, wish_gait, velocity, target, strafe, gait)
     blend_future(velocity, target, strafe, position, direction, gait)

@@ -1,0 +1,86 @@
+"""The folder of .bin files of the original release, read and written: its ports play what Hobble trains.
+
+W0_000.bin .. W2_049.bin and b0_000.bin .. b2_049.bin hold the weights at phases i / 50, Xmean.bin, Xstd.bin,
+Ymean.bin and Ystd.bin the statistics: raw little-endian float32, row-major (out, in).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.core.files import atomic_path
+from hobble.core.quat import Array
+from hobble.runtime.network import STATISTICS, Network, catmull_rom, weights_at
+
+PHASES = 50
+CONTROL_POINTS = 4
+# Of single precision weights near 1; a folder of another spline than ours is off by far more.
+LARGEST_RESIDUAL = 1e-4
+
+
+def write_release(folder: str | Path, network: Network) -> None:
+    """Write the network's weights at 50 phases and its statistics, creating the folder."""
+    folder = Path(folder)
+    phases = np.arange(PHASES) / PHASES
+    for name, array in zip(
+        STATISTICS, (network.x_mean, network.x_std, network.y_mean, network.y_std), strict=True
+    ):
+        _write(folder / f"{name}.bin", array)
+    for i, (w, b) in enumerate(zip(network.weights, network.biases, strict=True)):
+        for letter, points in (("W", w), ("b", b)):
+            for k, array in enumerate(weights_at(points, phases)):
+                _write(folder / f"{letter}{i}_{k:03d}.bin", array)
+
+
+def read_release(folder: str | Path) -> dict[str, Array]:
+    """The folder as arrays W0 (4, out, in), b0 (4, out), ..., Xmean, ...: control points by least squares.
+
+    Raises InputError where a file is missing or of a wrong size, or the 50 phases do not lie on one cyclic
+    cubic with 4 control points.
+    """
+    folder = Path(folder)
+    arrays = {name: _read(folder / f"{name}.bin") for name in STATISTICS}
+    layers = len(sorted(folder.glob("b*_000.bin")))
+    if not layers:
+        raise InputError(folder, "no weights.npz and no W0_000.bin, b0_000.bin, ...: not a network")
+    size = len(arrays["Xmean"])
+    for i in range(layers):
+        biases = np.stack([_read(folder / f"b{i}_{k:03d}.bin") for k in range(PHASES)])
+        rows = biases.shape[1]
+        weights = np.stack([_read(folder / f"W{i}_{k:03d}.bin", rows * size) for k in range(PHASES)])
+        arrays[f"b{i}"] = _control_points(folder, f"b{i}", biases)
+        arrays[f"W{i}"] = _control_points(folder, f"W{i}", weights).reshape(CONTROL_POINTS, rows, size)
+        size = rows
+    return arrays
+
+
+def _control_points(folder: Path, name: str, phases: Array) -> Array:
+    """(4, n) control points of weights (50, n)."""
+    indices, coefficients = catmull_rom(np.arange(PHASES) / PHASES, CONTROL_POINTS)
+    basis = np.zeros((PHASES, CONTROL_POINTS))
+    np.add.at(basis, (np.arange(PHASES)[:, None], indices), coefficients)
+    points = np.linalg.lstsq(basis, phases.astype(float), rcond=None)[0]
+    residual = float(np.abs(basis @ points - phases).max())
+    if not residual < LARGEST_RESIDUAL:
+        raise InputError(
+            folder, f"{name} at 50 phases is no cyclic cubic of 4 control points (off by {residual:.2g})"
+        )
+    return points.astype(np.float32)
+
+
+def _read(path: Path, size: int | None = None) -> Array:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(path, "no such file") from error
+    if len(data) % 4 or not data or (size is not None and len(data) != 4 * size):
+        raise InputError(path, f"{len(data)} bytes" + (f", expected {4 * size}" if size else ""))
+    return np.frombuffer(data, "<f4").astype(np.float32)
+
+
+def _write(path: Path, array: Array) -> None:
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(np.ascontiguousarray(array, "<f4").tobytes())

@@ -1,0 +1,92 @@
+"""Small networks that need no data: one of random weights, one that always predicts the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.database.layout import RowLayout
+from hobble.runtime.network import Network
+
+MakeNetwork = Callable[..., Network]
+
+
+def mean_output(skeleton: Skeleton, layout: RowLayout, speed: float, turn: float) -> np.ndarray:
+    """Y of a figure in its rest pose that glides ahead at `speed` and turns by `turn` (the sign of Y) a
+    frame."""
+    y = np.zeros(layout.y_size, np.float32)
+    rest = np.tile([1.0, 0, 0, 0], (1, layout.joints, 1))
+    positions = forward_kinematics(skeleton, rest, np.array([[0.0, 93.0, 0.0]]))[1][0]
+    velocity = np.zeros((layout.joints, 3))
+    velocity[:, 2] = speed
+    y[layout.y_root_velocity] = 0, speed
+    y[layout.y_turn] = turn
+    y[layout.y_phase_change] = 0.017
+    y[layout.y_position][layout.future :] = speed * layout.step * np.arange(layout.future)
+    y[layout.y_direction][layout.future :] = 1
+    y[layout.y_joint_position] = positions.ravel()
+    y[layout.y_joint_velocity] = velocity.ravel()
+    return y
+
+
+@pytest.fixture
+def make_network(holden31: Skeleton) -> MakeNetwork:
+    """make(links=0, scale=1.0, speed=1.5, turn=0.0, control_points=4); scale 0 predicts the mean output."""
+
+    def make(
+        links: int = 0,
+        scale: float = 1.0,
+        speed: float = 1.5,
+        turn: float = 0.0,
+        control_points: int = 4,
+        skeleton: Skeleton = holden31,
+    ) -> Network:
+        layout = RowLayout(len(skeleton.joints), links=links)
+        rng = np.random.default_rng(5)
+        sizes = (layout.x_size, 23, 17, layout.y_size)
+        shapes = list(zip(sizes[1:], sizes, strict=False))
+        gain = [scale if i == len(shapes) - 1 else 1.0 for i in range(len(shapes))]
+        return Network(
+            tuple(
+                (g * rng.normal(0, n**-0.5, (control_points, m, n))).astype(np.float32)
+                for g, (m, n) in zip(gain, shapes, strict=True)
+            ),
+            tuple(
+                (g * rng.normal(0, 0.1, (control_points, m))).astype(np.float32)
+                for g, (m, n) in zip(gain, shapes, strict=True)
+            ),
+            np.zeros(layout.x_size, np.float32),
+            np.full(layout.x_size, 20, np.float32),
+            mean_output(skeleton, layout, speed, turn),
+            np.full(layout.y_size, 0.05, np.float32),
+            layout,
+            skeleton,
+            links=skeleton.link_names[:links],
+        )
+
+    return make
+
+
+@pytest.fixture
+def network(make_network: MakeNetwork) -> Network:
+    """A network of random weights around a gliding figure, without severities."""
+    return make_network()
+
+
+@pytest.fixture
+def steady(make_network: MakeNetwork) -> Network:
+    """A network that predicts a figure gliding straight ahead at 1.5 cm a frame, whatever it is told."""
+    return make_network(scale=0.0)
+
+
+@pytest.fixture
+def hurtable(make_network: MakeNetwork) -> Network:
+    """A network of random weights with 30 severities, of which all were seen in training."""
+    made = make_network(links=30)
+    mean = made.x_mean.copy()
+    mean[made.layout.x_injury] = 0.5
+    return replace(made, x_mean=mean)

@@ -1,0 +1,316 @@
+"""The character: what goes into the network, what comes out, and what the caller may do."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core import quat
+from hobble.core.errors import InputError
+from hobble.evaluation.motion_measures import foot_slide, largest_turn
+from hobble.runtime import Pose, ProceduralAnimation
+from hobble.runtime.axes import MATRICES, Axes
+from hobble.runtime.ground import Heightmap
+from hobble.runtime.network import load_network
+
+KNEE = "LeftUpLeg-LeftLeg"
+
+
+def walk(character: ProceduralAnimation, frames: int, **wishes) -> list[Pose]:
+    wishes = {"target_velocity": (0.5, 2.0)} | wishes
+    return [character.next_pose(**wishes) for _ in range(frames)]
+
+
+def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:
+    return 8 * np.sin(x / 60) + 5 * np.cos(z / 45)
+
+
+def test_the_row_is_that_of_the_definition(hurtable) -> None:
+    """X written out in numpy from the state, by the columns' names."""
+    character = ProceduralAnimation(hurtable)
+    walk(character, 90, injury={KNEE: 6.0}, terrain=hills)
+    seen = {}
+    evaluate = character._predictor.evaluate
+    character._predictor.evaluate = lambda *a: (
+        seen.update(state=copy.deepcopy(character.state)),
+        evaluate(*a),
+    )
+    character.next_pose((0.5, 2.0), (1, 0), "jog", {KNEE: 6.0}, hills)
+    state, layout, x = seen["state"], hurtable.layout, character._controller.x[0]
+    now = layout.window
+    position, direction = state.position[0], state.direction[0]
+
+    def to_root(v: np.ndarray, frame: int) -> np.ndarray:
+        q = quat.between(np.array([direction[frame, 0], 0, direction[frame, 1]]), np.array([0, 0, 1.0]))
+        return quat.rotate(q, v)
+
+    def level(v: np.ndarray) -> np.ndarray:
+        return np.stack([v[:, 0], np.zeros(len(v)), v[:, 1]], axis=1)
+
+    samples = np.array(layout.offsets) + now
+    places = to_root(level(position[samples] - position[now]), now)
+    np.testing.assert_allclose(x[layout.x_position], np.concatenate([places[:, 0], places[:, 2]]), atol=1e-4)
+    facing = to_root(level(direction[samples]), now)
+    np.testing.assert_allclose(x[layout.x_direction], np.concatenate([facing[:, 0], facing[:, 2]]), atol=1e-6)
+    np.testing.assert_allclose(x[layout.x_gait], state.gait[0, samples].T.ravel(), atol=1e-6)
+    left = 25 * np.stack([direction[samples, 1], -direction[samples, 0]], axis=1)
+    heights = np.array([hills(*(position[samples] + side * left).T) for side in (1, 0, -1)])
+    mean = heights[1].mean()
+    np.testing.assert_allclose(x[layout.x_terrain], (heights - mean).ravel(), atol=1e-4)
+    before = np.array([position[now - 1, 0], mean, position[now - 1, 1]])
+    joints = to_root(state.joint_position[0] - before, now - 1)
+    np.testing.assert_allclose(x[layout.x_joint_position], joints.ravel(), atol=1e-4)
+    velocities = to_root(state.joint_velocity[0], now - 1)
+    np.testing.assert_allclose(x[layout.x_joint_velocity], velocities.ravel(), atol=1e-5)
+    assert x[layout.x_injury][2] == 6.0
+    assert x[layout.x_injury].sum() == 6.0
+
+
+def test_the_pose_is_that_of_the_prediction(network) -> None:
+    character = ProceduralAnimation(network, foot_locking=False)
+    walk(character, 50, terrain=hills)
+    old = character.state.joint_position[0].copy()
+    pose = character.next_pose((0.5, 2.0), terrain=hills)
+    y, layout = character._controller.y[0].astype(float), network.layout
+    turn = quat.yaw(pose.yaw)
+
+    def joints(block: slice) -> np.ndarray:
+        return y[block].reshape(-1, 3)
+
+    predicted = quat.rotate(turn, joints(layout.y_joint_position)) + pose.root
+    carried = old + quat.rotate(turn, joints(layout.y_joint_velocity))
+    np.testing.assert_allclose(character.state.joint_position[0], (predicted + carried) / 2, atol=1e-4)
+    rotations = quat.mul(turn, quat.exp(joints(layout.y_joint_rotation)))
+    np.testing.assert_allclose(character.state.joint_rotation[0], rotations, atol=1e-6)
+    legs = character._controller._legs
+    others = np.setdiff1d(np.arange(layout.joints), [*legs.ravel(), 4, 5, 9, 10])
+    np.testing.assert_array_equal(pose.positions[others], character.state.joint_position[0][others])
+    assert pose.positions.shape == (31, 3)
+    assert pose.rotations.shape == (31, 4)
+
+
+def test_what_the_caller_does_to_a_pose_stays_with_the_caller(network) -> None:
+    left, right = ProceduralAnimation(network), ProceduralAnimation(network)
+    for _ in range(40):
+        pose, untouched = left.next_pose((1, 2)), right.next_pose((1, 2))
+        np.testing.assert_array_equal(pose.positions, untouched.positions)
+        for array in (pose.positions, pose.rotations, pose.contacts, pose.root, pose.severity):
+            array[...] = 1e6
+
+
+@pytest.mark.parametrize("count", [2, 5])
+def test_many_characters_are_so_many_single_ones(hurtable, count: int) -> None:
+    rng = np.random.default_rng(3)
+    velocity, facing = rng.normal(0, 2, (count, 2)), rng.normal(size=(count, 2))
+    gaits = ["walk", "jog", "crouch", "walk", "jog"][:count]
+    severity = rng.uniform(0, 10, count)
+    start = rng.normal(0, 100, (count, 3))
+    crowd = ProceduralAnimation(hurtable, characters=count, position=start)
+    alone = [ProceduralAnimation(hurtable, position=start[k]) for k in range(count)]
+    for _ in range(45):
+        many = crowd.next_pose(velocity, facing, gaits, {KNEE: severity}, hills)
+        for k, one in enumerate(alone):
+            single = one.next_pose(velocity[k], facing[k], gaits[k], {KNEE: severity[k]}, hills)
+    assert many.positions.shape == (count, 31, 3)
+    for k in range(count):
+        one = alone[k].next_pose(velocity[k], facing[k], gaits[k], {KNEE: severity[k]}, hills)
+    many = crowd.next_pose(velocity, facing, gaits, {KNEE: severity}, hills)
+    np.testing.assert_allclose(many.positions[-1], one.positions, atol=0.02)
+    np.testing.assert_allclose(many.phase[-1], one.phase, atol=1e-4)
+    assert single.severity.max() == pytest.approx(min(severity[-1], 7.5))
+
+
+def test_the_same_calls_give_the_same_motion(network) -> None:
+    first = ProceduralAnimation(network)
+    motion = [p.positions for p in walk(first, 30)]
+    first.reset()
+    np.testing.assert_array_equal(motion, [p.positions for p in walk(first, 30)])
+
+
+def test_reset_places_the_figure(steady) -> None:
+    character = ProceduralAnimation(steady, position=(100, 0, -50), facing=(1, 0, 0))
+    pose = character.next_pose((0, 0))
+    np.testing.assert_allclose(pose.root, [100, 0, -50])
+    assert pose.yaw == pytest.approx(np.pi / 2)
+    left, right = (steady.skeleton.role(f"{side}_hip") for side in ("left", "right"))
+    # Facing +X, the left is -Z.
+    assert pose.positions[left, 2] < -50 < pose.positions[right, 2]
+
+
+def test_gaits(network) -> None:
+    character = ProceduralAnimation(network)
+
+    def shares(velocity, gait=None) -> dict[str, float]:
+        character.next_pose(velocity, gait=gait)
+        wish = dict(zip(network.gaits, character._wish_gait[0], strict=True))
+        return {name: share for name, share in wish.items() if share}
+
+    assert shares((0, 0.05), "jog") == {"stand": 1}
+    assert shares((0, 0.05), "crouch") == {"stand": 1, "crouch": 1}
+    assert shares((0, 2.5)) == {"walk": 1}
+    assert shares((0, 7.0)) == {"jog": 1}
+    assert shares((0, 7.0), "crouch") == {"crouch": 1}
+    assert shares((0, 2.5), np.array([0, 0.5, 0.5, 0, 0, 0])) == {"walk": 0.5, "jog": 0.5}
+    with pytest.raises(KeyError, match="no gait 'moonwalk': stand, walk, jog"):
+        character.next_pose((0, 1), gait="moonwalk")
+
+
+def test_gait_blends_slowly_into_the_future(network) -> None:
+    character = ProceduralAnimation(network)
+    middle = network.layout.window
+    for n in range(1, 20):
+        character.next_pose((0, 2.5), gait="walk")
+        walk_share = character.state.gait[0, middle, 1]
+        assert walk_share == pytest.approx(1 - 0.9**n)
+        np.testing.assert_allclose(character.state.gait[0, middle:, 1], walk_share)
+
+
+def test_severities_come_on_at_their_rate_and_are_scaled(hurtable) -> None:
+    character = ProceduralAnimation(hurtable, severity_rate=5.0, severity_scale=2.0)
+    index = hurtable.links.index(KNEE)
+    on = [p.severity[index] for p in walk(character, 120, injury={KNEE: 10})]
+    np.testing.assert_allclose(on[:60], 5.0 / 60 * np.arange(1, 61))
+    assert on[-1] == pytest.approx(5.0)
+    kept = walk(character, 5)[-1]
+    assert kept.severity[index] == pytest.approx(5.0)
+    assert kept.severity.sum() == pytest.approx(5.0)
+    healed = walk(character, 120, injury={})[-1]
+    assert healed.severity.sum() == 0
+
+
+@pytest.mark.parametrize("injury", [{"LeftUpLeg-LeftLeg": 11}, {KNEE: -0.1}, {KNEE: np.nan}])
+def test_a_severity_out_of_range(hurtable, injury) -> None:
+    with pytest.raises(ValueError, match="from 0 to 10"):
+        ProceduralAnimation(hurtable).next_pose((0, 1), injury=injury)
+
+
+def test_unknown_links_are_named(hurtable, network) -> None:
+    with pytest.raises(KeyError, match="no link 'Tail': Hips-LHipJoint, "):
+        ProceduralAnimation(hurtable).next_pose((0, 1), injury={"Tail": 1})
+    with pytest.raises(KeyError, match="no severity inputs"):
+        ProceduralAnimation(network).next_pose((0, 1), injury={KNEE: 1})
+
+
+def test_terrain_as_function_heightmap_and_array(network) -> None:
+    cell = 4.0
+    grid = (np.arange(401) - 200) * cell
+    heights = hills(grid[None, :], grid[:, None])
+    coarse = Heightmap(heights, cell)
+    motions = [
+        [p.positions for p in walk(ProceduralAnimation(network), 40, terrain=terrain)]
+        for terrain in (hills, coarse, None)
+    ]
+    np.testing.assert_allclose(motions[0], motions[1], atol=0.2)
+    assert np.abs(np.subtract(motions[0], motions[2])).max() > 2
+    one, other = ProceduralAnimation(network), ProceduralAnimation(network)
+    np.testing.assert_array_equal(
+        walk(one, 9, terrain=heights)[-1].positions, walk(other, 9, terrain=Heightmap(heights))[-1].positions
+    )
+    with pytest.raises(TypeError, match="not str"):
+        ProceduralAnimation(network).next_pose((0, 1), terrain="hill")
+    with pytest.raises(ValueError, match="2 x 2"):
+        Heightmap(np.zeros((1, 5)))
+
+
+def test_heightmap_is_bilinear_and_goes_on_outside() -> None:
+    ground = Heightmap(np.array([[0.0, 10.0], [20.0, 50.0]]), cell=2.0, centre=(5.0, 7.0))
+    x, z = np.array([4.0, 6.0, 4.0, 6.0, 5.0, 99.0]), np.array([6.0, 6.0, 8.0, 8.0, 7.0, -99.0])
+    np.testing.assert_allclose(ground(x, z), [0, 10, 20, 50, 20, 10])
+
+
+@pytest.mark.parametrize("unit", ["cm", "m"])
+@pytest.mark.parametrize(("handed", "up"), MATRICES)
+def test_the_callers_axes(network, handed: str, up: str, unit: str) -> None:
+    """The same walk over the same hills, in the caller's terms, is the same walk, left and right included."""
+    axes = Axes(handed, up, unit)
+    vertical = "XYZ".index(up)
+    level = [k for k in range(3) if k != vertical]
+
+    def terrain(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        points = np.zeros((len(a), 3))
+        points[:, level] = np.stack([a, b], axis=1)
+        ours = axes.points_in(points)
+        return hills(ours[:, 0], ours[:, 2]) * axes.scale
+
+    native = ProceduralAnimation(network, position=(30, 0, 10), facing=(1, 0, 1))
+    theirs = ProceduralAnimation(
+        network,
+        axes=axes,
+        position=axes.points_out(np.array([30.0, 0, 10])),
+        facing=axes.directions_out(np.array([1.0, 0, 1])),
+    )
+    velocity = np.array([0.5, 0, 2.0])
+    for k in range(25):
+        a = native.next_pose(velocity, (1, 0, 0), terrain=hills)
+        wish = axes.points_out(velocity)
+        b = theirs.next_pose(
+            wish if k % 2 else wish[level], axes.directions_out(np.array([1.0, 0, 0])), None, None, terrain
+        )
+    np.testing.assert_allclose(axes.points_in(b.positions), a.positions, atol=1e-3)
+    np.testing.assert_allclose(axes.points_in(b.root), a.root, atol=1e-3)
+    assert b.positions[:, vertical].mean() > 0.5 * 93 * axes.scale
+    # A rotation takes the same bone to the same place in both conventions: M R v = R' M v.
+    bone = np.array([3.0, -2.0, 5.0])
+    np.testing.assert_allclose(
+        quat.rotate(b.rotations, axes.directions_out(bone)),
+        axes.directions_out(quat.rotate(a.rotations, bone)),
+        atol=1e-5,
+    )
+
+
+def test_sides_in_unity_and_unreal() -> None:
+    """The left hand of a figure that faces ahead is where those engines have left."""
+    left, up, ahead = np.eye(3)
+    unity, unreal, blender = Axes("left", "Y"), Axes("left", "Z"), Axes("right", "Z")
+    np.testing.assert_array_equal(
+        unity.directions_out(np.array([left, up, ahead])), [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    )
+    np.testing.assert_array_equal(
+        unreal.directions_out(np.array([left, up, ahead])), [[0, -1, 0], [0, 0, 1], [1, 0, 0]]
+    )
+    np.testing.assert_array_equal(
+        blender.directions_out(np.array([left, up, ahead])), [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    )
+    with pytest.raises(ValueError, match="handed is right or left"):
+        Axes("both")
+
+
+def test_a_network_without_skeleton_is_refused(tmp_path: Path, network) -> None:
+    with pytest.raises(ValueError, match="skeleton"):
+        ProceduralAnimation(replace(network, skeleton=None))
+    with pytest.raises(InputError, match="no such file"):
+        ProceduralAnimation.load(tmp_path / "missing.npz")
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("mode", ["constant", "linear", "cubic"])
+def test_the_released_network_does_not_fall_apart(shared: Path, holden31, mode: str) -> None:
+    """A minute of walking, jogging, crouching, strafing, stopping and turning on flat ground."""
+    network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
+    character = ProceduralAnimation(network, mode=mode)
+    poses = []
+    script = [
+        ((0, 2.5), None, "walk"), ((6, 3), None, "jog"), ((0, 2), None, "crouch"), ((2.5, 0), (0, 1), "walk"),
+        ((-1.5, -1.5), (0, 1), "walk"), ((0, 0), None, "walk"), ((0, 0), (-1, 0), "walk"), ((0, -2.5), None,
+        "walk"),
+    ]  # fmt: skip
+    for velocity, facing, gait in script:
+        poses += [character.next_pose(velocity, facing, gait) for _ in range(450)]
+    positions = np.array([p.positions for p in poses])
+    assert np.all(np.isfinite(positions))
+    hips = positions[:, 0, 1]
+    assert hips.min() > 60
+    assert hips.max() < 110
+    assert largest_turn(np.array([p.rotations for p in poses])) < 60
+    assert foot_slide(positions[:, [5, 10]], np.array([p.contacts for p in poses])).mean() < 2
+    # It goes where it is sent: the last walk leads toward -Z, the stop stands still.
+    root = np.array([p.root for p in poses])
+    assert root[-1, 2] - root[-200, 2] < -200
+    stop = root[5 * 450 + 200 : 6 * 450]
+    assert np.abs(stop - stop[0]).max() < 3
+    # Its turn in place ends facing -X, which a wrong sign of the turn would never reach.
+    assert abs(np.sin(poses[7 * 450 - 1].yaw) + 1) < 0.05

@@ -1,0 +1,135 @@
+"""Feet: legs that reach, feet that stay where they stand and out of the ground."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.core import quat
+from hobble.core.ik import two_bone_knee
+from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.feet import LOCK_AT, RELEASE, TOO_FAR, carried, leg_joints, place_feet, reach
+
+coordinate = st.floats(-25, 25)
+
+
+def crouched(skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (J, 3) and world rotations (J, 4) of a figure with bent knees, its left toe 6 cm up."""
+    local = np.tile([1.0, 0, 0, 0], (1, len(skeleton.joints), 1))
+    for side in ("left", "right"):
+        local[0, skeleton.role(f"{side}_hip")] = quat.from_axis_angle([1.0, 0, 0], -0.5)
+        local[0, skeleton.role(f"{side}_knee")] = quat.from_axis_angle([1.0, 0, 0], 0.9)
+    rotations, positions = forward_kinematics(skeleton, local, np.array([[0.0, 90.0, 0.0]]))
+    return positions[0], rotations[0]
+
+
+@given(coordinate, coordinate, coordinate)
+@settings(max_examples=40, deadline=None)
+def test_reach_is_two_bone_ik(holden31: Skeleton, x: float, y: float, z: float) -> None:
+    position, rotation = crouched(holden31)
+    hip, knee, heel, _ = leg_joints(holden31)[0]
+    before, turned = position.copy(), rotation.copy()
+    shift = np.array([x, y, z])
+    reach(position, rotation, hip, knee, heel, *shift)
+    upper, lower = (
+        np.linalg.norm(before[knee] - before[hip]),
+        np.linalg.norm(before[heel] - before[knee]),
+    )
+    pole = before[knee] - before[hip]
+    expected = two_bone_knee(before[hip], before[heel] + shift, pole, upper, lower)
+    np.testing.assert_allclose(position[knee], expected[0], atol=1e-6)
+    np.testing.assert_allclose(position[heel], expected[1], atol=1e-6)
+    # The bones' rotations go with them, the others stay.
+    for joint, child in ((hip, knee), (knee, heel)):
+        bone = quat.rotate(quat.inv(turned[joint]), before[child] - before[joint])
+        moved = quat.rotate(rotation[joint], bone)
+        np.testing.assert_allclose(moved, position[child] - position[joint], atol=1e-6)
+    others = [j for j in range(len(position)) if j not in (hip, knee)]
+    np.testing.assert_array_equal(rotation[others], turned[others])
+
+
+class Feet:
+    """`place_feet` with its state, on one figure."""
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.legs = leg_joints(skeleton)
+        self.below = carried(skeleton, self.legs)
+        self.lock, self.hold, self.lift = np.zeros((1, 2)), np.zeros((1, 2, 2)), np.zeros((1, 2))
+        self.base = crouched(skeleton)
+
+    def __call__(self, moved: np.ndarray, contact: float, ground: float = -100.0, locking: bool = True):
+        position, rotation = self.base[0][None] + moved, self.base[1][None].copy()
+        place_feet(
+            np.array([[contact, contact, 0, 0]], np.float32), 0, np.full((1, 4), ground), locking, self.legs,
+            self.below,
+            np.array([5.0, 4.0]), self.lock, self.hold, self.lift, position, rotation,
+        )  # fmt: skip
+        return position[0]
+
+
+def test_a_foot_in_contact_stays_and_is_let_go_slowly(holden31: Skeleton) -> None:
+    feet = Feet(holden31)
+    toe = holden31.role("left_toe")
+    step = np.array([0.0, 0, 1.5])
+    first = feet(0 * step, LOCK_AT)[toe]
+    for k in range(1, 8):
+        np.testing.assert_allclose(feet(k * step, 1.0)[toe], first, atol=1e-9)
+    free = feet.base[0][toe] + 8 * step
+    np.testing.assert_allclose(feet(8 * step, 0.0)[toe], free + (1 - RELEASE) * (first - free), atol=1e-6)
+    for _ in range(20):
+        last = feet(8 * step, 0.0)[toe]
+    np.testing.assert_allclose(last, free, atol=1e-9)
+
+
+def test_contact_found_again_holds_the_foot_where_it_is_seen(holden31: Skeleton) -> None:
+    feet = Feet(holden31)
+    toe = holden31.role("left_toe")
+    feet(np.zeros(3), 1.0)
+    seen = feet(np.array([0, 0, 5.0]), 0.0)[toe]
+    again = feet(np.array([0, 0, 5.0]), 1.0)[toe]
+    np.testing.assert_allclose(again, seen, atol=1e-9)
+
+
+def test_a_foot_is_not_held_too_far_away(holden31: Skeleton) -> None:
+    feet = Feet(holden31)
+    toe = holden31.role("left_toe")
+    for k in range(60):
+        moved = np.array([0, 0, 0.8 * k])
+        distance = np.linalg.norm(feet(moved, 1.0)[toe] - feet.base[0][toe] - moved)
+        assert distance < TOO_FAR + 0.8
+
+
+def test_without_locking_feet_move_freely(holden31: Skeleton) -> None:
+    feet = Feet(holden31)
+    toe = holden31.role("left_toe")
+    for k in range(3):
+        moved = np.array([0, 0, 2.0 * k])
+        np.testing.assert_allclose(feet(moved, 1.0, locking=False)[toe], feet.base[0][toe] + moved)
+
+
+def test_feet_are_lifted_out_of_the_ground(holden31: Skeleton) -> None:
+    feet = Feet(holden31)
+    toe, heel = holden31.role("left_toe"), holden31.role("left_heel")
+    ground = feet.base[0][toe, 1] + 6.0
+    for _ in range(20):
+        position = feet(np.zeros(3), 0.0, ground=ground)
+    assert position[toe, 1] >= ground + 4.0 - 1e-3
+    assert position[heel, 1] >= ground + 5.0 - 1e-3
+    np.testing.assert_allclose(
+        position[toe] - position[heel], feet.base[0][toe] - feet.base[0][heel], atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.3])
+def test_the_character_stands_on_the_ground_it_is_given(steady, slope: float) -> None:
+    character = ProceduralAnimation(steady)
+    skeleton = steady.skeleton
+    heights = [
+        character.next_pose((0, 1.5), terrain=lambda x, z: slope * z).positions[skeleton.role("hips"), 1]
+        for _ in range(200)
+    ]
+    # A figure that climbs a slope of .3 at 1.5 cm a frame rises .45 cm a frame.
+    np.testing.assert_allclose(np.diff(heights[120:]).mean(), slope * 1.5, atol=0.01)

@@ -1,0 +1,245 @@
+"""The network: its spline, its modes, its files."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.core.errors import InputError
+from hobble.runtime.network import Network, catmull_rom, load_network, weights_at
+from hobble.runtime.predictor import MODES, STORAGES, Predictor
+from hobble.runtime.release import read_release, write_release
+
+ROWS = 7
+
+
+def spline(points: np.ndarray, phase: float) -> np.ndarray:
+    """The definition (Holden et al. 2017, eq. 7), written out: cyclic cubic Catmull-Rom in float64."""
+    k = len(points)
+    scaled = k * phase
+    n = int(np.floor(scaled))
+    w = scaled - n
+    a0, a1, a2, a3 = (points[(n + i) % k].astype(float) for i in (-1, 0, 1, 2))
+    return (
+        a1
+        + w * (a2 / 2 - a0 / 2)
+        + w**2 * (a0 - 5 / 2 * a1 + 2 * a2 - a3 / 2)
+        + w**3 * (3 / 2 * a1 - 3 / 2 * a2 + a3 / 2 - a0 / 2)
+    )
+
+
+def reference(network: Network, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    """Y by blending the weights first, in float64, row by row."""
+    out = []
+    for row, p in zip(x, phase, strict=True):
+        h = (row - network.x_mean.astype(float)) / network.x_std
+        for i, (w, b) in enumerate(zip(network.weights, network.biases, strict=True)):
+            h = spline(w, p) @ h + spline(b, p)
+            if i < len(network.weights) - 1:
+                h = np.where(h > 0, h, np.expm1(h))
+        out.append(h * network.y_std + network.y_mean)
+    return np.array(out)
+
+
+def rows(network: Network, count: int = ROWS) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(1)
+    x = rng.normal(0, 20, (count, network.layout.x_size)).astype(np.float32)
+    return x, rng.random(count)
+
+
+def arrays(network: Network) -> dict[str, np.ndarray]:
+    out = {f"W{i}": w for i, w in enumerate(network.weights)}
+    out |= {f"b{i}": b for i, b in enumerate(network.biases)}
+    return out | {
+        "Xmean": network.x_mean, "Xstd": network.x_std, "Ymean": network.y_mean, "Ystd": network.y_std
+    }  # fmt: skip
+
+
+@given(st.floats(0, 1, exclude_max=True), st.integers(4, 9))
+@settings(max_examples=60, deadline=None)
+def test_spline_is_the_definition(phase: float, points: int) -> None:
+    table = np.random.default_rng(points).normal(size=(points, 3))
+    np.testing.assert_allclose(weights_at(table, phase)[0], spline(table, phase), atol=1e-12)
+    assert catmull_rom(phase, points)[1].sum() == pytest.approx(1)
+
+
+@pytest.mark.parametrize("points", [4, 6])
+def test_cubic_mode_is_exact(make_network, points: int) -> None:
+    network = make_network(control_points=points, scale=20.0)
+    x, phase = rows(network)
+    np.testing.assert_allclose(Predictor(network).predict(x, phase), reference(network, x, phase), atol=2e-4)
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("count", [3, 4, 5, 23])
+def test_a_crowd_is_so_many_single_characters(make_network, mode: str, storage: str, count: int) -> None:
+    network = make_network(scale=20.0)
+    predictor = Predictor(network, mode, storage)
+    x, phase = rows(network, count)
+    one_by_one = [predictor.predict(x[i : i + 1], phase[i : i + 1])[0] for i in range(count)]
+    np.testing.assert_allclose(predictor.predict(x, phase), one_by_one, atol=1e-4)
+
+
+def test_modes_approach_the_spline(make_network) -> None:
+    network = make_network(scale=20.0)
+    x, phase = rows(network, 40)
+    exact = Predictor(network).predict(x, phase)
+    error = {mode: np.abs(Predictor(network, mode).predict(x, phase) - exact).mean() for mode in MODES}
+    assert 0 < error["linear"] < error["constant"] < 0.05 * np.abs(exact - network.y_mean).max()
+    on_table = np.arange(10) / 10
+    some = x[:10]
+    at_points = Predictor(network, "linear").predict(some, on_table)
+    np.testing.assert_allclose(at_points, Predictor(network).predict(some, on_table), atol=1e-4)
+
+
+@given(st.floats(-2, 3))
+@settings(max_examples=50, deadline=None)
+def test_no_phase_leaves_the_table(phase: float) -> None:
+    from hobble.runtime.predictor import _phase
+
+    for kind, points in ((1, 50), (2, 10), (4, 4)):
+        index, share = np.zeros(kind, np.int64), np.zeros(kind, np.float32)
+        for p in (phase, 1.0, np.nextafter(1.0, 0.0), np.float64(np.float32(0.99999999))):
+            _phase(p, kind, points, index, share)
+            assert index.min() >= 0
+            assert index.max() < points
+            assert share.sum() == pytest.approx(1, abs=1e-6)
+
+
+def test_phase_one_is_the_last_entry_of_the_constant_table(make_network) -> None:
+    network = make_network(scale=20.0)
+    x, _ = rows(network, 1)
+    predictor = Predictor(network, "constant")
+    y = [predictor.predict(x, np.array([p]))[0] for p in (0.0, 0.985, 1.0)]
+    np.testing.assert_array_equal(y[1], y[2])
+    assert not np.allclose(y[0], y[2], atol=1e-4)
+
+
+def test_int16_storage_is_close(make_network) -> None:
+    network = make_network(scale=20.0)
+    x, phase = rows(network)
+    difference = Predictor(network, storage="int16").predict(x, phase) - Predictor(network).predict(x, phase)
+    assert 0 < np.abs(difference).max() < 1e-3 * np.abs(network.y_std * 20).max()
+
+
+def test_a_column_that_never_varied_is_ignored(network: Network) -> None:
+    std = network.x_std.copy()
+    std[5] = 0
+    blind = Predictor(replace(network, x_std=std))
+    x, phase = rows(network)
+    before = blind.predict(x, phase)
+    x[:, 5] += 1e6
+    np.testing.assert_array_equal(before, blind.predict(x, phase))
+
+
+def test_unknown_mode_and_storage(network: Network) -> None:
+    with pytest.raises(ValueError, match="constant, linear, cubic"):
+        Predictor(network, "quadratic")
+    with pytest.raises(ValueError, match="float32, int16"):
+        Predictor(network, "cubic", "float8")
+
+
+def test_weights_file_round_trip(tmp_path: Path, hurtable: Network, holden31) -> None:
+    meta = {
+        "layout": hurtable.layout.to_dict(),
+        "skeleton": holden31.to_dict(),
+        "links": list(hurtable.links),
+        "gaits": list(hurtable.gaits),
+    }
+    np.savez(tmp_path / "weights.npz", **arrays(hurtable), meta=np.array(json.dumps(meta)))
+    for path in (tmp_path, tmp_path / "weights.npz"):
+        back = load_network(path)
+        assert back.layout == hurtable.layout
+        assert back.links == hurtable.links == holden31.link_names
+        assert back.skeleton is not None
+        assert back.skeleton.joints == holden31.joints
+        assert back.sizes == hurtable.sizes
+        for a, b in zip(back.weights, hurtable.weights, strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+def test_a_file_without_meta_tells_its_layout(tmp_path: Path, hurtable: Network, holden31) -> None:
+    np.savez(tmp_path / "weights.npz", **arrays(hurtable))
+    back = load_network(tmp_path, holden31)
+    assert back.layout == hurtable.layout
+    assert back.links == holden31.link_names
+
+
+def test_hurt_links_are_those_of_training(make_network) -> None:
+    network = make_network(links=30)
+    assert network.hurt_links == network.links
+    network.x_mean[network.layout.x_injury.start + 3] = 0.2
+    assert network.hurt_links == network.links[3:4]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda a: a.pop("b1"), "no b1"),
+        (lambda a: a.pop("Ystd"), "no Ystd"),
+        (lambda a: a.update(W1=a["W1"][:, :, :-1]), "W1"),
+        (lambda a: a.update(W0=np.full_like(a["W0"], np.nan)), "not finite"),
+        (lambda a: a.update(Ymean=a["Ymean"][:-1]), "statistics"),
+        (lambda a: a.update({k: v[:3] for k, v in a.items() if k[0] in "Wb"}), "3 control points"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said(tmp_path: Path, network: Network, change, message: str) -> None:
+    broken = arrays(network)
+    change(broken)
+    np.savez(tmp_path / "weights.npz", **broken)
+    with pytest.raises(InputError, match=message) as error:
+        load_network(tmp_path)
+    assert "weights.npz" in str(error.value)
+
+
+def test_skeleton_of_another_size(tmp_path: Path, network: Network, holden31) -> None:
+    np.savez(tmp_path / "weights.npz", **arrays(network))
+    short = replace(holden31, joints=holden31.joints[:-1])
+    with pytest.raises(InputError, match="31 joints"):
+        load_network(tmp_path, short)
+
+
+def test_release_folder_round_trip(tmp_path: Path, network: Network, holden31) -> None:
+    write_release(tmp_path / "pfnn", network)
+    assert (tmp_path / "pfnn" / "W2_049.bin").stat().st_size == 4 * network.weights[2][0].size
+    back = load_network(tmp_path / "pfnn", holden31)
+    for a, b in zip((*back.weights, *back.biases), (*network.weights, *network.biases), strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-6)
+    x, phase = rows(network)
+    np.testing.assert_allclose(
+        Predictor(back).predict(x, phase), Predictor(network).predict(x, phase), atol=1e-4
+    )
+
+
+def test_what_is_wrong_with_a_release_folder_is_said(tmp_path: Path, network: Network) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        load_network(tmp_path)
+    write_release(tmp_path, network)
+    path = tmp_path / "W1_007.bin"
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-4])
+    with pytest.raises(InputError, match=r"W1_007.bin: .* bytes, expected"):
+        read_release(tmp_path)
+    path.write_bytes(bytes(np.frombuffer(whole, "<f4") + np.float32(1)))
+    with pytest.raises(InputError, match="W1 at 50 phases is no cyclic cubic"):
+        read_release(tmp_path)
+
+
+@pytest.mark.shared
+def test_released_network_predicts_its_rows(shared: Path) -> None:
+    data = np.load(shared / "reference" / "original_rows_LocomotionFlat09_000.npz")
+    network = load_network(shared / "reference" / "pfnn_release_network.npz")
+    assert network.sizes == (342, 512, 512, 311)
+    assert network.parameters == 597_815
+    y = Predictor(network, "constant").predict(data["X"], data["P"].astype(float))
+    assert np.abs(y - data["Y_release"]).max() < 1e-3
+    stored = Predictor(network, "constant", "int16").predict(data["X"], data["P"].astype(float))
+    joints = network.layout.y_joint_position
+    assert np.abs(stored - y)[:, joints].max() < 0.01  # 0.1 mm

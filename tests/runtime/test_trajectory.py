@@ -1,0 +1,150 @@
+"""The trajectory: how wishes bend it, how predictions move it, and that left is the mirror of right."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.database.layout import RowLayout
+from hobble.runtime import trajectory
+
+LAYOUT = RowLayout(31)
+LENGTH, MIDDLE = 2 * LAYOUT.window, LAYOUT.window
+
+
+def path(
+    speed: float = 1.5, yaw: float = 0.0, stand: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position (1, T, 2), direction and gait of a straight glide that is at the origin now."""
+    ahead = np.array([np.sin(yaw), np.cos(yaw)])
+    t = np.arange(LENGTH) - MIDDLE
+    position = (t[:, None] * speed * ahead)[None]
+    gait = np.zeros((1, LENGTH, 6))
+    gait[..., 0], gait[..., 1] = stand, 1 - stand
+    return position, np.tile(ahead, (1, LENGTH, 1)), gait
+
+
+def prediction(
+    speed: float = 1.5, side: float = 0.0, turn: float = 0.0, phase_change: float = 0.02
+) -> np.ndarray:
+    """Y (1, outputs) of a steady glide with a turn, future samples on the arc that it makes."""
+    y = np.zeros((1, LAYOUT.y_size), np.float32)
+    y[0, LAYOUT.y_root_velocity] = side, speed
+    y[0, LAYOUT.y_turn], y[0, LAYOUT.y_phase_change] = turn, phase_change
+    t = LAYOUT.step * np.arange(LAYOUT.future)
+    y[0, LAYOUT.y_position] = np.concatenate([side * t, speed * t])
+    y[0, LAYOUT.y_direction] = np.concatenate([np.sin(-turn * t), np.cos(turn * t)])
+    return y
+
+
+def move(y: np.ndarray, position, direction, gait, phase=None) -> np.ndarray:
+    phase = np.zeros(1) if phase is None else phase
+    trajectory.advance(y, trajectory.advance_columns(LAYOUT), position, direction, gait, phase)
+    return phase
+
+
+def test_a_prediction_moves_root_and_phase() -> None:
+    position, direction, gait = path(yaw=0.7)
+    before = position.copy()
+    phase = move(prediction(speed=2.0, side=0.5), position, direction, gait, np.array([0.99]))
+    ahead, left = np.array([np.sin(0.7), np.cos(0.7)]), np.array([np.cos(0.7), -np.sin(0.7)])
+    np.testing.assert_allclose(position[0, MIDDLE], 2.0 * ahead + 0.5 * left, atol=1e-6)
+    np.testing.assert_allclose(position[0, :MIDDLE], before[0, 1 : MIDDLE + 1])
+    assert phase[0] == pytest.approx(0.01, abs=1e-6)
+
+
+def test_yaw_velocity_is_that_of_the_world_seen_from_the_root() -> None:
+    # q[i+1] q[i]^-1 of a figure that turns left by a has yaw -a, so a negative output turns it left (to +X).
+    position, direction, gait = path()
+    move(prediction(turn=-0.05), position, direction, gait)
+    np.testing.assert_allclose(direction[0, MIDDLE], [np.sin(0.05), np.cos(0.05)], atol=1e-6)
+
+
+def test_future_samples_stand_at_their_frames_and_the_line_goes_on_past_them() -> None:
+    position, direction, gait = path()
+    y = prediction(speed=2.0)
+    y[0, LAYOUT.y_position][: LAYOUT.future] = [0, 1, 4, 9, 16, 25]
+    move(y, position, direction, gait)
+    root = position[0, MIDDLE]
+    samples = position[0, MIDDLE :: LAYOUT.step] - root
+    np.testing.assert_allclose(samples, np.stack([[0, 1, 4, 9, 16, 25], 20.0 * np.arange(6)], 1), atol=1e-5)
+    steps = np.diff(position[0, MIDDLE + 50 :], axis=0)
+    np.testing.assert_allclose(steps, np.tile([0.9, 2.0], (9, 1)), atol=1e-5)
+    np.testing.assert_allclose(np.linalg.norm(direction[0], axis=-1), 1, atol=1e-6)
+
+
+def test_a_standing_figure_is_held() -> None:
+    position, direction, gait = path(stand=1.0)
+    phase = move(prediction(speed=2.0, turn=0.1), position, direction, gait)
+    np.testing.assert_allclose(position[0, MIDDLE], 0, atol=1e-12)
+    np.testing.assert_allclose(direction[0, MIDDLE], [0, 1], atol=1e-12)
+    assert phase[0] == pytest.approx(0.1 * 0.02)
+
+
+def test_a_wish_that_is_kept_changes_nothing() -> None:
+    position, direction, gait = path(1.5, 0.4)
+    before = position.copy(), direction.copy()
+    ahead = direction[:, MIDDLE].copy()
+    trajectory.blend_future(1.5 * ahead, ahead, np.zeros(1), position, direction, gait)
+    np.testing.assert_allclose(position, before[0], atol=1e-9)
+    np.testing.assert_allclose(direction, before[1], atol=1e-9)
+
+
+@pytest.mark.parametrize(("strafe", "position_bias", "direction_bias"), [(0.0, 0.5, 2.0), (1.0, 1.0, 0.5)])
+def test_shares_of_the_wish(strafe: float, position_bias: float, direction_bias: float) -> None:
+    position, direction, gait = path(1.0)
+    velocity, target = np.array([[3.0, 1.0]]), np.array([[1.0, 0.0]])
+    trajectory.blend_future(velocity, target, np.array([strafe]), position, direction, gait)
+    t = np.arange(1, MIDDLE) / MIDDLE
+    share = 1 - (1 - t) ** position_bias
+    np.testing.assert_allclose(np.diff(position[0, MIDDLE:], axis=0)[:, 0], 3.0 * share, atol=1e-9)
+    np.testing.assert_allclose(np.diff(position[0, MIDDLE:], axis=0)[:, 1], 1.0, atol=1e-9)
+    yaw = np.arctan2(direction[0, MIDDLE + 1 :, 0], direction[0, MIDDLE + 1 :, 1])
+    np.testing.assert_allclose(yaw, np.pi / 2 * (1 - (1 - t) ** direction_bias), atol=1e-9)
+
+
+def test_wishes_are_taken_up_at_their_rates() -> None:
+    _, _, gait = path(stand=1.0)
+    velocity, direction, strafe = np.zeros((1, 2)), np.array([[0.0, 1.0]]), np.zeros(1)
+    shares = np.eye(6)[[1]]
+    wish = np.array([[2.0, 0.0]]), np.array([[1.0, 0.0]]), np.ones(1), shares
+    trajectory.follow_wish(*wish, velocity, direction, strafe, gait)
+    np.testing.assert_allclose(velocity, [[1.8, 0]])
+    np.testing.assert_allclose(np.arctan2(*direction[0]), 0.9 * np.pi / 2)
+    np.testing.assert_allclose(strafe, 0.9)
+    np.testing.assert_allclose(gait[0, MIDDLE], [0.9, 0.1, 0, 0, 0, 0])
+    np.testing.assert_allclose(gait[0, MIDDLE - 1], [1, 0, 0, 0, 0, 0])
+
+
+def test_the_ground_is_looked_up_on_both_sides() -> None:
+    position, direction, _ = path(1.0, yaw=np.pi / 2)
+    points = np.zeros((1, LAYOUT.samples, 3, 2))
+    trajectory.sample_points(position, direction, LAYOUT.step, 25.0, points)
+    # Facing +X, the left is -Z.
+    for s, offset in enumerate(LAYOUT.offsets):
+        np.testing.assert_allclose(points[0, s], [[offset, -25], [offset, 0], [offset, 25]], atol=1e-9)
+
+
+@given(
+    st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3), st.floats(0, 1), st.floats(-0.1, 0.1),
+    st.floats(-1, 1),
+)  # fmt: skip
+@settings(max_examples=30, deadline=None)
+def test_left_is_the_mirror_of_right(
+    x: float, z: float, facing: float, strafe: float, turn: float, side: float
+) -> None:
+    results = []
+    for sign in (1, -1):
+        position, direction, gait = path(1.5)
+        mirror = np.array([sign, 1.0])
+        for _ in range(3):
+            wish = np.array([[sign * x, z]]), np.array([[np.sin(sign * facing), np.cos(facing)]])
+            trajectory.blend_future(*wish, np.array([strafe]), position, direction, gait)
+            move(prediction(side=sign * side, turn=sign * turn), position, direction, gait)
+        results.append((position * mirror, direction * mirror))
+    np.testing.assert_allclose(results[0][0], results[1][0], atol=1e-6)
+    # A target right behind may be turned to on either side.
+    if abs(abs(facing) - np.pi) > 0.15:
+        np.testing.assert_allclose(results[0][1], results[1][1], atol=1e-6)
