@@ -81,7 +81,7 @@ def widened(half: Any) -> Any:
     return np.uint32(np.uint32(half) << np.uint32(16)).view(np.float32)
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True)
+@numba.njit(parallel=True, error_model="numpy", cache=True)
 def _draw(mask: Any, counter: Any, keep: Any) -> Any:
     """Fill `mask` from a counter (splitmix64: Steele et al. 2014); returns the counter of the next one."""
     rows, width = mask.shape
@@ -111,7 +111,7 @@ def _coefficients(p: Any, c: Any) -> None:
         c[row, (knot + 2) % points] += (t - 1) * t * t / 2
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True)
+@numba.njit(parallel=True, error_model="numpy", cache=True)
 def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
     """e (B, K (n + 1)) and slope (B, n) of x (B, n)."""
     rows, width = x.shape
@@ -132,7 +132,7 @@ def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
                 e[row, start + width] = share
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True)
+@numba.njit(parallel=True, error_model="numpy", cache=True)
 def _contract(de: Any, c: Any, slope: Any, d: Any) -> None:
     """d (B, n): the sum of de (B, K (n + 1)) over the control points, times the slope."""
     rows, width = d.shape

@@ -10,6 +10,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from hobble.training.products import product
+
 
 @dataclass(frozen=True)
 class Network:
@@ -49,7 +51,7 @@ class Network:
         for number, layer in enumerate(self.layers):
             if number:
                 x = torch.nn.functional.elu(x)
-            x = expand(x, c) @ layer.flatten(1).T
+            x = product(expand(x, c), layer.flatten(1))
         return x
 
 

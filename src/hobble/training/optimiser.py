@@ -67,7 +67,7 @@ def _sweep_on_cpu(w: Tensor, m: Tensor, v: Tensor, g: Tensor, *numbers: float) -
     _fused(*arrays, *(arrays[0].dtype.type(n) for n in (*numbers, EPSILON)))
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True)
+@numba.njit(parallel=True, error_model="numpy", cache=True)
 def _fused(
     w: Any, m: Any, v: Any, g: Any, b1: Any, b2: Any, rate: Any, root: Any, slope: Any, epsilon: Any
 ) -> None:

@@ -38,7 +38,7 @@ def write_weights(
 
 
 def meta(network: Network, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
-    """What the columns mean and where the network comes from, as JSON."""
+    """What the columns mean and where the network comes from, as JSON; the joints keep their order."""
     links = ["-".join(link) for link in database.skeleton["links"]] if database.layout.links else []
     return json.dumps(
         {
