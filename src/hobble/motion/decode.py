@@ -17,12 +17,13 @@ STANDARD_RATES = (120, 60, 30, 24, 25, 50, 100, 90, 48, 72, 144, 180, 200, 240, 
 class Decoded:
     """F frames of J joints, in the file's unit.
 
-    rotations: (F, J, 4) local. root: (F, 3). translations: (F, J, 3) local joint positions where some joint
-    but the root really moves in its parent, else None. notes: sentences on what was dropped or kept.
+    rotations: (F, J, 4) local. root: (F, 3). offsets: (J, 3). translations: (F, J, 3) local joint positions where
+    some joint but the root really moves in its parent, else None. notes: what was found out, in sentences.
     """
 
     rotations: Array = field(repr=False)
     root: Array = field(repr=False)
+    offsets: Array = field(repr=False)
     translations: Array | None = field(repr=False)
     notes: list[str]
 
@@ -65,37 +66,61 @@ def decode(bvh: Bvh, still: float) -> Decoded:
             columns = starts[members][:, None] + np.array(turns)
             order = "".join(channels[i][0] for i in turns)
             rotations[:, members] = quat.from_euler(np.radians(bvh.values[:, columns]), order)
-    root, translations, notes = _positions(bvh, starts, still)
-    return Decoded(quat.continuous(rotations), root, translations, notes)
+    root, offsets, translations, notes = _positions(bvh, starts, still)
+    return Decoded(quat.continuous(rotations), root, offsets, translations, notes)
 
 
-def _positions(bvh: Bvh, starts: Array, still: float) -> tuple[Array, Array | None, list[str]]:
-    local = np.broadcast_to(bvh.offsets, (len(bvh), *bvh.offsets.shape)).copy()
-    moved = []
+def _positions(bvh: Bvh, starts: Array, still: float) -> tuple[Array, Array, Array | None, list[str]]:
+    """Root positions, offsets, and local positions where some joint moves in its parent; what was done."""
+    root = np.broadcast_to(bvh.offsets[0], (len(bvh), 3)).copy()
+    below = []
     for j, channels in enumerate(bvh.channels):
-        for i, name in enumerate(channels):
-            if name.endswith("position"):
-                local[:, j, "XYZ".index(name[0])] = bvh.values[:, starts[j] + i]
-                moved.append(j)
-    below = sorted({j for j in moved if j})
-    notes: list[str] = []
-    if below:
-        zeros = np.abs(local[:, below]).max() <= still
-        if zeros and np.abs(bvh.offsets[below]).max() > still:
-            local[:, below] = bvh.offsets[below]
-            notes.append(f"The position channels of {len(below)} joints are zero and were dropped.")
-            below = []
-    far = np.abs(local - bvh.offsets).max(axis=(0, 2)) if len(bvh) else np.zeros(len(bvh.names))
-    real = [j for j in below if far[j] > still]
-    if below and not real:
-        notes.append(
-            f"The position channels of {len(below)} joints below the root only repeat their offsets and were "
-            "dropped."
+        places = {name[0]: starts[j] + i for i, name in enumerate(channels) if name.endswith("position")}
+        if j == 0:
+            for axis, column in places.items():
+                root[:, "XYZ".index(axis)] = bvh.values[:, column]
+        elif places:
+            below.append((j, places))
+    if not below:
+        return root, bvh.offsets, None, []
+    local = np.broadcast_to(bvh.offsets, (len(bvh), *bvh.offsets.shape)).copy()
+    for j, places in below:
+        for axis, column in places.items():
+            local[:, j, "XYZ".index(axis)] = bvh.values[:, column]
+    return root, *_judged(bvh, local, [j for j, _ in below], still)
+
+
+def _judged(bvh: Bvh, local: Array, joints: list[int], still: float) -> tuple[Array, Array | None, list[str]]:
+    """Which position channels carry motion, which only repeat an offset, and which contradict it."""
+    if np.abs(local[:, joints]).max() <= still < np.abs(bvh.offsets[joints]).max():
+        return (
+            bvh.offsets,
+            None,
+            [f"The position channels of {len(joints)} joints are zero and were dropped."],
         )
-    if real:
-        names = ", ".join(bvh.names[j] for j in real[:6]) + (", ..." if len(real) > 6 else "")
+    middle = np.median(local, axis=0)
+    moving = [j for j in joints if np.abs(local[:, j] - middle[j]).max() > still]
+    wrong = [j for j in joints if j not in moving and np.abs(middle[j] - bvh.offsets[j]).max() > still]
+    offsets = bvh.offsets.copy()
+    offsets[wrong] = middle[wrong]
+    notes = []
+    if wrong:
         notes.append(
-            f"{len(real)} of {len(below)} joints with position channels move in their parents and keep "
-            f"that motion ({names})."
+            f"The OFFSET of {_some(bvh, wrong)} contradicts its position channels, which never change; their "
+            "value was used."
         )
-    return local[:, 0].copy(), (local if real else None), notes
+    if moving:
+        notes.append(
+            f"{len(moving)} of {len(joints)} joints with position channels really move in their parents "
+            f"({_some(bvh, moving)})."
+        )
+    else:
+        notes.append(
+            f"The position channels of {len(joints)} joints below the root only repeat their offsets and "
+            "were dropped."
+        )
+    return offsets, (local if moving else None), notes
+
+
+def _some(bvh: Bvh, joints: list[int]) -> str:
+    return ", ".join(bvh.names[j] for j in joints[:6]) + (", ..." if len(joints) > 6 else "")

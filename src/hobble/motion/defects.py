@@ -53,18 +53,24 @@ class Jump:
 def repair(clip: Clip) -> Repaired:
     """Find broken frames and mend what can be mended; a sound clip comes back as it is."""
     clip, sentences = _mend_glitches(clip)
-    jumps = find_jumps(clip)
-    first, last, said = _sound_part(clip, jumps)
-    sentences += said
-    inner = [jump for jump in jumps if first <= jump.after < last]
-    inner, bridges = _short_pieces(inner, clip.fps)
-    for start, end, jump in bridges:
+    left, bridges = _short_pieces(clip, find_jumps(clip))
+    for start, end, _ in bridges:
         clip = _interpolate(clip, start, end)
-        frames = f"frames {start + 1} to {end + 1}" if end > start else f"frame {start + 1}"
-        sentences.append(f"{jump}; {frames} were bridged by interpolation.")
-    for jump in inner:
-        clip = _smooth(clip, jump.after)
-        sentences.append(f"{jump}; the motion was blended over {BLEND:g} s to each side.")
+    first, last = _without_edges(len(clip), clip.fps, left)
+    teleports = [jump.after for jump in left if jump.root > TELEPORT and first <= jump.after < last]
+    edges = [first - 1, *teleports, last]
+    first, last = max(((a + 1, b) for a, b in pairwise(edges)), key=lambda part: part[1] - part[0])
+    for start, end, jump in bridges:
+        if first <= start <= end <= last:
+            sentences.append(f"{jump}; {_frames(start, end)} were bridged by interpolation.")
+    for jump in left:
+        if first <= jump.after < last:
+            clip = _smooth(clip, jump.after)
+            sentences.append(f"{jump}; the motion was blended over {BLEND:g} s to each side.")
+    if first > 0:
+        sentences.append(_cut_sentence(clip, 0, first - 1, left, first - 1))
+    if last < len(clip) - 1:
+        sentences.append(_cut_sentence(clip, last + 1, len(clip) - 1, left, last))
     return Repaired(_cut(clip, first, last), first, sentences)
 
 
@@ -111,47 +117,47 @@ def _mend_glitches(clip: Clip) -> tuple[Clip, list[str]]:
     return clip, sentences
 
 
-def _sound_part(clip: Clip, jumps: list[Jump]) -> tuple[int, int, list[str]]:
-    """First and last frame worth keeping, and a sentence for what is not."""
-    first, last = 0, len(clip) - 1
-    head = [j for j in jumps if j.after + 1 <= HEAD * clip.fps and 2 * (j.after + 1) <= len(clip)]
+def _without_edges(frames: int, fps: float, jumps: list[Jump]) -> tuple[int, int]:
+    """First and last frame of what is left without short pieces before the first and after the last jump."""
+    first, last = 0, frames - 1
+    head = [j.after for j in jumps if j.after + 1 <= HEAD * fps and 2 * (j.after + 1) <= frames]
     if head:
-        first = head[-1].after + 1
-    tail = [j for j in jumps if last - j.after <= TAIL * clip.fps and j.after - first > len(clip) // 2]
-    if tail:
-        last = tail[0].after
-    teleports = [j.after for j in jumps if first <= j.after < last and j.root > TELEPORT]
-    edges = [first - 1, *teleports, last]
-    start, end = max(pairwise(edges), key=lambda piece: piece[1] - piece[0])
-    first, last = start + 1, end
-    sentences = []
-    if first > 0:
-        sentences.append(_cut_sentence(clip, 0, first - 1, jumps, first - 1))
-    if last < len(clip) - 1:
-        sentences.append(_cut_sentence(clip, last + 1, len(clip) - 1, jumps, last))
-    return first, last, sentences
+        first = head[-1] + 1
+    tail = [j.after for j in jumps if last - j.after <= TAIL * fps and j.after - first > frames // 2]
+    return first, tail[0] if tail else last
+
+
+def _frames(start: int, end: int) -> str:
+    return f"frames {start + 1} to {end + 1}" if end > start else f"frame {start + 1}"
 
 
 def _cut_sentence(clip: Clip, start: int, end: int, jumps: list[Jump], after: int) -> str:
     jump = next(j for j in jumps if j.after == after)
     still = np.abs(quat.positive(clip.rotations[start : end + 1]) - quat.IDENTITY).max(axis=-1) < 1e-6
     what = " (no pose)" if still.mean() > NO_POSE else ""
-    frames = f"Frames {start + 1} to {end + 1}" if end > start else f"Frame {start + 1}"
-    return f"{frames}{what} cut off: {jump}."
+    return f"{_frames(start, end).capitalize()}{what} cut off: {jump}."
 
 
-def _short_pieces(jumps: list[Jump], fps: float) -> tuple[list[Jump], list[tuple[int, int, Jump]]]:
-    """Part jumps into those left and pairs that enclose a few broken frames: (first, last, jump)."""
+def _short_pieces(clip: Clip, jumps: list[Jump]) -> tuple[list[Jump], list[tuple[int, int, Jump]]]:
+    """Part jumps into those left and pairs that enclose a few broken frames: (first, last, jump).
+
+    A pair does so where the motion after it goes on from the motion before it.
+    """
     left: list[Jump] = []
     bridges = []
+    step = np.linalg.norm(np.diff(clip.positions, axis=0), axis=-1).max(axis=1)
+    usual = float(np.median(step)) if len(step) else 0.0
     i = 0
     while i < len(jumps):
-        near = i + 1 < len(jumps) and jumps[i + 1].after - jumps[i].after <= BRIDGE * fps
-        if near:
-            bridges.append((jumps[i].after + 1, jumps[i + 1].after, jumps[i]))
-        else:
-            left.append(jumps[i])
-        i += 2 if near else 1
+        a, b = jumps[i].after, jumps[i + 1].after if i + 1 < len(jumps) else len(clip)
+        if b - a <= BRIDGE * clip.fps and b + 1 < len(clip):
+            apart = np.linalg.norm(clip.positions[b + 1] - clip.positions[a], axis=-1).max()
+            if apart < JUMP + 3 * usual * (b + 1 - a):
+                bridges.append((a + 1, b, jumps[i]))
+                i += 2
+                continue
+        left.append(jumps[i])
+        i += 1
     return left, bridges
 
 

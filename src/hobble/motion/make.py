@@ -25,6 +25,9 @@ from hobble.motion.rig import Match, Target, clean_names, leg_length, load_skele
 STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
 SAME = 1e-3  # cm: offsets this near to the skeleton's are the skeleton's
 
+KEPT = "What joints move in their parents was kept."
+DROPPED = "What joints move in their parents was dropped, since the clip was put on other bone lengths."
+
 
 @dataclass(frozen=True)
 class Source:
@@ -114,7 +117,7 @@ def _unit(path: Path, rig: Skeleton, unit: str | float) -> tuple[float, str]:
 
 
 def _scaled(name: str, rig: Skeleton, decoded: Decoded, fps: float, unit: float) -> Clip:
-    offsets = rig.offsets * unit
+    offsets = decoded.offsets * unit
     offsets[0] = 0.0
     ends = {joint: (x * unit, y * unit, z * unit) for joint, (x, y, z) in rig.end_sites.items()}
     skeleton = replace(rig, offsets=offsets, end_sites=ends)
@@ -142,14 +145,19 @@ def fit_skeleton(clip: Clip, match: Match, target: Skeleton, proportions: str) -
         order = np.array([clip.skeleton.index(name) for name in target.joints])
         own = _reordered(clip, order, target)
         if np.abs(own.skeleton.offsets - target.offsets).max() <= SAME:
-            return replace(own, skeleton=target), []
+            own = replace(own, skeleton=target)
+            return own, _kept(own)
         if proportions == "clip":
-            return own, []
+            return own, _kept(own)
     made = retarget_clip(clip, plan(clip.skeleton, target, match.sources))
     notes = []
     if clip.translations is not None:
-        notes.append("Joints' motion in their parents is lost: the clip was put on another skeleton.")
+        notes.append(DROPPED)
     return made, notes
+
+
+def _kept(clip: Clip) -> list[str]:
+    return [] if clip.translations is None else [KEPT]
 
 
 def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:

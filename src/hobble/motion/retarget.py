@@ -28,6 +28,7 @@ LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "hee
 STANDING = (
     0.8  # cm a frame at 60 Hz: a heel slower than this is treated as standing, at most where it is slow
 )
+STRAIGHT = 0.5  # cm: a knee nearer than this to the line from hip to ankle is taken to point forward
 MOST_TILT = np.radians(6.0) / 2  # half the angle by which a foot is tilted at most
 
 
@@ -161,7 +162,7 @@ def _hold_heel(how: Retarget, rotations: Array, side: str, heel: Array, toe: Arr
 
 
 def standing_runs(point: Array, slow: float, shortest: int) -> list[tuple[int, int]]:
-    """Runs [first, last) of `shortest` frames or more in which a point (F, 3) moves less than `slow` a frame."""
+    """Runs [first, last) of `shortest` frames or more in which a point (F, 3) moves less than `slow` each."""
     speed = np.linalg.norm(np.diff(point, axis=0), axis=1)
     still = np.concatenate([[False], speed < slow, [False]])
     starts = np.flatnonzero(~still[:-1] & still[1:])
@@ -186,12 +187,21 @@ def _reach(how: Retarget, rotations: Array, root: Array, side: str, toe: Array) 
     rest = rest_positions(skeleton)
     thigh, shank, foot = rest[knee] - rest[hip], rest[heel] - rest[knee], rest[ball] - rest[heel]
     ankle = toe - quat.rotate(rotations[:, heel], foot)
-    forward = quat.rotate(rest_frame(skeleton), np.array([0.0, 0.0, 1.0]))
-    pole = quat.rotate(rotations[:, hip], forward)
+    pole = _knee_direction(rotations[:, hip], rotations[:, knee], thigh, shank, rest_frame(skeleton))
     lengths = float(np.linalg.norm(thigh)), float(np.linalg.norm(shank))
     middle, ankle = two_bone_knee(start, ankle, pole, *lengths)
     rotations[:, hip] = aim(rotations[:, hip], thigh, middle - start)
     rotations[:, knee] = aim(rotations[:, knee], shank, ankle - middle)
+
+
+def _knee_direction(hip: Array, knee: Array, thigh: Array, shank: Array, rest: Array) -> Array:
+    """Where the knee points: off the line from hip to ankle, and, the straighter the leg, forward."""
+    along = quat.rotate(hip, thigh)
+    line = along + quat.rotate(knee, shank)
+    line /= np.linalg.norm(line, axis=-1, keepdims=True)
+    bend = along - line * np.sum(along * line, axis=-1, keepdims=True)
+    straight = np.clip(STRAIGHT - np.linalg.norm(bend, axis=-1, keepdims=True), 0.0, None)
+    return bend + straight * quat.rotate(hip, quat.rotate(rest, np.array([0.0, 0.0, 1.0])))
 
 
 def _position(skeleton: Skeleton, rotations: Array, root: Array, joint: int) -> Array:

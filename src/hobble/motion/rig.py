@@ -17,6 +17,7 @@ from hobble.core.skeleton import Skeleton
 # Centimetres per unit of the file; the CMU files count in inches / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
 LEG = 80.0  # thigh and shank of an adult of ordinary size, cm
+KNOWN = 0.75  # share of a clip's joints that a skeleton must know by name to be its rig
 LEG_RANGE = (50.0, 125.0)
 LIMBS = ("shoulder", "hip", "knee", "heel", "toe")
 MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") for part in LIMBS))
@@ -74,24 +75,38 @@ def match_rig(path: Path, rig: Skeleton, target: Target, folder: str | Path) -> 
         return Match(
             target.skeleton.name, target.skeleton.roles, True, {name: name for name in target.skeleton.joints}
         )
-    best: Match | None = None
+    best, known = _share(rig, target.skeleton), None
     for file in sorted(Path(folder).glob("*.yaml")):
-        if file.stem == target.skeleton.name:
-            continue
-        known = load_skeleton(file)
-        sources = _sources(rig, known, target)
-        if sources and (best is None or len(sources) > len(best.sources)):
-            best = Match(file.stem, _roles(rig, known.skeleton), False, sources)
-    if best is None:
-        shown = "; ".join(differences[:4]) + (
-            f"; and {len(differences) - 4} more" if len(differences) > 4 else ""
-        )
+        other = load_skeleton(file)
+        if _share(rig, other.skeleton) > best:
+            best, known = _share(rig, other.skeleton), other
+    if known is None or best < KNOWN:
+        raise _refusal(path, f"another skeleton than {target.skeleton.name}", differences)
+    differences = _unfit(rig, known.skeleton)
+    if differences:
+        raise _refusal(path, f"looks like the rig {known.skeleton.name}, but", differences)
+    sources = {a: b for a, b in joint_pairs(known, target).items() if b in rig.joints}
+    if not sources:
         raise InputError(
             path,
-            f"another skeleton than {target.skeleton.name}, and no skeleton file maps it: {shown}",
-            fix="Name the right skeleton in the data set, or add a map to config/skeletons/.",
+            f"its rig is {known.skeleton.name}, which no map leads from to {target.skeleton.name}",
+            fix="Add a map to config/skeletons/.",
         )
-    return best
+    return Match(known.skeleton.name, _roles(rig, known.skeleton), False, sources)
+
+
+def _refusal(path: Path, problem: str, differences: list[str]) -> InputError:
+    more = f"; and {len(differences) - 4} more" if len(differences) > 4 else ""
+    return InputError(
+        path,
+        f"{problem}: {'; '.join(differences[:4])}{more}",
+        fix="Name the right skeleton in the data set, or describe this rig in config/skeletons/.",
+    )
+
+
+def _share(rig: Skeleton, known: Skeleton) -> float:
+    """How many of the clip's joints have names of a known skeleton, 0 to 1."""
+    return len(set(rig.joints) & set(known.joints)) / len(rig.joints)
 
 
 def _differences(rig: Skeleton, target: Skeleton) -> list[str]:
@@ -116,35 +131,26 @@ def _roles(rig: Skeleton, known: Skeleton) -> dict[str, str]:
     return {role: joint for role, joint in known.roles.items() if joint in rig.joints}
 
 
-def _sources(rig: Skeleton, known: Target, target: Target) -> dict[str, str]:
-    """Target joint -> the clip's joint, where the clip is on the skeleton `known`; empty where it is not.
+def _unfit(rig: Skeleton, known: Skeleton) -> list[str]:
+    """What keeps a rig from being used as a known one, in words.
 
-    A rig may lack fingers or a nose of the known skeleton, but nothing that plays a mandatory role, and it
-    may have joints that nobody knows, as long as they are fewer than those that are known.
+    It may lack fingers or eyes, but nothing that plays a mandatory role, and may have joints unknown to all.
     """
-    roles = _roles(rig, known.skeleton)
-    common = set(rig.joints) & set(known.skeleton.joints)
-    if any(role not in roles for role in MANDATORY) or 2 * len(common) < len(rig.joints):
-        return {}
-    if not _same_order(rig, known.skeleton):
-        return {}
-    pairs = joint_pairs(known, target)
-    return {mine: source for mine, source in pairs.items() if source in common}
+    roles = _roles(rig, known)
+    found = [f"joint {known.roles[role]} ({role}) is missing" for role in MANDATORY if role not in roles]
+    mine, wanted = _nearest(rig, known), _nearest(known, rig)
+    return found + [
+        f"joint {n} hangs from {mine[n]}, not from {p}" for n, p in wanted.items() if mine[n] != p
+    ]
 
 
-def _same_order(rig: Skeleton, known: Skeleton) -> bool:
-    """Whether the joints both have hang from one another in the same way."""
-
-    def ancestors(skeleton: Skeleton) -> dict[str, str | None]:
-        other = rig if skeleton is known else known
-        out: dict[str, str | None] = {}
-        for name, p in zip(skeleton.joints, skeleton.parents, strict=True):
-            up = None if p < 0 else skeleton.joints[p]
-            out[name] = up if up is None or up in other.joints else out[up]
-        return out
-
-    a, b = ancestors(rig), ancestors(known)
-    return all(a[name] == b[name] for name in a if name in b)
+def _nearest(skeleton: Skeleton, other: Skeleton) -> dict[str, str | None]:
+    """Of every joint that both skeletons have: the nearest joint above it that both have."""
+    above: dict[str, str | None] = {}
+    for name, p in zip(skeleton.joints, skeleton.parents, strict=True):
+        up = None if p < 0 else skeleton.joints[p]
+        above[name] = up if up is None or up in other.joints else above[up]
+    return {name: up for name, up in above.items() if name in other.joints}
 
 
 def joint_pairs(source: Target, target: Target) -> dict[str, str]:

@@ -1,0 +1,126 @@
+"""Broken frames are found where they were put in, named, and mended; sound clips come back untouched."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hobble.core import quat
+from hobble.core.errors import InputError
+from hobble.motion.defects import find_jumps, repair
+
+
+def with_rest_pose(clip, frames, root=None):
+    rotations, place = clip.rotations.copy(), clip.root.copy()
+    rotations[frames] = quat.IDENTITY
+    if root is not None:
+        place[frames] = root
+    return replace(clip, rotations=rotations, root=place)
+
+
+def top_speed(clip):
+    return np.linalg.norm(np.diff(clip.positions, axis=0), axis=-1).max()
+
+
+@pytest.mark.parametrize("fps", [24.0, 30.0, 60.0, 120.0])
+def test_a_sound_clip_comes_back_as_it_is(walker, holden31, fps):
+    clip = walker(holden31, int(4 * fps), fps)
+    mended = repair(clip)
+    assert mended.clip is clip
+    assert (mended.first, mended.sentences) == (0, [])
+
+
+@pytest.mark.parametrize("fps", [30.0, 60.0, 120.0])
+def test_a_rest_pose_in_front_is_cut(walker, holden31, fps):
+    clip = walker(holden31, int(2 * fps), fps)
+    mended = repair(with_rest_pose(clip, [0]))
+    assert mended.first == 1
+    assert len(mended.clip) == len(clip) - 1
+    np.testing.assert_array_equal(mended.clip.rotations, clip.rotations[1:])
+    assert mended.sentences[0].startswith("Frame 1 (no pose) cut off")
+
+
+def test_zeroed_last_frames_are_cut(walk):
+    mended = repair(with_rest_pose(walk, slice(-3, None), 0.0))
+    assert (mended.first, len(mended.clip)) == (0, len(walk) - 3)
+    assert mended.sentences[0].startswith("Frames 239 to 241 (no pose) cut off")
+    assert "between frames 238 and 239" in mended.sentences[0]
+
+
+def test_after_a_teleport_the_longer_part_is_kept(walk):
+    moved = replace(walk, root=walk.root + np.where(np.arange(241) >= 100, 200.0, 0.0)[:, None])
+    mended = repair(moved)
+    assert (mended.first, len(mended.clip)) == (100, 141)
+    assert mended.sentences[0].startswith("Frames 1 to 100 cut off")
+    assert find_jumps(mended.clip) == []
+
+
+def test_a_single_wrong_frame_is_replaced_by_the_middle(walk):
+    wrong = replace(walk, rotations=walk.rotations.copy())
+    wrong.rotations[120, 2] = quat.mul(
+        wrong.rotations[120, 2], quat.from_axis_angle(np.array([1.0, 0, 0]), 0.5)
+    )
+    mended = repair(wrong)
+    assert len(mended.clip) == 241
+    assert mended.sentences == [s for s in mended.sentences if s.startswith("Frame 121 is off by")]
+    apart = np.linalg.norm(mended.clip.positions - walk.positions, axis=-1)
+    assert apart.max() < 1.0
+
+
+def test_a_few_broken_frames_in_the_middle_are_bridged(walk):
+    mended = repair(with_rest_pose(walk, slice(120, 126), 0.0))
+    assert len(mended.clip) == 241
+    assert "frames 121 to 126 were bridged by interpolation" in mended.sentences[0]
+    apart = np.linalg.norm(mended.clip.positions - walk.positions, axis=-1)
+    assert apart.max() < 5.0
+    assert top_speed(mended.clip) < 1.5 * top_speed(walk)
+
+
+def test_a_jump_at_a_seam_is_blended_and_the_path_goes_on(walk):
+    first, second = slice(0, 100), slice(60, 160)
+    turned = walk.rotations[second].copy()
+    arm = walk.skeleton.role("left_shoulder")
+    turned[:, arm] = quat.mul(turned[:, arm], quat.from_axis_angle(np.array([0, 0, 1.0]), 0.6))
+    root = np.concatenate([walk.root[first], walk.root[second] + [0, 0, 50]])
+    seam = replace(walk, rotations=np.concatenate([walk.rotations[first], turned]), root=root)
+    mended = repair(seam)
+    assert "between frames 100 and 101; the motion was blended" in mended.sentences[0]
+    assert top_speed(mended.clip) < 1.5 * top_speed(walk)
+    assert find_jumps(mended.clip) == []
+    assert np.diff(mended.clip.root[:, 2]).min() > 0
+
+
+def test_refusing_names_the_file_and_the_frames(walk, bvh, make):
+    path = bvh(with_rest_pose(walk, slice(-3, None), 0.0))
+    clip, report = make(path)
+    assert len(clip) == 119
+    assert report["source_start"] == 0
+    with pytest.raises(InputError, match=r"walk.bvh: Frames 239 to 241 .* Set motion.defects: repair"):
+        make(path, defects="refuse")
+
+
+def test_where_the_clip_begins_is_reported(walk, bvh, make):
+    clip, report = make(bvh(with_rest_pose(walk, slice(0, 3))))
+    assert report["source_start"] == 3
+    np.testing.assert_allclose(clip.root, walk.root[3::2], atol=1e-6)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    ("file", "said", "frames"),
+    [
+        ("pfnn/LocomotionFlat04_000", "Frames 2333 to 2428 cut off", 1166),
+        ("pfnn/LocomotionFlat04_000_mirror", "Frames 2333 to 2428 cut off", 1166),
+        ("cmu/07_12", "Frames 1 to 2 (no pose) cut off", 131),
+        ("cmu/02_01", "Frame 1 (no pose) cut off", 172),
+        ("cmu/03_02", "Frames 1 to 51 cut off", 158),
+        ("cmu/16_17", "Frame 475 is off", 259),
+    ],
+)
+def test_known_defects_of_real_files(shared, make, file, said, frames):
+    clip, report = make(shared / f"mocap/{file}.bvh", proportions="clip")
+    assert any(said in sentence for sentence in report["repairs"])
+    assert len(clip) == frames
+    assert np.all(clip.root[:, 1] > 40)

@@ -1,0 +1,291 @@
+"""From files to clips: units, axes, frame rates, channels, skeletons."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.core import quat
+from hobble.core.errors import InputError
+from hobble.motion.decode import frame_rate
+from hobble.motion.resample import sample_positions, sample_rotations, sample_times
+
+
+def test_a_clip_on_the_skeleton_passes_through_untouched(walk, bvh, make):
+    clip, report = make(bvh(walk))
+    assert report["repairs"] == []
+    assert (report["unit"], report["up"], report["source_fps"], report["source_frames"]) == (
+        1.0,
+        "+Y",
+        120.0,
+        241,
+    )
+    assert (clip.fps, len(clip), report["frames"]) == (60.0, 121, 121)
+    assert quat.angle(clip.rotations, walk.rotations[::2]).max() < 1e-6
+    np.testing.assert_allclose(clip.root, walk.root[::2], atol=1e-6)
+    np.testing.assert_array_equal(clip.skeleton.offsets, walk.skeleton.offsets)
+
+
+@pytest.mark.parametrize("order", ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"])
+def test_any_rotation_order(walk, bvh, make, order):
+    clip, _ = make(bvh(walk, order=order))
+    assert quat.angle(clip.rotations, walk.rotations[::2]).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit"),
+    [(1.0, 1.0), (1 / 2.54, 2.54), (0.01, 100.0), (10.0, 0.1), (1 / 5.6444, 5.6444), (1 / 30.48, 30.48)],
+)
+def test_the_unit_is_found_from_the_legs(walk, bvh, make, scaled, factor, unit):
+    clip, report = make(bvh(scaled(walk, factor), decimals=12))
+    assert report["unit"] == unit
+    np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=2e-3 if factor < 1 else 1e-4)
+
+
+def test_the_unit_can_be_overruled(walk, bvh, make):
+    clip, report = make(bvh(walk), unit=2.0, proportions="clip")
+    assert report["unit"] == 2.0
+    np.testing.assert_allclose(clip.positions, 2 * walk.positions[::2], atol=1e-3)
+
+
+def test_a_rig_of_no_known_size_is_refused(walk, bvh, make, scaled):
+    with pytest.raises(InputError, match=r"walk.bvh: no unit makes this rig a person.*Set motion.unit"):
+        make(bvh(scaled(walk, 500.0)))
+
+
+def z_up(clip):
+    """As a program with Z up writes it: its rest pose along Z, too."""
+    turn = quat.from_axis_angle(np.array([1.0, 0, 0]), np.pi / 2)
+    rotations = quat.mul(quat.mul(turn, clip.rotations), quat.inv(turn))
+    skeleton = replace(clip.skeleton, offsets=quat.rotate(turn, clip.skeleton.offsets))
+    return replace(clip, skeleton=skeleton, rotations=rotations, root=quat.rotate(turn, clip.root))
+
+
+def left_handed(clip):
+    flip = np.array([-1.0, 1, 1])
+    skeleton = replace(clip.skeleton, offsets=clip.skeleton.offsets * flip)
+    return replace(clip, skeleton=skeleton, rotations=clip.rotations * [1, 1, -1, -1], root=clip.root * flip)
+
+
+def facing_x(clip):
+    """The same motion on a rig whose rest pose faces +X."""
+    turn = quat.yaw(np.pi / 2)
+    rotations = quat.mul(quat.mul(turn, clip.rotations), quat.inv(turn))
+    rotations[:, 0] = quat.mul(clip.rotations[:, 0], quat.inv(turn))
+    skeleton = replace(clip.skeleton, offsets=quat.rotate(turn, clip.skeleton.offsets))
+    return replace(clip, skeleton=skeleton, rotations=rotations)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (z_up, {"up": "+Z", "handedness": "right"}),
+        (left_handed, {"up": "+Y", "handedness": "left"}),
+        (facing_x, {"up": "+Y", "handedness": "right", "rest_facing": "+X"}),
+        (lambda clip: left_handed(z_up(clip)), {"up": "+Z", "handedness": "left"}),
+    ],
+)
+def test_axes_are_found_said_and_put_right(walk, bvh, make, change, said):
+    clip, report = make(bvh(change(walk)))
+    assert {key: report[key] for key in said} == said
+    np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
+    assert quat.angle(clip.rotations, walk.rotations[::2]).max() < 1e-5
+
+
+def test_axes_can_be_overruled(walk, bvh, make):
+    clip, report = make(bvh(walk), handedness="left", proportions="clip")
+    assert report["handedness"] == "left"
+    np.testing.assert_allclose(clip.positions * [-1, 1, 1], walk.positions[::2], atol=1e-4)
+    clip, report = make(bvh(walk), up="Z", proportions="clip")
+    np.testing.assert_allclose(clip.positions[..., 1], walk.positions[::2, :, 2], atol=1e-4)
+
+
+def test_a_wrong_frame_time_can_be_overruled(walk, bvh, make):
+    path = bvh(walk, edit=lambda s: s.replace("0.00833333", "0.06666667"))
+    wrong, report = make(path)
+    assert report["source_fps"] == 15.0
+    assert len(wrong) == 961
+    right, report = make(path, source_fps=120.0)
+    assert report["source_fps"] == 120.0
+    np.testing.assert_allclose(right.root, walk.root[::2], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "fps"),
+    [
+        ("0.008333", 120), ("0.0083333", 120), ("0.00833333", 120), ("0.0166667", 60), ("0.016667", 60),
+        ("0.0333333", 30), ("0.0333", 30), ("0.033333", 30), ("0.04", 25), ("0.0416667", 24),
+        ("0.02", 50),
+        ("0.01", 100), ("0.0111111", 90), ("0.066667", 15), ("8.33333e-3", 120), ("0.005", 200),
+    ],
+)  # fmt: skip
+def test_frame_times_as_written_mean_standard_rates(text, fps):
+    assert frame_rate(float(text), text) == pytest.approx(fps, rel=1e-5)
+
+
+def test_film_rate_stays_itself():
+    assert frame_rate(0.0417083, "0.0417083") == pytest.approx(23.976, abs=1e-3)
+
+
+@pytest.mark.parametrize("rate", [24, 25, 30, 50, 90, 120])
+def test_resampling_keeps_time_and_stays_on_the_shorter_way(walk, rate):
+    times = sample_times(len(walk), 120, rate)
+    assert len(times) == int(240 * rate / 120) + 1
+    rotations = sample_rotations(walk.rotations, times)
+    assert np.abs(np.linalg.norm(rotations, axis=-1) - 1).max() < 1e-12
+    assert np.sum(rotations[1:] * rotations[:-1], axis=-1).min() > 0
+    np.testing.assert_allclose(sample_positions(walk.root, times)[-1], walk.root[round(times[-1])], atol=1e-9)
+
+
+def test_every_second_frame_is_exact(walk):
+    times = sample_times(241, 120, 60)
+    np.testing.assert_array_equal(times, np.arange(0, 241, 2))
+    picked = sample_rotations(walk.rotations, times)
+    assert np.abs(np.sum(picked * walk.rotations[::2], axis=-1)).min() > 1 - 1e-15
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(1, 50), st.sampled_from([24, 25, 30, 50, 60, 90, 120]), st.sampled_from([30, 60, 120]))
+def test_sample_times_lie_in_the_clip(frames, source, target):
+    times = sample_times(frames, source, target)
+    assert times[0] == 0
+    assert times[-1] <= frames - 1
+    assert frames - 1 - times[-1] < source / target + 1e-6
+    np.testing.assert_allclose(np.diff(times), source / target, atol=1e-9)
+
+
+def test_angles_that_wrap_do_not_show(walk, bvh, make):
+    """The same angles written as 181 and -179 degrees by turns give the same rotations between the frames."""
+    spun = replace(walk, rotations=walk.rotations.copy())
+    spun.rotations[:, 0] = quat.mul(quat.yaw(np.linspace(0, 4 * np.pi, len(walk))), spun.rotations[:, 0])
+    clip, _ = make(bvh(spun, decimals=6), fps=50.0)
+    step = quat.angle(clip.rotations[1:], clip.rotations[:-1])
+    assert step.max() < 0.5
+    assert np.sum(clip.rotations[1:] * clip.rotations[:-1], axis=-1).min() > 0
+
+
+def test_six_channels_that_repeat_the_offsets_are_dropped_and_said(walk, bvh, make):
+    repeated = replace(walk, translations=np.tile(walk.skeleton.offsets, (len(walk), 1, 1)))
+    clip, report = make(bvh(repeated))
+    assert clip.translations is None
+    assert "only repeat their offsets and were dropped" in report["repairs"][0]
+    np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
+
+
+def test_six_channels_that_move_are_kept_and_said(walk, bvh, make):
+    moving = np.tile(walk.skeleton.offsets, (len(walk), 1, 1))
+    moving[:, 3, 1] += np.linspace(0, 5, len(walk))
+    clip, report = make(bvh(replace(walk, translations=moving)), proportions="clip")
+    assert clip.translations is not None
+    np.testing.assert_allclose(clip.translations[:, 3], moving[::2, 3], atol=1e-5)
+    assert (
+        "1 of 30 joints with position channels really move in their parents (LeftLeg)" in report["repairs"][0]
+    )
+    assert "kept" in report["repairs"][1]
+
+
+def test_what_cannot_go_to_other_bones_is_dropped_and_said(walk, bvh, make, scaled):
+    moving = np.tile(walk.skeleton.offsets, (len(walk), 1, 1))
+    moving[:, 3, 1] += np.linspace(0, 5, len(walk))
+    path = bvh(scaled(replace(walk, translations=moving), 1.1), edit=None)
+    clip, report = make(path)
+    assert clip.translations is None
+    assert "dropped" in report["repairs"][-1]
+
+
+def test_a_wrong_offset_gives_way_to_channels_that_never_change(walk, bvh, make):
+    repeated = replace(walk, translations=np.tile(walk.skeleton.offsets, (len(walk), 1, 1)))
+    clip, report = make(
+        bvh(repeated, edit=lambda s: s.replace("0.000000 -4.500000 13.500000", "0 -4.5 0", 1))
+    )
+    assert "OFFSET of LeftToeBase contradicts its position channels" in report["repairs"][0]
+    assert clip.translations is None
+    np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
+
+
+def test_six_channels_of_zeros_add_nothing(walk, bvh, make):
+    zeros = replace(walk, translations=np.zeros((len(walk), 31, 3)))
+    clip, report = make(bvh(zeros))
+    assert "zero and were dropped" in report["repairs"][0]
+    np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
+
+
+def test_prefixes_of_names_do_not_matter(walk, bvh, make):
+    path = bvh(walk, edit=lambda s: s.replace("ROOT ", "ROOT my rig:").replace("JOINT ", "JOINT my rig:"))
+    clip, _ = make(path)
+    assert clip.skeleton.joints == walk.skeleton.joints
+
+
+def test_joints_in_another_order_are_sorted(walk, bvh, make, holden31):
+    order = np.array([0, *range(11, 31), *range(6, 11), *range(1, 6)])
+    back = {int(old): new for new, old in enumerate(order)}
+    shuffled = replace(
+        holden31,
+        joints=tuple(holden31.joints[i] for i in order),
+        parents=tuple(-1 if holden31.parents[i] < 0 else back[holden31.parents[i]] for i in order),
+        offsets=holden31.offsets[order],
+    )
+    clip, _ = make(bvh(replace(walk, skeleton=shuffled, rotations=walk.rotations[:, order])))
+    np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
+
+
+def test_another_skeleton_is_refused_with_what_differs(walk, bvh, make):
+    path = bvh(walk, edit=lambda s: s.replace("JOINT LThumb", "JOINT LeftPalm"))
+    with pytest.raises(InputError) as raised:
+        make(path)
+    text = str(raised.value)
+    assert "another skeleton than holden31" in text
+    assert "joint LThumb is missing" in text
+    assert "joint LeftPalm is not in the skeleton" in text
+
+
+def test_another_hierarchy_is_refused_with_what_differs(walk, bvh, make, holden31):
+    parents = list(holden31.parents)
+    parents[holden31.index("LThumb")] = holden31.index("LeftForeArm")
+    path = bvh(replace(walk, skeleton=replace(holden31, parents=tuple(parents))))
+    with pytest.raises(InputError, match="joint LThumb hangs from LeftForeArm, not from LeftHand"):
+        make(path)
+
+
+@pytest.mark.parametrize("declared", [240, 242])
+def test_one_frame_off_is_repaired_or_refused(walk, bvh, make, declared):
+    path = bvh(walk, edit=lambda s: s.replace("Frames: 241", f"Frames: {declared}"))
+    clip, report = make(path)
+    assert len(clip) == 121
+    assert f"declares {declared} frames and holds 241" in report["repairs"][0]
+    with pytest.raises(InputError, match=f"declares {declared} frames and holds 241"):
+        make(path, defects="refuse")
+
+
+def test_two_makings_are_equal(walk, bvh, make):
+    path = bvh(walk)
+    a, first = make(path)
+    b, second = make(path)
+    assert first == second
+    assert a.rotations.tobytes() == b.rotations.tobytes()
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("file", ["cmu/105_16", "cmu/16_21"])
+def test_round_trip_120_60_120_stays_within_2_mm(shared, make, file):
+    from hobble.motion.make import resample
+
+    source, _ = make(shared / f"mocap/{file}.bvh", fps=120.0, proportions="clip")
+    again = resample(resample(source, 60.0), 120.0)
+    apart = np.linalg.norm(again.positions - source.positions[: len(again)], axis=-1)
+    assert apart.mean() < 0.2
+
+
+@pytest.mark.shared
+def test_every_shared_clip_becomes_a_clip(shared, make):
+    for file in sorted((shared / "mocap").glob("*/*.bvh")):
+        clip, report = make(file)
+        assert np.isfinite(clip.positions).all(), file.name
+        assert report["unit_name"] == ("cm" if report["rig"] == "mixamo55" else "CMU"), file.name
+        assert (report["up"], report["handedness"], report["rest_facing"]) == ("+Y", "right", "+Z"), file.name
+        height = clip.positions[..., 1].max(axis=1) - clip.positions[..., 1].min(axis=1)
+        assert 80 < np.median(height) < 200, file.name

@@ -1,0 +1,183 @@
+"""Reading BVH: what the wild holds is read, what is broken is refused with its place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.motion.read import read_bvh
+
+SMALL = """HIERARCHY
+ROOT Hips
+{
+	OFFSET 0 0 0
+	CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation
+	JOINT mixamorig:Left Leg
+	{
+		OFFSET 1 -2e1 3.5
+		CHANNELS 3 Yrotation Xrotation Zrotation
+		End Site
+		{
+			OFFSET 0 -10 0
+		}
+		End Site
+		{
+			OFFSET 0 0 10
+		}
+	}
+}
+MOTION
+Frames: 2
+Frame Time: 0.0333333
+1 2 3 4 5 6 7 8 9
+1.5e1 -2 3 4 5 6 7 8 -9
+"""
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text: str | bytes):
+        path = tmp_path / "clip.bvh"
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return write
+
+
+def test_reads_names_offsets_channels_and_values(written):
+    clip = read_bvh(written(SMALL))
+    assert clip.names == ("Hips", "mixamorig:Left Leg")
+    assert clip.parents == (-1, 0)
+    np.testing.assert_array_equal(clip.offsets[1], [1, -20, 3.5])
+    assert clip.channels[1] == ("Yrotation", "Xrotation", "Zrotation")
+    assert clip.end_sites == {"mixamorig:Left Leg": [(0, -10, 0), (0, 0, 10)]}
+    np.testing.assert_array_equal(clip.values, [[1, 2, 3, 4, 5, 6, 7, 8, 9], [15, -2, 3, 4, 5, 6, 7, 8, -9]])
+    assert clip.frame_time == 0.0333333
+
+
+VARIANTS = {
+    "crlf": lambda s: s.replace("\n", "\r\n"),
+    "byte order mark": lambda s: "\ufeff" + s,
+    "tabs": lambda s: s.replace(" ", "\t").replace("\tLeg", " Leg").replace("End\tSite", "End Site"),
+    "trailing blanks": lambda s: s.replace("\n", "  \n") + "\n\n",
+    "no newline at the end": lambda s: s.rstrip("\n"),
+    "braces on the line": lambda s: s.replace("ROOT Hips\n{", "ROOT Hips {").replace("Leg\n\t{", "Leg {"),
+    "lower case": lambda s: s.replace("Xposition", "xposition").replace("Frames:", "FRAMES:"),
+    "frames over several lines": lambda s: s.replace(" 5 6", "\n5 6"),
+    "blank lines between": lambda s: s.replace("7 8 9\n", "7 8 9\n\n"),
+}
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_reads_variants_alike(written, variant):
+    plain = read_bvh(written(SMALL))
+    other = read_bvh(written(VARIANTS[variant](SMALL)))
+    assert other.names == plain.names
+    assert other.channels == plain.channels
+    np.testing.assert_array_equal(other.values, plain.values)
+
+
+BROKEN = {
+    "empty": (lambda s: "", "empty", None),
+    "blank": (lambda s: " \n\n", "empty", None),
+    "binary": (lambda s: b"HIERARCHY\n\0\1\2" + s.encode(), "binary", None),
+    "fbx": (lambda s: b"Kaydara FBX Binary  \0", "FBX", None),
+    "something else": (lambda s: "name,age\n1,2\n", "HIERARCHY", 1),
+    "cut in the hierarchy": (lambda s: s[:150], "truncated", 8),
+    "joint left open": (lambda s: s.replace("}\nMOTION", "MOTION"), "open", 19),
+    "cut in a row": (lambda s: s[:-6], "7 values", 24),
+    "cut after the rows' header": (lambda s: s[: s.index("1 2 3 4")], "truncated", 21),
+    "no frame time": (lambda s: s[: s.index("Frame Time")], "Frame Time", None),
+    "half the frames": (lambda s: s.replace("Frames: 2", "Frames: 4"), "declares 4 frames", None),
+    "twice the frames": (lambda s: s + s[s.index("1 2 3 4") :] * 2, "declares 2 frames and holds 6", None),
+    "two billion frames": (lambda s: s.replace("Frames: 2", "Frames: 2000000000"), "2000000000 frames", 21),
+    "minus one frame": (lambda s: s.replace("Frames: 2", "Frames: -1"), "-1 frames", 21),
+    "frames no number": (lambda s: s.replace("Frames: 2", "Frames: many"), "'many' is not a number", 21),
+    "nan": (lambda s: s.replace(" 5 6 7 8 -9", " nan 6 7 8 -9"), "NaN", 24),
+    "infinity": (lambda s: s.replace(" 5 6 7 8 -9", " inf 6 7 8 -9"), "infinite", 24),
+    "windows' nan": (
+        lambda s: s.replace(" 5 6 7 8 -9", " -1.#IND 6 7 8 -9"),
+        "'-1.#IND' is not a number",
+        24,
+    ),
+    "decimal comma": (lambda s: s.replace("1.5e1", "1,5"), "decimal comma", 24),
+    "a value missing": (lambda s: s.replace("7 8 9\n", "7 8\n"), "8 values where the joints have 9", 23),
+    "a value too many": (lambda s: s.replace("7 8 -9\n", "7 8 -9 1\n"), "10 values", 24),
+    "duplicate joints": (lambda s: s.replace("mixamorig:Left Leg", "Hips"), "'Hips' stands twice", 6),
+    "second root": (
+        lambda s: s.replace("MOTION", "ROOT Two\n{\nOFFSET 0 0 0\nCHANNELS 0\n}\nMOTION"),
+        "second root",
+        20,
+    ),
+    "unknown channel": (
+        lambda s: s.replace("Yrotation Xrotation Z", "Wrotation Xrotation Z"),
+        "Wrotation",
+        9,
+    ),
+    "wrong channel count": (lambda s: s.replace("CHANNELS 3", "CHANNELS 4"), "declares 4 and names 3", 9),
+    "a million channels": (lambda s: s.replace("CHANNELS 3", "CHANNELS 1000000"), "declares 1000000", 9),
+    "same channel twice": (lambda s: s.replace("3 Yrotation", "3 Xrotation"), "twice", 9),
+    "bad offset": (
+        lambda s: s.replace("OFFSET 1 -2e1 3.5", "OFFSET 1 -2e1"),
+        "OFFSET needs three numbers",
+        8,
+    ),
+    "offset nan": (lambda s: s.replace("OFFSET 1 -2e1 3.5", "OFFSET 1 nan 2"), "not finite", 8),
+    "no offset": (lambda s: s.replace("\t\tOFFSET 1 -2e1 3.5\n", ""), "no OFFSET", 17),
+    "brace too many": (lambda s: s.replace("}\nMOTION", "}\n}\nMOTION"), "closing brace too many", 20),
+    "frame time nought": (lambda s: s.replace("0.0333333", "0"), "makes no sense", 22),
+    "frame time nan": (lambda s: s.replace("0.0333333", "nan"), "makes no sense", 22),
+    "strange word": (lambda s: s.replace("OFFSET 0 0 0", "OFSET 0 0 0"), "'OFSET'", 4),
+}
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_refuses_with_file_and_line(written, what):
+    change, message, line = BROKEN[what]
+    path = written(change(SMALL))
+    with pytest.raises(InputError) as raised:
+        read_bvh(path)
+    assert message in str(raised.value)
+    assert str(path) in str(raised.value)
+    if line is not None:
+        assert raised.value.line == line
+
+
+def test_missing_file_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"nowhere.bvh: no such file"):
+        read_bvh(tmp_path / "nowhere.bvh")
+
+
+def test_a_million_joints_are_refused_before_they_are_built(written):
+    joints = "".join(f"JOINT j{i}\n{{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n" for i in range(20_000))
+    with pytest.raises(InputError, match="more than 4096 joints"):
+        read_bvh(written("HIERARCHY\nROOT r\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n" + joints + "MOTION\n"))
+
+
+def test_a_deep_chain_reads(written):
+    deep = 3000
+    joints = "".join(f"JOINT j{i}\n{{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n" for i in range(deep))
+    row = " ".join(["0"] * (deep + 1))
+    text = (
+        "HIERARCHY\nROOT r\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n"
+        + joints
+        + "}\n" * (deep + 1)
+        + f"MOTION\nFrames: 1\nFrame Time: 0.01\n{row}\n"
+    )
+    assert read_bvh(written(text)).parents[-1] == deep - 1
+
+
+def test_one_frame_short_is_read_and_can_be_told(written):
+    clip = read_bvh(written(SMALL.replace("Frames: 2", "Frames: 3")))
+    assert (len(clip), clip.declared) == (2, 3)
+
+
+@pytest.mark.shared
+def test_every_shared_file_loads(shared):
+    files = sorted((shared / "mocap").glob("*/*.bvh"))
+    assert len(files) == 82
+    for file in files:
+        clip = read_bvh(file)
+        assert len(clip.names) in (31, 55)
+        assert len(clip) == clip.declared

@@ -1,0 +1,201 @@
+"""From rig to rig: bones point the same way, standing feet stand, and known figures come out exactly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.motion.make import load_source, resample
+from hobble.motion.read import read_bvh
+from hobble.motion.retarget import plan, retarget_clip
+from hobble.motion.rig import joint_pairs, load_skeleton
+
+NAMES = ("holden31", "ava191", "mixamo55", "rig22")
+FEET = [f"{side}_{part}" for side in ("left", "right") for part in ("heel", "toe")]
+
+
+@pytest.fixture(scope="module")
+def rigs(root):
+    return {name: load_skeleton(root / f"config/skeletons/{name}.yaml") for name in NAMES}
+
+
+def onto(clip: Clip, source, target) -> Clip:
+    return retarget_clip(clip, plan(source.skeleton, target.skeleton, joint_pairs(source, target)))
+
+
+def slide(clip: Clip, role: str) -> np.ndarray:
+    """Centimetres a frame over the ground."""
+    step = np.diff(clip.positions[:, clip.skeleton.role(role)], axis=0)
+    return np.hypot(step[:, 0], step[:, 2])
+
+
+def standing(clip: Clip, role: str) -> np.ndarray:
+    step = np.diff(clip.positions[:, clip.skeleton.role(role)], axis=0)
+    return np.sum(step**2, axis=1) < 0.02
+
+
+@pytest.mark.parametrize("start", NAMES)
+@pytest.mark.parametrize("end", NAMES)
+def test_standing_feet_stand_in_every_direction(walker, rigs, start, end):
+    clip = walker(rigs[start].skeleton, 120, 60.0)
+    made = onto(clip, rigs[start], rigs[end])
+    scale = plan(clip.skeleton, rigs[end].skeleton, joint_pairs(rigs[start], rigs[end])).scale
+    for role in FEET:
+        frames = standing(clip, role)
+        assert frames.sum() > 20
+        # What is left are a few frames where the other rig's leg cannot reach, 5 mm over all steps together.
+        assert slide(made, role)[frames].sum() <= 1.2 * scale * slide(clip, role)[frames].sum() + 0.5
+
+
+@pytest.mark.parametrize("start", NAMES)
+@pytest.mark.parametrize("end", NAMES)
+def test_limbs_point_as_the_source_s_do(walker, rigs, start, end):
+    clip = walker(rigs[start].skeleton, 60, 60.0)
+    made = onto(clip, rigs[start], rigs[end])
+
+    def bone(of, a, b):
+        way = of.positions[:, of.skeleton.role(b)] - of.positions[:, of.skeleton.role(a)]
+        return way / np.linalg.norm(way, axis=-1, keepdims=True)
+
+    for side in ("left", "right"):
+        for a, b in (("shoulder", "elbow"), ("elbow", "wrist")):
+            np.testing.assert_allclose(
+                bone(made, f"{side}_{a}", f"{side}_{b}"), bone(clip, f"{side}_{a}", f"{side}_{b}"), atol=1e-6
+            )
+        for a, b in (("hip", "knee"), ("knee", "heel")):
+            cosine = np.sum(
+                bone(made, f"{side}_{a}", f"{side}_{b}") * bone(clip, f"{side}_{a}", f"{side}_{b}"), -1
+            )
+            assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 12
+
+
+def test_the_same_proportions_come_out_exactly(walk, rigs):
+    again = onto(walk, rigs["holden31"], rigs["holden31"])
+    np.testing.assert_allclose(again.positions, walk.positions, atol=1e-4)
+    assert quat.angle(again.rotations, walk.rotations).max() < 1e-4
+
+
+def test_191_joints_carry_the_31_exactly(walk, rigs):
+    """ava191 has holden31's proportions: every equivalent joint is where the 31-joint figure has it."""
+    ava = onto(walk, rigs["holden31"], rigs["ava191"])
+    for mine, theirs in rigs["ava191"].maps["holden31"].items():
+        if "Index" in mine or "Thumb" in mine:
+            continue
+        apart = ava.positions[:, ava.skeleton.index(mine)] - walk.positions[:, walk.skeleton.index(theirs)]
+        assert np.linalg.norm(apart, axis=-1).max() < 0.01, mine
+
+
+def test_joints_without_motion_follow_their_parents_rigidly(walk, rigs):
+    ava = onto(walk, rigs["holden31"], rigs["ava191"])
+    moved = rigs["ava191"].maps["holden31"]
+    still = [i for i, name in enumerate(ava.skeleton.joints) if name not in moved]
+    assert len(still) == 191 - len(moved)
+    assert quat.angle(ava.rotations[:, still], quat.IDENTITY).max() < 1e-6
+
+
+def test_there_and_back_again(walk, rigs):
+    """By way of the larger rig and back: the same walk but for what the legs' proportions cost."""
+    back = onto(onto(walk, rigs["holden31"], rigs["mixamo55"]), rigs["mixamo55"], rigs["holden31"])
+    apart = np.linalg.norm(back.positions - walk.positions, axis=-1)
+    assert apart.mean() < 2.0
+    assert np.abs(back.root[:, [0, 2]] - walk.root[:, [0, 2]]).max() < 0.5
+
+
+def test_the_path_is_scaled_by_the_legs(walk, rigs):
+    tall = replace(rigs["holden31"].skeleton, offsets=rigs["holden31"].skeleton.offsets * 1.5)
+    how = plan(walk.skeleton, tall, {name: name for name in walk.skeleton.joints})
+    made = retarget_clip(walk, how)
+    assert how.scale == pytest.approx(1.5)
+    np.testing.assert_allclose(made.positions, 1.5 * walk.positions, atol=1e-6)
+
+
+def test_a_splayed_rest_pose_does_not_splay_the_legs(walk, holden31):
+    """The CMU rigs' legs stand apart at rest; the motion knows, and so must the retargeting."""
+    offsets = holden31.offsets.copy()
+    for side, sign in (("Left", 1), ("Right", -1)):
+        turn = quat.from_axis_angle(np.array([0, 0, 1.0]), 0.35 * sign)
+        for bone in ("Leg", "Foot"):
+            j = holden31.index(side + bone)
+            offsets[j] = quat.rotate(turn, offsets[j])
+    splayed = replace(holden31, offsets=offsets)
+    names = {name: name for name in holden31.joints}
+    away = retarget_clip(walk, plan(holden31, splayed, names))
+    apart = np.linalg.norm(away.positions - walk.positions, axis=-1)
+    assert apart.max() < 0.1
+    back = retarget_clip(away, plan(splayed, holden31, names))
+    np.testing.assert_allclose(back.positions, walk.positions, atol=0.1)
+
+
+def test_foreign_rigs_are_recognised_by_their_names(walker, rigs, bvh, make):
+    for name, prefix in (("mixamo55", "mixamorig:"), ("rig22", "")):
+        clip = walker(rigs[name].skeleton, 60, 30.0)
+        path = bvh(
+            clip,
+            name,
+            edit=lambda s, p=prefix: s.replace("ROOT ", f"ROOT {p}").replace("JOINT ", f"JOINT {p}"),
+        )
+        made, report = make(path)
+        assert report["rig"] == name
+        assert made.skeleton.name == "holden31"
+        assert len(made) == 119
+        lowest = made.positions[..., 1].min(axis=1)
+        assert -3 < lowest.min() < lowest.max() < 6
+
+
+def test_a_rig_without_fingers_is_still_that_rig(walker, rigs, bvh, make):
+    full = rigs["mixamo55"].skeleton
+    keep = [
+        i for i, n in enumerate(full.joints) if not any(f in n for f in ("Index", "Middle", "Ring", "Pinky"))
+    ]
+    new = {old: i for i, old in enumerate(keep)}
+    bare = replace(
+        full,
+        joints=tuple(full.joints[i] for i in keep),
+        parents=tuple(new.get(full.parents[i], -1) for i in keep),
+        offsets=full.offsets[keep],
+        end_sites={},
+    )
+    _, report = make(bvh(walker(bare, 30, 30.0)))
+    assert report["rig"] == "mixamo55"
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    "file", ["cmu/02_01", "cmu/08_11", "cmu/105_16", "cmu/105_25", "cmu/105_10", "ferre/Injured_Walk_LLL"]
+)
+def test_feet_of_real_clips_slide_no_more_than_before(shared, root, rigs, options, file):
+    target = rigs["holden31"]
+    source = load_source(read_bvh(shared / f"mocap/{file}.bvh"), target, root / "config/skeletons", options)
+    clip = resample(source.clip, 60.0)
+    how = plan(clip.skeleton, target.skeleton, source.match.sources)
+    made = retarget_clip(clip, how)
+    for role in FEET:
+        frames = standing(clip, role)
+        before = slide(clip, role)[frames].sum() * how.scale
+        assert slide(made, role)[frames].sum() <= 1.2 * before + 0.05, role
+
+
+@pytest.mark.shared
+def test_a_real_walk_keeps_its_look(shared, root, rigs, options):
+    """Knee bend, trunk lean and stride over leg length stay those of the source."""
+    target = rigs["holden31"]
+    source = load_source(read_bvh(shared / "mocap/cmu/02_01.bvh"), target, root / "config/skeletons", options)
+    clip = resample(source.clip, 60.0)
+    made = retarget_clip(clip, plan(clip.skeleton, target.skeleton, source.match.sources))
+
+    def knee(of):
+        p = {r: of.positions[:, of.skeleton.role(f"left_{r}")] for r in ("hip", "knee", "heel")}
+        a, b = p["hip"] - p["knee"], p["heel"] - p["knee"]
+        cosine = np.sum(a * b, -1) / np.linalg.norm(a, axis=-1) / np.linalg.norm(b, axis=-1)
+        return np.degrees(np.arccos(cosine))
+
+    def lean(of):
+        trunk = of.positions[:, of.skeleton.role("head")] - of.positions[:, 0]
+        return np.degrees(np.arccos(trunk[:, 1] / np.linalg.norm(trunk, axis=-1)))
+
+    assert np.abs(knee(made) - knee(clip)).mean() < 5
+    assert np.abs(lean(made) - lean(clip)).mean() < 3

@@ -1,0 +1,114 @@
+"""The root frame, against the original's rows and against what it must be by construction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.core import quat
+from hobble.motion.root import (
+    facing,
+    local_pose,
+    points_to_root,
+    root_frames,
+    rotations_to_root,
+    vectors_to_root,
+)
+
+
+def turned(clip, angle, shift):
+    """The whole clip turned about the vertical and moved over the ground."""
+    turn = quat.yaw(angle)
+    rotations = clip.rotations.copy()
+    rotations[:, 0] = quat.mul(turn, rotations[:, 0])
+    return replace(
+        clip, rotations=rotations, root=quat.rotate(turn, clip.root) + np.array([shift, 0, -shift])
+    )
+
+
+def test_a_figure_facing_z_has_the_world_as_its_root(walk):
+    still = replace(
+        walk, rotations=np.tile(quat.IDENTITY, (4, 31, 1)), root=np.tile([3.0, 93.0, -7.0], (4, 1))
+    )
+    root = root_frames(still, 20)
+    np.testing.assert_allclose(root.direction, [[0, 0, 1]] * 4, atol=1e-12)
+    np.testing.assert_allclose(root.position, [[3, -7]] * 4)
+    np.testing.assert_allclose(quat.angle(root.rotation, quat.IDENTITY), 0, atol=1e-9)
+    np.testing.assert_allclose(root.turn, 0, atol=1e-12)
+
+
+@settings(max_examples=15, deadline=None)
+@given(angle=st.floats(-3.1, 3.1), shift=st.floats(-500, 500))
+def test_what_the_character_sees_of_itself_is_the_same_wherever_it_goes(walk, angle, shift):
+    clip = replace(walk, rotations=walk.rotations[:40], root=walk.root[:40])
+    other = turned(clip, angle, shift)
+    ours, theirs = root_frames(clip, 5), root_frames(other, 5)
+    for a, b in zip(local_pose(clip, ours), local_pose(other, theirs), strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-7)
+    np.testing.assert_allclose(ours.turn, theirs.turn, atol=1e-9)
+
+
+def test_rotation_takes_the_facing_direction_to_z(walk):
+    root = root_frames(turned(walk, 2.9, 0), 20)
+    np.testing.assert_allclose(
+        quat.rotate(root.rotation, root.direction), np.tile([0, 0, 1], (len(root), 1)), atol=1e-12
+    )
+    np.testing.assert_allclose(np.linalg.norm(root.direction, axis=1), 1)
+    assert np.all(root.direction[:, 1] == 0)
+
+
+def test_turning_left_has_the_sign_of_the_facts_page(walk):
+    """Turning left by d a frame, q[i+1] q[i]^-1 turns by -d, so that the runtime applies the negative."""
+    clip = replace(walk, rotations=np.tile(quat.IDENTITY, (5, 31, 1)), root=np.zeros((5, 3)))
+    clip.rotations[:, 0] = quat.yaw(0.1 * np.arange(5))
+    np.testing.assert_allclose(root_frames(clip, 0).turn, -0.1, atol=1e-12)
+
+
+def test_smoothing_is_the_gaussian_of_the_facts_page(walk):
+    from scipy.ndimage import gaussian_filter1d
+
+    raw = facing(walk.skeleton, walk.positions, 0)
+    smooth = gaussian_filter1d(raw, 20, axis=0, mode="nearest")
+    smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
+    np.testing.assert_allclose(root_frames(walk, 20).direction, smooth, atol=1e-12)
+
+
+def test_helpers_agree_with_their_formulas(walk):
+    root = root_frames(walk, 20)
+    point = walk.positions[5, 3]
+    hips = walk.positions[5, 0] * [1, 0, 1]
+    np.testing.assert_allclose(
+        points_to_root(root, walk.positions[[5], :], [5])[0, 3], quat.rotate(root.rotation[5], point - hips)
+    )
+    np.testing.assert_allclose(
+        vectors_to_root(root, np.ones((len(walk), 3)))[7], quat.rotate(root.rotation[7], np.ones(3))
+    )
+    np.testing.assert_allclose(
+        rotations_to_root(root, walk.global_rotations)[9, 4],
+        quat.mul(root.rotation[9], walk.global_rotations[9, 4]),
+    )
+
+
+@pytest.mark.shared
+def test_rows_of_the_original_come_out(shared, make):
+    """Frame 95 is the first of the original's rows: line 1 of the footsteps begins at 191 of 120 Hz."""
+    clip, report = make(shared / "mocap/pfnn/LocomotionFlat09_000.bvh", proportions="clip")
+    assert report["repairs"] == []
+    assert len(clip) == 925
+    rows = np.load(shared / "reference/original_rows_LocomotionFlat09_000.npz")
+    n = int(rows["cycle_length"][0])
+    x, y = rows["X"][:n], rows["Y"][:n]
+    root = root_frames(clip, 20)
+    positions, velocities, rotations = local_pose(clip, root)
+    frames = slice(95, 95 + n)
+    ours = positions[frames][..., [0, 2]], y[:, 32:125].reshape(n, 31, 3)[..., [0, 2]]
+    np.testing.assert_allclose(*ours, atol=1e-5)
+    np.testing.assert_allclose(velocities[frames], y[:, 125:218].reshape(n, 31, 3), atol=1e-5)
+    np.testing.assert_allclose(rotations[frames], y[:, 218:311].reshape(n, 31, 3), atol=1e-6)
+    np.testing.assert_allclose(root.turn[frames], y[:, 2], atol=1e-7)
+    previous = positions[94 : 94 + n][..., [0, 2]]
+    np.testing.assert_allclose(previous, x[:, 120:213].reshape(n, 31, 3)[..., [0, 2]], atol=1e-5)
