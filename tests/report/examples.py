@@ -32,7 +32,7 @@ HELD_OUT = ("walk_turns", "hurt_back")
 
 
 def walker(skeleton: Skeleton, frames: int, speed: float, limp: float = 0.0) -> dict[str, np.ndarray]:
-    """Positions (F, J, 3), contacts (F, 4) and phase (F,) of a figure swinging its legs and arms on an arc."""
+    """Positions (F, J, 3), contacts (F, 4) and phase (F,) of a figure that walks an arc."""
     t = np.arange(frames)
     phase = (t * 0.017) % 1.0
     angle = 2 * np.pi * phase
@@ -396,9 +396,16 @@ def terrain(path: Path, skeleton: Skeleton, rng: np.random.Generator, flat: bool
 
 
 def write_all(
-    folder: Path, skeleton: Skeleton, clips: tuple[str, ...] = CLIPS, injury: bool = True
+    folder: Path,
+    skeleton: Skeleton,
+    clips: tuple[str, ...] = CLIPS,
+    injury: bool = True,
+    terrain_names: list[str] | None = None,
 ) -> dict[str, Any]:
-    """Every input of the report under `folder`; returns the arguments of `hobble.report.gather.gather`."""
+    """Every input of the report under `folder`; returns the arguments of `hobble.report.gather.gather`.
+
+    terrain_names: of the terrain files, where the clips' names cannot be file names.
+    """
     rng = np.random.default_rng(1)
     paths = clip_reports(folder, clips)
     splits = {
@@ -416,7 +423,8 @@ def write_all(
     write_json(folder / "responsivity.json", responsivity(rng))
     write_json(folder / "injury.json", injury_sweep(rng) if injury else {"applies": False, "reason": "none"})
     grounds = [
-        terrain(folder / "terrain" / f"{clip}.npz", skeleton, rng, flat="hurt" in clip) for clip in clips
+        terrain(folder / "terrain" / f"{name}.npz", skeleton, rng, flat="hurt" in clip)
+        for name, clip in zip(terrain_names or clips, clips, strict=True)
     ]
     write_json(folder / "pipeline.json", costs())
     history(folder / "history.csv")

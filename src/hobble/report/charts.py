@@ -1,4 +1,4 @@
-"""Charts as plain plotly figures; colours are names of the page's tokens ("@accent"), for themes to change."""
+"""Charts as plain plotly figures; colours are names of the page's tokens ("@accent")."""
 
 from __future__ import annotations
 

@@ -251,7 +251,7 @@ def _injury(material: Material) -> Iterator[Hint]:
         yield Hint(
             "note",
             f"{len(deaf)} of {len(walks)} links hardly change the walk at severity 10",
-            f"(under half a centimetre a joint): {', '.join(deaf[:4])}{' and more' if len(deaf) > 4 else ''}.",
+            f"(under half a centimetre a joint): {', '.join(deaf[:4])}{' …' if len(deaf) > 4 else ''}.",
         )
     rough = [r["link"] for r in walks if _rho(r) < 0.7 and r["link"] not in deaf]
     if rough:

@@ -77,7 +77,7 @@ def _scenario(data: Mapping[str, Array], name: str, stride: int, links: Sequence
 
 
 def pack_positions(positions: Array) -> dict[str, str]:
-    """World positions (F, J, 3) in cm: `root` as float32, `pose` as int16 steps of UNIT from the root joint."""
+    """Positions (F, J, 3) in cm: `root` as float32, `pose` as int16 steps of UNIT from the root joint."""
     root = positions[:, 0].astype(np.float32)
     steps = np.round((positions - root[:, None].astype(float)) / UNIT)
     return {"root": packed(root), "pose": packed(np.clip(steps, -32767, 32767).astype(np.int16))}

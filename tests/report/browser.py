@@ -1,0 +1,155 @@
+"""A browser to look at pages with: chromium, headless, over the DevTools protocol on a pair of pipes."""
+
+from __future__ import annotations
+
+import base64
+import fcntl
+import json
+import os
+import select
+import shutil
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+FLAGS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--hide-scrollbars",
+    "--remote-debugging-pipe",
+)
+
+
+def executable() -> str | None:
+    """Path of a browser, or None."""
+    return next(filter(None, map(shutil.which, BROWSERS)), None)
+
+
+class Browser:
+    """One tab. `console` has what the page said, `requests` every address it asked for."""
+
+    def __init__(self, path: str, profile: Path, width: int = 1280, height: int = 900) -> None:
+        (read_there, self._write), (self._read, write_there) = os.pipe(), os.pipe()
+        command = [
+            path,
+            *FLAGS,
+            f"--user-data-dir={profile}",
+            f"--window-size={width},{height}",
+            "about:blank",
+        ]
+
+        def connect() -> None:  # the protocol speaks on descriptors 3 and 4
+            ends = [fcntl.fcntl(fd, fcntl.F_DUPFD, 10) for fd in (read_there, write_there)]
+            os.dup2(ends[0], 3)
+            os.dup2(ends[1], 4)
+
+        self._process = subprocess.Popen(
+            command, preexec_fn=connect, close_fds=False, stderr=subprocess.DEVNULL
+        )
+        os.close(read_there)
+        os.close(write_there)
+        self._buffer, self._last, self._session = b"", 0, None
+        self.console: list[str] = []
+        self.requests: list[str] = []
+        target = self.send("Target.createTarget", url="about:blank")["targetId"]
+        self._session = self.send("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Network", "Log"):
+            self.send(f"{domain}.enable")
+
+    def send(self, method: str, **parameters: Any) -> dict[str, Any]:
+        """Give one command and return its result; events that come meanwhile are kept."""
+        self._last += 1
+        message: dict[str, Any] = {"id": self._last, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        os.write(self._write, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._receive()
+            if answer.get("id") == self._last:
+                assert "error" not in answer, (method, answer["error"])
+                return answer["result"]
+            self._keep(answer)
+
+    def open(self, url: str) -> None:
+        """Go to a page and wait until it is loaded."""
+        self.send("Page.navigate", url=url)
+        while self.run("document.readyState + location.href.startsWith('about:')") != "completefalse":
+            time.sleep(0.05)
+
+    def run(self, expression: str) -> Any:
+        """The value of a JavaScript expression, awaited where it is a promise. Raises where it throws."""
+        answer = self.send("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def until(self, expression: str, seconds: float = 20.0) -> Any:
+        """Wait for an expression to become true; returns its last value."""
+        end = time.monotonic() + seconds
+        while not (value := self.run(expression)) and time.monotonic() < end:
+            time.sleep(0.05)
+        return value
+
+    def press(self, key: str, code: str | None = None) -> None:
+        """Press a key, as a keyboard does it."""
+        for kind in ("keyDown", "keyUp"):
+            text = {"text": key} if len(key) == 1 and kind == "keyDown" else {}
+            self.send("Input.dispatchKeyEvent", type=kind, key=key, code=code or key, **text)
+
+    def size(self, width: int, height: int) -> None:
+        """Give the window another size."""
+        self.send(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=False,
+        )
+
+    def picture(self, path: Path, selector: str | None = None) -> None:
+        """Save what is seen, or all of one element, as PNG."""
+        clip = {}
+        if selector:
+            box = (
+                f"(() => {{ const r = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
+            )
+            box += " return {x: r.x + scrollX, y: r.y + scrollY, width: r.width, height: r.height, scale: 1}; })()"
+            clip = {"clip": self.run(box), "captureBeyondViewport": True}
+        taken = self.send("Page.captureScreenshot", format="png", **clip)
+        path.write_bytes(base64.b64decode(taken["data"]))
+
+    def close(self) -> None:
+        """End the browser."""
+        os.close(self._write)
+        os.close(self._read)
+        self._process.terminate()
+        self._process.wait(timeout=20)
+
+    def _receive(self, seconds: float = 120.0) -> dict[str, Any]:
+        while b"\0" not in self._buffer:
+            ready, _, _ = select.select([self._read], [], [], seconds)
+            chunk = os.read(self._read, 1 << 20) if ready else b""
+            if not chunk:
+                raise TimeoutError("the browser does not answer")
+            self._buffer += chunk
+        message, _, self._buffer = self._buffer.partition(b"\0")
+        return json.loads(message)
+
+    def _keep(self, event: dict[str, Any]) -> None:
+        method, values = event.get("method"), event.get("params", {})
+        if method == "Runtime.consoleAPICalled":
+            self.console.append(" ".join(str(a.get("value", a.get("description"))) for a in values["args"]))
+        elif method == "Runtime.exceptionThrown":
+            self.console.append(str(values["exceptionDetails"]))
+        elif method == "Log.entryAdded":
+            self.console.append(values["entry"]["text"])
+        elif method == "Network.requestWillBeSent":
+            self.requests.append(values["request"]["url"])

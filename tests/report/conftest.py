@@ -1,0 +1,66 @@
+"""Example inputs, and the page made from them once."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from hobble.core.skeleton import Skeleton
+from hobble.report.gather import Material, gather
+from hobble.report.page import render
+from hobble.report.scenes import scenes
+
+
+def beside(name: str) -> ModuleType:
+    """A module of this folder, which is no package."""
+    path = Path(__file__).with_name(f"{name}.py")
+    spec = importlib.util.spec_from_file_location(f"report_{name}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[f"report_{name}"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def examples() -> ModuleType:
+    """The generators of made-up artefacts."""
+    return beside("examples")
+
+
+@pytest.fixture(scope="session")
+def tools() -> ModuleType:
+    """The browser."""
+    return beside("browser")
+
+
+@pytest.fixture(scope="session")
+def inputs(
+    examples: ModuleType, holden31: Skeleton, tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, Any]:
+    """Paths of a whole set of inputs; `scenarios` beside those that `gather` takes."""
+    folder = tmp_path_factory.mktemp("inputs")
+    arguments = examples.write_all(folder, holden31)
+    return {"gather": arguments, "scenarios": folder / "scenarios.npz", "folder": folder}
+
+
+@pytest.fixture(scope="session")
+def material(inputs: dict[str, Any]) -> Material:
+    return gather(**inputs["gather"])
+
+
+@pytest.fixture(scope="session")
+def play(inputs: dict[str, Any], material: Material) -> dict[str, Any]:
+    return scenes(inputs["scenarios"], material.network["skeleton"], material.network["links"])
+
+
+@pytest.fixture(scope="session")
+def page(material: Material, play: dict[str, Any]) -> str:
+    """The report of the examples."""
+    return render(material, play)

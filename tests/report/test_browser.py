@@ -1,0 +1,192 @@
+"""The page in a real browser: what a reader does with it, and what it does on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from hobble.report.gather import Material
+
+INK = """(() => {{
+  const canvas = document.getElementById("{0}"), copy = document.createElement("canvas");
+  [copy.width, copy.height] = [canvas.width, canvas.height];
+  const context = copy.getContext("2d", {{ willReadFrequently: true }});
+  context.drawImage(canvas, 0, 0);
+  const pixels = context.getImageData(0, 0, copy.width, copy.height).data;
+  let sum = 0;
+  for (let i = 3; i < pixels.length; i += 4) sum += pixels[i] > 0;
+  return sum / (copy.width * copy.height);
+}})()"""
+
+
+@pytest.fixture(scope="module")
+def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """The page, open in a browser; each test leaves it usable for the next."""
+    path = tools.executable()
+    if path is None:
+        pytest.skip(f"no browser here ({', '.join(tools.BROWSERS)}): the page was not opened in one")
+    folder = tmp_path_factory.mktemp("browser")
+    (folder / "report.html").write_text(page, encoding="utf-8")
+    browser = tools.Browser(path, folder / "profile")
+    browser.open((folder / "report.html").as_uri())
+    yield browser
+    browser.close()
+
+
+def show(tab: Any, what: str) -> None:
+    """Scroll to an element."""
+    tab.run(f"document.getElementById('{what}').scrollIntoView({{ behavior: 'instant', block: 'center' }})")
+
+
+def choose(tab: Any, what: str, index: int) -> None:
+    """Pick an option of a <select>."""
+    tab.run(
+        f"(() => {{ const s = document.getElementById('{what}'); s.selectedIndex = {index};"
+        " s.dispatchEvent(new Event('change')); })()"
+    )
+
+
+def scrub(tab: Any, frame: int) -> None:
+    """Drag the figure's slider."""
+    tab.run(
+        f"(() => {{ const t = document.getElementById('time'); t.value = {frame};"
+        " t.dispatchEvent(new Event('input')); })()"
+    )
+
+
+def text(tab: Any, what: str) -> str:
+    return tab.run(f"document.getElementById('{what}').textContent")
+
+
+def test_charts_are_drawn_when_they_are_scrolled_to(tab: Any) -> None:
+    last = "document.querySelector('[data-chart=\"stage-bytes\"] .main-svg') !== null"
+    assert not tab.run(last)
+    show(tab, "costs")
+    assert tab.until(last)
+    tab.run("Hobble.drawAll()")
+    undrawn = (
+        "[...document.querySelectorAll('[data-chart]')].filter((e) => !e.querySelector('.main-svg')).length"
+    )
+    assert tab.run(undrawn) == 0
+
+
+def test_the_figure_plays_stops_and_is_scrubbed(tab: Any) -> None:
+    show(tab, "stage")
+    assert tab.until(INK.format("view") + " > .02")
+    tab.run("document.getElementById('stage').focus()")
+    assert text(tab, "play") == "Pause"
+    tab.press(" ", "Space")
+    assert text(tab, "play") == "Play"
+    scrub(tab, 120)
+    assert tab.until("document.getElementById('clock').textContent === '4.0 of 10.0 s'")
+    tab.press(".", "Period")
+    assert tab.until("Number(document.getElementById('time').value) === 121")
+    tab.press("n", "KeyN")
+    assert tab.run("document.getElementById('scenario').value") == "Jog"
+
+
+def test_keys_and_pointer_turn_the_camera(tab: Any) -> None:
+    show(tab, "stage")
+    tab.run("document.getElementById('stage').focus()")
+    image = "document.getElementById('view').toDataURL()"
+    seen = [tab.run(image)]
+    for _ in range(3):
+        tab.press("ArrowLeft")
+    tab.until(f"{image} !== {seen[0]!r}")
+    seen.append(tab.run(image))
+    corner = "(({ x, y }) => [x + 200, y + 200])(document.getElementById('view').getBoundingClientRect())"
+    x, y = tab.run(corner)
+    for kind, dx in (("mousePressed", 0), ("mouseMoved", 80), ("mouseReleased", 80)):
+        tab.send("Input.dispatchMouseEvent", type=kind, x=x + dx, y=y, button="left", buttons=1, clickCount=1)
+    tab.until(f"{image} !== {seen[1]!r}")
+    seen.append(tab.run(image))
+    assert len(set(seen)) == 3
+
+
+def test_what_hurts_is_told(tab: Any) -> None:
+    show(tab, "stage")
+    choose(tab, "scenario", 3)
+    scrub(tab, 200)
+    assert tab.until("document.getElementById('reading').textContent.includes('LeftUpLeg-LeftLeg: 8.')")
+    assert tab.run("!document.getElementById('legend').hidden")
+
+
+def test_the_ground_is_drawn(tab: Any) -> None:
+    show(tab, "ground-stage")
+    assert tab.until(INK.format("ground") + " > .1")
+
+
+def test_choosers_change_their_pictures(tab: Any, material: Material) -> None:
+    choose(tab, "sweeps-choice", 2)
+    drawn = "document.querySelector('[data-chart=\"sweep-speed\"]').data[0].y[0]"
+    assert tab.run(drawn) == pytest.approx(material.injury["rows"][22]["speed"])
+    choose(tab, "strip-clip", 12)
+    assert "eftUpLeg-LeftLeg" in text(tab, "strip")
+
+
+def test_tables_sort_and_become_csv(tab: Any, material: Material) -> None:
+    table = "document.querySelector('table[data-csv=\"example-accuracy\"]')"
+    ranked = [row["clip"] for row in sorted(material.accuracy["clips"], key=lambda row: row["mean"])]
+    column = f"[...{table}.tBodies[0].rows].map((row) => row.cells[0].textContent)"
+    for order, name in ((ranked, "ascending"), (ranked[::-1], "descending")):
+        tab.run(f"{table}.tHead.rows[0].cells[3].querySelector('button').click()")
+        assert tab.run(column) == order
+        assert tab.run(f"{table}.tHead.rows[0].cells[3].getAttribute('aria-sort')") == name
+    lines = tab.run(f"Hobble.csv({table})").split("\r\n")
+    assert lines[0] == 'clip,split,frames,mean,sd,"position error, cm"'
+    worst = max(material.accuracy["clips"], key=lambda row: row["mean"])
+    assert lines[1].startswith(f"{worst['clip']},{worst['split']},{worst['frames']},{worst['mean']},")
+
+
+def test_themes_recolour_page_and_charts(tab: Any) -> None:
+    colours = []
+    for _ in range(2):
+        tab.run("document.getElementById('theme').click()")
+        colours.append(
+            tab.run(
+                "[getComputedStyle(document.body).backgroundColor,"
+                " document.querySelector('[data-chart=\"learning-curve\"]').data[1].line.color]"
+            )
+        )
+    assert colours == [["rgb(252, 251, 248)", "rgb(11, 110, 116)"], ["rgb(20, 23, 26)", "rgb(88, 188, 192)"]]
+    tab.run("document.getElementById('theme').click()")
+
+
+@pytest.mark.parametrize("width", [390, 820, 1440])
+def test_fits_its_window(tab: Any, width: int) -> None:
+    tab.size(width, 900)
+    over = (
+        "[...document.querySelectorAll('main *')]"
+        ".filter((e) => e.getBoundingClientRect().right > innerWidth + 1"
+        " && !e.closest('.table, pre, .plot, svg')).map((e) => e.tagName + '.' + e.className)"
+    )
+    assert tab.until(f"document.documentElement.scrollWidth <= {width}"), tab.run(over)
+    tab.size(1280, 900)
+
+
+def test_prints_every_chart_in_light(tab: Any) -> None:
+    tab.run("dispatchEvent(new Event('beforeprint'))")
+    assert tab.run("getComputedStyle(document.body).backgroundColor") == "rgb(252, 251, 248)"
+    assert tab.run("document.querySelectorAll('details:not([open])').length") <= 3
+    tab.run("dispatchEvent(new Event('afterprint'))")
+    assert len(tab.send("Page.printToPDF")["data"]) > 100_000
+
+
+def test_says_nothing_and_asks_for_nothing(tab: Any) -> None:
+    """Last, after everything above was done to the page."""
+    assert tab.console == []
+    assert [url for url in tab.requests if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
+    assert len([url for url in tab.requests if url.startswith("file:")]) == 1
+
+
+def test_sections_as_pictures(tab: Any, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """For a person to look at: one PNG a section, in the folder that pytest keeps."""
+    folder: Path = tmp_path_factory.getbasetemp() / "report-sections"
+    folder.mkdir(exist_ok=True)
+    for section in ("summary", "walking", "accuracy", "injury", "terrain"):
+        tab.picture(folder / f"{section}.png", f"#{section}")
+        assert (folder / f"{section}.png").stat().st_size > 5000

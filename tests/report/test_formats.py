@@ -1,0 +1,28 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.report.formats import embedded, plain
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.dictionaries(st.text(), st.text() | st.floats(allow_nan=False, allow_infinity=False), max_size=4))
+def test_embedded_json_comes_back_and_cannot_end_its_element(value: dict) -> None:
+    text = str(embedded(value))
+    assert json.loads(text) == value
+    assert not set("<>&") & set(text)
+
+
+def test_no_string_opens_a_comment_or_ends_the_script() -> None:
+    text = str(embedded({"clip": "</script><!--<script>\u2028"}))
+    assert "<" not in text
+    assert "\u2028" not in text
+
+
+def test_what_is_not_finite_becomes_null() -> None:
+    value = {"a": np.array([1.0, np.nan]), "b": np.float32("inf"), "c": (np.int64(3), None)}
+    assert plain(value) == {"a": [1.0, None], "b": None, "c": [3, None]}

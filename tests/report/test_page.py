@@ -1,0 +1,145 @@
+from __future__ import annotations
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from hobble.core.skeleton import Skeleton
+from hobble.report import page as page_module
+from hobble.report.gather import Material, gather
+from hobble.report.page import render
+
+SECTIONS = [
+    "summary",
+    "walking",
+    "training",
+    "accuracy",
+    "injury",
+    "speed",
+    "data",
+    "labels",
+    "terrain",
+    "costs",
+    "configuration",
+    "origin",
+]
+
+
+class Outline(HTMLParser):
+    """Elements with their attributes, and the text of each script."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self._script = False
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        if tag == "script":
+            self.scripts.append("")
+        self._script = tag == "script"
+
+    def handle_data(self, data: str) -> None:
+        if self._script:
+            self.scripts[-1] += data
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+@pytest.fixture(scope="module")
+def outline(page: str) -> Outline:
+    return Outline(page)
+
+
+def data_of(outline: Outline) -> dict[str, Any]:
+    (text,) = [
+        s for s, e in zip(outline.scripts, outline.all("script"), strict=True) if e.get("id") == "material"
+    ]
+    return json.loads(text)
+
+
+def test_has_every_section_and_leads_to_it(outline: Outline) -> None:
+    ids = [e["id"] for e in outline.all("section")]
+    assert ids == SECTIONS
+    assert [e["href"] for e in outline.all("a") if (e["href"] or "").startswith("#")][1 : 1 + len(ids)] == [
+        f"#{i}" for i in ids
+    ]
+
+
+def test_needs_nothing_else(page: str, outline: Outline) -> None:
+    assert len(page.encode()) < 25e6
+    for tag, attributes in outline.elements:
+        assert "src" not in attributes, tag
+        assert not (attributes.get("href") or "").startswith(("http", "//", "file"))
+    assert [e["href"] for e in outline.all("link")] == ["data:,"]
+    (policy,) = [e["content"] for e in outline.all("meta") if e.get("http-equiv")]
+    assert (policy or "").startswith("default-src 'none'")
+    own = "".join(s for s in outline.scripts if "plotly.js v" not in s[:300])
+    assert not re.search(r"fetch\(|XMLHttpRequest|import\(|WebSocket|sendBeacon", own)
+
+
+def test_every_picture_has_its_data_and_its_words(outline: Outline) -> None:
+    charts = data_of(outline)["charts"]
+    drawn = [e for e in outline.all("div") if "data-chart" in e]
+    assert {e["data-chart"] for e in drawn} == set(charts)
+    assert len(drawn) == len(charts) >= 18
+    assert all(e["aria-label"] for e in drawn)
+
+
+def test_ids_are_unique_and_controls_are_labelled(outline: Outline) -> None:
+    ids = [a["id"] for _, a in outline.elements if "id" in a]
+    assert len(ids) == len(set(ids))
+    labels = {e["for"] for e in outline.all("label")}
+    assert all(e["id"] in labels for e in outline.all("select"))
+    assert labels <= set(ids)
+
+
+def test_numbers_of_the_tables_are_whole_in_their_cells(page: str, material: Material) -> None:
+    row = material.accuracy["clips"][0]
+    assert f'data-v="{row["mean"]}"' in page
+
+
+def test_same_input_same_page(material: Material, play: dict[str, Any], page: str) -> None:
+    assert render(material, play) == page
+
+
+HOSTILE = "<script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}"
+
+
+def test_a_hostile_clip_name_is_only_text(
+    examples: ModuleType, holden31: Skeleton, tmp_path: Path, outline: Outline
+) -> None:
+    clips = (HOSTILE, *examples.CLIPS[1:])
+    arguments = examples.write_all(
+        tmp_path, holden31, clips, terrain_names=[f"c{i}" for i in range(len(clips))]
+    )
+    material = gather(**{**arguments, "title": HOSTILE, "dataset": HOSTILE})
+    text = render(material)
+    hostile = Outline(text)
+    assert len(hostile.all("script")) == len(outline.all("script"))
+    assert not hostile.all("img")
+    assert not any(key.startswith("on") for _, a in hostile.elements for key in a)
+    assert "{{7*7}}" in text
+    assert data_of(hostile)["strips"][0]["clip"] == HOSTILE
+
+
+def test_a_network_that_cannot_be_hurt(examples: ModuleType, holden31: Skeleton, tmp_path: Path) -> None:
+    text = render(gather(**examples.write_all(tmp_path, holden31, injury=False)))
+    assert "nothing can hurt it" in text
+    assert 'data-chart="sweep-pose"' not in text
+    assert 'id="walking"' not in text
+
+
+def test_our_scripts_cannot_end_their_element(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "page.js").write_text("'</SCRIPT>'")
+    monkeypatch.setattr(page_module, "TEMPLATES", tmp_path)
+    with pytest.raises(ValueError, match=r"page\.js"):
+        page_module._text("page.js")

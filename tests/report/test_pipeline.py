@@ -1,0 +1,61 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.report.pipeline import read_benchmark, summarise
+
+HEADER = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
+
+
+def benchmark(path: Path, seconds: float, memory: str = "120.5") -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"{HEADER}{seconds}\t0:00:01\t{memory}\t1\t1\t1\t0\t0\t90.0\t{seconds / 2}\n")
+    return path
+
+
+def test_adds_up_jobs_rules_and_bytes(tmp_path: Path) -> None:
+    folder = tmp_path / "benchmarks" / "motion"
+    benchmark(folder / "motion_clip" / "a.tsv", 2.0)
+    benchmark(folder / "motion_clip" / "b.tsv", 3.0, memory="300.25")
+    benchmark(folder / "motion_mirror.tsv", 0.5, memory="-")
+    (tmp_path / "motion").mkdir()
+    (tmp_path / "motion" / "a.npz").write_bytes(b"x" * 100)
+    (tmp_path / "motion" / ".a.npz.1.part").write_bytes(b"x" * 999)
+    one = tmp_path / "one.json"
+    one.write_bytes(b"12345")
+    stages = {"motion": {"benchmarks": [str(folder)], "files": [str(tmp_path / "motion"), str(one)]}}
+
+    found = summarise("c", stages)
+
+    (motion,) = found["stages"]
+    assert (motion["jobs"], motion["seconds"], motion["longest"]) == (3, 5.5, 3.0)
+    assert (motion["max_rss_mb"], motion["cpu_seconds"]) == (300.2, 2.75)
+    assert (motion["files"], motion["bytes"]) == (2, 105)
+    assert {r["rule"]: r["jobs"] for r in motion["rules"]} == {"motion_clip": 2, "motion_mirror": 1}
+    assert (found["total_seconds"], found["total_bytes"], found["missing"]) == (5.5, 105, [])
+
+
+def test_lists_what_is_missing(tmp_path: Path) -> None:
+    nowhere = str(tmp_path / "nowhere")
+    found = summarise("c", {"training": {"benchmarks": [nowhere], "files": [f"{nowhere}.npz"]}})
+    assert found["missing"] == [nowhere, f"{nowhere}.npz"]
+    assert found["stages"][0]["jobs"] == 0
+    assert found["stages"][0]["max_rss_mb"] is None
+
+
+def test_repeated_benchmarks_count_each_run(tmp_path: Path) -> None:
+    path = benchmark(tmp_path / "a.tsv", 1.0)
+    with path.open("a") as file:
+        file.write("2.0\t0:00:02\tNA\t1\t1\t1\t0\t0\t90\tNA\n")
+    assert [run["s"] for run in read_benchmark(path)] == [1.0, 2.0]
+    assert "max_rss" not in read_benchmark(path)[1]
+
+
+def test_refuses_another_table(tmp_path: Path) -> None:
+    path = tmp_path / "a.tsv"
+    path.write_text("clip\tframes\nwalk\t3\n")
+    with pytest.raises(InputError, match=r"a\.tsv: not a Snakemake benchmark"):
+        read_benchmark(path)

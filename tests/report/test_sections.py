@@ -1,0 +1,140 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.report import accuracy_section, cost_section, data_section, terrain_section, training_section
+from hobble.report.charts import Chart
+from hobble.report.gather import Material, describe_network, read_history
+from hobble.report.ground_pictures import ground_pictures
+
+
+def test_sections_end_where_their_pass_does(material: Material) -> None:
+    x = training_section.passes_axis(material)
+    assert (x[0], x[9], x[10], x[-1]) == (pytest.approx(0.1), 1.0, pytest.approx(1.1), 20.0)
+
+
+def test_history_with_empty_cells_and_with_words(tmp_path: Path) -> None:
+    path = tmp_path / "history.csv"
+    path.write_text("pass,held_out_mse\n1,\n2,0.5\n")
+    assert read_history(path) == {"pass": [1.0, 2.0], "held_out_mse": [None, 0.5]}
+    path.write_text("pass,held_out_mse\n1,good\n")
+    with pytest.raises(InputError, match="column held_out_mse holds 'good'"):
+        read_history(path)
+
+
+def test_a_curve_without_held_out_clips(material: Material) -> None:
+    nothing = {**material.history, "held_out_mse": [None] * 200}
+    chart = training_section.learning_curve(replace(material, history=nothing))
+    assert [trace["name"] for trace in chart.traces] == ["training"]
+
+
+def test_weights_that_are_not(tmp_path: Path) -> None:
+    path = tmp_path / "weights.npz"
+    path.write_bytes(b"nothing")
+    with pytest.raises(InputError, match="not a network's weights"):
+        describe_network(path)
+
+
+def test_bars_show_every_clip_of_its_split(material: Material) -> None:
+    chart = accuracy_section.clip_bars(material)
+    assert chart is not None
+    bars = {trace["name"]: dict(zip(trace["y"], trace["x"], strict=True)) for trace in chart.traces}
+    assert set(bars["held out"]) == {"walk_turns", "walk_turns_mirror", "hurt_back", "hurt_back_mirror"}
+    assert len(bars["training"]) == 12
+    row = next(r for r in material.accuracy["clips"] if r["clip"] == "jog")
+    assert bars["training"]["jog"] == pytest.approx(100 * row["mean"])
+    assert set(chart.layout["yaxis"]["categoryarray"]) == set(bars["held out"]) | set(bars["training"])
+
+
+def test_boxes_only_where_there_are_quantiles(material: Material) -> None:
+    assert accuracy_section.clip_boxes(material) is not None
+    clips = [{k: v for k, v in row.items() if k != "quantiles"} for row in material.accuracy["clips"]]
+    assert accuracy_section.clip_boxes(replace(material, accuracy={"clips": clips})) is None
+
+
+def test_gait_seconds_add_up(material: Material) -> None:
+    chart = data_section.gait_chart(material)
+    assert chart is not None
+    drawn = sum(sum(trace["y"]) for trace in chart.traces)
+    assert drawn == pytest.approx(sum(sum(r["seconds"].values()) for r in material.labels))
+
+
+def test_hurt_seconds_by_link_and_severity(material: Material) -> None:
+    chart = data_section.injury_coverage(material)
+    assert chart is not None
+    (cells,) = chart.traces
+    assert cells["x"] == ["5", "7"]
+    assert set(cells["y"]) == {"LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg", "Hips-LowerBack"}
+    total = sum(v for row in cells["z"] for v in row if v)
+    assert total == pytest.approx(sum(h["seconds"] for r in material.injuries for h in r["hurt"].values()))
+
+
+def test_strips_carry_what_hurts(material: Material) -> None:
+    strips = {strip["clip"]: strip for strip in data_section.strips(material)}
+    assert len(strips) == 16
+    (row,) = strips["hurt_left_knee_mirror"]["status"]
+    assert row["name"] == "RightUpLeg-RightLeg"
+    assert row["spans"][0][2] == 7.0
+    assert strips["jog"]["status"] == []
+
+
+def test_stages_beside_the_published(material: Material) -> None:
+    rows = {row[0]: row for row in cost_section.stage_table(material).rows}
+    assert rows["training"][-2:] == [154800, 122.0e6]
+    assert rows["labels"][-2:] == [None, None]
+
+
+def test_steps_of_a_frame_in_their_order(material: Material) -> None:
+    chart = cost_section.lap_chart(material)
+    assert chart is not None
+    assert [t["name"] for t in chart.traces] == ["prepare", "input", "insert", "predict", "output", "update"]
+    total = sum(trace["y"][0] for trace in chart.traces)
+    assert total == pytest.approx(material.responsivity["laps"][0]["milliseconds"]["total"])
+
+
+def test_ground_profiles_are_the_centre_heights_of_now(tmp_path: Path) -> None:
+    heights = np.arange(6 * 3 * 36, dtype=np.float32).reshape(18, 36)
+    path = tmp_path / "clip.npz"
+    np.savez(
+        path, frame=np.arange(6), fits=np.full(6, 3), heights=heights, error=np.zeros((1, 10)),
+        foot_error=np.zeros((1, 10, 2)),
+    )  # fmt: skip
+    fits = terrain_section.read_fits(path)
+    assert fits.frame.tolist() == [0, 3]
+    # Of 12 centre samples, -60 to +50 by tens, the seventh is the present one: column 12 + 6.
+    assert fits.profile.tolist() == [heights[0:3, 18].tolist(), heights[9:12, 18].tolist()]
+
+
+def test_a_damaged_terrain_file_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "clip.npz"
+    np.savez(path, frame=np.arange(3))
+    with pytest.raises(InputError, match=r"clip\.npz: not the terrain of a clip"):
+        terrain_section.read_fits(path)
+
+
+def test_flat_clips_have_no_ground_to_show(material: Material) -> None:
+    section = terrain_section.section(material.terrain)
+    assert len(section["table"].rows) == 6
+    assert "hurt_back" not in section["charts"][0].options
+    pictures = ground_pictures(material.terrain, material.network["skeleton"])["pictures"]
+    assert [p["name"] for p in pictures][:2] == ["walk_straight, cycle 2", "walk_turns, cycle 2"]
+
+
+def test_texts_reach_plotly_as_entities() -> None:
+    chart = Chart("c", "t", "", [{"type": "bar", "y": ["<b>a & b"], "hovertemplate": "%{y}<extra></extra>"}])
+    (trace,) = chart.spec()["traces"]
+    assert trace["y"] == ["&lt;b>a &amp; b"]
+    assert trace["hovertemplate"] == "%{y}<extra></extra>"
+
+
+def test_examples_are_seeded(examples: ModuleType, holden31: Any, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        examples.scenarios(tmp_path / f"{name}.npz", holden31)
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
