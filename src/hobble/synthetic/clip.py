@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import pathlib
 from dataclasses import dataclass
-from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,6 @@ def generate(
     frames: int,
     recipe: str | None,
     injured: str | None,
-    ground: str,
     fps: float,
     seed: int,
 ) -> Walk:
@@ -56,6 +55,20 @@ def generate(
     recipe = recipe or (INJURED if injured else "walk-straight")
     total = round(frames * fps / 60)
     segments = plan(recipe, total, fps, seed, clip)
+    return walk(clip, skeleton, segments, total, injured, GROUND.get(recipe, "flat"), fps, seed)
+
+
+def walk(
+    clip: str,
+    skeleton: Skeleton,
+    segments: list[Segment],
+    total: int,
+    injured: str | None,
+    ground: str,
+    fps: float,
+    seed: int,
+) -> Walk:
+    """Walk a plan for `total` frames at `fps`, on a kind of ground that `make_ground` knows."""
     status = [(0, 0)]
     if injured:
         injury.check_link(injured, clip)
@@ -68,9 +81,9 @@ def generate(
         if injured:
             status = injury.at_footsteps(status, sorted(right + left))
     rng = generator(seed, clip, "walk")
-    terrain = make_ground(GROUND.get(recipe, "flat"), rng)
+    terrain = make_ground(ground, rng)
     steps = stances(path, style, phase, terrain, rng)
-    feet = tuple(move_foot(steps[side], style, side, terrain) for side in (LEFT, RIGHT))
+    feet = (move_foot(steps[LEFT], style, LEFT, terrain), move_foot(steps[RIGHT], style, RIGHT, terrain))
     rotations, root = pose(skeleton, path, style, phase, feet, terrain, rng)
     part = slice(path.first, path.first + total)
     motion = Clip(clip, skeleton, fps, rotations[part], root[part])
@@ -99,20 +112,19 @@ def write_clip(
     frames: int,
     recipe: str | None,
     injured: str | None,
-    ground: str,
     options: dict[str, Any],
     *,
-    bvh: str | PathLike[str],
-    footsteps: str | PathLike[str],
-    gait: str | PathLike[str],
-    status: str | PathLike[str],
+    bvh: str | pathlib.Path,
+    footsteps: str | pathlib.Path,
+    gait: str | pathlib.Path,
+    status: str | pathlib.Path,
 ) -> None:
     """Generate a clip and write it as a user's folder would hold it. skeleton: as `Skeleton.to_dict`.
 
     options: `fps` of the files and `seed`. Raises HobbleError for what cannot be walked.
     """
     rig = Skeleton.from_dict(skeleton)
-    walk = generate(clip, rig, frames, recipe, injured, ground, options["fps"], options["seed"])
+    walk = generate(clip, rig, frames, recipe, injured, options["fps"], options["seed"])
     write_bvh(bvh, walk.clip)
     write_text(footsteps, files.footsteps_text(walk.right, walk.left))
     write_text(gait, files.gait_text(walk.gait))

@@ -18,7 +18,7 @@ X_AXIS = np.array([1.0, 0.0, 0.0])
 HEEL = np.array([0.0, -4.2, -3.0])  # the back of the sole from the ankle, nearly
 ROLL = 2.8  # the heel rises slowly at first, then fast
 READY = 0.85  # share of the swing after which the foot is pitched for its landing
-FOLLOW = 0.55  # share of the pitch rate at which it leaves that the foot keeps
+FOLLOW = 0.7  # share of the pitch rate at which it leaves that the foot keeps
 SPEED_LEFT = 0.3  # share of its mean speed over ground that the foot has left as it lands
 EARLY = 0.8  # below 1 the foot has most of its way behind it before half of its time
 SOLE_HEIGHT = 2.0  # a moving joint of the foot keeps at least this and the clearance over the ground
@@ -81,7 +81,7 @@ class _Roll:
             float(heel_off),
         )
 
-    def pitch(self, t: Array, lands: bool = True, leaves: bool = True) -> Array:
+    def pitch(self, t: Array | float, lands: bool = True, leaves: bool = True) -> Array:
         """Radians, + toe up, at frames `t` within or just outside of the stance."""
         u = (np.asarray(t, float) - self.step.land) / (self.step.leave - self.step.land)
         down = u / self.flat
@@ -90,9 +90,9 @@ class _Roll:
         landing = (self.land - rest) * (1 - _ease(down)) if lands else 0.0
         return rest + landing + ((self.off - rest) * rise**ROLL if leaves else 0.0)
 
-    def toe(self, pitch: float) -> Array:
+    def toe(self, pitch: Array) -> Array:
         """(3,) the toe joint: still where the heel is up, on an arc about the ankle where the toe is up."""
-        turned = quat.mul(self.step.turn, quat.from_axis_angle(X_AXIS, -max(pitch, 0.0)))
+        turned = quat.mul(self.step.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0.0)))
         return self.step.ankle + quat.rotate(turned, FOOT)
 
     def ankle(self, pitch: Array) -> Array:
@@ -158,7 +158,7 @@ def _ease(u: Array) -> Array:
     return u * u * (3 - 2 * u)
 
 
-def _hermite(a: Array, da: Array, b: Array, db: Array, u: Array) -> Array:
+def _hermite(a: Array | float, da: Array | float, b: Array | float, db: Array | float, u: Array) -> Array:
     """Cubic from a to b with slopes da and db."""
     u2, u3 = u * u, u * u * u
     return a * (2 * u3 - 3 * u2 + 1) + da * (u3 - 2 * u2 + u) + b * (3 * u2 - 2 * u3) + db * (u3 - u2)

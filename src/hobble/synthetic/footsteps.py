@@ -14,7 +14,8 @@ from hobble.synthetic.path import Path
 
 ANKLE_HEIGHT = 7.0  # of the ankle joint over the sole; the toe joint is 4.5 cm lower on the skeleton
 FOOT = np.array([0.0, -4.5, 13.5])  # from ankle to toe joint in a foot that stands flat
-STAY = (3.0, np.radians(5.0))  # a standing figure leaves its foot where it would move less than this
+STAY = (7.0, np.radians(12.0))  # a standing figure leaves its foot where it would move less than this
+APART = 8.0  # least distance between the ankles, across the way
 STILL = 12.0  # cm/s; slower than this the figure stands
 SOLE = np.array([-11.0, -5.0, 0.0, 6.0, 13.5, 20.5, 27.0])  # along the foot from below the ankle, with room
 SHIFTS = sorted(np.arange(-20.0, 21.0, 2.0), key=abs)  # how far a foot is moved to keep it off an edge
@@ -49,35 +50,35 @@ def landings(phase: Array, style: Style, side: int) -> Array:
 def stances(
     path: Path, style: Style, phase: Array, ground: Ground, rng: np.random.Generator
 ) -> tuple[list[Stance], list[Stance]]:
-    """Every stance of the left and of the right foot along the path."""
-    return _of_side(path, style, phase, ground, LEFT, rng), _of_side(path, style, phase, ground, RIGHT, rng)
-
-
-def _of_side(
-    path: Path, style: Style, phase: Array, ground: Ground, side: int, rng: np.random.Generator
-) -> list[Stance]:
+    """Every stance of the left and of the right foot along the path, placed in the order they land."""
     frames = np.arange(len(path), dtype=float)
-    at = landings(phase, style, side)
-    out: list[Stance] = []
-    for land in at[:-1]:
+    events = [(land, side) for side in (LEFT, RIGHT) for land in landings(phase, style, side)[:-1]]
+    out: tuple[list[Stance], list[Stance]] = ([], [])
+    for land, side in sorted(events):
         here = np.interp(land, frames, phase)
         # The share on the ground is that of the moment of leaving: who speeds up leaves sooner.
         leave = np.interp(here, phase - style.duty[:, side], frames)
         middle = np.interp((here + np.interp(leave, frames, phase)) / 2, phase, frames)
-        ankle, turn = _footprint(path, style, ground, side, middle, rng)
+        before, beside = (out[s][-1] if out[s] else None for s in (side, 1 - side))
+        ankle, turn = _footprint(path, style, ground, side, middle, beside, rng)
         standing = np.interp(middle, frames, path.speed) < STILL
-        if out and standing and _close(out[-1], ankle, turn):
-            ankle, turn = out[-1].ankle, out[-1].turn
-            out.append(Stance(land, leave, ankle, turn, swings=False))
+        if before and standing and _close(before, ankle, turn):
+            out[side].append(Stance(land, leave, before.ankle, before.turn, swings=False))
         else:
-            out.append(Stance(land, leave, ankle, turn))
+            out[side].append(Stance(land, leave, ankle, turn))
     return out
 
 
 def _footprint(
-    path: Path, style: Style, ground: Ground, side: int, middle: float, rng: np.random.Generator
+    path: Path,
+    style: Style,
+    ground: Ground,
+    side: int,
+    middle: float,
+    beside: Stance | None,
+    rng: np.random.Generator,
 ) -> tuple[Array, Array]:
-    """Under the body in mid-stance, the foot's middle ahead of the ankle; the faster, the further ahead."""
+    """Under the body in mid-stance, but never across the other foot."""
     frames = np.arange(len(path), dtype=float)
 
     def value(curve: Array) -> float:
@@ -91,6 +92,10 @@ def _footprint(
     yaw = facing + SIGN[side] * toe_out
     x = value(path.position[:, 0]) + out * np.cos(facing) + along * np.sin(facing)
     z = value(path.position[:, 1]) - out * np.sin(facing) + along * np.cos(facing)
+    if beside is not None:
+        apart = SIGN[side] * ((x - beside.ankle[0]) * np.cos(facing) - (z - beside.ankle[2]) * np.sin(facing))
+        aside = SIGN[side] * max(0.0, APART - apart)
+        x, z = x + aside * np.cos(facing), z - aside * np.sin(facing)
     return _planted(ground, np.array([x, z]), yaw)
 
 

@@ -17,23 +17,23 @@ from hobble.synthetic.path import GAITS, Path
 REFERENCE_SPEED = (0.0, 1.3, 2.8, 0.8)
 TABLE: dict[str, tuple[tuple[float, float], ...]] = {
     "duty": ((0.64, 0), (0.60, -0.06), (0.335, -0.045), (0.64, -0.06)),  # share of the cycle on the ground
-    "land_pitch": ((0, 0), (16, 6), (8, 2), (-20, 0)),  # of the foot as it lands, + toe up
-    "off_pitch": ((-15, 0), (-57.5, -13), (-54, -6), (-58, -8)),  # as it leaves
-    "rest_pitch": ((0, 0), (0, 0), (0, 0), (-20, 0)),  # while it stands
+    "land_pitch": ((0, 0), (20, 6), (8, 2), (-24, 0)),  # of the foot as it lands, + toe up
+    "off_pitch": ((-15, 0), (-56, -13), (-48, -4), (-58, -8)),  # as it leaves
+    "rest_pitch": ((0, 0), (0, 0), (0, 0), (-24, 0)),  # while it stands
     "flat": ((0.15, 0), (0.13, 0), (0.18, 0), (0.15, 0)),  # share of stance until the toe is down
     "heel_off": ((0.6, 0), (0.46, -0.05), (0.30, 0), (0.45, 0)),  # share of stance when the heel leaves
-    "lift": ((2, 0), (0.8, 1), (8, 3), (4, 0)),  # of the swinging foot over the line of its ends
+    "lift": ((2, 0), (1.4, 1), (8, 3), (4, 0)),  # of the swinging foot over the line of its ends
     "clearance": ((1, 0), (1.5, 0), (3, 0), (2, 0)),  # least height of the swinging sole
-    "behind": ((4, 0), (12, 5.5), (12, 5), (10, 5)),  # of an ankle behind the body in mid-stance
+    "behind": ((4, 0), (11.7, 5.5), (12, 5), (10, 5)),  # of an ankle behind the body in mid-stance
     "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # of an ankle from the path
     "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),
-    "height": ((94.6, 0), (93.7, -1.0), (91.5, -0.5), (62, 0)),  # of the hips above the ground
+    "height": ((94.6, 0), (93.7, -1.0), (91.5, -0.5), (57, 0)),  # of the hips above the ground
     "bob": ((0, 0), (1.8, 1.2), (-3.0, 0.3), (0.8, 0)),  # + highest in mid-stance, - lowest
     "sway": ((1.6, 0), (2.2, -0.8), (0.8, 0), (2.5, 0)),
     "pelvis_yaw": ((0.3, 0), (6, 2), (6, 1), (5, 0)),
     "pelvis_list": ((1.0, 0), (4, 1), (4, 0), (3, 0)),
-    "pelvis_tilt": ((3, 0), (4, 1), (9, 1), (24, 0)),
-    "lean": ((1, 0), (3, 2), (10, 2), (58, 0)),  # of the trunk, forward
+    "pelvis_tilt": ((3, 0), (4, 1), (9, 1), (34, 0)),
+    "lean": ((1, 0), (3, 2), (10, 2), (66, 0)),  # of the trunk, forward
     "chest_yaw": ((0.3, 0), (4, 2), (9, 2), (4, 0)),
     "arm_swing": ((0.8, 0), (17, 12), (27, 4), (9, 0)),
     "arm_mean": ((1, 0), (-1, 0), (-8, 0), (14, 0)),  # + forward
@@ -41,7 +41,16 @@ TABLE: dict[str, tuple[tuple[float, float], ...]] = {
     "elbow_swing": ((0.5, 0), (9, 5), (11, 0), (5, 0)),
     "abduction": ((9, 0), (9, 0), (13, 0), (14, 0)),
 }
-SIDED = ("duty", "land_pitch", "off_pitch", "heel_off", "lift", "clearance", "toe_out", "arm_swing")
+SIDED: tuple[str, ...] = (
+    "duty",
+    "land_pitch",
+    "off_pitch",
+    "heel_off",
+    "lift",
+    "clearance",
+    "toe_out",
+    "arm_swing",
+)
 SIDED += ("arm_mean", "elbow", "elbow_swing", "abduction")
 LEFT, RIGHT = 0, 1
 SIGN = (1.0, -1.0)  # +X is the figure's left
@@ -101,7 +110,7 @@ def healthy_style(path: Path) -> Style:
     for name, row in TABLE.items():
         base = np.array([value for value, _ in row])
         slope = np.array([change for _, change in row])
-        each = base + slope * (speed[:, None] - np.array(REFERENCE_SPEED)) * (np.array(row)[:, 1] != 0)
+        each = base + slope * (speed[:, None] - np.array(REFERENCE_SPEED))
         mixed = np.sum(path.gait * each, axis=1)
         values[name] = np.repeat(mixed[:, None], 2, axis=1) if name in SIDED else mixed
     values["duty"] = np.clip(values["duty"], 0.28, 0.82)

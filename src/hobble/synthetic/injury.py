@@ -34,18 +34,18 @@ EFFECTS: dict[str, dict[str, tuple[str, float]]] = {
         **{"duty": ("+", -0.18), "duty_sound": ("+", 0.05), "lag_hurt": ("+", -0.12), "shift": ("+", -7.0)},
         **{"off_pitch": ("*", 0.45), "heel_off": ("+", 0.14), "land_pitch": ("*", 0.35), "lift": ("+", -2.0)},
         **{"clearance": ("*", 0.5), "swing_out": ("+", 10.0), "hike": ("+", 8.0), "side_lean": ("+", 18.0)},
-        **{"sway": ("+", 2.5), "frequency": ("*", 1.14), "arm_swing_all": ("*", 0.6)},
+        **{"sway": ("+", 2.5), "frequency": ("*", 1.24), "arm_swing_all": ("*", 0.6)},
     },
     "shank": {  # set down flat and lifted early, the knee soft
         **{"duty": ("+", -0.18), "duty_sound": ("+", 0.05), "lag_hurt": ("+", -0.12), "shift": ("+", -6.0)},
         **{"off_pitch": ("*", 0.25), "heel_off": ("+", 0.10), "land_pitch": ("*", 0.0), "lift": ("+", -1.0)},
         **{"clearance": ("*", 0.8), "toe_out": ("+", 5.0), "side_lean": ("+", 11.0), "sway": ("+", 1.2)},
-        **{"frequency": ("*", 1.15), "height": ("+", -2.0), "arm_swing_all": ("*", 0.75)},
+        **{"frequency": ("*", 1.24), "height": ("+", -2.0), "arm_swing_all": ("*", 0.75)},
     },
     "foot": {  # on the heel, turned out, no roll over the toe
         **{"duty": ("+", -0.14), "duty_sound": ("+", 0.03), "lag_hurt": ("+", -0.09), "shift": ("+", -4.0)},
         **{"off_pitch": ("*", 0.08), "heel_off": ("+", 0.2), "land_pitch": ("*", 1.1), "flat": ("+", 0.10)},
-        **{"lift": ("+", 3.0), "toe_out": ("+", 22.0), "side_lean": ("+", 6.0), "frequency": ("*", 1.10)},
+        **{"lift": ("+", 3.0), "toe_out": ("+", 22.0), "side_lean": ("+", 6.0), "frequency": ("*", 1.14)},
         **{"arm_swing_all": ("*", 0.9)},
     },
     "back": {  # bent forward and stiff

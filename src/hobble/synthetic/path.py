@@ -12,7 +12,7 @@ from hobble.core.quat import Array
 from hobble.synthetic.recipes import CROUCH, JOG, STAND, WALK, Segment
 
 GAITS = (STAND, WALK, JOG, CROUCH)
-BLEND = 0.28  # seconds, sigma of the change from one segment to the next: about a second from end to end
+BLEND = 0.30  # seconds, sigma of the change from one segment to the next: about a second from end to end
 
 
 @dataclass(frozen=True)

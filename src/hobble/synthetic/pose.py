@@ -137,7 +137,7 @@ def _trunk(skeleton: Skeleton, world: Array, path: Path, hips: Array, chest: Arr
         world[:, skeleton.index(name)] = hips
     for name, share in (("LowerBack", 0.3), ("Spine", 0.65), ("Spine1", 1.0)):
         world[:, skeleton.index(name)] = quat.slerp(hips, chest, np.full(len(path), share))
-    for name, share in (("Neck", 0.2), ("Neck1", 0.6), ("Head", 1.0)):
+    for name, share in (("Neck", 0.1), ("Neck1", 0.5), ("Head", 1.0)):
         world[:, skeleton.index(name)] = quat.slerp(chest, look, np.full(len(path), share))
 
 

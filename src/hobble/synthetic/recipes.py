@@ -73,8 +73,8 @@ RECIPES: dict[str, tuple[Segment, ...]] = {
         *(_stand(1.6), _walk(65, 0, 2.2, 140), _walk(65, 0, 2.2, -140)),
     ),
     "stop-and-go": (
-        *(_stand(2.4), _walk(130, 0, 2.6), _stand(2.4), _walk(20, 90, 1.8), _walk(100, 0, 2.2)),
-        *(_stand(2.4), _walk(20, -90, 1.8), _jog(260, 0, 2.4), _stand(2.4)),
+        *(_stand(4.2), _walk(130, 0, 2.2), _stand(4.2), _walk(20, 90, 1.7), _walk(100, 0, 2)),
+        *(_stand(3.2), _walk(20, -90, 1.7), _jog(250, 0, 2.2), _stand(3.4)),
     ),
     "walk-jog-walk": (
         *(_walk(130, 0, 2.5), _jog(270, 0, 3), _walk(140, 15, 2.5), _jog(330, -15, 3)),
@@ -92,7 +92,8 @@ def plan(recipe: str, frames: float, fps: float, seed: int, clip: str) -> list[S
     """The segments of a clip of `frames` frames, each a little different by the clip's own generator.
 
     The recipe is walked as often as fits best, at three quarters of its time or more, the turns of
-    every other round mirrored; an injured clip starts anywhere in it. Raises HobbleError for an unknown recipe.
+    every other round mirrored; an injured clip starts anywhere in it.
+    Raises HobbleError for a recipe that there is not.
     """
     if recipe not in RECIPES:
         raise HobbleError(f"clip {clip}: there is no recipe {recipe!r}. There are: {', '.join(RECIPES)}.")

@@ -1,0 +1,161 @@
+"""Measuring the walker from the files it writes, with nothing of the code that wrote them."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from scipy.spatial.transform import Rotation
+
+from hobble.core.skeleton import Skeleton
+from hobble.synthetic.clip import write_clip
+
+Array = np.ndarray
+CONTACT = 0.02  # cm2 per 60 Hz frame
+
+
+@dataclass(frozen=True)
+class Files:
+    """A clip's four files, read; frames count from 0 at 60 Hz, as every second one of the BVH's is kept."""
+
+    folder: Path
+    name: str
+
+    def text(self, ending: str) -> str:
+        return (self.folder / f"{self.name}{ending}").read_text()
+
+    @cached_property
+    def bvh(self) -> tuple[list[str], float, Array]:
+        """Joint names, frame time, (F, J, 3) positions of every frame of the file."""
+        return read_bvh(self.text(".bvh"))
+
+    @cached_property
+    def positions(self) -> Array:
+        return self.bvh[2][::2]
+
+    def joint(self, name: str) -> Array:
+        return self.positions[:, self.bvh[0].index(name)]
+
+    @cached_property
+    def footsteps(self) -> Array:
+        """(N, 2) 1-based frames of the file: right lands, left lands."""
+        return np.array(
+            [[int(x) for x in line.split()[:2]] for line in self.text("_footsteps.txt").splitlines()]
+        )
+
+    def landings(self, side: str) -> Array:
+        return (self.footsteps[:, 0 if side == "Right" else 1]) // 2
+
+    @cached_property
+    def facing(self) -> Array:
+        across = (
+            self.joint("LeftArm")
+            - self.joint("RightArm")
+            + self.joint("LeftUpLeg")
+            - self.joint("RightUpLeg")
+        )
+        ahead = np.cross(across, [0.0, 1.0, 0.0])
+        return ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
+
+    def ahead(self, vectors: Array) -> Array:
+        return np.sum(vectors * self.facing, axis=1)
+
+    def contact(self, joint: str) -> Array:
+        moved = np.sum(np.diff(self.joint(joint), axis=0) ** 2, axis=1)
+        return np.append(moved, moved[-1]) < CONTACT
+
+    def down(self, side: str) -> Array:
+        return self.contact(f"{side}Foot") | self.contact(f"{side}ToeBase")
+
+    def angles(self, side: str) -> dict[str, Array]:
+        """Degrees in the sagittal plane: thigh from the vertical, knee bend, ankle from the standing foot."""
+
+        def slope(above: str, below: str) -> Array:
+            bone = self.joint(f"{side}{below}") - self.joint(f"{side}{above}")
+            return np.degrees(np.arctan2(self.ahead(bone), -bone[:, 1]))
+
+        thigh, shank, foot = slope("UpLeg", "Leg"), slope("Leg", "Foot"), slope("Foot", "ToeBase")
+        flat = np.degrees(np.arctan2(13.5, 4.5))
+        return {"hip": thigh, "knee": thigh - shank, "ankle": foot - shank - flat}
+
+    def cycles(self, side: str, slowest: float = 0.0, fastest: float = np.inf) -> list[tuple[int, int]]:
+        """First and last frame of each cycle of a foot whose mean speed lies between the two, cm/s."""
+        at = self.landings(side)
+        hips = self.joint("Hips")[:, [0, 2]]
+        out = []
+        for a, b in itertools.pairwise(at):
+            speed = np.sum(np.linalg.norm(np.diff(hips[a : b + 1], axis=0), axis=1)) / (b - a) * 60
+            if slowest <= speed <= fastest:
+                out.append((int(a), int(b)))
+        return out
+
+
+def read_bvh(text: str) -> tuple[list[str], float, Array]:
+    """Names, frame time and world positions, by matrices; every joint must rotate in the order ZYX."""
+    head, motion = text.split("MOTION\n")
+    names: list[str] = []
+    parents: list[int] = []
+    offsets: list[list[float]] = []
+    stack: list[int] = []
+    for words in (line.split() for line in head.splitlines()):
+        if words[0] in ("ROOT", "JOINT", "End"):
+            parents.append(stack[-1] if stack else -1)
+            names.append(words[1])
+            stack.append(len(names) - 1)
+        elif words[0] == "OFFSET":
+            offsets.append([float(x) for x in words[1:]])
+        elif words[0] == "}":
+            stack.pop()
+        elif words[0] == "CHANNELS":
+            assert words[-3:] == ["Zrotation", "Yrotation", "Xrotation"]
+    lines = motion.splitlines()
+    table = np.array([np.fromstring(line, sep=" ") for line in lines[2:]])
+    assert int(lines[0].split()[1]) == len(table)
+    moving = [i for i, name in enumerate(names) if name != "Site"]
+    turns: dict[int, Array] = {}
+    places = np.empty((len(table), len(names), 3))
+    for n, i in enumerate(moving):
+        turn = Rotation.from_euler("ZYX", table[:, 3 + 3 * n : 6 + 3 * n], degrees=True).as_matrix()
+        p = parents[i]
+        turns[i] = turn if p < 0 else turns[p] @ turn
+        places[:, i] = table[:, :3] if p < 0 else places[:, p] + turns[p] @ np.array(offsets[i])
+    return [names[i] for i in moving], float(lines[1].split()[2]), places[:, moving]
+
+
+@pytest.fixture(scope="session")
+def written(tmp_path_factory: pytest.TempPathFactory, holden31: Skeleton) -> Callable[..., Files]:
+    """Writes a clip once a session: `written(name, recipe, injured, frames, fps, seed)`."""
+    folder = tmp_path_factory.mktemp("synthetic")
+
+    @functools.cache
+    def write(
+        name: str,
+        recipe: str | None = None,
+        injured: str | None = None,
+        frames: int = 600,
+        fps: int = 120,
+        seed: int = 1,
+    ) -> Files:
+        here = folder / f"{fps}-{seed}-{frames}-{recipe}-{injured}"
+        paths: dict[str, Any] = {"bvh": here / f"{name}.bvh"}
+        endings = {"footsteps": "footsteps", "gait": "gait", "status": "injuries"}
+        paths |= {key: here / f"{name}_{ending}.txt" for key, ending in endings.items()}
+        write_clip(name, holden31.to_dict(), frames, recipe, injured, {"fps": fps, "seed": seed}, **paths)
+        return Files(here, name)
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def dataset(root: Path) -> dict[str, Any]:
+    """config/datasets/synthetic.yaml."""
+    data: dict[str, Any] = yaml.safe_load((root / "config/datasets/synthetic.yaml").read_text())
+    return data

@@ -1,0 +1,72 @@
+"""The data sets that are walked: complete, balanced, and split so that what is held out has its like."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import yaml
+
+from hobble.synthetic.injury import LINKS
+from hobble.synthetic.path import GAITS
+from hobble.synthetic.recipes import GROUND, RECIPES, plan
+
+
+def plans(data):
+    """clip -> (entry, its plan at the length it has)."""
+    total = sum(entry.get("share", 1) for entry in data["clips"].values())
+    for name, entry in data["clips"].items():
+        frames = data["synthetic"]["frames"] * entry.get("share", 1) / total
+        recipe = entry.get("recipe") or "injured"
+        yield name, entry, frames, plan(recipe, 2 * frames, 120, data["synthetic"]["seed"], name)
+
+
+@pytest.mark.parametrize("name", ["synthetic", "tiny"])
+def test_clips_name_recipes_and_links_that_there_are(root, name):
+    data = yaml.safe_load((root / f"config/datasets/{name}.yaml").read_text())
+    for clip, entry in data["clips"].items():
+        assert ("recipe" in entry) != ("injured" in entry), clip
+        assert entry.get("recipe", "injured") in RECIPES
+        assert entry.get("injured", "LowerBack-Spine") in LINKS
+        assert (entry.get("ground", "flat") == "rocky") == (entry.get("recipe") in GROUND), clip
+        assert entry["gait"] in GAITS
+    training = [entry for clip, entry in data["clips"].items() if clip not in data["held_out"]]
+    for clip in data["held_out"]:
+        entry = data["clips"][clip]
+        if name == "synthetic":
+            like = [e for e in training if all(e.get(k) == entry.get(k) for k in ("recipe", "injured"))]
+            assert like, f"nothing like {clip} is trained on"
+    assert {bool(data["clips"][c].get("injured")) for c in data["held_out"]} == {True, False}
+
+
+def test_every_link_that_can_be_hurt_is(dataset):
+    assert {e["injured"] for e in dataset["clips"].values() if "injured" in e} == set(LINKS)
+    assert {e["recipe"] for e in dataset["clips"].values() if "recipe" in e} == set(RECIPES) - {"injured"}
+
+
+def test_turns_go_left_as_much_as_right_and_every_gait_has_its_share(dataset):
+    seconds = dict.fromkeys(GAITS, 0.0)
+    left = right = 0.0
+    for _, _, frames, segments in plans(dataset):
+        begun = 0.0
+        for s in segments:
+            inside = np.clip((frames / 60 - begun) / s.seconds, 0, 1)
+            begun += s.seconds
+            seconds[s.gait] += inside * s.seconds
+            left, right = left + max(s.turn, 0) * inside, right + max(-s.turn, 0) * inside
+    assert 0.8 < left / right < 1.25
+    assert min(left, right) > 720
+    share = {gait: t / sum(seconds.values()) for gait, t in seconds.items()}
+    assert share["walk"] > 0.5
+    assert share["jog"] > 0.1
+    assert share["crouch"] > 0.02
+    assert share["stand"] > 0.02
+
+
+def test_injured_clips_try_to_jog_at_several_severities(dataset):
+    tried = set()
+    for _, entry, frames, segments in plans(dataset):
+        ends = np.cumsum([s.seconds for s in segments])
+        for end, s in zip(ends, segments, strict=True):
+            if "injured" in entry and s.gait == "jog" and end < frames / 60:
+                tried.add(int((end - s.seconds / 2) / (frames / 60) * 5))
+    assert len(tried) >= 4

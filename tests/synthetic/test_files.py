@@ -1,0 +1,140 @@
+"""The files beside the BVH say what is in it, in the form of a user's own."""
+
+from __future__ import annotations
+
+import itertools
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.core.errors import HobbleError
+from hobble.synthetic.files import footsteps_text, gait_text, status_text
+from hobble.synthetic.path import gait_keys
+from hobble.synthetic.recipes import Segment
+
+RECIPES = ["walk-straight", "walk-turns", "jog", "walk-jog-walk", "uneven", "crouch"]
+
+
+@pytest.mark.parametrize("recipe", RECIPES)
+def test_footsteps_are_landings_of_the_right_and_the_left_foot_in_turn(written, recipe):
+    clip = written("any", recipe=recipe)
+    order = clip.footsteps.ravel()
+    assert (np.diff(order) > 10).all()
+    for side in ("Right", "Left"):
+        down = clip.down(side)
+        for frame in clip.landings(side):
+            if 3 < frame < len(down) - 4:
+                assert down[frame + 1 : frame + 4].all(), f"{side} is not down after frame {frame}"
+                assert not down[frame - 3 : frame - 1].any(), f"{side} is down before frame {frame}"
+
+
+def test_every_landing_of_the_motion_has_its_line(written):
+    clip = written("any", recipe="walk-turns")
+    for side in ("Right", "Left"):
+        down = clip.down(side)
+        lands = np.flatnonzero(~down[:-1] & down[1:]) + 1
+        first, last = clip.footsteps.min() // 2, clip.footsteps.max() // 2
+        for frame in lands[(lands > first + 2) & (lands < last - 2)]:
+            assert np.abs(clip.landings(side) - frame).min() <= 1
+
+
+def test_frames_rate_and_number_are_as_asked(written):
+    for fps in (60, 120):
+        clip = written("any", recipe="jog", frames=300, fps=fps)
+        _, frame_time, positions = clip.bvh
+        assert len(positions) == 300 * fps // 60
+        assert frame_time == pytest.approx(1 / fps, abs=1e-6)
+        assert clip.footsteps.max() <= len(positions)
+
+
+def test_same_arguments_same_bytes_and_another_seed_or_name_another_walk(written, tmp_path, holden31):
+    from hobble.synthetic.clip import write_clip
+
+    def write(name, seed):
+        paths = {key: tmp_path / f"{name}{seed}{key}" for key in ("bvh", "footsteps", "gait", "status")}
+        write_clip(
+            name, holden31.to_dict(), 240, "uneven", "LowerBack-Spine", {"fps": 120, "seed": seed}, **paths
+        )
+        return [path.read_bytes() for path in paths.values()]
+
+    once = write("a", 1)
+    assert write("a", 1) == once
+    assert write("a", 2)[0] != once[0]
+    assert write("b", 1)[0] != once[0]
+
+
+def test_unknown_recipe_or_link_is_refused_with_what_there_is(written):
+    with pytest.raises(HobbleError, match=r"clip x: there is no recipe 'moonwalk'.*walk-straight"):
+        written("x", recipe="moonwalk")
+    with pytest.raises(HobbleError, match=r"clip x: .*cannot hurt 'Neck-Head'.*LeftUpLeg-LeftLeg"):
+        written("x", injured="Neck-Head")
+
+
+def test_gait_keys_say_which_gait_and_fade_between(written):
+    clip = written("any", recipe="walk-jog-walk")
+    keys = [line.split() for line in clip.text("_gait.txt").splitlines()]
+    frames = [int(frame) for frame, _ in keys]
+    assert frames[0] == 1
+    assert frames == sorted(set(frames))
+    assert frames[-1] <= 2 * len(clip.positions)
+    assert {label for _, label in keys} == {"walk", "jog"}
+    hips = clip.joint("Hips")[:, [0, 2]]
+    speed = np.linalg.norm(np.diff(hips, axis=0), axis=1) * 60
+    for (a, label), (b, following) in itertools.pairwise(keys):
+        if label == following:
+            inner = speed[int(a) // 2 : int(b) // 2]
+            assert (inner.mean() > 200) == (label == "jog")
+
+
+segments = st.lists(
+    st.builds(Segment, st.sampled_from(["stand", "walk", "jog", "crouch"]), seconds=st.floats(0.2, 4.0)),
+    min_size=1,
+    max_size=8,
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(segments, st.integers(30, 900))
+def test_gait_keys_always_grow_and_begin_at_the_beginning(plan, frames):
+    keys = gait_keys(plan, frames, 60)
+    at = [frame for frame, _ in keys]
+    assert at[0] == 0
+    assert all(a < b for a, b in itertools.pairwise(at))
+    assert at[-1] < frames
+    assert gait_text(keys).splitlines()[0] == f"1 {plan[0].gait}"
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.integers(1, 40), min_size=2, max_size=30), st.booleans())
+def test_footstep_lines_pair_each_right_with_the_next_left(gaps, left_first):
+    frames = np.cumsum(gaps).tolist()
+    left, right = frames[0 if left_first else 1 :: 2], frames[1 if left_first else 0 :: 2]
+    numbers = [int(x) for x in footsteps_text(right, left).split()]
+    assert len(numbers) % 2 == 0
+    assert numbers == sorted(numbers)
+    assert all(n - 1 in right for n in numbers[::2])
+    assert all(n - 1 in left for n in numbers[1::2])
+
+
+def test_status_lines_cover_what_hurts_and_nothing_else():
+    assert status_text(90, None, [(0, 0)]) == "frames:90\n"
+    text = status_text(90, "A-B", [(0, 0), (20, 3), (50, 10)])
+    assert text == "frames:90\n21-50 A-B[3];\n51-90 A-B[10];\n"
+
+
+def test_a_clip_hurts_at_every_severity_from_footstep_to_footstep(written):
+    clip = written("hurt", injured="LeftLeg-LeftFoot", frames=800)
+    first, *lines = clip.text("_injuries.txt").splitlines()
+    assert first == "frames:1600"
+    found = [re.fullmatch(r"(\d+)-(\d+) LeftLeg-LeftFoot\[(\d+)\];", line) for line in lines]
+    ranges = [tuple(int(x) for x in match.groups()) for match in found]
+    assert [severity for _, _, severity in ranges] == [3, 5, 7, 10]
+    assert ranges[-1][1] == 1600
+    assert all(b + 1 == c for (_, b, _), (c, _, _) in itertools.pairwise(ranges))
+    landings = clip.footsteps.ravel()
+    for start, _, _ in ranges:
+        assert np.abs(landings - start).min() <= 2
+    assert written("healthy", recipe="jog").text("_injuries.txt") == "frames:1200\n"
