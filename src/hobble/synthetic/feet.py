@@ -88,7 +88,7 @@ class _Roll:
         rise = np.clip((u - self.heel_off) / (1 - self.heel_off), 0, None)
         rest = np.interp(t, np.arange(len(self.rest)), self.rest)
         landing = (self.land - rest) * (1 - _ease(down)) if lands else 0.0
-        return rest + landing + ((self.off - rest) * rise**ROLL if leaves else 0.0)
+        return np.asarray(rest + landing + ((self.off - rest) * rise**ROLL if leaves else 0.0))
 
     def toe(self, pitch: Array) -> Array:
         """(3,) the toe joint: still where the heel is up, on an arc about the ankle where the toe is up."""
