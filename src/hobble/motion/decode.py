@@ -17,7 +17,7 @@ STANDARD_RATES = (120, 60, 30, 24, 25, 50, 100, 90, 48, 72, 144, 180, 200, 240, 
 class Decoded:
     """F frames of J joints, in the file's unit.
 
-    rotations: (F, J, 4) local. root: (F, 3). offsets: (J, 3). translations: (F, J, 3) local joint positions where
+    rotations: (F, J, 4) local. root: (F, 3). offsets: (J, 3). translations: (F, J, 3) local positions where
     some joint but the root really moves in its parent, else None. notes: what was found out, in sentences.
     """
 

@@ -1,0 +1,118 @@
+"""Files are whole or absent, equal values give equal bytes, and failures say what to do."""
+
+from __future__ import annotations
+
+import errno
+
+import numpy as np
+import pytest
+
+from hobble.core import files
+from hobble.core.clip import Clip, load_clip, save_clip
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import atomic_path, load_npz, read_json, save_npz, write_json, write_text
+
+
+def leftovers(folder):
+    return [path.name for path in folder.iterdir() if path.name.startswith(".")]
+
+
+def test_a_failure_half_way_leaves_the_old_file_and_no_other(tmp_path):
+    path = tmp_path / "sub" / "a.txt"
+    write_text(path, "old")
+
+    def fail_half_way():
+        with atomic_path(path) as temporary:
+            temporary.write_text("half")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail_half_way()
+    assert path.read_text() == "old"
+    assert leftovers(path.parent) == []
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [(errno.ENOSPC, "the disk is full"), (errno.EACCES, "no permission"), (errno.EROFS, "read-only")],
+)
+def test_a_disk_that_fills_ends_in_one_message(tmp_path, monkeypatch, number, words):
+    path = tmp_path / "a.json"
+    write_json(path, {"old": 1})
+
+    def full(*_):
+        raise OSError(number, "no")
+
+    monkeypatch.setattr(files.os, "fsync", full)
+    with pytest.raises(HobbleError) as raised:
+        write_json(path, {"new": 2})
+    assert words in str(raised.value)
+    assert str(path) in str(raised.value)
+    assert read_json(path) == {"old": 1}
+    assert leftovers(tmp_path) == []
+
+
+def test_equal_values_give_equal_bytes(tmp_path):
+    write_json(tmp_path / "a.json", {"b": 1, "a": [1.5, None]})
+    write_json(tmp_path / "b.json", {"a": [1.5, None], "b": 1})
+    assert (tmp_path / "a.json").read_bytes() == (tmp_path / "b.json").read_bytes()
+    for name in ("a.npz", "b.npz"):
+        save_npz(tmp_path / name, x=np.arange(5.0), word=np.array("text"))
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+def test_json_without_numbers_is_refused_when_written(tmp_path):
+    with pytest.raises(ValueError, match="JSON"):
+        write_json(tmp_path / "a.json", {"x": float("nan")})
+    assert not (tmp_path / "a.json").exists()
+
+
+def test_bad_json_is_named_with_its_line(tmp_path):
+    (tmp_path / "a.json").write_text('{"a": 1,\n "b": }\n')
+    with pytest.raises(InputError, match=r"a\.json, line 2: not valid JSON"):
+        read_json(tmp_path / "a.json")
+
+
+def test_damaged_arrays_are_found(tmp_path):
+    path = tmp_path / "a.npz"
+    save_npz(path, x=np.arange(1000.0))
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-300])
+    with pytest.raises(InputError, match=r"a.npz: damaged.*Delete it"):
+        load_npz(path)
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 0xFF
+    path.write_bytes(bytes(flipped))
+    with pytest.raises(InputError, match="damaged"):
+        load_npz(path)
+    with pytest.raises(InputError, match="no such file"):
+        load_npz(tmp_path / "b.npz")
+
+
+def test_some_arrays_only(tmp_path):
+    save_npz(tmp_path / "a.npz", x=np.arange(3), y=np.arange(4))
+    assert list(load_npz(tmp_path / "a.npz", ["y"])) == ["y"]
+    with pytest.raises(InputError):
+        load_npz(tmp_path / "a.npz", ["z"])
+
+
+def test_clips_come_back(tmp_path, holden31):
+    rng = np.random.default_rng(3)
+    rotations = rng.normal(size=(9, 31, 4))
+    rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+    moved = np.tile(holden31.offsets, (9, 1, 1)) + 1
+    for translations in (None, moved):
+        clip = Clip("a-clip", holden31, 60.0, rotations, rng.normal(size=(9, 3)), translations)
+        save_clip(tmp_path / "c.npz", clip)
+        again = load_clip(tmp_path / "c.npz")
+        assert (again.name, again.fps, len(again)) == ("a-clip", 60.0, 9)
+        assert again.skeleton.to_dict() == holden31.to_dict()
+        np.testing.assert_allclose(again.positions, clip.positions, atol=1e-3)
+        np.testing.assert_allclose(np.linalg.norm(again.rotations, axis=-1), 1, atol=1e-12)
+        np.testing.assert_array_equal(again.root, clip.root)
+        assert (again.translations is None) == (translations is None)
+
+
+def test_errors_name_file_line_and_frame():
+    error = InputError("a.bvh", "it is broken", line=3, frame=7, fix="Mend it.")
+    assert str(error) == "a.bvh, line 3, frame 7: it is broken. Mend it."

@@ -1,0 +1,70 @@
+"""Two bones reach where they can, bend where they are told, and stay as long as they are."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from hobble.core import quat
+from hobble.core.ik import aim, two_bone_knee
+
+FEW = settings(max_examples=60, deadline=None)
+points = arrays(float, 3, elements=st.floats(-60, 60, allow_subnormal=False))
+HIP = np.zeros(3)
+FORWARD = np.array([0.0, 0.0, 1.0])
+
+
+@FEW
+@given(points, st.floats(20, 60), st.floats(20, 60))
+def test_bones_keep_their_lengths_and_reach_what_is_in_reach(target, upper, lower):
+    distance = np.linalg.norm(target)
+    if distance < 1 or np.linalg.norm(np.cross(target, FORWARD)) < 1:
+        return
+    knee, ankle = two_bone_knee(HIP, target, FORWARD, upper, lower)
+    np.testing.assert_allclose(np.linalg.norm(knee), upper, rtol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(ankle - knee), lower, rtol=1e-6)
+    if abs(upper - lower) * 1.002 + 1e-3 < distance < (upper + lower) * 0.998:
+        np.testing.assert_allclose(ankle, target, atol=1e-6)
+    assert np.linalg.norm(ankle) <= (upper + lower) * 0.999 + 1e-9
+
+
+@FEW
+@given(points)
+def test_the_knee_points_where_it_should(target):
+    if not 5 < np.linalg.norm(target) < 80 or np.linalg.norm(np.cross(target, FORWARD)) < 5:
+        return
+    knee, ankle = two_bone_knee(HIP, target, FORWARD, 41.0, 40.0)
+    along = ankle / np.linalg.norm(ankle)
+    out = knee - along * (knee @ along)
+    forward = FORWARD - along * (FORWARD @ along)
+    assert out @ forward > 0
+    np.testing.assert_allclose(np.cross(out, forward), 0, atol=1e-6)
+
+
+def test_out_of_reach_is_approached_along_the_line():
+    _, ankle = two_bone_knee(HIP, np.array([0, -500.0, 0]), FORWARD, 41.0, 40.0)
+    np.testing.assert_allclose(ankle, [0, -81 * 0.999, 0], atol=1e-9)
+
+
+def test_a_whole_clip_at_once():
+    rng = np.random.default_rng(6)
+    hips, targets = rng.normal(size=(50, 3)) * 5, rng.normal(size=(50, 3)) * 30
+    knees, ankles = two_bone_knee(hips, targets, FORWARD, 41.0, 40.0)
+    one = two_bone_knee(hips[17], targets[17], FORWARD, 41.0, 40.0)
+    np.testing.assert_allclose(knees[17], one[0])
+    np.testing.assert_allclose(ankles[17], one[1])
+
+
+@FEW
+@given(points, arrays(float, 4, elements=st.floats(-1, 1)))
+def test_aim_points_the_bone_and_turns_no_further(direction, q):
+    if np.linalg.norm(direction) < 1 or np.linalg.norm(q) < 0.1:
+        return
+    q, bone = quat.normalize(q), np.array([0.0, -40.0, 0.0])
+    aimed = aim(q, bone, direction)
+    unit = direction / np.linalg.norm(direction)
+    np.testing.assert_allclose(quat.rotate(aimed, bone) / 40.0, unit, atol=1e-5)
+    before = quat.rotate(q, bone) / 40.0
+    assert abs(quat.angle(aimed, q) - np.arccos(np.clip(before @ unit, -1, 1))) < 1e-4

@@ -1,0 +1,134 @@
+"""Rotations against scipy, which knows, and against what must hold for all of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation, Slerp
+
+from hobble.core import quat
+
+FEW = settings(max_examples=40, deadline=None)
+ORDERS = ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"]
+numbers = st.floats(-1, 1, allow_subnormal=False)
+vectors = arrays(float, 3, elements=st.floats(-100, 100, allow_subnormal=False))
+rotations = arrays(float, 4, elements=numbers).filter(lambda q: np.linalg.norm(q) > 0.1).map(quat.normalize)
+
+
+def scipy(q):
+    return Rotation.from_quat(q, scalar_first=True)
+
+
+def same(a, b, tolerance=1e-7):
+    """Whether two rotations are one, whatever their signs."""
+    return np.all(quat.angle(a, b) < tolerance)
+
+
+@FEW
+@given(rotations, rotations, vectors)
+def test_product_inverse_and_rotation_agree_with_scipy(a, b, v):
+    assert same(quat.mul(a, b), (scipy(a) * scipy(b)).as_quat(scalar_first=True))
+    assert same(quat.inv(a), scipy(a).inv().as_quat(scalar_first=True))
+    np.testing.assert_allclose(quat.rotate(a, v), scipy(a).apply(v), atol=1e-10)
+    np.testing.assert_allclose(quat.rotate(quat.mul(a, b), v), quat.rotate(a, quat.rotate(b, v)), atol=1e-10)
+
+
+@FEW
+@given(rotations)
+def test_matrices_agree_with_scipy_and_lead_back(q):
+    matrix = quat.to_matrix(q)
+    np.testing.assert_allclose(matrix, scipy(q).as_matrix(), atol=1e-12)
+    assert same(quat.from_matrix(matrix), q)
+    assert quat.from_matrix(matrix)[0] >= 0
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@FEW
+@given(arrays(float, (3,), elements=st.floats(-3.1, 3.1)))
+def test_euler_angles_are_intrinsic_and_lead_back(order, angles):
+    q = quat.from_euler(angles, order)
+    assert same(q, Rotation.from_euler(order, angles).as_quat(scalar_first=True))
+    assert same(quat.from_euler(quat.to_euler(q, order), order), q, 1e-5)
+    assert abs(quat.to_euler(q, order)[1]) <= np.pi / 2 + 1e-9
+
+
+def test_fewer_angles_than_three_are_a_rotation_too():
+    q = quat.from_euler(np.array([[0.3, -0.2]]), "ZX")
+    expected = Rotation.from_euler("ZX", [[0.3, -0.2]]).as_quat(scalar_first=True)
+    assert same(q, expected)
+
+
+@FEW
+@given(rotations)
+def test_log_is_half_the_angle_and_exp_its_inverse(q):
+    v = quat.log(q)
+    assert np.linalg.norm(v) <= np.pi / 2 + 1e-9
+    assert same(quat.exp(v), q)
+    if abs(q[0]) > 1e-6:  # half a turn has two axes
+        np.testing.assert_allclose(2 * v, scipy(quat.positive(q)).as_rotvec(), atol=1e-7)
+
+
+def test_log_and_exp_near_nothing():
+    np.testing.assert_array_equal(quat.log(quat.IDENTITY), np.zeros(3))
+    tiny = np.array([1e-15, 0, 0])
+    np.testing.assert_allclose(quat.log(quat.exp(tiny)), tiny)
+    np.testing.assert_allclose(quat.log(-quat.IDENTITY), np.zeros(3))
+
+
+@FEW
+@given(vectors, vectors)
+def test_between_is_the_shortest_way(a, b):
+    if min(np.linalg.norm(a), np.linalg.norm(b)) < 1e-3:
+        return
+    q = quat.between(a, b)
+    unit = b / np.linalg.norm(b)
+    np.testing.assert_allclose(quat.rotate(q, a / np.linalg.norm(a)), unit, atol=1e-5)
+    cosine = np.clip(a @ b / np.linalg.norm(a) / np.linalg.norm(b), -1, 1)
+    assert quat.angle(q, quat.IDENTITY) == pytest.approx(np.arccos(cosine), abs=1e-4)
+
+
+@pytest.mark.parametrize("direction", [[0, 0, 1], [0, 1, 0], [1, 0, 0], [0.6, 0, -0.8]])
+def test_between_opposite_directions_is_half_a_turn(direction):
+    direction = np.array(direction, float)
+    q = quat.between(direction, -direction)
+    np.testing.assert_allclose(quat.rotate(q, direction), -direction, atol=1e-9)
+    assert quat.angle(q, quat.IDENTITY) == pytest.approx(np.pi)
+
+
+@FEW
+@given(rotations, rotations, st.floats(0, 1))
+def test_slerp_agrees_with_scipy(a, b, t):
+    if quat.angle(a, b) > 3.1:
+        return
+    expected = Slerp([0, 1], scipy(np.stack([a, b])))(t).as_quat(scalar_first=True)
+    assert same(quat.slerp(a, b, t), expected, 1e-6)
+
+
+def test_slerp_takes_the_shorter_way_whatever_the_signs():
+    a, b = quat.IDENTITY, -quat.yaw(0.2)
+    assert quat.angle(quat.slerp(a, b, np.array(0.5)), quat.yaw(0.1)) < 1e-9
+
+
+def test_continuous_flips_signs_and_nothing_else():
+    q = quat.yaw(np.linspace(0, 20, 300))[:, None]
+    signs = np.where(np.random.default_rng(1).random((300, 1, 1)) < 0.5, -1.0, 1.0)
+    mended = quat.continuous(q * signs)
+    assert np.sum(mended[1:] * mended[:-1], axis=-1).min() > 0
+    np.testing.assert_array_equal(np.abs(mended), np.abs(q))
+
+
+def test_yaw_turns_forward_to_the_left():
+    np.testing.assert_allclose(quat.rotate(quat.yaw(np.pi / 2), np.array([0.0, 0, 1])), [1, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(quat.yaw(0.7), quat.from_axis_angle(np.array([0, 1.0, 0]), 0.7), atol=1e-15)
+
+
+def test_one_function_serves_one_pose_and_a_whole_clip():
+    rng = np.random.default_rng(2)
+    a, b = quat.normalize(rng.normal(size=(5, 7, 4))), quat.normalize(rng.normal(size=(7, 4)))
+    v = rng.normal(size=(7, 3))
+    np.testing.assert_allclose(quat.mul(a, b)[3, 2], quat.mul(a[3, 2], b[2]))
+    np.testing.assert_allclose(quat.rotate(a, v)[4, 6], quat.rotate(a[4, 6], v[6]))
+    np.testing.assert_allclose(quat.log(a)[1, 1], quat.log(a[1, 1]))

@@ -1,0 +1,155 @@
+"""Skeletons: their files, their sides, and where their joints are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
+
+from hobble.config.load import Catalogue
+from hobble.core import quat
+from hobble.core.skeleton import Skeleton, forward_kinematics, local_rotations, other_side
+
+NAMES = ("holden31", "ava191", "mixamo55", "rig22")
+
+
+@pytest.fixture(params=NAMES)
+def skeleton(request, root):
+    data = yaml.safe_load((root / f"config/skeletons/{request.param}.yaml").read_text())
+    return Skeleton.from_dict({"name": request.param, **data})
+
+
+def random_pose(skeleton, frames=3, seed=0):
+    rng = np.random.default_rng(seed)
+    rotations = quat.normalize(rng.normal(size=(frames, len(skeleton.joints), 4)))
+    return rotations, rng.normal(size=(frames, 3)) * 100
+
+
+def test_files_are_valid_and_hang_together(root, skeleton):
+    Catalogue(root / "config").skeleton(skeleton.name)
+    assert skeleton.parents[0] == -1
+    assert all(p < j for j, p in enumerate(skeleton.parents))
+    assert len(set(skeleton.joints)) == len(skeleton.joints)
+
+
+def test_maps_name_joints_that_there_are(root, skeleton):
+    data = yaml.safe_load((root / f"config/skeletons/{skeleton.name}.yaml").read_text())
+    for other, pairs in data.get("maps", {}).items():
+        theirs = yaml.safe_load((root / f"config/skeletons/{other}.yaml").read_text())["joints"]
+        assert set(pairs) <= set(skeleton.joints)
+        assert set(pairs.values()) <= set(theirs)
+        assert len(set(pairs.values())) == len(pairs), "two joints for one"
+        for mine, joint in pairs.items():
+            assert (pairs.get(other_side(mine)) or joint) == other_side(joint) or other_side(mine) == mine
+
+
+def test_rest_poses_are_people_standing_upright(skeleton):
+    rest = np.tile(quat.IDENTITY, (1, len(skeleton.joints), 1))
+    at = forward_kinematics(skeleton, rest, np.zeros((1, 3)))[1][0]
+    get = lambda role: at[skeleton.role(role)]  # noqa: E731
+    assert get("left_hip")[0] > 5 > -5 > get("right_hip")[0]
+    assert get("head")[1] > 35
+    assert get("left_toe")[2] > get("left_heel")[2] + 8
+    assert 75 < get("hips")[1] - get("left_heel")[1] < 100
+    np.testing.assert_allclose(get("left_hip")[1], get("right_hip")[1], atol=0.1)
+
+
+def test_plain_data_leads_back(skeleton):
+    again = Skeleton.from_dict(skeleton.to_dict())
+    assert again.to_dict() == skeleton.to_dict()
+    np.testing.assert_allclose(again.offsets, skeleton.offsets, atol=1e-6)
+    assert again.links == skeleton.links
+
+
+def test_mirroring_joints_twice_is_nothing(skeleton):
+    swap = skeleton.mirror_joints
+    np.testing.assert_array_equal(swap[swap], np.arange(len(swap)))
+    assert skeleton.joints[swap[skeleton.role("left_toe")]] == skeleton.roles["right_toe"]
+
+
+def test_links_of_the_31_joints(holden31):
+    names = holden31.link_names
+    assert len(names) == 30
+    assert names[0] == "Hips-LHipJoint"
+    assert names[2] == "LeftUpLeg-LeftLeg"
+    assert names[15] == "Neck1-Head"
+    assert names[29] == "RightHand-RThumb"
+    swap = holden31.mirror_links
+    np.testing.assert_array_equal(swap[swap], np.arange(30))
+    assert names[swap[2]] == "RightUpLeg-RightLeg"
+    assert names[swap[0]] == "Hips-RHipJoint"
+    assert swap[15] == 15
+
+
+def test_unseen_joints_are_those_of_the_facts_page(holden31):
+    indices = [holden31.index(name) for name in holden31.unseen]
+    assert indices == [1, 6, 11, 14, 17, 21, 22, 23, 24, 28, 29, 30]
+    assert (holden31.index("Head"), holden31.role("left_heel"), holden31.role("right_toe")) == (16, 4, 10)
+
+
+def test_an_unknown_joint_is_named_with_those_there_are(holden31):
+    with pytest.raises(KeyError, match="no joint 'Tail' in skeleton holden31: Hips, "):
+        holden31.index("Tail")
+
+
+def test_forward_kinematics_against_matrices(skeleton):
+    rotations, root = random_pose(skeleton)
+    world, positions = forward_kinematics(skeleton, rotations, root)
+    matrices = np.zeros((len(skeleton.joints), 4, 4))
+    for j, p in enumerate(skeleton.parents):
+        local = np.eye(4)
+        local[:3, :3] = Rotation.from_quat(rotations[1, j], scalar_first=True).as_matrix()
+        local[:3, 3] = skeleton.offsets[j] if p >= 0 else root[1]
+        matrices[j] = local if p < 0 else matrices[p] @ local
+    np.testing.assert_allclose(positions[1], matrices[:, :3, 3], atol=1e-9)
+    np.testing.assert_allclose(quat.to_matrix(world[1]), matrices[:, :3, :3], atol=1e-9)
+
+
+def test_bones_keep_their_lengths(skeleton):
+    rotations, root = random_pose(skeleton, seed=4)
+    positions = forward_kinematics(skeleton, rotations, root)[1]
+    for j, p in enumerate(skeleton.parents):
+        if p >= 0:
+            length = np.linalg.norm(positions[:, j] - positions[:, p], axis=-1)
+            np.testing.assert_allclose(length, np.linalg.norm(skeleton.offsets[j]), atol=1e-9)
+
+
+def test_translations_replace_offsets_below_the_root(holden31):
+    rotations, root = random_pose(holden31)
+    moved = np.tile(holden31.offsets * 2, (3, 1, 1))
+    moved[:, 0] = 999.0
+    doubled = forward_kinematics(holden31, rotations, root, moved)[1] - root[:, None]
+    plain = forward_kinematics(holden31, rotations, root)[1] - root[:, None]
+    np.testing.assert_allclose(doubled, 2 * plain, atol=1e-9)
+
+
+def test_local_rotations_undo_forward_kinematics(skeleton):
+    rotations, root = random_pose(skeleton)
+    world, _ = forward_kinematics(skeleton, rotations, root)
+    assert quat.angle(local_rotations(skeleton, world), rotations).max() < 1e-6
+
+
+@settings(max_examples=15, deadline=None)
+@given(arrays(float, (2,), elements=st.floats(-3, 3)))
+def test_turning_the_root_turns_everything(holden31, angles):
+    rotations, root = random_pose(holden31)
+    turn = quat.mul(quat.yaw(angles[0]), quat.from_axis_angle(np.array([1.0, 0, 0]), angles[1]))
+    before = forward_kinematics(holden31, rotations, root)[1]
+    turned = rotations.copy()
+    turned[:, 0] = quat.mul(turn, rotations[:, 0])
+    after = forward_kinematics(holden31, turned, quat.rotate(turn, root))[1]
+    np.testing.assert_allclose(after, quat.rotate(turn, before), atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [("LeftArm", "RightArm"), ("RHipJoint", "LHipJoint"), ("LThumb", "RThumb"), ("Hips", "Hips"),
+     ("Hand_L", "Hand_R"), ("UpperLeg.R", "UpperLeg.L"), ("fLeftEye", "fRightEye"), ("Spine", "Spine")],
+)  # fmt: skip
+def test_other_sides(name, other):
+    assert other_side(name) == other
+    assert other_side(other) == name
