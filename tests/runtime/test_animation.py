@@ -188,6 +188,17 @@ def test_a_severity_out_of_range(hurtable, injury) -> None:
         ProceduralAnimation(hurtable).next_pose((0, 1), injury=injury)
 
 
+def test_wishes_that_make_no_sense(network) -> None:
+    character = ProceduralAnimation(network, characters=2)
+    with pytest.raises(ValueError, match="not a finite vector"):
+        character.next_pose((0, np.nan))
+    with pytest.raises(ValueError, match="1 gaits for 2 characters"):
+        character.next_pose((0, 1), gait=["walk"])
+    for options in ({"characters": 0}, {"severity_rate": 0}, {"severity_scale": -1}):
+        with pytest.raises(ValueError, match="are positive"):
+            ProceduralAnimation(network, **options)
+
+
 def test_unknown_links_are_named(hurtable, network) -> None:
     with pytest.raises(KeyError, match="no link 'Tail': Hips-LHipJoint, "):
         ProceduralAnimation(hurtable).next_pose((0, 1), injury={"Tail": 1})

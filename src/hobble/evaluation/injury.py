@@ -92,7 +92,7 @@ class Sweep:
         rough = acceleration(self.world[late])
         rows = []
         for c, severity in enumerate(SEVERITIES):
-            row = {"severity": float(severity)}
+            row: dict[str, Any] = {"severity": float(severity)}
             row |= gait_measures(
                 self.skeleton, self.local[late, c], self.contacts[late, c], self.root[late, c]
             )

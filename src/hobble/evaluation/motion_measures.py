@@ -16,7 +16,7 @@ STANCE = 0.5  # predicted contact from which a foot counts as standing
 SHORTEST_STANCE = 4  # frames; shorter contacts are flickers, not steps
 
 
-def runs(on: Array) -> Array:
+def runs(on: np.ndarray) -> np.ndarray:
     """(N, 2) first frame and end (exclusive) of each stretch in which `on` (F,) is true.
 
     >>> runs(np.array([False, True, True, False, True])).tolist()
@@ -26,7 +26,7 @@ def runs(on: Array) -> Array:
     return np.flatnonzero(edges).reshape(-1, 2)
 
 
-def stance(contacts: Array) -> Array:
+def stance(contacts: Array) -> np.ndarray:
     """(F, 2) whether the left and the right foot stand, by heel or toe, of contacts (F, 4)."""
     return np.maximum(contacts[:, ::2], contacts[:, 1::2]) >= STANCE
 
@@ -109,11 +109,11 @@ def gait_measures(
         "step_right": length[1],
         "step_asymmetry": asymmetry(*length),
     }
-    for side in ("left", "right"):
-        hip, knee, heel = (local[:, role(f"{side}_{part}")] for part in ("hip", "knee", "heel"))
-        arm = local[:, role(f"{side}_wrist")] - local[:, role(f"{side}_shoulder")]
-        out[f"knee_{side}"] = _range(bend(hip, knee, heel))
-        out[f"arm_{side}"] = _range(np.degrees(np.arctan2(arm[:, 2], -arm[:, 1])))
+    for name in ("left", "right"):
+        hip, knee, heel = (local[:, role(f"{name}_{part}")] for part in ("hip", "knee", "heel"))
+        arm = local[:, role(f"{name}_wrist")] - local[:, role(f"{name}_shoulder")]
+        out[f"knee_{name}"] = _range(bend(hip, knee, heel))
+        out[f"arm_{name}"] = _range(np.degrees(np.arctan2(arm[:, 2], -arm[:, 1])))
     trunk = (local[:, role("neck")] - local[:, role("hips")]).mean(axis=0)
     out["lean_forward"] = float(np.degrees(np.arctan2(trunk[2], trunk[1])))
     out["lean_left"] = float(np.degrees(np.arctan2(trunk[0], trunk[1])))

@@ -104,7 +104,8 @@ def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[dic
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
     start = int(follower.reached[0])
     goal = start + len(follower.track)
-    positions, rotations, contacts, off, times = [], [], [], [], []
+    positions, rotations, contacts, off = [], [], [], []
+    times: list[tuple[float, ...]] = []
     while follower.reached[0] < goal and len(times) < longest:
         before = perf_counter()
         pose = animation.next_pose()

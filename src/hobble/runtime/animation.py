@@ -176,6 +176,8 @@ class ProceduralAnimation:
     def _level(self, vector: Any, convert: Any) -> Array:
         """The caller's vectors as our x, z (C, 2); two components are those on the ground."""
         v = np.asarray(vector, float)
+        if not np.isfinite(v).all():
+            raise ValueError(f"not a finite vector: {vector}")
         if v.shape[-1] == 2:
             if self.axes.native:
                 return np.array(np.broadcast_to(v, (self.characters, 2)), order="C")
@@ -203,6 +205,8 @@ class ProceduralAnimation:
             shares[:] = gait
             return shares
         names = [gait] * self.characters if gait is None or isinstance(gait, str) else gait
+        if len(names) != self.characters:
+            raise ValueError(f"{len(names)} gaits for {self.characters} characters")
         shares[:] = 0.0
         for c, name in enumerate(names):
             if name is None:
@@ -224,6 +228,7 @@ class ProceduralAnimation:
         return float(abs(angle) > TURN_IN_PLACE)
 
     def _severities(self, injury: Any) -> Array:
+        values: Array
         if isinstance(injury, Mapping):
             values = np.zeros((self.characters, len(self._links)))
             for name, value in injury.items():
@@ -232,7 +237,7 @@ class ProceduralAnimation:
                     raise KeyError(f"no link {name!r}: {known}")
                 values[:, self._links[name]] = value
         else:
-            values = np.broadcast_to(np.asarray(injury, float), (self.characters, len(self._links)))
+            values = np.array(np.broadcast_to(injury, (self.characters, len(self._links))), float)
         if not np.all((values >= 0) & (values <= 10)):
             raise ValueError("a severity is a number from 0 to 10")
         return values / self.severity_scale
@@ -241,7 +246,7 @@ class ProceduralAnimation:
         c, state = self._controller, self.state
         positions, rotations, root = c.pose_position.copy(), c.pose_rotation.copy(), c.root.copy()
         if not self.axes.native:
-            positions, root = self.axes.points_out(positions), self.axes.points_out(root)
+            positions[:], root[:] = self.axes.points_out(positions), self.axes.points_out(root)
             rotations = self.axes.rotations_out(rotations)
         contacts = np.clip(c.y[:, c.layout.y_contacts], 0, 1)
         severity = state.severity.copy()

@@ -107,7 +107,8 @@ def network_from_arrays(
     if len(links) != layout.links:
         raise InputError(path, f"{layout.links} severity inputs, but {len(links)} links named")
     gaits = tuple(meta.get("gaits") or GAITS)
-    return Network(weights, biases, *statistics, layout, skeleton, gaits, links, meta)
+    x_mean, x_std, y_mean, y_std = statistics
+    return Network(weights, biases, x_mean, x_std, y_mean, y_std, layout, skeleton, gaits, links, meta)
 
 
 def _check(path: str | Path, weights: Any, biases: Any, statistics: list[Array]) -> None:
@@ -132,7 +133,7 @@ def _guess_layout(x_size: int, y_size: int) -> RowLayout:
     return RowLayout(joints, links=max(0, x_size - RowLayout(joints).x_size))
 
 
-def catmull_rom(phase: Array, points: int) -> tuple[Array, Array]:
+def catmull_rom(phase: Array, points: int) -> tuple[np.ndarray, Array]:
     """The four control points of a cyclic cubic spline at `phase` (...) in cycles, and their coefficients.
 
     Returns indices (..., 4) and coefficients (..., 4) in float64 (Holden et al. 2017, eq. 7).
@@ -147,7 +148,12 @@ def catmull_rom(phase: Array, points: int) -> tuple[Array, Array]:
 
 def weights_at(points: Array, phase: Array) -> Array:
     """Control points (K, ...) blended at phases (P,): (P, ...) float64."""
-    indices, coefficients = catmull_rom(np.atleast_1d(phase), len(points))
-    table = np.zeros((len(indices), len(points)))
+    return np.tensordot(basis(phase, len(points)), points.astype(float), 1)
+
+
+def basis(phase: Array, points: int) -> Array:
+    """(P, points) the share of every control point at phases (P,)."""
+    indices, coefficients = catmull_rom(np.atleast_1d(phase), points)
+    table = np.zeros((len(indices), points))
     np.add.at(table, (np.arange(len(indices))[:, None], indices), coefficients)
-    return np.tensordot(table, points.astype(float), 1)
+    return table

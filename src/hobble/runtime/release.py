@@ -13,7 +13,7 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.files import atomic_path
 from hobble.core.quat import Array
-from hobble.runtime.network import STATISTICS, Network, catmull_rom, weights_at
+from hobble.runtime.network import STATISTICS, Network, basis, weights_at
 
 PHASES = 50
 CONTROL_POINTS = 4
@@ -59,11 +59,9 @@ def read_release(folder: str | Path) -> dict[str, Array]:
 
 def _control_points(folder: Path, name: str, phases: Array) -> Array:
     """(4, n) control points of weights (50, n)."""
-    indices, coefficients = catmull_rom(np.arange(PHASES) / PHASES, CONTROL_POINTS)
-    basis = np.zeros((PHASES, CONTROL_POINTS))
-    np.add.at(basis, (np.arange(PHASES)[:, None], indices), coefficients)
-    points = np.linalg.lstsq(basis, phases.astype(float), rcond=None)[0]
-    residual = float(np.abs(basis @ points - phases).max())
+    shares = basis(np.arange(PHASES) / PHASES, CONTROL_POINTS)
+    points = np.linalg.lstsq(shares, phases.astype(float), rcond=None)[0]
+    residual = float(np.abs(shares @ points - phases).max())
     if not residual < LARGEST_RESIDUAL:
         raise InputError(
             folder, f"{name} at 50 phases is no cyclic cubic of 4 control points (off by {residual:.2g})"

@@ -1,0 +1,94 @@
+"""Laps: ended by arriving or by the clock, and the same numbers each time but for the times."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.evaluation.responsivity import lap_rows, parameter_counts, responsivity
+from hobble.evaluation.tables import write_csv
+from hobble.runtime.controller import STEPS
+from hobble.runtime.waypoints import Waypoint
+
+RUNTIME = {"mode": "cubic", "severity_rate": 10.0, "severity_scale": 1.0, "foot_locking": True}
+# So near to each other that standing in their midst is arriving at each.
+NEAR = tuple(Waypoint((x, 0.0), "walk", 2.5) for x in (0.0, 30.0, 60.0))
+# Straight ahead of the start, 3 m away, where a figure that glides straight on comes by; then behind it.
+AHEAD = (Waypoint((0.0, 400.0), "walk", 1.5), Waypoint((0.0, 0.0), "walk", 1.5))
+
+
+def without_times(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: without_times(v) for k, v in value.items() if k != "milliseconds"}
+    return [without_times(v) for v in value] if isinstance(value, list) else value
+
+
+def run(network, track, laps=2, seconds=10.0) -> dict[str, Any]:
+    return responsivity(
+        network, configuration="x", runtime=RUNTIME, laps=laps, lap_seconds=seconds, track=track
+    )
+
+
+def test_laps_that_are_finished(steady) -> None:
+    result = run(steady, NEAR)
+    assert result["laps_finished"] == 2
+    assert [lap["waypoints_reached"] for lap in result["laps"]] == [3, 3]
+    assert all(lap["finished"] and lap["frames"] < 20 for lap in result["laps"])
+    assert result["track"] == {"waypoints": 3, "metres": 1.2}
+
+
+def test_a_character_that_cannot_turn_is_ended_by_the_clock(steady) -> None:
+    result = run(steady, AHEAD, seconds=8.0)
+    for lap in result["laps"]:
+        assert lap["frames"] == 480
+        assert lap["seconds"] == 8.0
+        assert not lap["finished"]
+        # It passes the first waypoint after 200 frames of 1.5 cm; the other lies behind it.
+        assert lap["waypoints_reached"] == 1
+        assert lap["path_overshoot_cm"] == pytest.approx(480 * 1.5 - 400, abs=30)
+    assert result["waypoints_reached"] == 2
+    assert result["waypoints"] == 4
+    # The second lap begins where the first did.
+    np.testing.assert_allclose(
+        result["laps"][0]["path_distance_cm"], result["laps"][1]["path_distance_cm"], atol=1e-6
+    )
+
+
+def test_everything_but_the_times_is_reproducible(network) -> None:
+    first, second = run(network, AHEAD, seconds=3.0), run(network, AHEAD, seconds=3.0)
+    assert without_times(first) == without_times(second)
+    assert "milliseconds" not in json.dumps(without_times(first))
+    times = first["laps"][0]["milliseconds"]
+    assert set(times) == {*STEPS, "total", "spread"}
+    assert times["total"] == pytest.approx(sum(times[step] for step in STEPS), abs=1e-4)
+    assert times["spread"]["whole_call"] > times["total"] > 0
+    json.dumps(first, allow_nan=False)
+
+
+def test_rows_for_a_table(steady, tmp_path) -> None:
+    rows = lap_rows(run(steady, NEAR))
+    write_csv(tmp_path / "laps.csv", rows)
+    lines = (tmp_path / "laps.csv").read_text().splitlines()
+    assert len(lines) == 3
+    assert lines[0].startswith("lap,finished,frames,")
+    assert "milliseconds_predict" in lines[0]
+    write_csv(tmp_path / "none.csv", [])
+    assert (tmp_path / "none.csv").read_text() == ""
+
+
+def test_published_counts() -> None:
+    published = {
+        (342, 512, 512, 311): (597_815, 335_501),
+        (342, 512, 512, 512, 311): (860_471, 598_157),
+    }
+    for sizes, (true, printed) in published.items():
+        counts = parameter_counts(sizes)
+        assert counts["true"] == true
+        assert counts["table_6_1_as_printed"] == printed
+    # AVA: 191 joints.
+    ava = parameter_counts((1302, 512, 512, 1751))
+    assert ava["true"] == 1_828_055
+    assert ava["table_6_1_as_printed"] == 1_566_701

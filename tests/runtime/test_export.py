@@ -1,0 +1,126 @@
+"""Generated motion as BVH, and the scripted scenarios."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from hobble.core import quat
+from hobble.core.skeleton import forward_kinematics
+from hobble.runtime import ProceduralAnimation
+from hobble.runtime.export import export_bvh, fitted_skeleton, motion_clip
+from hobble.runtime.network import load_network
+from hobble.runtime.scenarios import generate, hurt_links, scenarios
+
+
+def motion(skeleton, frames: int = 20) -> tuple[np.ndarray, np.ndarray]:
+    """World positions and rotations of a skeleton in random motion."""
+    rng = np.random.default_rng(2)
+    local = quat.exp(rng.normal(0, 0.3, (frames, len(skeleton.joints), 3)))
+    rotations, positions = forward_kinematics(skeleton, local, rng.normal(0, 50, (frames, 3)))
+    return positions, rotations
+
+
+def read_again(path: Path) -> dict[str, np.ndarray]:
+    """Joint -> world positions (F, 3) of a BVH file, by the format's own rules and nothing of ours."""
+    head, table = path.read_text().split("MOTION")
+    values = np.array([line.split() for line in table.strip().splitlines()[2:]], float)
+    stack: list[tuple[np.ndarray, Rotation]] = []
+    out, column, name, offset = {}, 0, "", np.zeros(3)
+    for line in head.splitlines():
+        words = line.split()
+        if words[:1] in (["ROOT"], ["JOINT"], ["End"]):
+            name = words[1] if words[0] != "End" else ""
+        elif words[:1] == ["OFFSET"]:
+            offset = np.array(words[1:], float)
+            if not name:
+                stack.append((np.zeros(3), Rotation.identity()))
+        elif words[:1] == ["CHANNELS"]:
+            channels = {c: values[:, column + i] for i, c in enumerate(words[2:])}
+            column += len(channels)
+            turn = Rotation.identity()
+            for channel, angle in channels.items():
+                if channel.endswith("rotation"):
+                    turn = turn * Rotation.from_euler(channel[0].lower(), angle[:, None], degrees=True)
+            own = np.stack(
+                [channels.get(f"{axis}position", np.zeros(len(values))) for axis in "XYZ"], axis=-1
+            )
+            at, world = stack[-1] if stack else (np.zeros(3), Rotation.identity())
+            at = at + (world.apply(offset + own) if stack else own)
+            stack.append((at, world * turn))
+            out[name] = at
+        elif words[:1] == ["}"]:
+            stack.pop()
+    return out
+
+
+def test_a_clip_has_the_motion_it_was_made_of(holden31) -> None:
+    positions, rotations = motion(holden31)
+    clip = motion_clip("walk", holden31, positions, rotations)
+    np.testing.assert_allclose(clip.positions, positions, atol=1e-9)
+    np.testing.assert_allclose(quat.angle(clip.global_rotations, rotations), 0, atol=1e-6)
+
+
+def test_bones_are_found_in_a_motion(holden31) -> None:
+    positions, rotations = motion(holden31)
+    found = fitted_skeleton(holden31, positions, rotations)
+    np.testing.assert_allclose(found.offsets[1:], holden31.offsets[1:], atol=1e-9)
+
+
+def test_a_bvh_file_says_the_same_when_read_again(tmp_path: Path, holden31) -> None:
+    positions, rotations = motion(holden31)
+    export_bvh(tmp_path / "walk.bvh", "walk", holden31, positions, rotations)
+    back = read_again(tmp_path / "walk.bvh")
+    assert set(back) == set(holden31.joints)
+    for j, name in enumerate(holden31.joints):
+        np.testing.assert_allclose(back[name], positions[:, j], atol=2e-3)
+
+
+def test_scenarios_are_written(tmp_path: Path, hurtable) -> None:
+    generate(hurtable, tmp_path / "scenarios.npz", tmp_path / "bvh", mode="cubic")
+    data = np.load(tmp_path / "scenarios.npz")
+    names = [str(name) for name in data["names"]]
+    assert names[:3] == ["walk", "jog", "crouch"]
+    assert {"left_knee", "right_knee", "left_ankle", "lower_back", "left_arm"} < set(names)
+    assert sorted(p.stem for p in (tmp_path / "bvh").iterdir()) == sorted(names)
+    assert data["parents"].tolist() == list(hurtable.skeleton.parents)
+    for scenario in scenarios(hurtable):
+        positions = data[f"{scenario.name}/positions"]
+        assert positions.shape == (scenario.frames, 31, 3)
+        assert positions.dtype == np.float32
+        assert len(data[f"{scenario.name}/gait"]) == scenario.frames
+    knee = data["left_knee/severity"]
+    assert (knee[0], knee[-1]) == (0, 10)
+    assert np.all(np.diff(knee) > 0)
+    assert str(data["left_knee/hurt"]) == "LeftUpLeg-LeftLeg"
+    assert not data["walk/severity"].any()
+    assert str(data["walk/hurt"]) == ""
+
+
+def test_which_link_each_scenario_hurts(hurtable, network) -> None:
+    assert hurt_links(hurtable) == {
+        "left_knee": "LeftUpLeg-LeftLeg",
+        "right_knee": "RightUpLeg-RightLeg",
+        "left_ankle": "LeftLeg-LeftFoot",
+        "lower_back": "Hips-LowerBack",
+        "left_arm": "LeftArm-LeftForeArm",
+    }
+    assert hurt_links(network) == {}
+    assert len(scenarios(hurtable)) == len(scenarios(network)) + 5
+
+
+@pytest.mark.shared
+def test_the_released_walk_as_bvh(shared: Path, tmp_path: Path, holden31) -> None:
+    """The released network's body is not holden31's: bones are found, and joints land within 3 cm."""
+    network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
+    character = ProceduralAnimation(network)
+    poses = [character.next_pose((0, 2.5)) for _ in range(200)][50:]
+    positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
+    body = fitted_skeleton(holden31, positions, rotations)
+    export_bvh(tmp_path / "walk.bvh", "walk", body, positions, rotations)
+    back = read_again(tmp_path / "walk.bvh")
+    off = [np.linalg.norm(back[name] - positions[:, j], axis=-1) for j, name in enumerate(holden31.joints)]
+    assert np.mean(off) < 3

@@ -1,0 +1,77 @@
+"""Waypoints: the track, being led around it, and arriving."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hobble.runtime import ProceduralAnimation
+from hobble.runtime.waypoints import TRACK, Follower, Waypoint
+
+SQUARE = (
+    Waypoint((0.0, 1000.0), "walk", 2.5),
+    Waypoint((1000.0, 1000.0), "jog", 7.0, (0.0, 1.0)),
+    Waypoint((1000.0, 0.0), "crouch", 2.0),
+    Waypoint((0.0, 0.0), "walk", 2.5),
+)
+
+
+def test_the_published_track() -> None:
+    assert [w.position for w in TRACK[:2]] == [(-3000.0, 4000.0), (-5000.0, 0.0)]
+    assert [w.gait for w in TRACK] == ["walk", "walk", "jog", "jog", "crouch", "walk"]
+    assert [w.speed for w in TRACK] == [2.5, 2.5, 10.5, 10.5, 2.0, 2.5]
+    assert [i for i, w in enumerate(TRACK) if w.facing] == [1, 5]
+
+
+def test_a_point_that_obeys_goes_around() -> None:
+    follower = Follower(SQUARE, arrived=20.0)
+    place = follower.start[0][None]
+    assert follower.start[1] == 0.0
+    frames = [0]
+    while follower.reached[0] < 8:
+        velocity, (waypoint,) = follower.lead(place)
+        assert np.hypot(*velocity[0]) == pytest.approx(waypoint.speed)
+        place = place + velocity
+        frames[-1] += 1
+        if follower.reached[0] == len(frames):
+            frames.append(0)
+        assert follower.off_path[0] <= 20.0
+    expected = 1000 / np.array([2.5, 7.0, 2.0, 2.5])
+    np.testing.assert_allclose(frames[4:8], expected, rtol=0.03)
+
+
+def test_distance_from_the_path_is_that_from_the_line() -> None:
+    follower = Follower(SQUARE)
+    for place, distance in (((30.0, 500.0), 30.0), ((-40.0, -30.0), 50.0), ((0.0, 10.0), 0.0)):
+        follower.lead(np.array([place]))
+        assert follower.off_path[0] == pytest.approx(distance)
+
+
+def test_everyone_has_an_own_place_on_the_track() -> None:
+    follower = Follower(SQUARE, characters=2, arrived=50.0)
+    velocity, heading = follower.lead(np.array([[0.0, 990.0], [0.0, 500.0]]))
+    assert follower.reached.tolist() == [1, 0]
+    assert [w.gait for w in heading] == ["jog", "walk"]
+    np.testing.assert_allclose(velocity[1], [0, 2.5])
+    assert velocity[0, 0] > 6.9
+
+
+def test_a_track_of_one_place() -> None:
+    with pytest.raises(ValueError, match="two waypoints"):
+        Follower(SQUARE[:1])
+
+
+def test_the_character_follows_waypoints(network) -> None:
+    character = ProceduralAnimation(network, waypoints=SQUARE)
+    pose = character.next_pose()
+    np.testing.assert_allclose(pose.root, 0, atol=1e-9)
+    np.testing.assert_allclose(character.state.target_velocity, [[0, 0.9 * 2.5]])
+    character.follower.reached[:] = 1
+    character.next_pose()
+    assert character._wish_gait[0].tolist() == [0, 0, 1, 0, 0, 0]
+    # On the way to the second it strafes, facing +Z.
+    np.testing.assert_allclose(character.state.target_direction, [[0, 1]], atol=1e-9)
+    assert character.state.strafe[0] > 0.5
+    # A velocity of the caller's own takes precedence.
+    character.next_pose((0.0, -1.0))
+    np.testing.assert_allclose(character._wish_gait[0], np.eye(6)[1])
