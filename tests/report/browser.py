@@ -119,9 +119,9 @@ class Browser:
         clip = {}
         if selector:
             box = (
-                f"(() => {{ const r = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
+                "(({ x, y, width, height }) => ({ x: x + scrollX, y: y + scrollY, width, height, scale: 1 }))"
+                f"(document.querySelector({json.dumps(selector)}).getBoundingClientRect())"
             )
-            box += " return {x: r.x + scrollX, y: r.y + scrollY, width: r.width, height: r.height, scale: 1}; })()"
             clip = {"clip": self.run(box), "captureBeyondViewport": True}
         taken = self.send("Page.captureScreenshot", format="png", **clip)
         path.write_bytes(base64.b64decode(taken["data"]))

@@ -14,7 +14,7 @@ class Chart:
     """A chart: what the page draws, and how to read it.
 
     traces: plotly traces. options: alternatives to `traces`, by name, among which a chooser called `choose`
-    picks.
+    picks; option_layouts: what changes in the layout with them.
     """
 
     name: str
@@ -25,6 +25,7 @@ class Chart:
     height: int = 340
     choose: str | None = None
     options: Mapping[str, Sequence[Trace]] = field(repr=False, default_factory=dict)
+    option_layouts: Mapping[str, Mapping[str, Any]] = field(repr=False, default_factory=dict)
 
     def spec(self) -> dict[str, Any]:
         """What the page's script needs."""
@@ -34,7 +35,8 @@ class Chart:
             "traces": _escaped(traces),
             "layout": _escaped({"height": self.height, **self.layout}),
             "options": [
-                {"label": key, "traces": _escaped(list(value))} for key, value in self.options.items()
+                {"label": key, "traces": _escaped(list(value)), "layout": self.option_layouts.get(key)}
+                for key, value in self.options.items()
             ],
         }
 

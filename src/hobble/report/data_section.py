@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.formats import size
 from hobble.report.gather import Material
@@ -40,6 +42,44 @@ def gait_chart(material: Material) -> Chart | None:
     )
     layout = {"barmode": "stack", "xaxis": {"type": "category"}, "yaxis": axis("seconds", rangemode="tozero")}
     return Chart("gaits", "How much of each gait", caption, traces, layout, 300)
+
+
+def speed_chart(material: Material) -> Chart | None:
+    """Seconds at each speed over the ground, from the label strips."""
+    edges = np.arange(0, 6.01, 0.2)
+    traces: list[Trace] = []
+    for split, colour in (("train", "@muted"), ("held_out", "@accent")):
+        seconds = np.zeros(len(edges) - 1)
+        for report in material.labels:
+            strip = report.get("strip") or {}
+            speed = [v for v in strip.get("speed") or () if v is not None]
+            if speed and material.split(report["clip"]) == split:
+                counts, _ = np.histogram(np.clip(speed, 0, edges[-1] - 1e-6), edges)
+                seconds += counts / len(speed) * strip["seconds"][-1]
+        if seconds.any():
+            traces.append(
+                {
+                    "type": "bar",
+                    "name": SPLIT_NAMES[split],
+                    "x": np.round((edges[:-1] + edges[1:]) / 2, 2).tolist(),
+                    "y": np.round(seconds, 3).tolist(),
+                    "marker": {"color": colour},
+                    "hovertemplate": "%{x:.1f} m/s: %{y:.1f} s<extra></extra>",
+                }
+            )
+    if not traces:
+        return None
+    last = max(x for t in traces for x, y in zip(t["x"], t["y"], strict=True) if y)
+    layout = {
+        "barmode": "stack",
+        "bargap": 0.08,
+        "xaxis": axis("m/s", range=[0, last + 0.3]),
+        "yaxis": axis("seconds", rangemode="tozero"),
+    }
+    caption = (
+        "Seconds at each speed. Between two humps the network makes up its own way from one to the other."
+    )
+    return Chart("speeds", "How fast", caption, traces, layout, 300)
 
 
 def hurt_seconds(report: dict[str, Any]) -> dict[str, tuple[float, float]]:

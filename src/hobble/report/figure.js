@@ -133,7 +133,7 @@
   // Playing
 
   let scene, time = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, rate = 1, trails = true, last = null;
-  const view = Hobble.view(find("view"), { yaw: 2.45, pitch: .2, distance: 430 }, (now) => {
+  const view = Hobble.view(find("view"), { yaw: .75, pitch: .2, distance: 430 }, (now) => {
     const passed = playing && last !== null ? Math.min(.1, (now - last) / 1000) * fps * rate : 0;
     time = passed ? (time + passed) % Math.max(1, scene.frames - 1) : time;
     last = playing ? now : null;

@@ -20,7 +20,7 @@
   };
   const LIGHT = unit([.4, .8, -.35]);
 
-  const view = Hobble.view(canvas, { yaw: 2.2, pitch: .5, distance: 560 }, () => {
+  const view = Hobble.view(canvas, { yaw: .9, pitch: .5, distance: 560 }, () => {
     const g = unpack(choice.selectedIndex), { n, heights, x, z } = g, { context, paint, project } = view;
     const at = (i, k) => [x[0] + (x[1] - x[0]) * i / (n - 1), heights[i * n + k], z[0] + (z[1] - z[0]) * k / (n - 1)];
     const middle = g.poses[1][0];

@@ -11,33 +11,36 @@ from hobble.report.tables import Column, Table
 
 GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
 SIDES = (("left", "@accent"), ("right", "@g2"))
-# Small charts: name, title, unit, lines as (column, label, colour), and whether the axis starts at 0.
-PANELS: tuple[tuple[str, str, str, tuple[tuple[str, str, str], ...], bool], ...] = (
+# Small charts: name, title, unit, lines as (column, label, colour), the least that the axis spans.
+PANELS: tuple[tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool], ...] = (
     (
         "pose",
         "Pose",
         "cm",
         (("from_healthy", "from healthy", "@accent"), ("from_worst", "from severity 10", "@muted")),
+        2.0,
         True,
     ),
-    ("speed", "Speed", "cm/s", (("speed", "speed", "@accent"),), True),
-    ("stance", "Time on each foot", "share", tuple((f"stance_{s}", s, c) for s, c in SIDES), False),
-    ("step", "Step length", "cm", tuple((f"step_{s}", s, c) for s, c in SIDES), False),
-    ("knee", "Range of the knee", "degrees", tuple((f"knee_{s}", s, c) for s, c in SIDES), False),
-    ("arm", "Swing of the arm", "degrees", tuple((f"arm_{s}", s, c) for s, c in SIDES), False),
+    ("speed", "Speed", "cm/s", (("speed", "speed", "@accent"),), 20.0, True),
+    ("stance", "Time on each foot", "share", tuple((f"stance_{s}", s, c) for s, c in SIDES), 0.2, False),
+    ("step", "Step length", "cm", tuple((f"step_{s}", s, c) for s, c in SIDES), 15.0, False),
+    ("knee", "Range of the knee", "degrees", tuple((f"knee_{s}", s, c) for s, c in SIDES), 15.0, False),
+    ("arm", "Swing of the arm", "degrees", tuple((f"arm_{s}", s, c) for s, c in SIDES), 15.0, False),
     (
         "lean",
         "Lean of the trunk",
         "degrees",
         (("lean_forward", "forward", "@accent"), ("lean_left", "to the left", "@g2")),
+        6.0,
         False,
     ),
-    ("hip", "Height of the hips", "cm", (("hip_height", "hips", "@accent"),), False),
+    ("hip", "Height of the hips", "cm", (("hip_height", "hips", "@accent"),), 5.0, False),
     (
         "rough",
         "Largest acceleration of a joint",
         "cm per frame²",
         (("largest_acceleration", "joint", "@accent"),),
+        2.0,
         True,
     ),
 )
@@ -64,7 +67,7 @@ def curves(rows: Sequence[Mapping[str, Any]]) -> Family:
     for row in rows:
         sweeps.setdefault(f"{row['link']}, {row['gait']}", []).append(row)
     charts = []
-    for name, title, unit, lines, from_zero in PANELS:
+    for name, title, unit, lines, span, from_zero in PANELS:
         options: dict[str, list[Trace]] = {}
         for sweep, some in sweeps.items():
             x = [row["severity"] for row in some]
@@ -76,10 +79,26 @@ def curves(rows: Sequence[Mapping[str, Any]]) -> Family:
             options[sweep] = traces
         layout = {
             "xaxis": axis("severity", dtick=2, range=[-0.3, 10.3]),
-            "yaxis": axis(unit, **({"rangemode": "tozero"} if from_zero else {})),
+            "yaxis": axis(unit),
             "showlegend": len(lines) > 1,
         }
-        charts.append(Chart(f"sweep-{name}", title, "", layout=layout, height=230, options=options))
+        ranges = {
+            sweep: {
+                "yaxis": {"range": y_range(rows, some[0]["gait"], [c for c, *_ in lines], span, from_zero)}
+            }
+            for sweep, some in sweeps.items()
+        }
+        charts.append(
+            Chart(
+                f"sweep-{name}",
+                title,
+                "",
+                layout=layout,
+                height=230,
+                options=options,
+                option_layouts=ranges,
+            )
+        )
     return Family(
         "sweeps",
         "One link, hurt more and more",
@@ -92,15 +111,28 @@ def curves(rows: Sequence[Mapping[str, Any]]) -> Family:
     )
 
 
+def y_range(
+    rows: Sequence[Mapping[str, Any]], gait: str, columns: Sequence[str], span: float, from_zero: bool
+) -> list[float] | None:
+    """One range for every link of a gait, so that links compare, and never so narrow that noise fills it."""
+    found = [row[c] for row in rows if row["gait"] == gait for c in columns if row.get(c) is not None]
+    if not found:
+        return None
+    low, high = (0.0 if from_zero else min(found)), max(found)
+    spare = max(span - (high - low), 0.08 * (high - low))
+    return [low if from_zero else low - spare / 2, high + spare / (1 if from_zero else 2)]
+
+
 def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
     """What severity 10 does to pose and speed, link by link."""
     charts = []
-    for name, key, title, label, caption in (
+    for name, key, title, label, least, caption in (
         (
             "injury-pose",
             "from_healthy_cm",
             "How far the pose goes",
             "cm from healthy at severity 10",
+            2.0,
             "Mean distance over joints, at the same phase, from the healthy walk. A dot at 0 is a link the "
             "network does not feel.",
         ),
@@ -109,6 +141,7 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
             "speed_share",
             "What is left of the speed",
             "share of the healthy speed at severity 10",
+            1.0,
             "1 means that the hurt character is as fast as the healthy one.",
         ),
     ):
@@ -128,7 +161,9 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
                     }
                 )
         links = len({r["link"] for r in responses})
-        layout = {"xaxis": axis(label, rangemode="tozero"), "yaxis": {"automargin": True, "type": "category"}}
+        furthest = max((r[key] for r in responses if r.get(key) is not None), default=0.0)
+        across = axis(label, range=[0, 1.08 * max(least, furthest)])
+        layout = {"xaxis": across, "yaxis": {"automargin": True, "type": "category"}}
         if traces:
             charts.append(Chart(name, title, caption, traces, layout, 130 + 21 * links))
     return charts

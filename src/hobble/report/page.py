@@ -96,6 +96,7 @@ def _sections(material: Material) -> dict[str, dict[str, Any]]:
         },
         "data": {
             "gaits": data.gait_chart(material),
+            "speeds": data.speed_chart(material),
             "hurt": data.injury_coverage(material),
             "clips": data.clip_table(material),
             "remarks": data.remarks_table(material),

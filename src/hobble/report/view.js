@@ -20,15 +20,16 @@ Hobble.view = (canvas, home, draw) => {
   let scale = 1, eye, right, up, ahead, seen = false, waiting = false;
   const view = { context, camera, W: 0, H: 0, zoom: 1, paint: {}, onHidden: () => {} };
 
+  const paint = (now) => {
+    if (view.W < 4 || view.H < 4) return; // a window that is being made or folded away
+    context.setTransform(scale, 0, 0, scale, 0, 0);
+    context.clearRect(0, 0, view.W, view.H);
+    draw(now, view);
+  };
   view.ask = () => {
     if (waiting || !seen) return;
     waiting = true;
-    requestAnimationFrame((now) => {
-      waiting = false;
-      context.setTransform(scale, 0, 0, scale, 0, 0);
-      context.clearRect(0, 0, view.W, view.H);
-      draw(now, view);
-    });
+    requestAnimationFrame((now) => { waiting = false; paint(now); });
   };
   view.aim = (target) => {
     const { yaw, pitch, distance } = camera, c = Math.cos(pitch);
@@ -74,7 +75,7 @@ Hobble.view = (canvas, home, draw) => {
     const mid = [(p[0] + q[0]) / 2, (p[1] + q[1]) / 2];
     const lit = mix(colour, [255, 255, 255], dark ? .25 : .55), dim = mix(colour, [20, 30, 45], dark ? .62 : .42);
     let fill;
-    if (d < .8 * r) {
+    if (d <= .8 * r) {
       const from = [mid[0] + LIGHT[0] * r * .5, mid[1] + LIGHT[1] * r * .5];
       fill = context.createRadialGradient(from[0], from[1], r * .1, mid[0], mid[1], r + d / 2);
     } else {
@@ -179,7 +180,7 @@ Hobble.view = (canvas, home, draw) => {
     scale = Math.min(2, devicePixelRatio || 1);
     [canvas.width, canvas.height] = [Math.round(view.W * scale), Math.round(view.H * scale)];
     [shade.width, shade.height] = [canvas.width >> 1, canvas.height >> 1];
-    view.ask();
+    if (seen) paint(performance.now()); // at once: a canvas loses its picture with its size
   }).observe(canvas);
   new IntersectionObserver(([entry]) => { seen = entry.isIntersecting; view.onHidden(); view.ask(); }).observe(canvas);
   return view;
