@@ -22,14 +22,14 @@ END_OF_BOUT = (np.nan, -1)
 
 # In shares of the unit speeds and of the swings to either side, in cm and in frames at 60 Hz; set once, on
 # the hand-made labels of the original release and on generated walks whose landings are exact.
-SLOWEST_REST = 0.4
+SLOWEST_REST = 0.35
 REST_OF_SWING = 0.12
 DIP_OF_SWING = 0.35
 LEAST_PATH = 6.0
 SAME_SWING = 12
 LESSER_SWING = 0.4
 LONGEST_REST = 60
-SETTLING = 10.0
+SETTLING = 8.0
 LAST_FRAMES = 2
 
 

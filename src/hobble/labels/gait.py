@@ -17,12 +17,12 @@ GRAVITY = 981.0 / 3600.0
 
 # Each is where the evidence for a gait outweighs that for walking; set once on the labelled clips.
 STANDING_SPEED = 0.15
-JOG_BOUNCE = 0.25
-JOG_FLIGHT = 0.4
+JOG_BOUNCE = 0.22
+JOG_FLIGHT = 0.35
 CROUCHED_HEAD = 0.8
 CROUCHED_HIPS = 0.85
 SAID = 0.3
-SWITCH = 12.0
+SWITCH = 14.0
 FADE = 31
 PASSING = 75
 

@@ -1,0 +1,90 @@
+"""Clips whose footfalls are known because they were made here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.skeleton import Skeleton
+
+OPTIONS = {
+    "files": True,
+    "contact_threshold": 0.02,
+    "phase_zero": "right",
+    "heel_speed": 0.375,
+    "toe_speed": 0.0875,
+    "valley_factor": 2.875,
+    "shortest_step": 5,
+}
+
+
+@pytest.fixture
+def options() -> dict:
+    return dict(OPTIONS)
+
+
+def feet_only(skeleton: Skeleton, right: np.ndarray, left: np.ndarray, hips: np.ndarray, name: str) -> Clip:
+    """A clip whose ankles stand at given places (F, 3): joint translations do it, no rotation."""
+    frames = len(hips)
+    rotations = np.tile(quat.IDENTITY, (frames, len(skeleton.joints), 1))
+    translations = np.tile(skeleton.offsets, (frames, 1, 1))
+    for role, place in (("right_heel", right), ("left_heel", left)):
+        joint = skeleton.role(role)
+        rest = np.zeros(3)
+        parent = skeleton.parents[joint]
+        while parent > 0:
+            rest = rest + skeleton.offsets[parent]
+            parent = skeleton.parents[parent]
+        translations[:, joint] = place - hips - rest
+    return Clip(name, skeleton, 60.0, rotations, hips, translations)
+
+
+def stepping(landings: np.ndarray, swing: int, stride: float, frames: int, side: float) -> np.ndarray:
+    """(F, 3) an ankle that lands at the frames given after swings of `swing` frames and `stride` cm."""
+    t = np.arange(frames, dtype=float)
+    place = np.zeros((frames, 3))
+    place[:, 0], place[:, 1] = side, 7.0
+    for landing in landings:
+        s = np.clip((t - (landing - swing)) / swing, 0.0, 1.0)
+        place[:, 2] += stride * (s - np.sin(2 * np.pi * s) / (2 * np.pi))
+        place[:, 1] += 12.0 * np.sin(np.pi * s) ** 2
+    return place
+
+
+@pytest.fixture
+def walker(holden31: Skeleton) -> Callable[..., Clip]:
+    """Makes a walk: the right foot lands every 2 `half` frames from `start`, the left at `limp` of that."""
+
+    def make(
+        frames: int = 600,
+        half: int = 30,
+        limp: float = 0.5,
+        start: int = 40,
+        swing: int = 24,
+        stride: float = 120.0,
+    ) -> Clip:
+        right = np.arange(start, frames - 10, 2 * half, dtype=float)
+        left = right + 2 * half * limp
+        left = left[left < frames - 10]
+        hips = np.zeros((frames, 3))
+        hips[:, 1] = 93.0
+        hips[:, 2] = np.clip(np.arange(frames) - start, 0, None) * stride / (2 * half)
+        feet = (stepping(x, swing, stride, frames, s) for x, s in ((right, -9.0), (left, 9.0)))
+        return feet_only(holden31, *feet, hips, "walker")
+
+    return make
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[[str, str], Path]:
+    def to_file(name: str, text: str) -> Path:
+        path = tmp_path / name
+        path.write_text(text)
+        return path
+
+    return to_file

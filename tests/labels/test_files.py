@@ -1,0 +1,163 @@
+"""Hand-made label files: what they mean, and what is refused with file and line."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.core.errors import InputError
+from hobble.labels.files import (
+    SourceTime,
+    read_footsteps,
+    read_gait,
+    read_gait_keys,
+    read_phase,
+    whole_frame,
+)
+
+AT_120 = SourceTime(240, 120.0)
+
+
+@given(st.integers(1, 10_000))
+@settings(max_examples=100, deadline=None)
+def test_a_cycle_starts_at_half_the_frame_number_of_a_120_hz_file(number):
+    for fps in (120.0, 120.0048, 119.9995):
+        assert whole_frame(SourceTime(20_000, fps).to_clip(number)) == number // 2
+
+
+@pytest.mark.parametrize(("fps", "number", "frame"), [(60, 31, 30), (30, 16, 30), (24, 13, 30), (50, 26, 30)])
+def test_frames_of_other_rates_keep_their_moment(fps, number, frame):
+    assert SourceTime(500, fps).to_clip(number) == pytest.approx(frame)
+    assert SourceTime(500, fps, first=number - 1).to_clip(number) == 0
+
+
+def test_a_rate_that_is_not_whole_is_taken_as_it_stands():
+    assert SourceTime(500, 23.976).ratio == pytest.approx(23.976 / 60)
+
+
+def test_footsteps_count_from_one(write):
+    steps = read_footsteps(write("a_footsteps.txt", "11 21\r\n31 41 *\r\n\r\n51"), AT_120)
+    assert steps[:2].tolist() == [[5.0, 10.0, 0.0], [15.0, 20.0, 1.0]]
+    assert steps[2, 0] == 25.0
+    assert math.isnan(steps[2, 1])
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "word"),
+    [
+        ("1 20\n20 30\n", 2, "frame 20 does not come after 20"),
+        ("1 20\n40 30\n", 2, "frame 30 does not come after 40"),
+        ("0 20\n", 1, "does not come after 0"),
+        ("1 20\nx 30\n", 2, "'x' is not a number"),
+        ("1 nan\n", 1, "'nan' is not a number"),
+        ("1 2 3\n", 1, "a line holds"),
+        ("*\n", 1, "a line holds"),
+        ("1 20\n30\n40 50\n", 2, "only the last line"),
+        ("1 20\n30 242\n", 2, "past the clip's last, 240"),
+    ],
+)
+def test_wrong_footsteps_are_refused_with_their_line(write, text, line, word):
+    path = write("a_footsteps.txt", text)
+    with pytest.raises(InputError, match=word) as caught:
+        read_footsteps(path, AT_120)
+    assert (caught.value.path, caught.value.line) == (path, line)
+
+
+def test_gait_keys_hold_between_equal_and_fade_between_different(write):
+    shares = read_gait_keys(write("a_gait.txt", "1 stand\n41 stand\n82 run\n122 crawl\n"), AT_120, 120)
+    assert (shares[:21, 0] == 1).all()
+    assert shares[20:41, 0] == pytest.approx(np.linspace(1, 0, 21))
+    assert shares[20:41, 2] == pytest.approx(np.linspace(0, 1, 21))
+    assert shares[61:, 3] == pytest.approx(1)
+    assert shares.sum(axis=1) == pytest.approx(1)
+
+
+def test_one_gait_key_holds_throughout(write):
+    assert (read_gait_keys(write("a_gait.txt", "1 unknown"), AT_120, 7)[:, 5] == 1).all()
+
+
+def test_keys_hold_before_the_first_and_after_the_last(write):
+    shares = read_gait_keys(write("a_gait.txt", "50 walk\n100 jog\n"), AT_120, 120)
+    assert (shares[:24, 1] == 1).all()
+    assert (shares[50:, 2] == 1).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "word"),
+    [
+        ("1 stand\n20 moonwalk\n", 2, "no such gait: 'moonwalk'. There are stand, walk, jog, run, crouch"),
+        ("1 stand\n1 walk\n", 2, "does not come after"),
+        ("1\n", 1, "a line holds"),
+        ("one stand\n", 1, "not a number"),
+        ("1 stand\n500 walk\n", 2, "past the clip's last"),
+        ("\n", None, "holds no keys"),
+    ],
+)
+def test_wrong_gait_keys_are_refused_with_their_line(write, text, line, word):
+    with pytest.raises(InputError, match=word) as caught:
+        read_gait_keys(write("a_gait.txt", text), AT_120, 120)
+    assert caught.value.line == line
+
+
+def test_every_second_row_of_a_phase_file_is_exact(write):
+    rows = np.round(np.linspace(0, 5, 240) % 1.0, 5)
+    path = write("a.phase", "\n".join(f"{r:.5f}" for r in rows))
+    assert (read_phase(path, AT_120, 120) == rows[::2]).all()
+
+
+def test_phase_between_rows_goes_the_short_way_round(write):
+    path = write("a.phase", "0.8\n0.9\n0.1\n0.2\n")
+    phase = read_phase(path, SourceTime(4, 30.0), 7)
+    assert phase == pytest.approx([0.8, 0.85, 0.9, 0.0, 0.1, 0.15, 0.2])
+
+
+def test_the_last_rows_hold_where_a_file_is_a_row_short(write):
+    path = write("a.phase", "0.1\n0.2\n0.3\n")
+    assert read_phase(path, SourceTime(4, 60.0), 4) == pytest.approx([0.1, 0.2, 0.3, 0.3])
+
+
+def test_the_eight_columns_of_a_gait_file_become_six(write):
+    rows = np.eye(8)
+    text = "\n".join(" ".join(f"{x:.5f}" for x in row) for row in rows)
+    shares = read_gait(write("a.gait", text), SourceTime(8, 60.0), 8)
+    assert shares.argmax(axis=1).tolist() == [0, 1, 2, 2, 3, 4, 3, 5]
+    assert shares.sum(axis=1).tolist() == [1] * 8
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "word"),
+    [
+        ("0.1\n1.1\n0.2\n0.3\n", 2, "outside 0..1"),
+        ("0.1\nnan\n0.2\n0.3\n", 2, "not a number"),
+        ("0.1\n0.1 0.2\n0.2\n0.3\n", 2, "2 values where 1 belong"),
+        ("0.1\n0.2\n", None, "has 2 rows, but the clip's file has 4 frames"),
+        ("", None, "has 0 rows"),
+    ],
+)
+def test_wrong_phase_files_are_refused(write, text, line, word):
+    with pytest.raises(InputError, match=word) as caught:
+        read_phase(write("a.phase", text), SourceTime(4, 60.0), 4)
+    assert caught.value.line == line
+
+
+def test_binary_and_missing_files_are_refused(tmp_path: Path):
+    (tmp_path / "a.phase").write_bytes(b"\x80\x81\xff")
+    with pytest.raises(InputError, match="not a text file"):
+        read_phase(tmp_path / "a.phase", AT_120, 120)
+    with pytest.raises(InputError, match="cannot be read"):
+        read_footsteps(tmp_path / "b_footsteps.txt", AT_120)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("clip", ["pfnn/LocomotionFlat04_000", "pfnn/LocomotionFlat09_000"])
+def test_keys_give_the_gait_file_of_the_release(shared: Path, clip):
+    stem = shared / "mocap" / clip
+    frames = len((stem.with_suffix(".gait")).read_text().splitlines())
+    time = SourceTime(frames, 120.0)
+    keys = read_gait_keys(Path(f"{stem}_gait.txt"), time, frames // 2)
+    assert keys == pytest.approx(read_gait(stem.with_suffix(".gait"), time, frames // 2), abs=6e-6)

@@ -1,0 +1,83 @@
+"""Landings found from the motion alone: on made walks exactly, on limps and pauses without one too many."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hobble.labels.footfall import SETTLING, feet_up, find_swings, foot_speeds, landings
+from hobble.labels.phase import find_cycles, phase_of_footsteps, rows_of_landings
+
+
+def found(clip):
+    swings = find_swings(clip, 0.375, 0.0875, 2.875)
+    return swings, landings(swings, len(clip), 5)
+
+
+@pytest.mark.parametrize("limp", [0.5, 0.3, 0.7])
+@pytest.mark.parametrize(("half", "swing", "stride"), [(30, 24, 120.0), (20, 16, 200.0), (45, 40, 50.0)])
+def test_every_landing_is_found_once(walker, limp, half, swing, stride):
+    clip = walker(limp=limp, half=half, swing=swing, stride=stride)
+    _, events = found(clip)
+    rights = np.arange(40, 590, 2 * half, dtype=float)
+    truth = sorted([(r, 0) for r in rights] + [(r + 2 * half * limp, 1) for r in rights])
+    truth = [(when, foot) for when, foot in truth if when < 590]
+    assert [foot for _, foot in events] == [foot for _, foot in truth]
+    late = np.array([when - true for (when, _), (true, _) in zip(events, truth, strict=True)])
+    assert np.abs(late - late.mean()).max() <= 1.0
+    assert -0.15 * swing < late.mean() < SETTLING / 1.5
+
+
+def test_phase_of_a_made_limp_is_within_three_hundredths(walker):
+    clip = walker(limp=0.35)
+    rights = np.arange(40, 590, 60.0)
+    truth = np.column_stack([rights, rights + 21, np.zeros(len(rights))])
+    phase, known = phase_of_footsteps(rows_of_landings(found(clip)[1]), len(clip))
+    true, known_true = phase_of_footsteps(truth, len(clip))
+    both = known & known_true
+    assert both.sum() > 500
+    assert np.abs((phase - true + 0.5) % 1 - 0.5)[both].mean() < 0.03
+
+
+def test_who_stands_takes_no_steps(walker):
+    clip = walker(start=1000)
+    swings, events = found(clip)
+    assert swings == []
+    assert events == []
+    assert not foot_speeds(clip).any()
+
+
+@pytest.mark.parametrize(("pause", "bouts"), [(30, 1), (90, 2)])
+def test_only_a_long_pause_parts_two_bouts(walker, pause, bouts):
+    clip = walker(frames=400)
+    both_down = 163
+    order = np.repeat(np.arange(400), np.where(np.arange(400) == both_down, pause, 1))
+    paused = replace(
+        clip,
+        rotations=clip.rotations[order],
+        root=clip.root[order],
+        translations=clip.translations[order],
+    )
+    _, events = found(paused)
+    assert [foot for _, foot in events].count(-1) == bouts - 1
+    assert len(events) - (bouts - 1) == len(found(clip)[1])
+    cycles, _ = find_cycles(rows_of_landings(events), len(paused), "right")
+    assert any(a < both_down < b for a, b in cycles) == (bouts == 1)
+
+
+def test_feet_up_marks_the_frames_of_swings(walker):
+    clip = walker()
+    swings, _ = found(clip)
+    up = feet_up(swings, len(clip))
+    assert up.shape == (600, 2)
+    assert not up.all(axis=1).any()
+    assert up[:, 0].sum() == sum(s.end - s.start for s in swings if s.foot == 0)
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3, 30])
+def test_the_shortest_clips_are_no_trouble(walker, frames):
+    clip = walker(frames=frames, start=5)
+    assert len(found(clip)[1]) <= 1
+    assert find_cycles(rows_of_landings(found(clip)[1]), frames, "right")[0].shape == (0, 2)

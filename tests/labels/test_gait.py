@@ -1,0 +1,92 @@
+"""Gaits of a clip that nobody labelled, and the crouch of flat clips."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hobble.labels import gait as g
+from hobble.labels.footfall import find_swings
+from hobble.labels.model import GAITS
+
+
+def automatic(clip, dominant=None):
+    return g.automatic_gait(clip, find_swings(clip, 0.375, 0.0875, 2.875), dominant)
+
+
+def test_shares_add_up_to_one(walker):
+    shares = automatic(walker(frames=400, start=150))
+    assert shares.sum(axis=1) == pytest.approx(1)
+    assert ((shares >= 0) & (shares <= 1)).all()
+
+
+def test_a_walk_after_a_stand(walker):
+    shares = automatic(walker(frames=500, start=200))
+    assert (shares[:150].argmax(axis=1) == g.STAND).all()
+    assert (shares[230:].argmax(axis=1) == g.WALK).all()
+
+
+def test_bouncing_hips_and_feet_in_the_air_are_a_jog(walker):
+    clip = walker(half=20, swing=26, stride=160.0)
+    assert (automatic(clip)[60:-60].argmax(axis=1) == g.WALK).mean() > 0.9
+    bounce = clip.root.copy()
+    bounce[:, 1] += 4 * np.cos(2 * np.pi * np.arange(len(clip)) / 20)
+    feet = clip.translations.copy()
+    for role in ("left_heel", "right_heel"):
+        feet[:, clip.skeleton.role(role), 1] -= bounce[:, 1] - clip.root[:, 1]
+    jog = replace(clip, root=bounce, translations=feet)
+    assert (automatic(jog)[60:-60].argmax(axis=1) == g.JOG).all()
+
+
+def test_low_head_and_hips_are_a_crouch_and_a_bow_is_not(walker):
+    clip = walker()
+    low = clip.root - np.array([0.0, 38.0, 0.0])
+    feet = clip.translations.copy()
+    for role in ("left_heel", "right_heel"):
+        feet[:, clip.skeleton.role(role), 1] += 38.0
+    crouch = replace(clip, root=low, translations=feet)
+    assert (automatic(crouch)[60:-60].argmax(axis=1) == g.CROUCH).all()
+    bow = clip.translations.copy()
+    bow[:, clip.skeleton.role("chest"), 1] -= 40.0
+    assert (automatic(replace(clip, translations=bow))[60:-60].argmax(axis=1) == g.WALK).all()
+
+
+@pytest.mark.parametrize("dominant", ["jump", "bump"])
+def test_a_jump_is_what_the_data_set_says_is_one(walker, dominant):
+    shares = automatic(walker(frames=500, start=200), dominant)
+    assert (shares[:150].argmax(axis=1) == g.STAND).all()
+    assert (shares[230:].argmax(axis=1) == GAITS.index(dominant)).all()
+    assert shares.sum(axis=1) == pytest.approx(1)
+
+
+def test_the_likeliest_path_changes_only_for_what_it_costs():
+    evidence = np.tile([0.0, -1.0], (60, 1))
+    evidence[20:28, 1], evidence[40:, 1] = 1.0, 1.0
+    assert g._likeliest_path(evidence, 9.0).tolist() == [0] * 40 + [1] * 20
+    assert g._likeliest_path(evidence, 3.0).tolist() == [0] * 20 + [1] * 8 + [0] * 12 + [1] * 20
+    assert g._likeliest_path(evidence, 99.0).tolist() == [0] * 60
+    assert len(g._likeliest_path(np.zeros((0, 4)), 1.0)) == 0
+
+
+def test_a_short_walk_into_a_jog_is_part_of_setting_off():
+    gait = np.array([g.STAND] * 20 + [g.WALK] * 40 + [g.JOG] * 20 + [g.WALK] * 30 + [g.CROUCH] * 5)
+    out = g._without_passing(gait)
+    assert out.tolist() == [g.STAND] * 40 + [g.JOG] * 40 + [g.WALK] * 30 + [g.CROUCH] * 5
+    longer = np.array([g.STAND] * 5 + [g.WALK] * (g.PASSING + 1) + [g.JOG] * 5)
+    assert (g._without_passing(longer) == longer).all()
+
+
+@pytest.mark.parametrize(
+    ("head", "crouch"), [(150.0, 0.0), (130.0, 0.0), (105.0, 0.5), (80.0, 1.0), (60.0, 1.0)]
+)
+def test_flat_ground_overwrites_crouch_alone(walker, head, crouch):
+    clip = walker(frames=5)
+    rest = clip.positions[0, clip.skeleton.role("head"), 1]
+    moved = replace(clip, root=clip.root + np.array([0.0, head - rest, 0.0]))
+    before = np.full((5, 6), 0.25)
+    after = g.overwrite_crouch(before, moved)
+    assert after[:, g.CROUCH] == pytest.approx(crouch)
+    assert (np.delete(after, g.CROUCH, axis=1) == 0.25).all()
+    assert (before == 0.25).all()

@@ -1,0 +1,146 @@
+"""A clip's labels as a whole: files before motion, mirrors, reports, and the original's own numbers."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.database.layout import CONTACTS, GAITS
+from hobble.labels import model
+from hobble.labels.label import label_clip, mirror_labels, write_report
+from hobble.labels.model import LabelReport, load_labels, save_labels
+
+MOTION = {"source_frames": 1200, "source_fps": 120.0, "source_start": 0}
+FOOTSTEPS = "141 201\n261 321\n381 441 *\n501 561\n621 681\n741"
+
+
+def apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.abs((a - b + 0.5) % 1.0 - 0.5)
+
+
+def test_orders_are_those_of_the_rows():
+    assert model.GAITS == GAITS
+    assert model.CONTACT_ROLES == CONTACTS
+
+
+def test_files_go_before_motion(walker, options, write):
+    clip = walker()
+    files = [write("w_footsteps.txt", FOOTSTEPS), write("w_gait.txt", "1 jog\n")]
+    labels, report = label_clip(clip, files, MOTION, "walk", "rocky", options)
+    assert (report.phase_source, report.gait_source) == ("file", "file")
+    assert labels.cycles.tolist() == [[70, 130], [250, 310], [310, 370]]
+    assert report.cycles_dropped == 2
+    assert (labels.gait[:, 2] == 1).all()
+    assert labels.phase[70] == 0
+    assert labels.phase[100] == 0.5
+    assert not labels.phase_known[190:250].any()
+
+    labels, report = label_clip(clip, files, MOTION, "walk", "rocky", {**options, "files": False})
+    assert (report.phase_source, report.gait_source) == ("automatic", "automatic")
+    assert (labels.gait.argmax(axis=1)[60:] == 1).all()
+
+
+def test_a_phase_file_goes_before_footsteps_and_a_gait_file_before_keys(walker, options, write):
+    clip = walker()
+    phase = np.linspace(0, 20, 1200) % 1.0
+    gait = np.zeros((1200, 8))
+    gait[:, 5] = 1
+    files = [
+        write("w_footsteps.txt", FOOTSTEPS),
+        write("w_gait.txt", "1 jog\n"),
+        write("w.phase", "\n".join(f"{p:.5f}" for p in phase)),
+        write("w.gait", "\n".join(" ".join(map(str, row)) for row in gait)),
+    ]
+    labels, _ = label_clip(clip, files, MOTION, None, "rocky", options)
+    assert apart(labels.phase, phase[::2]).max() < 1e-5
+    assert labels.cycles.tolist() == [[70, 130], [250, 310], [310, 370]]
+    assert (labels.gait[:, 4] == 1).all()
+    alone, _ = label_clip(clip, files[2:], MOTION, None, "rocky", options)
+    landed = alone.footsteps[:, 0][np.isfinite(alone.footsteps[:, 0])]
+    assert np.diff(landed) == pytest.approx(1199 / 20 / 2, abs=0.01)
+
+
+def test_left_zero_shifts_phase_and_starts_cycles_with_the_left_foot(walker, options, write):
+    clip = walker()
+    files = [write("w_footsteps.txt", FOOTSTEPS)]
+    right, _ = label_clip(clip, files, MOTION, None, "rocky", options)
+    left, report = label_clip(clip, files, MOTION, None, "rocky", {**options, "phase_zero": "left"})
+    assert report.phase_zero == "left"
+    assert apart(left.phase, right.phase + 0.5).max() < 1e-12
+    assert left.cycles.tolist() == [[100, 160], [280, 340]]
+    assert left.phase[100] == 0
+
+
+def test_a_mirror_is_labelled_as_if_its_own_files_said_so(walker, options, write):
+    clip = walker()
+    labels, report = label_clip(clip, [write("w_footsteps.txt", FOOTSTEPS)], MOTION, None, "flat", options)
+    mirrored, other = mirror_labels(labels, report, replace(clip, name="walker_mirror"))
+    own = [write("m_footsteps.txt", "201 261\n321 381\n441 501 *\n561 621\n681 741")]
+    expected, _ = label_clip(clip, own, MOTION, None, "flat", options)
+    assert mirrored.cycles.tolist() == expected.cycles.tolist()
+    both = mirrored.phase_known & expected.phase_known
+    assert apart(mirrored.phase, expected.phase)[both].max() < 1e-12
+    assert (mirrored.contacts == labels.contacts[:, [2, 3, 0, 1]]).all()
+    assert (mirrored.gait == labels.gait).all()
+    assert other.clip == "walker_mirror"
+
+
+@pytest.mark.parametrize("zero", ["right", "left"])
+def test_mirroring_twice_gives_the_labels_back(walker, options, zero):
+    clip = walker(limp=0.4)
+    labels, report = label_clip(clip, [], MOTION, "walk", "flat", {**options, "phase_zero": zero})
+    mirrored, other = mirror_labels(labels, report, clip)
+    assert mirrored.cycles.tolist() != labels.cycles.tolist()
+    back, again = mirror_labels(mirrored, other, clip)
+    assert again == report
+    assert apart(back.phase, labels.phase).max() < 1e-12
+    for name in ("contacts", "phase_known", "gait", "footsteps", "cycles"):
+        np.testing.assert_equal(getattr(back, name), getattr(labels, name))
+
+
+def test_contacts_are_joints_that_do_not_move(walker, options):
+    clip = walker(start=100, swing=24)
+    labels, _ = label_clip(clip, [], MOTION, "walk", "flat", options)
+    assert labels.contacts.dtype == bool
+    assert labels.contacts[:75].all()
+    assert not labels.contacts[80:95, 2:].any()
+    assert labels.contacts[80:95, :2].all()
+    step = np.sum(np.diff(clip.positions[:, clip.skeleton.role("right_toe")], axis=0) ** 2, axis=1)
+    assert (labels.contacts[:-1, 3] == (step < 0.02)).all()
+
+
+def test_a_clip_without_a_whole_cycle_says_so(walker, options):
+    _, report = label_clip(walker(frames=120), [], MOTION, "walk", "flat", options)
+    assert "no locomotion cycle" in report.warnings[0]
+
+
+def test_a_wrong_file_is_named_with_its_line(walker, options, write):
+    with pytest.raises(InputError, match=r"w_gait.txt, line 2: no such gait"):
+        label_clip(walker(), [write("w_gait.txt", "1 walk\n9 fly\n")], MOTION, None, "flat", options)
+
+
+def test_files_come_back_as_they_were_and_the_report_draws(walker, options, tmp_path):
+    clip = walker()
+    labels, report = label_clip(clip, [], MOTION, "walk", "flat", options)
+    for name in "ab":
+        save_labels(tmp_path / f"{name}.npz", labels)
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    again = load_labels(tmp_path / "a.npz")
+    for name in ("contacts", "phase", "phase_known", "gait", "footsteps", "cycles"):
+        np.testing.assert_equal(getattr(again, name), getattr(labels, name))
+    write_report(tmp_path / "a.json", report, labels, clip)
+    data = json.loads((tmp_path / "a.json").read_text())
+    assert LabelReport.from_dict(data) == report
+    assert data["seconds"]["walk"] == pytest.approx(10, abs=1)
+    assert data["cycles"] == len(labels.cycles)
+    strip = data["strip"]
+    assert len(strip["seconds"]) == len(strip["phase"]) == len(strip["speed"]) == 400
+    assert strip["speed"][200] == pytest.approx(1.2, rel=0.01)
+    assert strip["phase"][0] is None
+    assert len(strip["landings"]["right"]) == np.isfinite(labels.footsteps[:, 0]).sum()
+    down = [b - a for a, b in strip["contacts"]["right_toe"]]
+    assert sum(down) == pytest.approx(labels.contacts[:, 3].sum() / 60, abs=0.02)

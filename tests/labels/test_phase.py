@@ -1,0 +1,152 @@
+"""Phase, footsteps and cycles: exact where they are given, and the same whichever is made from the other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.labels.phase import (
+    IDLE_RATE,
+    dropped_frames,
+    find_cycles,
+    footsteps_of_phase,
+    mirrored_footsteps,
+    phase_of_footsteps,
+    rows_of_landings,
+)
+
+STEPS = np.array([[70.0, 95.0, 0], [120.0, 150.0, 0], [175.0, 200.0, 0], [230.0, np.nan, 0]])
+
+
+def apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.abs((a - b + 0.5) % 1.0 - 0.5)
+
+
+def test_phase_is_zero_where_the_right_foot_lands_and_a_half_where_the_left_does():
+    phase, known = phase_of_footsteps(STEPS, 300)
+    assert phase[[70, 120, 175, 230]] == pytest.approx(0)
+    assert phase[[95, 150, 200]] == pytest.approx(0.5)
+    assert phase[135] == pytest.approx(0.25)
+    assert phase[180] == pytest.approx(0.1)
+    assert np.flatnonzero(known).tolist() == list(range(70, 231))
+
+
+def test_where_no_phase_is_known_it_creeps():
+    phase, known = phase_of_footsteps(STEPS, 300)
+    assert not known[240:].any()
+    assert np.diff(phase[231:])[1:] == pytest.approx(IDLE_RATE)
+    assert np.diff(phase[:60]) == pytest.approx(IDLE_RATE)
+    nothing, known = phase_of_footsteps(np.zeros((0, 3)), 50)
+    assert np.diff(nothing) == pytest.approx(IDLE_RATE)
+    assert not known.any()
+
+
+def test_over_a_pause_phase_goes_on_forward_and_meets_the_next_landing():
+    steps = np.array([[10.0, 40, 0], [np.nan, np.nan, 1], [np.nan, 400.0, 0], [430.0, np.nan, 0]])
+    phase, known = phase_of_footsteps(steps, 500)
+    assert phase[[40, 400]] == pytest.approx(0.5)
+    assert known[[10, 39, 40, 400, 430]].all()
+    assert not known[41:400].any()
+    assert ((np.diff(phase) % 1.0) < 0.05).all()
+    assert ((np.diff(phase[45:395]) % 1.0) < 3 * IDLE_RATE).all()
+
+
+def test_cycles_run_from_line_to_line_and_share_their_boundary_frames():
+    cycles, dropped = find_cycles(STEPS, 300, "right")
+    assert cycles.tolist() == [[70, 120], [120, 175], [175, 230]]
+    assert dropped == 0
+    cycles, _ = find_cycles(STEPS, 300, "left")
+    assert cycles.tolist() == [[95, 150], [150, 200]]
+
+
+@pytest.mark.parametrize(("first", "kept"), [(59.0, 2), (59.5, 3), (60.0, 3)])
+def test_a_cycle_that_starts_before_frame_60_is_left_out(first, kept):
+    steps = STEPS.copy()
+    steps[0, 0] = first
+    assert len(find_cycles(steps, 300, "right")[0]) == kept
+
+
+@pytest.mark.parametrize(("frames", "kept"), [(291, 2), (292, 3), (293, 3)])
+def test_a_cycle_that_ends_within_61_frames_of_the_end_is_left_out(frames, kept):
+    cycles, dropped = find_cycles(STEPS, frames, "right")
+    assert (len(cycles), dropped) == (kept, 3 - kept)
+
+
+@pytest.mark.parametrize(("line", "kept"), [(0, [1, 2]), (1, [2]), (2, [0]), (3, [0, 1])])
+def test_a_marked_line_drops_the_cycles_on_both_sides_of_it(line, kept):
+    steps = STEPS.copy()
+    steps[line, 2] = 1
+    whole = find_cycles(STEPS, 300, "right")[0]
+    assert find_cycles(steps, 300, "right")[0].tolist() == whole[kept].tolist()
+    assert dropped_frames(steps, 300).sum() == (0 if line == 3 else whole[line, 1] - whole[line, 0])
+
+
+def test_no_cycle_runs_over_a_pause():
+    steps = np.array([[70.0, 95, 0], [np.nan, np.nan, 1], [270.0, 300, 0], [330.0, 360, 0]])
+    assert find_cycles(steps, 500, "right")[0].tolist() == [[270, 330]]
+    assert find_cycles(steps, 500, "left")[0].tolist() == [[300, 360]]
+
+
+def test_landings_become_rows_and_the_same_foot_twice_parts_them():
+    rows = rows_of_landings([(1, 1), (5, 0), (9, 1), (13, 1), (20, 0), (np.nan, -1), (40, 0)])
+    expected = [[np.nan, 1, 0], [5, 9, 0], [np.nan, np.nan, 1], [np.nan, 13, 0], [20, np.nan, 0]]
+    expected += [[np.nan, np.nan, 1], [40, np.nan, 0]]
+    np.testing.assert_equal(rows, np.array(expected, float))
+    assert rows_of_landings([(np.nan, -1)]).shape == (0, 3)
+
+
+@st.composite
+def bouts(draw):
+    """Footsteps of one to three bouts of walking with uneven steps."""
+    events, when = [], float(draw(st.integers(0, 30)))
+    for bout in range(draw(st.integers(1, 3))):
+        foot = draw(st.integers(0, 1))
+        if bout:
+            events.append((np.nan, -1))
+            when += draw(st.integers(80, 200))
+        for _ in range(draw(st.integers(2, 9))):
+            events.append((when, foot))
+            when += draw(st.integers(4, 60))
+            foot = 1 - foot
+    return rows_of_landings(events), int(when) + 70
+
+
+@given(bouts())
+@settings(max_examples=60, deadline=None)
+def test_phase_goes_forward_and_gives_its_footsteps_back(case):
+    steps, frames = case
+    phase, known = phase_of_footsteps(steps, frames)
+    assert ((phase >= 0) & (phase < 1)).all()
+    assert ((np.diff(phase) % 1.0) <= 0.5).all()
+    still = np.where(known, phase, 0.0)
+    back, moving = footsteps_of_phase(still)
+    landed = np.sort(steps[:, :2][np.isfinite(steps[:, :2])])
+    found = np.sort(back[:, :2][np.isfinite(back[:, :2])])
+    for when in landed:
+        assert np.abs(found - when).min() < 1.0
+    assert len(find_cycles(steps, frames, "right")[0]) <= len(steps)
+    assert not (moving & ~known)[:-1].sum() > len(landed)
+
+
+@given(bouts())
+@settings(max_examples=60, deadline=None)
+def test_mirroring_footsteps_shifts_phase_by_half_a_cycle(case):
+    steps, frames = case
+    phase, known = phase_of_footsteps(steps, frames)
+    other, known_other = phase_of_footsteps(mirrored_footsteps(steps), frames)
+    assert (known == known_other).all()
+    assert apart(other[known], phase[known] + 0.5) == pytest.approx(0, abs=1e-9)
+    twice = mirrored_footsteps(mirrored_footsteps(steps))
+    np.testing.assert_equal(twice, steps)
+    left = find_cycles(steps, frames, "left")[0]
+    assert find_cycles(mirrored_footsteps(steps), frames, "right")[0].tolist() == left.tolist()
+
+
+def test_a_dropped_line_stays_dropped_in_the_mirror():
+    steps = STEPS.copy()
+    steps[1, 2] = 1
+    mirrored = mirrored_footsteps(steps)
+    marked = mirrored[mirrored[:, 2] == 1]
+    assert marked[:, 0].tolist() == [150.0]
