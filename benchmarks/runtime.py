@@ -1,4 +1,4 @@
-"""Microseconds of a prediction and of a whole frame, beside a plain numpy blend of the weights in the same run.
+"""Microseconds of a prediction and of a whole frame, beside a plain numpy blend.
 
     python benchmarks/runtime.py [weights.npz or folder] [skeleton.yaml]
 

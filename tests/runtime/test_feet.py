@@ -11,7 +11,7 @@ from hobble.core import quat
 from hobble.core.ik import two_bone_knee
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.feet import LOCK_AT, RELEASE, TOO_FAR, carried, leg_joints, place_feet, reach
+from hobble.runtime.feet import FLOATING, LOCK_AT, RELEASE, TOO_FAR, carried, leg_joints, place_feet, reach
 
 coordinate = st.floats(-25, 25)
 
@@ -60,7 +60,9 @@ class Feet:
         self.lock, self.hold, self.lift = np.zeros((1, 2)), np.zeros((1, 2, 2)), np.zeros((1, 2))
         self.base = crouched(skeleton)
 
-    def __call__(self, moved: np.ndarray, contact: float, ground: float = -100.0, locking: bool = True):
+    def __call__(self, moved: np.ndarray, contact: float, ground: float | None = None, locking: bool = True):
+        if ground is None:  # just under the feet, neither sunk nor floating
+            ground = min(self.base[0][self.legs[0, 2], 1] - 5.0, self.base[0][self.legs[0, 3], 1] - 4.0) - 1.0
         position, rotation = self.base[0][None] + moved, self.base[1][None].copy()
         place_feet(
             np.array([[contact, contact, 0, 0]], np.float32), 0, np.full((1, 4), ground), locking, self.legs,
@@ -121,6 +123,21 @@ def test_feet_are_lifted_out_of_the_ground(holden31: Skeleton) -> None:
     np.testing.assert_allclose(
         position[toe] - position[heel], feet.base[0][toe] - feet.base[0][heel], atol=1e-9
     )
+
+
+def test_a_standing_foot_that_floats_comes_down(holden31: Skeleton) -> None:
+    feet = Feet(holden31)
+    toe, heel = holden31.role("left_toe"), holden31.role("left_heel")
+    low = min(feet.base[0][toe, 1] - 4.0, feet.base[0][heel, 1] - 5.0)
+    for gap, left in ((8.0, FLOATING), (2.0, 2.0)):
+        for _ in range(30):
+            standing = feet(np.zeros(3), 1.0, ground=low - gap)
+        assert min(standing[toe, 1] - 4.0, standing[heel, 1] - 5.0) - (low - gap) == pytest.approx(
+            left, abs=0.01
+        )
+    for _ in range(60):
+        flying = feet(np.zeros(3), 0.0, ground=low - 8.0)
+    assert flying[toe, 1] == pytest.approx(feet.base[0][toe, 1], abs=1e-3)
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.3])

@@ -15,6 +15,7 @@ LOCK_AT = 0.5
 RELEASE = 0.075  # share of the hold given up each frame afterwards
 TOO_FAR = 20.0  # centimetres the network may want a held foot elsewhere before it is let go
 HEIGHT_MIX = 0.5
+FLOATING = 3.0  # centimetres above SOLE that a standing foot may be, as rigs differ
 SOLE = (5.0, 4.0)  # centimetres of heel and toe joint above the ground under a standing foot
 
 
@@ -123,9 +124,12 @@ def place_feet(
                 lock[c, f] = max(0.0, lock[c, f] - RELEASE)
             heel_sunk = ground[c, 2 * f] + sole[0] - position[c, heel, 1]
             toe_sunk = ground[c, 2 * f + 1] + sole[1] - position[c, toe, 1]
-            lift[c, f] += HEIGHT_MIX * (max(0.0, heel_sunk, toe_sunk) - lift[c, f])
+            # Up out of the ground; down to it too for a foot that should stand and floats.
+            rise = max(heel_sunk, toe_sunk)
+            rise = max(rise, 0.0) + lock[c, f] * min(rise + FLOATING, 0.0)
+            lift[c, f] += HEIGHT_MIX * (rise - lift[c, f])
             away_x, away_z = lock[c, f] * away_x, lock[c, f] * away_z
-            if abs(away_x) + abs(away_z) + lift[c, f] < 1e-4:
+            if abs(away_x) + abs(away_z) + abs(lift[c, f]) < 1e-4:
                 continue
             x, up, z = position[c, heel, 0], position[c, heel, 1], position[c, heel, 2]
             reach(position[c], rotation[c], hip, knee, heel, away_x, lift[c, f], away_z)
