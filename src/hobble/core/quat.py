@@ -104,12 +104,26 @@ def to_matrix(q: ArrayLike) -> Array:
 
 
 def from_matrix(m: ArrayLike) -> Array:
-    """Rotation matrices (..., 3, 3) -> (..., 4), w >= 0."""
-    from scipy.spatial.transform import Rotation
+    """Rotation matrices (..., 3, 3) -> (..., 4), w >= 0.
 
+    By the largest of the four components, which keeps its precision at any angle (Shepperd 1978).
+    """
     m = np.asarray(m, float)
-    q = Rotation.from_matrix(m.reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    return positive(q.reshape(*m.shape[:-2], 4))
+    a, b, c = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
+    x, y, z = m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]
+    xy, yz, zx = m[..., 0, 1] + m[..., 1, 0], m[..., 1, 2] + m[..., 2, 1], m[..., 2, 0] + m[..., 0, 2]
+    rows = np.stack(
+        [
+            np.stack([1 + a + b + c, x, y, z], axis=-1),
+            np.stack([x, 1 + a - b - c, xy, zx], axis=-1),
+            np.stack([y, xy, 1 - a + b - c, yz], axis=-1),
+            np.stack([z, zx, yz, 1 - a - b + c], axis=-1),
+        ],
+        axis=-2,
+    )
+    largest = np.argmax(np.diagonal(rows, axis1=-2, axis2=-1), axis=-1)
+    row = np.take_along_axis(rows, largest[..., None, None], axis=-2)[..., 0, :]
+    return positive(normalize(row))
 
 
 def positive(q: ArrayLike) -> Array:

@@ -189,9 +189,9 @@ def _reach(how: Retarget, rotations: Array, root: Array, side: str, toe: Array) 
     ankle = toe - quat.rotate(rotations[:, heel], foot)
     pole = _knee_direction(rotations[:, hip], rotations[:, knee], thigh, shank, rest_frame(skeleton))
     lengths = float(np.linalg.norm(thigh)), float(np.linalg.norm(shank))
-    middle, ankle = two_bone_knee(start, ankle, pole, *lengths)
+    middle, end = two_bone_knee(start, ankle, pole, *lengths)
     rotations[:, hip] = aim(rotations[:, hip], thigh, middle - start)
-    rotations[:, knee] = aim(rotations[:, knee], shank, ankle - middle)
+    rotations[:, knee] = aim(rotations[:, knee], shank, end - middle)
 
 
 def _knee_direction(hip: Array, knee: Array, thigh: Array, shank: Array, rest: Array) -> Array:
