@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -107,10 +108,24 @@ def mirror_severity(severity: Array, mirror_links: Array) -> Array:
 def write_report(
     path: str | Path, clip: Clip, severity: Array, links: Sequence[str], warnings: Sequence[str]
 ) -> None:
-    """Write the JSON beside the severities: for each link hurt at all, for how long and how much at most."""
+    """Write the JSON beside the severities: for each link hurt at all, for how long, how much at most, when."""
     hurt = {
-        link: {"seconds": float(np.sum(column > 0) / clip.fps), "highest": float(column.max())}
+        link: {
+            "seconds": float(np.sum(column > 0) / clip.fps),
+            "highest": float(column.max()),
+            "spells": _spells(column, clip.fps),
+        }
         for link, column in zip(links, severity.T, strict=True)
         if column.any()
     }
     write_json(path, {"clip": clip.name, "hurt": hurt, "warnings": list(warnings)})
+
+
+def _spells(column: Array, fps: float) -> list[list[float]]:
+    """[from, to, severity] in seconds of each stretch of one severity above 0."""
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(column)) + 1, [len(column)]])
+    return [
+        [round(float(a / fps), 3), round(float(b / fps), 3), float(column[a])]
+        for a, b in itertools.pairwise(edges)
+        if column[a] > 0
+    ]

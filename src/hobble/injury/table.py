@@ -58,7 +58,7 @@ def statuses(
         if row.clip not in frames:
             raise InputError(path, f"no such clip: {row.clip}", line=row.line)
         first, last = row.first or 1, row.last or frames[row.clip]
-        if not 1 <= first <= last <= frames[row.clip]:
+        if not first <= last <= frames[row.clip]:
             raise InputError(
                 path,
                 f"the range {first}-{last} does not lie in the {frames[row.clip]} frames of {row.clip}",
