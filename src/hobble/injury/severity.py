@@ -108,7 +108,7 @@ def mirror_severity(severity: Array, mirror_links: Array) -> Array:
 def write_report(
     path: str | Path, clip: Clip, severity: Array, links: Sequence[str], warnings: Sequence[str]
 ) -> None:
-    """Write the JSON beside the severities: for each link hurt at all, for how long, how much at most, when."""
+    """Write the JSON beside the severities: for each link hurt, for how long, how much at most, and when."""
     hurt = {
         link: {
             "seconds": float(np.sum(column > 0) / clip.fps),
