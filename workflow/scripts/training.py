@@ -3,12 +3,12 @@
 import os
 from pathlib import Path
 
-# Threads that wait must sleep: spinning ones starve each other wherever another process wants a core. With five
-# others at work on two cores: 170 samples a second spinning, 7,000 sleeping. Read when torch is first imported.
+# Threads that wait must sleep: spinning ones starve each other wherever another process wants a core. With
+# five others at work on two cores: 170 samples a second spinning, 7,000 sleeping. Read when torch is imported.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
-from hobble.training.run import run  # noqa: E402
-from hobble.workflow.job import job  # noqa: E402
+from hobble.training.run import run
+from hobble.workflow.job import job
 
 with job(snakemake):
     run(
