@@ -72,6 +72,7 @@ def test_a_response_that_is_known(hurtable) -> None:
         assert found["spearman"]["speed"] == pytest.approx(-1)
         assert found["spearman"]["from_healthy"] == pytest.approx(1)
         assert found["speed_share"] == pytest.approx(2 / 3, rel=0.02)
+        assert found["after_healing_cm"] == pytest.approx(0, abs=1e-3)
         assert found["from_healthy_cm"] == pytest.approx(10 * each, rel=0.02)
         # The severity climbs for a second, and a mean over a second follows it for another.
         assert 0.9 < found["settle_seconds"] < 2.1
@@ -103,7 +104,8 @@ def test_all_walk_healthy_before_the_onset(hurtable) -> None:
     sweep = Sweep(hurtable, KNEE, "walk", 2.0, RUNTIME)
     same = sweep.world[: sweep.onset]
     np.testing.assert_allclose(same, same[:, :1].repeat(11, axis=1), atol=1e-3)
-    assert np.abs(sweep.world[-1] - sweep.world[-1][:1]).max() > 1e-3
+    worst = sweep.world[sweep.frames - 1]
+    assert np.abs(worst - worst[:1]).max() > 1e-3
 
 
 @given(st.lists(st.one_of(st.none(), st.integers(-3, 3).map(float)), min_size=11, max_size=11))

@@ -75,9 +75,10 @@ class Sweep:
         self.onset, self.measured = self.frames // 4, self.frames // 2
         animation = ProceduralAnimation(network, characters=len(SEVERITIES), **runtime)
         poses = []
-        for f in range(self.frames):
-            injury = {link: SEVERITIES if f >= self.onset else 0.0}
+        for f in range(2 * self.frames - self.onset):
+            injury = {link: SEVERITIES if self.onset <= f < self.frames else 0.0}
             poses.append(animation.next_pose((0.0, GAITS[gait]), gait=gait, injury=injury))
+        self.late = slice(self.measured, self.frames)
         self.world = np.array([p.positions for p in poses])
         self.root = np.array([p.root for p in poses])
         yaw = np.array([p.yaw for p in poses])
@@ -87,7 +88,7 @@ class Sweep:
 
     def measures(self) -> list[dict[str, Any]]:
         """One row for each severity; distances of the pose are phase-matched means over joints, cm."""
-        late = slice(self.measured, None)
+        late = self.late
         cycles = [self._cycle(c) for c in range(len(SEVERITIES))]
         rough = acceleration(self.world[late])
         rows = []
@@ -98,20 +99,25 @@ class Sweep:
             )
             row["from_healthy"] = float(np.mean(self._apart(c, cycles[0])[late]))
             row["from_worst"] = float(np.mean(self._apart(c, cycles[-1])[late]))
+            row["after_healing"] = float(np.mean(self._apart(c, cycles[0])[-FPS:]))
             row["largest_acceleration"] = float(rough[:, c].max())
-            row["settle_seconds"] = self._settle(self._apart(c, cycles[0])) if c else 0.0
+            row["settle_seconds"] = self._settle(self._apart(c, cycles[0])[: self.frames]) if c else 0.0
             rows.append({k: None if v is None else round(v, 5) for k, v in row.items()})
         return rows
 
     def response(self, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-        """How the measures answer to severity: Spearman's rho (None where a measure does not change),
-        settling time in seconds and largest joint acceleration against the healthy walk's, both at severity
-        10."""
-        names = [k for k in rows[0] if k not in ("severity", "settle_seconds")]
+        """How the measures answer to severity: Spearman's rho, None where a measure does not change.
+
+        At severity 10: distance from healthy when hurt and after healing (cm, less the healthy walk's own),
+        share of the healthy speed, settling time in seconds, largest joint acceleration against the healthy
+        walk's.
+        """
+        names = [k for k in rows[0] if k not in ("severity", "settle_seconds", "after_healing")]
         healthy, worst = rows[0], rows[-1]
         return {
             "spearman": {name: spearman(SEVERITIES, [row[name] for row in rows]) for name in names},
-            "from_healthy_cm": worst["from_healthy"] - healthy["from_healthy"],
+            "from_healthy_cm": round(worst["from_healthy"] - healthy["from_healthy"], 5),
+            "after_healing_cm": round(worst["after_healing"] - healthy["after_healing"], 5),
             "speed_share": round(worst["speed"] / healthy["speed"], 5) if healthy["speed"] > 0 else None,
             "settle_seconds": worst["settle_seconds"],
             "acceleration_share": round(
@@ -122,7 +128,7 @@ class Sweep:
     def _cycle(self, c: int) -> Array:
         """(PHASES, J, 3) mean pose of character c in each phase bin of the last half; empty bins are
         bridged."""
-        late = slice(self.measured, None)
+        late = self.late
         bins = np.minimum((self.phase[late, c] * PHASES).astype(int), PHASES - 1)
         mean = np.zeros((PHASES, *self.local.shape[2:]))
         seen = np.unique(bins)
@@ -152,13 +158,17 @@ class Sweep:
 def spearman(x: Sequence[float] | Array, y: Sequence[float | None]) -> float | None:
     """Spearman's rank correlation of the pairs in which y is known; None for fewer than 3 or without any
     change."""
-    from scipy.stats import rankdata
-
     pairs = [(a, b) for a, b in zip(x, y, strict=True) if b is not None]
     if len(pairs) < 3 or len({b for _, b in pairs}) < 2:
         return None
-    ranks = [rankdata(v) for v in zip(*pairs, strict=True)]
-    return round(float(np.corrcoef(*ranks)[0, 1]), 5)
+    ranks = np.array([_ranks(np.array(v)) for v in zip(*pairs, strict=True)])
+    return round(float(np.corrcoef(ranks)[0, 1]), 5)
+
+
+def _ranks(values: Array) -> Array:
+    """Ranks from 1 on, equal values sharing the mean of theirs."""
+    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
+    return (np.cumsum(count) - (count - 1) / 2)[place]
 
 
 def _summary(responses: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -170,6 +180,7 @@ def _summary(responses: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             "spearman_from_healthy": _mean([r["spearman"]["from_healthy"] for r in some]),
             "spearman_speed": _mean([r["spearman"]["speed"] for r in some]),
             "from_healthy_cm": _mean([r["from_healthy_cm"] for r in some]),
+            "after_healing_cm": _mean([r["after_healing_cm"] for r in some]),
             "speed_share": _mean([r["speed_share"] for r in some]),
             "settle_seconds": _mean([r["settle_seconds"] for r in some]),
             "acceleration_share": _mean([r["acceleration_share"] for r in some]),
