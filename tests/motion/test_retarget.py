@@ -9,9 +9,10 @@ import pytest
 
 from hobble.core import quat
 from hobble.core.clip import Clip
+from hobble.core.errors import HobbleError
 from hobble.motion.make import load_source, resample
 from hobble.motion.read import read_bvh
-from hobble.motion.retarget import plan, retarget_clip
+from hobble.motion.retarget import plan, retarget_clip, retarget_pose
 from hobble.motion.rig import joint_pairs, load_skeleton
 
 NAMES = ("holden31", "ava191", "mixamo55", "rig22")
@@ -95,6 +96,30 @@ def test_joints_without_motion_follow_their_parents_rigidly(walk, rigs):
     still = [i for i, name in enumerate(ava.skeleton.joints) if name not in moved]
     assert len(still) == 191 - len(moved)
     assert quat.angle(ava.rotations[:, still], quat.IDENTITY).max() < 1e-6
+
+
+@pytest.mark.parametrize("end", ["ava191", "mixamo55", "rig22"])
+def test_a_pose_at_run_time_drives_another_figure(walk, rigs, end):
+    """Frame by frame as a network gives them, all at once, and as a clip: one and the same motion."""
+    how = plan(walk.skeleton, rigs[end].skeleton, joint_pairs(rigs["holden31"], rigs[end]))
+    positions, rotations = retarget_pose(how, walk.positions, walk.global_rotations)
+    one = retarget_pose(how, walk.positions[7], walk.global_rotations[7])
+    np.testing.assert_allclose(one[0], positions[7], atol=1e-9)
+    np.testing.assert_allclose(one[1], rotations[7], atol=1e-9)
+    assert positions.shape == (len(walk), len(how.target.joints), 3)
+    for j, p in enumerate(how.target.parents):
+        if p >= 0:
+            bone = quat.rotate(rotations[:, p], how.target.offsets[j])
+            np.testing.assert_allclose(positions[:, j] - positions[:, p], bone, atol=1e-6)
+    clip = retarget_clip(walk, how)
+    tilted = 1e-6 if end == "ava191" else 2.5
+    assert np.linalg.norm(clip.positions - positions, axis=-1).max() < tilted
+
+
+def test_a_figure_whose_legs_nothing_moves_is_refused(walk, rigs):
+    pairs = {n: n for n in walk.skeleton.joints if n != "LeftLeg"}
+    with pytest.raises(HobbleError, match=r"no joint of holden31 moves LeftLeg \(left_knee\) of holden31"):
+        plan(walk.skeleton, rigs["holden31"].skeleton, pairs)
 
 
 def test_there_and_back_again(walk, rigs):

@@ -1,11 +1,11 @@
-"""One figure's motion on another: by joint maps, rest poses and leg lengths, with the feet kept where they
-stand.
+"""One figure's motion on another: by joint maps, rest poses and leg lengths, feet kept where they stand.
 
 World rotations carry over relative to the rest poses. Limbs point where the source's limbs point; trunk, head
 and feet turn as far from their own rest as the source's do from theirs, so that a flat foot stays flat
 whatever the height of its ankle. The path is scaled by the length of the legs, and the balls of the feet
 follow the source's, scaled alike, by two-bone inverse kinematics: what does not slide in the source does not
-slide in the result.
+slide in the result. Joints that follow none of the source (fingers, face, roll joints) keep their rest pose
+on the joint above them.
 """
 
 from __future__ import annotations
@@ -17,27 +17,29 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.clip import Clip
+from hobble.core.errors import HobbleError
 from hobble.core.ik import aim, two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.motion.axes import rest_frame, rest_positions
+from hobble.motion.feet import level_heels
 from hobble.motion.rig import leg_length
 
 # Joints that point along a limb: role -> the role at the other end of the bone.
 LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "heel"}
-STANDING = (
-    0.8  # cm a frame at 60 Hz: a heel slower than this is treated as standing, at most where it is slow
-)
 STRAIGHT = 0.5  # cm: a knee nearer than this to the line from hip to ankle is taken to point forward
-MOST_TILT = np.radians(6.0) / 2  # half the angle by which a foot is tilted at most
 
 
 @dataclass(frozen=True)
 class Retarget:
     """What it takes to move `target` as `source` moves; made once by `plan`, applied to any pose.
 
-    joints: (M,) target joints that follow a joint of the source. follows: (M,) those joints.
+    joints: (M,) target joints that follow a joint of the source, parents first. follows: (M,) those joints.
     turns: (M, 4) what comes between them: world rotation of the target = that of the source times this.
+    leaders: (J,) for each target joint the nearest of `joints` above it, or itself where it is one of them.
+    arms: (J, 3) where a joint is in its leader's frame; for one of `joints`, in that of its parent's leader.
+    levels: joints of `joints` below the hips, those together whose parents' leaders are placed before them.
+    forward: (3,) where the target's rest pose faces.
     scale: legs of the target to legs of the source. lift: cm added to the height of the hips after scaling.
     """
 
@@ -46,6 +48,10 @@ class Retarget:
     joints: Array
     follows: Array
     turns: Array = field(repr=False)
+    leaders: Array = field(repr=False)
+    arms: Array = field(repr=False)
+    levels: tuple[Array, ...] = field(repr=False)
+    forward: Array = field(repr=False)
     scale: float
     lift: float
 
@@ -53,21 +59,27 @@ class Retarget:
 def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Retarget:
     """Work out how `target` follows `source`; sources: the target's joint -> the joint it follows.
 
-    Both need the roles hips, head and, of both sides, shoulder, hip, knee, heel and toe.
+    Both need the roles hips, head and, of both sides, shoulder, hip, knee, heel and toe. Raises HobbleError
+    where the target's hips or legs follow nothing.
     """
-    pairs = [(target.index(mine), source.index(theirs)) for mine, theirs in sources.items()]
-    pairs.sort()
-    joints = np.array([a for a, _ in pairs])
-    follows = np.array([b for _, b in pairs])
+    pairs = sorted((target.index(mine), source.index(theirs)) for mine, theirs in sources.items())
+    joints, follows = (np.array(side) for side in zip(*pairs, strict=True))
+    for role in ("hips", *(f"{s}_{part}" for s in ("left", "right") for part in ("hip", "knee", "heel"))):
+        if target.role(role) not in joints:
+            raise HobbleError(
+                f"no joint of {source.name} moves {target.roles[role]} ({role}) of {target.name}"
+            )
     from_source, to_target = rest_frame(source), quat.inv(rest_frame(target))
     turns = np.broadcast_to(quat.mul(from_source, to_target), (len(pairs), 4)).copy()
     bones = _limb_bones(source, target, from_source, to_target)
-    for i, (mine, theirs) in enumerate(pairs):
-        if (mine, theirs) in bones:
-            turns[i] = bones[mine, theirs]
+    for i, pair in enumerate(pairs):
+        turns[i] = bones.get(pair, turns[i])
     scale = leg_length(target) / leg_length(source)
     lift = _standing(target, to_target) - scale * _standing(source, quat.inv(from_source))
-    return Retarget(source, target, joints, follows, turns, scale, lift)
+    leaders, arms = _leaders(target, joints)
+    levels = _levels(target, joints, leaders)
+    forward = quat.rotate(rest_frame(target), np.array([0.0, 0.0, 1.0]))
+    return Retarget(source, target, joints, follows, turns, leaders, arms, levels, forward, scale, lift)
 
 
 def _limb_bones(
@@ -84,8 +96,7 @@ def _limb_bones(
             mine, theirs = target.role(roles[0]), source.role(roles[0])
             bone = quat.rotate(to_target, a[target.role(roles[1])] - a[mine])
             wanted = quat.rotate(quat.inv(from_source), b[source.role(roles[1])] - b[theirs])
-            turn = quat.mul(quat.between(bone, wanted), to_target)
-            out[mine, theirs] = quat.mul(from_source, turn)
+            out[mine, theirs] = quat.mul(from_source, quat.mul(quat.between(bone, wanted), to_target))
     return out
 
 
@@ -97,117 +108,98 @@ def _standing(skeleton: Skeleton, to_upright: Array) -> float:
     return float(np.mean(drop) + leg_length(skeleton) + np.mean(ankle))
 
 
+def _leaders(target: Skeleton, joints: Array) -> tuple[Array, Array]:
+    """`leaders` and `arms` of a Retarget; what hangs above the hips is carried by them."""
+    rest, hips = rest_positions(target), target.role("hips")
+    leaders = np.full(len(target.joints), hips)
+    arms = np.zeros((len(target.joints), 3))
+    for j, p in enumerate(target.parents):
+        above = leaders[p] if p >= 0 else hips
+        leaders[j] = j if j in joints else above
+        arms[j] = rest[j] - rest[above]
+    return leaders, arms
+
+
+def _levels(target: Skeleton, joints: Array, leaders: Array) -> tuple[Array, ...]:
+    depth = {target.role("hips"): 0}
+    for j in joints:
+        if j not in depth:
+            depth[int(j)] = depth[int(leaders[target.parents[j]])] + 1
+    return tuple(np.array([j for j in depth if depth[j] == d]) for d in range(1, max(depth.values()) + 1))
+
+
 def retarget_clip(clip: Clip, how: Retarget) -> Clip:
-    """The clip's motion on the target; joints that follow none keep their rest pose on their parents."""
-    root = clip.positions[:, how.source.role("hips")] * how.scale + np.array([0.0, how.lift, 0.0])
-    rotations = np.empty((len(clip), len(how.target.joints), 4))
-    rotations[:, how.joints] = quat.mul(clip.global_rotations[:, how.follows], how.turns)
-    _follow_rigidly(how, rotations)
-    placed = _root_position(how.target, rotations, root)
+    """The clip's motion on the target."""
+    rotations = _carried(how, clip.global_rotations)
     for side in ("left", "right"):
-        toe = clip.positions[:, how.source.role(f"{side}_toe")] * how.scale
-        heel = clip.positions[:, how.source.role(f"{side}_heel")] * how.scale
-        _hold_heel(how, rotations, side, heel, toe, clip.fps)
-        _reach(how, rotations, placed, side, toe)
-    _follow_rigidly(how, rotations)
+        heel, toe = (clip.positions[:, how.source.role(f"{side}_{part}")] for part in ("heel", "toe"))
+        joint, ball = how.target.role(f"{side}_heel"), how.target.role(f"{side}_toe")
+        foot = quat.rotate(rotations[:, joint], how.arms[ball])
+        tilt = level_heels(foot, heel * how.scale, toe * how.scale, clip.fps)
+        rotations[:, joint] = quat.mul(tilt, rotations[:, joint])
+    positions, rotations = _posed(how, clip.positions, rotations)
     local = quat.continuous(local_rotations(how.target, rotations))
-    return Clip(clip.name, how.target, clip.fps, local, placed)
+    return Clip(clip.name, how.target, clip.fps, local, positions[:, 0])
 
 
-def _follow_rigidly(how: Retarget, rotations: Array) -> None:
-    """Give joints without a motion of their own the world rotation of their parent."""
-    moved = set(how.joints.tolist())
-    for j, p in enumerate(how.target.parents):
-        if j not in moved:
-            rotations[:, j] = rotations[:, p] if p >= 0 else quat.IDENTITY
+def retarget_pose(how: Retarget, positions: Array, rotations: Array) -> tuple[Array, Array]:
+    """A pose, or any number of them, on the target: what a figure driven by a network needs every frame.
+
+    positions (..., J, 3) and rotations (..., J, 4) in the world; returns the same of the target's joints.
+    """
+    return _posed(how, positions, _carried(how, rotations))
 
 
-def _root_position(target: Skeleton, rotations: Array, hips: Array) -> Array:
-    """Where the root joint is when the hips, which may hang from it, are at `hips`."""
-    out = hips.copy()
-    j = target.role("hips")
-    while target.parents[j] >= 0:
-        out -= quat.rotate(rotations[:, target.parents[j]], target.offsets[j])
-        j = target.parents[j]
+def _carried(how: Retarget, rotations: Array) -> Array:
+    """World rotations (..., J, 4) of the target's joints that follow; of the others, nothing yet."""
+    out = np.empty((*rotations.shape[:-2], len(how.target.joints), 4))
+    out[..., how.joints, :] = quat.mul(rotations[..., how.follows, :], how.turns)
     return out
 
 
-def _hold_heel(how: Retarget, rotations: Array, side: str, heel: Array, toe: Array, fps: float) -> None:
-    """Tilt a standing foot about its ball, by a few degrees, so that its heel moves no more than the
-    source's.
-
-    Feet of another shape carry the ankle at another height above the ball, so that the same rocking would
-    move it further. heel, toe: (F, 3) those of the source, scaled.
-    """
-    skeleton = how.target
-    joint, ball = skeleton.role(f"{side}_heel"), skeleton.role(f"{side}_toe")
-    foot = quat.rotate(rotations[:, joint], rest_positions(skeleton)[ball] - rest_positions(skeleton)[joint])
-    length = np.linalg.norm(foot[0])
-    apart = toe - foot - heel
-    share = np.zeros(len(heel))
-    wanted = foot.copy()
-    for first, last in standing_runs(heel, STANDING * 60.0 / fps, round(fps / 20)):
-        here = slice(first, last)
-        level = toe[here] - heel[here] - apart[here].mean(axis=0)
-        level[:, 1] = 0.0
-        across = np.linalg.norm(level, axis=1, keepdims=True)
-        level *= np.minimum(1.0, length / np.maximum(across, 1e-9))
-        level[:, 1] = np.sign(foot[here, 1]) * np.sqrt(np.maximum(length**2 - np.sum(level**2, axis=1), 0.0))
-        wanted[here] = level
-        share[here] = _eased(last - first, round(fps / 15), first == 0, last == len(heel))
-    tilt = quat.log(quat.between(foot, wanted))
-    size = np.linalg.norm(tilt, axis=-1, keepdims=True)
-    tilt *= np.minimum(1.0, MOST_TILT / np.maximum(size, 1e-9)) * share[:, None]
-    rotations[:, joint] = quat.mul(quat.exp(tilt), rotations[:, joint])
+def _posed(how: Retarget, source: Array, rotations: Array) -> tuple[Array, Array]:
+    """World positions and rotations of all of the target's joints, the feet where the source's are, scaled."""
+    hips = source[..., how.source.role("hips"), :] * how.scale + np.array([0.0, how.lift, 0.0])
+    for side in ("left", "right"):
+        _reach(how, rotations, hips, side, source[..., how.source.role(f"{side}_toe"), :] * how.scale)
+    positions = np.empty((*rotations.shape[:-1], 3))
+    positions[..., how.target.role("hips"), :] = hips
+    parents = np.array(how.target.parents)
+    for level in how.levels:
+        above = how.leaders[parents[level]]
+        arms = quat.rotate(rotations[..., above, :], how.arms[level])
+        positions[..., level, :] = positions[..., above, :] + arms
+    led = np.flatnonzero(how.leaders != np.arange(len(how.leaders)))
+    leaders = how.leaders[led]
+    rotations[..., led, :] = rotations[..., leaders, :]
+    arms = quat.rotate(rotations[..., leaders, :], how.arms[led])
+    positions[..., led, :] = positions[..., leaders, :] + arms
+    return positions, rotations
 
 
-def standing_runs(point: Array, slow: float, shortest: int) -> list[tuple[int, int]]:
-    """Runs [first, last) of `shortest` frames or more in which a point (F, 3) moves less than `slow` each."""
-    speed = np.linalg.norm(np.diff(point, axis=0), axis=1)
-    still = np.concatenate([[False], speed < slow, [False]])
-    starts = np.flatnonzero(~still[:-1] & still[1:])
-    ends = np.flatnonzero(still[:-1] & ~still[1:]) + 1
-    return [(int(a), int(b)) for a, b in zip(starts, ends, strict=True) if b - a >= shortest]
-
-
-def _eased(frames: int, ramp: int, open_start: bool, open_end: bool) -> Array:
-    """(frames,) weights that rise from 0 to 1 and fall again over `ramp` frames, but not at an open end."""
-    n = np.arange(frames)
-    up = np.ones(frames) if open_start else np.clip((n + 1) / (ramp + 1), 0, 1)
-    down = np.ones(frames) if open_end else np.clip((frames - n) / (ramp + 1), 0, 1)
-    share = np.minimum(up, down)
-    return share * share * (3 - 2 * share)
-
-
-def _reach(how: Retarget, rotations: Array, root: Array, side: str, toe: Array) -> None:
-    """Bend a leg so that the ball of the foot gets to `toe` (F, 3); the foot keeps its world rotation."""
-    skeleton = how.target
-    hip, knee, heel, ball = (skeleton.role(f"{side}_{part}") for part in ("hip", "knee", "heel", "toe"))
-    start = _position(skeleton, rotations, root, hip)
-    rest = rest_positions(skeleton)
-    thigh, shank, foot = rest[knee] - rest[hip], rest[heel] - rest[knee], rest[ball] - rest[heel]
-    ankle = toe - quat.rotate(rotations[:, heel], foot)
-    pole = _knee_direction(rotations[:, hip], rotations[:, knee], thigh, shank, rest_frame(skeleton))
+def _reach(how: Retarget, rotations: Array, hips: Array, side: str, toe: Array) -> None:
+    """Bend a leg so that the ball of the foot gets to `toe` (..., 3); the foot keeps its rotation."""
+    hip, knee, heel, ball = (how.target.role(f"{side}_{part}") for part in ("hip", "knee", "heel", "toe"))
+    start, joint = hips, hip
+    while joint != how.target.role("hips"):
+        above = how.leaders[how.target.parents[joint]]
+        start = start + quat.rotate(rotations[..., above, :], how.arms[joint])
+        joint = above
+    thigh, shank = how.arms[knee], how.arms[heel]
+    ankle = toe - quat.rotate(rotations[..., heel, :], how.arms[ball])
+    upper, lower = rotations[..., hip, :], rotations[..., knee, :]
+    pole = _knee_direction(upper, lower, thigh, shank, how.forward)
     lengths = float(np.linalg.norm(thigh)), float(np.linalg.norm(shank))
     middle, end = two_bone_knee(start, ankle, pole, *lengths)
-    rotations[:, hip] = aim(rotations[:, hip], thigh, middle - start)
-    rotations[:, knee] = aim(rotations[:, knee], shank, end - middle)
+    rotations[..., hip, :] = aim(upper, thigh, middle - start)
+    rotations[..., knee, :] = aim(lower, shank, end - middle)
 
 
-def _knee_direction(hip: Array, knee: Array, thigh: Array, shank: Array, rest: Array) -> Array:
+def _knee_direction(hip: Array, knee: Array, thigh: Array, shank: Array, ahead: Array) -> Array:
     """Where the knee points: off the line from hip to ankle, and, the straighter the leg, forward."""
     along = quat.rotate(hip, thigh)
     line = along + quat.rotate(knee, shank)
-    line /= np.linalg.norm(line, axis=-1, keepdims=True)
+    line = line / np.linalg.norm(line, axis=-1, keepdims=True)
     bend = along - line * np.sum(along * line, axis=-1, keepdims=True)
     straight = np.clip(STRAIGHT - np.linalg.norm(bend, axis=-1, keepdims=True), 0.0, None)
-    return bend + straight * quat.rotate(hip, quat.rotate(rest, np.array([0.0, 0.0, 1.0])))
-
-
-def _position(skeleton: Skeleton, rotations: Array, root: Array, joint: int) -> Array:
-    """World position (F, 3) of one joint, of world rotations (F, J, 4)."""
-    out = root.copy()
-    while skeleton.parents[joint] >= 0:
-        out += quat.rotate(rotations[:, skeleton.parents[joint]], skeleton.offsets[joint])
-        joint = skeleton.parents[joint]
-    return out
+    return bend + straight * quat.rotate(hip, ahead)
