@@ -31,7 +31,7 @@ def odd_ranges(status: Status, path: str | Path) -> list[str]:
     """A sentence for each range that starts at 0, leaves the clip, or changes what an earlier line says."""
     said = []
     for i, spell in enumerate(status.spells):
-        place = f"{path}, line {spell.line}: the range {spell.first}-{spell.last}"
+        place = f"{Path(path).name}, line {spell.line}: the range {spell.first}-{spell.last}"
         if spell.first > status.frames:
             said.append(f"{place} lies past the last of {status.frames} frames and says nothing.")
         elif spell.last > status.frames:
