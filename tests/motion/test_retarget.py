@@ -82,12 +82,16 @@ def test_the_same_proportions_come_out_exactly(walk, rigs):
 
 def test_191_joints_carry_the_31_exactly(walk, rigs):
     """ava191 has holden31's proportions: every equivalent joint is where the 31-joint figure has it."""
+    assert sorted(rigs["ava191"].maps["holden31"].values()) == sorted(walk.skeleton.joints)
+    neck = quat.from_axis_angle(np.array([1.0, 0, 0]), np.full(len(walk), 0.4))
+    walk = replace(walk, rotations=walk.rotations.copy())
+    walk.rotations[:, walk.skeleton.index("Neck")] = neck
     ava = onto(walk, rigs["holden31"], rigs["ava191"])
     for mine, theirs in rigs["ava191"].maps["holden31"].items():
-        if "Index" in mine or "Thumb" in mine:
-            continue
+        if any(word in mine for word in ("Index", "Thumb", "Ass")):
+            continue  # placed elsewhere on the hand and the pelvis
         apart = ava.positions[:, ava.skeleton.index(mine)] - walk.positions[:, walk.skeleton.index(theirs)]
-        assert np.linalg.norm(apart, axis=-1).max() < 0.01, mine
+        assert np.linalg.norm(apart, axis=-1).max() < 1e-4, mine
 
 
 def test_joints_without_motion_follow_their_parents_rigidly(walk, rigs):

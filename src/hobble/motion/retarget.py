@@ -158,7 +158,7 @@ def _carried(how: Retarget, rotations: Array) -> Array:
 
 
 def _posed(how: Retarget, source: Array, rotations: Array) -> tuple[Array, Array]:
-    """World positions and rotations of all of the target's joints, the feet where the source's are, scaled."""
+    """World positions and rotations of the target's joints, the feet where the source's are, scaled."""
     hips = source[..., how.source.role("hips"), :] * how.scale + np.array([0.0, how.lift, 0.0])
     for side in ("left", "right"):
         _reach(how, rotations, hips, side, source[..., how.source.role(f"{side}_toe"), :] * how.scale)
@@ -178,7 +178,7 @@ def _posed(how: Retarget, source: Array, rotations: Array) -> tuple[Array, Array
 
 
 def _reach(how: Retarget, rotations: Array, hips: Array, side: str, toe: Array) -> None:
-    """Bend a leg so that the ball of the foot gets to `toe` (..., 3); the foot keeps its rotation."""
+    """Bend a leg so that the ball of the foot gets to `toe` (..., 3); the foot stays turned as it is."""
     hip, knee, heel, ball = (how.target.role(f"{side}_{part}") for part in ("hip", "knee", "heel", "toe"))
     start, joint = hips, hip
     while joint != how.target.role("hips"):
