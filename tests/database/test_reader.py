@@ -251,8 +251,8 @@ def test_a_chunk_is_a_file_that_other_tools_open(path):
     data = (path / db.manifest.folder / chunk.file).read_bytes()
     length = int.from_bytes(data[:8], "little")
     header = json.loads(data[8 : 8 + length])
-    assert header["frames"]["dtype"] == "F32"
-    assert header["frames"]["shape"][0] == header["phase"]["shape"][0] == chunk.rows
+    assert header["x"]["dtype"] == "F32"
+    assert header["x"]["shape"][0] == header["phase"]["shape"][0] == chunk.rows
     ends = sorted(entry["data_offsets"] for entry in header.values())
     assert ends[0][0] == 0
     assert all(a[1] == b[0] for a, b in pairwise(ends))

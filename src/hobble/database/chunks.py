@@ -39,7 +39,7 @@ class Chunk:
 
 
 def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Chunk:
-    """Write arrays of float16, float32 or int32 to folder/file; `frames` and `fits` are among them."""
+    """Write arrays of float16, float32 or int32 to folder/file; `x` and `fits` are among them."""
     header: dict[str, Any] = {}
     place = 0
     for name, array in arrays.items():
@@ -60,7 +60,7 @@ def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Ch
         out.writelines(parts)
         out.flush()
         os.fsync(out.fileno())
-    rows, fits = len(arrays["frames"]), len(arrays["fits"])
+    rows, fits = len(arrays["x"]), len(arrays["fits"])
     return Chunk(file, rows, fits, sum(len(part) for part in parts), _checksum(parts))
 
 

@@ -24,7 +24,7 @@ from hobble.core.quat import Array
 from hobble.database.buckets import INDEX, Buckets
 from hobble.database.chunks import Chunk, write_chunk
 from hobble.database.clip_rows import ClipRows, Outline, load_clip_rows, outline
-from hobble.database.compose import fit_columns, frame_columns, split_rows
+from hobble.database.compose import fit_columns, split_rows, x_columns
 from hobble.database.layout import RowLayout
 from hobble.database.manifest import FILE, SPLITS, STATISTICS, Manifest
 from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
@@ -136,7 +136,7 @@ def _plan(
             "60 frames from its ends. Add clips, or hold fewer out."
         )
     layout = first.layout if injury else replace(first.layout, links=0)
-    values = frame_columns(layout) + fit_columns(layout) * pairs / rows
+    values = x_columns(layout) + layout.y_size + fit_columns(layout) * pairs / rows
     chunk_rows = max(1, int(chunk_bytes / (item * values + 16)))
     each = max(1, int(BUCKET_BYTES / (chunk_rows * 4 * values)))
     return Plan(layout, first.skeleton, visits, entries, chunk_rows, chunk_rows * each)
@@ -151,7 +151,7 @@ def _scatter(
 ) -> tuple[dict[str, Buckets], tuple[Moments, Moments]]:
     """Pass 1: every clip into its split's buckets, and the moments of the clips in training."""
     layout = plan.layout
-    columns, of_fits = frame_columns(layout), fit_columns(layout)
+    columns, of_fits = x_columns(layout) + layout.y_size, fit_columns(layout)
     buckets, places, done = {}, {}, dict.fromkeys(SPLITS, 0)
     for number, split in enumerate(SPLITS):
         rows = plan.rows(split)
@@ -190,16 +190,18 @@ def _chunks(
     work: Path, split: str, buckets: Buckets, plan: Plan, statistics: Statistics, dtype: str
 ) -> Iterator[Chunk]:
     """Pass 2: each bucket in order, standardised, as chunks of `chunk_rows` rows."""
-    number = 0
+    number, columns = 0, x_columns(plan.layout)
     for frames, fits, index in buckets.drain():
         ends = np.cumsum(index["count"])
         for start in range(0, len(index), plan.chunk_rows):
             part = slice(start, min(start + plan.chunk_rows, len(index)))
             count = index["count"][part]
             fit_part = slice(int(ends[start] - count[0]), int(ends[part.stop - 1]))
-            some, ground = split_rows(plan.layout, statistics, frames[part], fits[fit_part], count)
+            raw = frames[part, :columns], frames[part, columns:], fits[fit_part]
+            x, y, ground = split_rows(plan.layout, statistics, *raw, count)
             arrays = {
-                "frames": some.astype(dtype),
+                "x": x.astype(dtype),
+                "y": y.astype(dtype),
                 "fits": ground.astype(dtype),
                 "count": count,
                 "clip": index["clip"][part],

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from itertools import chain
+from itertools import chain, cycle
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -16,12 +16,13 @@ from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.database import order
 from hobble.database.chunks import read_chunk
-from hobble.database.compose import compose, fit_columns, frame_columns
+from hobble.database.compose import compose, fit_columns, x_columns
 from hobble.database.layout import RowLayout
 from hobble.database.manifest import STATISTICS, Manifest
 from hobble.database.statistics import Statistics
 
 Item = TypeVar("Item")
+Rooms = Iterator[Mapping[str, np.ndarray]]
 BLOCK_ROWS = 4096
 BLOCKS = 3  # in memory at a time: being made, waiting, in use
 
@@ -48,7 +49,8 @@ class Window:
 
     rows: Sequence[int]
     first: np.ndarray
-    frames: Array
+    x: Array
+    y: Array
     fits: Array
     count: np.ndarray
     clip: np.ndarray
@@ -129,14 +131,21 @@ class Database:
             return iter(())
         spans = order.spans(self.rows(split), self.manifest.visits, section, sections)
         window = self.window(split, block_rows)
-        parts = chain.from_iterable(self._parts(split, pass_index, seed, span, window) for span in spans)
+        rooms = self._rooms(split, window)
+        parts = chain.from_iterable(
+            self._parts(split, pass_index, seed, span, window, rooms) for span in spans
+        )
         total = self.section_pairs(split, section, sections)
         return ahead(self._composed(parts, total, block_rows))
 
     def _parts(
-        self, split: str, pass_index: int, seed: int, span: tuple[int, int, int], window: int
+        self, split: str, pass_index: int, seed: int, span: tuple[int, int, int], window: int, rooms: Rooms
     ) -> Iterator[tuple[Window, np.ndarray, np.ndarray]]:
-        """Windows, the rows of them to show in order, and the fit of each: a layer from place to place."""
+        """Windows, the rows of them to show in order, and the fit of each: a layer from place to place.
+
+        Windows are loaded into one of `rooms` while the one before is in use in the other, so each has to be
+        done with before the next is asked for.
+        """
         layer, start, stop = span
         every = range(len(self.manifest.chunks[split]))
         if window >= len(every):
@@ -144,13 +153,8 @@ class Database:
             windows = iter([self._whole(split)])
         else:
             wanted = list(self._wanted(split, pass_index, seed, layer, start, stop, window))
-            windows = ahead(self._load(split, some) for _, some, _, _ in wanted)
-        for (
-            group,
-            some,
-            low,
-            high,
-        ) in wanted:  # no name is left to hold a window while the next but one is read
+            windows = ahead(self._load(split, some, next(rooms)) for _, some, _, _ in wanted)
+        for group, some, low, high in wanted:
             yield self._shown(next(windows), some, (seed, pass_index, layer), group, slice(low, high))
 
     def _shown(
@@ -194,15 +198,23 @@ class Database:
         sizes = [chunk.bytes for chunk in self.manifest.chunks[split]]
         return len(sizes) if self.manifest.bytes <= memory else max(1, memory // (2 * max(sizes)))
 
+    def _rooms(self, split: str, window: int) -> Rooms:
+        """Two rooms for windows, in turn; the memory is the same for all windows that a section reads."""
+        if window >= len(self.manifest.chunks[split]):
+            return iter(())
+        return cycle([self._room(split, window) for _ in range(2)])
+
     def _whole(self, split: str) -> Window:
         if split not in self._kept:
-            self._kept[split] = self._load(split, range(len(self.manifest.chunks[split])))
+            every = range(len(self.manifest.chunks[split]))
+            self._kept[split] = self._load(split, every, self._room(split, len(every)))
         return self._kept[split]
 
-    def _load(self, split: str, some: Sequence[int]) -> Window:
-        """Chunks, one after another, read straight into one table; checksums verified the first time."""
+    def _load(self, split: str, some: Sequence[int], room: Mapping[str, np.ndarray]) -> Window:
+        """Chunks, one after another, read straight into `room`; checksums verified the first time."""
         chunks = [self.manifest.chunks[split][i] for i in some]
-        tables = self._tables(sum(c.rows for c in chunks), sum(c.fits for c in chunks))
+        all_rows, all_fits = sum(c.rows for c in chunks), sum(c.fits for c in chunks)
+        tables = {name: table[: all_fits if name == "fits" else all_rows] for name, table in room.items()}
         row = fit = 0
         for chunk in chunks:
             rows, fits = slice(row, row + chunk.rows), slice(fit, fit + chunk.fits)
@@ -214,11 +226,15 @@ class Database:
         first = np.cumsum(tables["count"], dtype=np.int64) - tables["count"]
         return Window([c.rows for c in chunks], first, **tables)
 
-    def _tables(self, rows: int, fits: int) -> dict[str, np.ndarray]:
-        """Empty arrays for what chunks hold, in their order."""
+    def _room(self, split: str, window: int) -> dict[str, np.ndarray]:
+        """Empty arrays for what any `window` chunks hold, in their order."""
+        chunks = self.manifest.chunks[split]
+        rows = sum(sorted(chunk.rows for chunk in chunks)[-window:])
+        fits = sum(sorted(chunk.fits for chunk in chunks)[-window:])
         floats = np.dtype(self.manifest.dtype)
         return {
-            "frames": np.empty((rows, frame_columns(self.layout)), floats),
+            "x": np.empty((rows, x_columns(self.layout)), floats),
+            "y": np.empty((rows, self.layout.y_size), floats),
             "fits": np.empty((fits, fit_columns(self.layout)), floats),
             "count": np.empty(rows, np.int32),
             "clip": np.empty(rows, np.int32),
@@ -235,16 +251,8 @@ class Database:
             while len(rows):
                 n = min(len(rows), len(block.p) - filled)
                 here, some = slice(filled, filled + n), rows[:n]
-                compose(
-                    self.layout,
-                    self.statistics,
-                    window.frames,
-                    window.fits,
-                    some,
-                    fit[:n],
-                    block.x[here],
-                    block.y[here],
-                )
+                tables = window.x, window.y, window.fits
+                compose(self.layout, self.statistics, tables, some, fit[:n], block.x[here], block.y[here])
                 block.p[here] = window.phase[some]
                 block.clip[here], block.frame[here] = window.clip[some], window.frame[some]
                 rows, fit, filled = rows[n:], fit[n:], filled + n
@@ -252,7 +260,6 @@ class Database:
                     yield block
                     total -= filled
                     block, filled = self._empty(min(block_rows, total)), 0
-            del window, rows, fit  # the next window needs the room
 
     def _empty(self, rows: int) -> Block:
         x = np.empty((rows, self.layout.x_size), np.float32)

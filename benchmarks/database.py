@@ -1,0 +1,309 @@
+"""Speed, size and memory of the database, as ratios measured in one run.
+
+    python benchmarks/database.py [--size-mb 1280] [--memory-mb 128] [--folder DIR] [--joints 31]
+
+Builds a database of made-up rows `size-mb` large, half of them flat and half with ten fits, and reads it back
+from disk in `memory-mb`, from memory, and by the simpler ways that it replaces. Whatever reads from disk does
+so with the page cache dropped and, where a memory cgroup can be made, in one that counts the page cache too,
+of `memory-mb` and what the program itself needs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from hobble.database.clip_rows import ClipRows, save_clip_rows
+from hobble.database.layout import RowLayout
+from hobble.database.merge import write_database
+from hobble.database.reader import Database
+
+CLIP_ROWS = 3000
+BATCH = 512
+TURNS, STEPS = 8, 50  # of training
+STACK = 8 << 20
+PROGRAM_MB = 100  # Python, numpy and some room for the page cache
+SECONDS = 6.0  # of reading, per measurement
+
+
+def made_up(folder: Path, size: int, joints: int) -> dict[str, Path]:
+    """Files of random rows, about `size` bytes in all."""
+    layout = RowLayout(joints, links=30)
+    skeleton = {"name": "made up", "joints": {f"j{i}": {} for i in range(joints)}}
+    files, total, rng = {}, 0, np.random.default_rng(0)
+    while total < size:
+        fits = 1 if len(files) % 2 else 10
+        shapes = {
+            "x": (CLIP_ROWS, layout.x_terrain.start),
+            "y": (CLIP_ROWS, layout.y_size),
+            "p": (CLIP_ROWS,),
+            "severity": (CLIP_ROWS, 30),
+            "heights": (CLIP_ROWS * fits, 36),
+            "mean": (CLIP_ROWS * fits,),
+        }
+        arrays = {name: rng.standard_normal(shape, np.float32) for name, shape in shapes.items()}
+        count = np.full(CLIP_ROWS, fits)
+        frame = np.arange(CLIP_ROWS)
+        name = f"clip{len(files):04d}"
+        rows = ClipRows(name, layout, skeleton, frame=frame, cycle=frame // 60, fits=count, **arrays)
+        files[name] = folder / f"{name}.npz"
+        save_clip_rows(files[name], rows)
+        total += files[name].stat().st_size
+    return files
+
+
+def cold(folder: Path) -> None:
+    """Drop a folder's files from the page cache."""
+    for file in folder.rglob("*"):
+        if file.is_file():
+            with open(file, "rb") as opened:
+                os.fsync(opened.fileno())
+                os.posix_fadvise(opened.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
+
+
+def rate(batches: Iterator[int], seconds: float = SECONDS) -> float:
+    """Rows a second of an iterator of row counts, its first batch (compiling, loading) left out."""
+    next(batches)
+    start, rows = time.perf_counter(), 0
+    for n in batches:
+        rows += n
+        if time.perf_counter() - start > seconds:
+            break
+    return rows / (time.perf_counter() - start)
+
+
+def of_database(db: Database) -> Iterator[int]:
+    """Rows of one block after another, over as many sections as are asked for."""
+    rows = db.block_rows(BATCH)
+    for section in range(1_000_000):
+        for block in db.blocks("train", section // 10, section % 10, 10, 1, rows):
+            yield len(block.p)
+
+
+def write_expanded(db: Database, path: Path, rows: int) -> None:
+    """The original's layout, every pair a row of X, Y and P in float32: what the factorised one replaces."""
+    with open(path, "wb") as file:
+        for section in range(1_000_000):
+            for block in db.blocks("train", 0, section, 10, 1):
+                n = min(len(block.p), rows)
+                file.write(np.concatenate([block.x, block.y, block.p[:, None]], axis=1)[:n].tobytes())
+                rows -= n
+                if not rows:
+                    return
+
+
+def random_rows(table: np.memmap) -> Iterator[int]:
+    """Batches of rows at random, as a data loader over a memory map does it."""
+    rng = np.random.default_rng(1)
+    while True:
+        yield len(np.array(table[np.sort(rng.integers(0, len(table), BATCH))]))
+
+
+def shuffled_pieces(table: np.memmap, rows: int) -> Iterator[int]:
+    """Pieces of `rows` rows at random, 16 of them shuffled together: the same mixing, no thread."""
+    rng = np.random.default_rng(1)
+    while True:
+        order = rng.permutation(len(table) // rows)
+        for i in range(0, len(order), 16):
+            piece = np.concatenate([table[k * rows : (k + 1) * rows] for k in order[i : i + 16]])
+            shuffle = rng.permutation(len(piece))
+            for start in range(0, len(piece), BATCH):
+                yield len(piece[shuffle[start : start + BATCH]])
+
+
+def build(args: argparse.Namespace, folder: Path) -> Database:
+    """Build in a process of its own, so that its peak memory is its own."""
+    start = time.perf_counter()
+    files = made_up(folder / "clips", args.size_mb << 20, args.joints)
+    print(f"made {len(files)} clips of {CLIP_ROWS} rows in {time.perf_counter() - start:.0f} s")
+    seconds, peak, before = child("build", folder, str(folder / "clips"), limit_mb=1000)
+    manifest = Database.open(folder / "db").manifest
+    size = manifest.bytes / (1 << 20)
+    print(f"build: {seconds:.1f} s, {size / seconds:.0f} MB/s, {size:.0f} MB; peak {peak:.0f} MB, ", end="")
+    print(f"of which {before:.0f} MB before it began")
+    print(f"bytes: {manifest.bytes / manifest.original_bytes:.1%} of the original's layout (goal: 27%)")
+    return Database.open(folder / "db", args.memory_mb)
+
+
+def child(task: str, folder: Path, argument: str = "", limit_mb: int | None = None) -> list[float]:
+    """Run a task of this file in a new process and return the numbers that it prints.
+
+    limit_mb: most memory, the page cache counted in, beyond which the kernel reclaims pages or kills.
+    """
+    command = [sys.executable, __file__, "--task", task, "--folder", str(folder), "--argument", argument]
+    with cgroup(limit_mb) as join:
+        out = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, preexec_fn=join).stdout
+    return [float(word) for word in out.split()]
+
+
+@contextlib.contextmanager
+def cgroup(limit_mb: int | None) -> Iterator[Callable[[], None] | None]:
+    """A memory cgroup of its own, where this user may make one; yields what a child calls to join it."""
+    if limit_mb is None:
+        yield None
+        return
+    v1 = Path("/sys/fs/cgroup/memory")
+    base, file = (v1, "memory.limit_in_bytes") if v1.is_dir() else (Path("/sys/fs/cgroup"), "memory.max")
+    group = base / f"hobble-benchmark-{os.getpid()}"
+    try:
+        group.mkdir()
+        (group / file).write_text(str(limit_mb << 20))
+    except OSError as error:
+        print(f"no memory cgroup ({error}): the page cache is not limited", file=sys.stderr)
+        yield None
+        return
+    try:
+        yield lambda: (group / "cgroup.procs").write_text(str(os.getpid())) and None
+    finally:
+        group.rmdir()
+
+
+def task_build(folder: Path, clips: str) -> None:
+    """The merge, as the rule calls it: seconds, peak memory, memory before, MB."""
+    files = {file.stem: file for file in sorted(Path(clips).glob("*.npz"))}
+    splits = dict.fromkeys(files, "train")
+    before, start = status("VmRSS"), time.perf_counter()
+    write_database(folder / "db", files, splits, injury=True, joint_weight=0.1)
+    print(time.perf_counter() - start, status("VmHWM") >> 20, before >> 20)
+
+
+def task_section(folder: Path, memory_mb: str) -> None:
+    """One section from disk, with no more new data than stated: an allocation beyond it fails."""
+    list(Database.open(folder / "small").blocks("train", 0, 0, 10, 1))  # the program itself, once through
+    before = status("VmRSS")
+    limit = (int(memory_mb) << 20) + 2 * STACK  # the threads' stacks, which the kernel counts as data
+    resource.setrlimit(resource.RLIMIT_DATA, (status("VmData") + limit, resource.RLIM_INFINITY))
+    db = Database.open(folder / "db", int(memory_mb))
+    rows = sum(len(block.p) for block in db.blocks("train", 0, 0, 10, 1, db.block_rows(BATCH)))
+    assert rows == db.section_pairs("train", 0, 10)
+    print(rows, status("VmHWM") >> 20, before >> 20)
+
+
+def task_database(folder: Path, memory_mb: str) -> None:
+    """Rows a second of the reader."""
+    print(rate(of_database(Database.open(folder / "db", int(memory_mb)))))
+
+
+def task_random_rows(folder: Path, columns: str) -> None:
+    """Rows a second of single rows of a memory map."""
+    print(rate(random_rows(np.memmap(folder / "expanded.bin", np.float32, "r").reshape(-1, int(columns)))))
+
+
+def task_pieces(folder: Path, argument: str) -> None:
+    """Rows a second of shuffled pieces of a memory map; argument: columns, rows of a piece."""
+    columns, rows = map(int, argument.split())
+    table = np.memmap(folder / "expanded.bin", np.float32, "r").reshape(-1, columns)
+    print(rate(shuffled_pieces(table, rows)))
+
+
+def status(field: str) -> int:
+    """A line of /proc/self/status, in bytes."""
+    lines = dict(
+        line.split(":") for line in Path("/proc/self/status").read_text().splitlines() if ":" in line
+    )
+    return int(lines[field].split()[0]) << 10
+
+
+def reading(db: Database, folder: Path, args: argparse.Namespace) -> None:
+    """Rows a second from memory, from disk and by the simpler ways; memory under hard limits."""
+    window = db.window("train", db.block_rows(BATCH))
+    chunks = db.manifest.chunks["train"]
+    print(
+        f"window: {window} of {len(chunks)} chunks of {chunks[0].rows} rows, blocks of {db.block_rows(BATCH)}"
+    )
+    columns = db.layout.x_size + db.layout.y_size + 1
+    expanded = folder / "expanded.bin"
+    write_expanded(db, expanded, min(db.pairs("train"), (args.size_mb << 20) // (4 * columns)))
+    limit = args.memory_mb + PROGRAM_MB
+    piece = (args.memory_mb << 20) // (2 * 16 * 4 * columns)
+    (memory,) = child("database", folder, str(1 << 20))
+    print(f"from memory                       {memory:>11,.0f} rows/s   1.00")
+    for name, task, argument in (
+        ("from disk", "database", str(args.memory_mb)),
+        ("memmap, 16 pieces shuffled", "pieces", f"{columns} {piece}"),
+        ("memmap, random rows", "random_rows", str(columns)),
+    ):
+        cold(folder)
+        (value,) = child(task, folder, argument, limit)
+        print(f"{name:<33} {value:>11,.0f} rows/s   {value / memory:.2f}")
+    expanded.unlink()
+    cold(folder)
+    rows, peak, before = child("section", folder, str(args.memory_mb), limit)
+    print(
+        f"a section of {rows:,.0f} rows with at most {args.memory_mb} MB of new data: peak {peak:.0f} MB, ",
+        end="",
+    )
+    print(f"{peak - before:.0f} MB above the program's own {before:.0f} MB")
+
+
+def training(folder: Path, memory_mb: int) -> None:
+    """Steps of the real training, from memory and from disk in turns, so that both meet the same machine."""
+    import torch
+
+    from hobble.training.batches import batches
+    from hobble.training.network import initialise
+    from hobble.training.optimiser import Adam
+    from hobble.training.step import Step
+
+    torch.set_num_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    databases = [Database.open(folder / "db", mb) for mb in (1 << 20, memory_mb)]
+    layout = databases[0].layout
+    network = initialise((layout.x_size, 512, 512, layout.y_size), 4, 1).to(device)
+    step, adam = Step(network, 0.3), Adam(network, 1e-4, 0.9, 0.999, 0.01)
+    times: list[list[float]] = [[], []]
+    cold(folder / "db")
+    streams = [(b for s in range(100) for b in batches(db, 0, s % 10, 10, 1, 32)) for db in databases]
+    for turn in range(TURNS):
+        for which, stream in enumerate(streams):
+            start = time.perf_counter()
+            for _ in range(STEPS):
+                batch = next(stream)
+                x, y, p = (torch.from_numpy(a).to(device) for a in batch[:3])
+                loss = step(x, y, p, step.masks(len(x)))
+                adam.step(step.gradients)
+            loss.item()
+            if turn:
+                times[which].append(time.perf_counter() - start)
+    memory, disk = (STEPS * 32 / np.median(t) for t in times)
+    print(f"training on {device}: {memory:,.0f} samples/s from memory, {disk:,.0f} from disk: ", end="")
+    print(f"{disk / memory:.3f} (goal: 0.95)")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--size-mb", type=int, default=1280)
+    parser.add_argument("--memory-mb", type=int, default=128)
+    parser.add_argument("--joints", type=int, default=31)
+    parser.add_argument("--folder", type=Path)
+    parser.add_argument("--task", help=argparse.SUPPRESS)
+    parser.add_argument("--argument", help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.task:
+        globals()[f"task_{args.task}"](args.folder, args.argument)
+        return
+    folder = Path(tempfile.mkdtemp(prefix="hobble-database-", dir=args.folder))
+    try:
+        small = made_up(folder / "one", 1, args.joints)
+        splits = dict.fromkeys(small, "train")
+        write_database(folder / "small", small, splits, injury=True, joint_weight=0.1)
+        db = build(args, folder)
+        reading(db, folder, args)
+        training(folder, args.memory_mb)
+    finally:
+        shutil.rmtree(folder)
+
+
+if __name__ == "__main__":
+    main()
