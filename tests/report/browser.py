@@ -10,8 +10,11 @@ import select
 import shutil
 import subprocess
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
@@ -153,3 +156,15 @@ class Browser:
             self.console.append(values["entry"]["text"])
         elif method == "Network.requestWillBeSent":
             self.requests.append(values["request"]["url"])
+
+
+def opened(page: str, folder: Path) -> Iterator[Browser]:
+    """A browser that has opened the page, for a fixture; the tests are skipped where there is none."""
+    path = executable()
+    if path is None:
+        pytest.skip(f"no browser here ({', '.join(BROWSERS)}): the page was not opened in one")
+    (folder / "report.html").write_text(page, encoding="utf-8")
+    browser = Browser(path, folder / "profile")
+    browser.open((folder / "report.html").as_uri())
+    yield browser
+    browser.close()

@@ -13,7 +13,9 @@ import pytest
 from hobble.core.skeleton import Skeleton
 from hobble.report.gather import Material, gather
 from hobble.report.page import render
+from hobble.report.playable import playable
 from hobble.report.scenes import scenes
+from hobble.runtime.network import Network, load_network
 
 
 def beside(name: str) -> ModuleType:
@@ -61,6 +63,17 @@ def play(inputs: dict[str, Any], material: Material) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="session")
-def page(material: Material, play: dict[str, Any]) -> str:
+def network(inputs: dict[str, Any]) -> Network:
+    """The small untrained network of the examples."""
+    return load_network(inputs["gather"]["weights"])
+
+
+@pytest.fixture(scope="session")
+def character(network: Network, examples: ModuleType) -> dict[str, Any]:
+    return playable(network, examples.RUNTIME)
+
+
+@pytest.fixture(scope="session")
+def page(material: Material, play: dict[str, Any], character: dict[str, Any]) -> str:
     """The report of the examples."""
-    return render(material, play)
+    return render(material, play, character)

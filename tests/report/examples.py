@@ -13,6 +13,7 @@ import yaml
 from hobble.core import quat
 from hobble.core.files import save_npz, write_json, write_text
 from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.database.layout import RowLayout
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 STAGES = (
@@ -28,6 +29,7 @@ STAGES = (
 )
 CLIPS = ("walk_straight", "walk_turns", "jog", "crouch", "stand", "strafe", "hurt_left_knee", "hurt_back")
 LINKS = ("LeftUpLeg-LeftLeg", "RightLeg-RightFoot", "Hips-LowerBack")
+RUNTIME = {"mode": "cubic", "severity_rate": 10.0, "severity_scale": 1.0, "foot_locking": True}
 HELD_OUT = ("walk_turns", "hurt_back")
 
 
@@ -90,18 +92,39 @@ def scenarios(path: Path, skeleton: Skeleton, hurt: bool = True) -> None:
 
 
 def weights(path: Path, skeleton: Skeleton, units: int = 16, links: bool = True) -> None:
-    """network/weights.npz of a small network."""
+    """network/weights.npz of a small untrained network that stays near a standing pose and walks a little."""
     rng = np.random.default_rng(0)
-    sizes = (342 + (len(skeleton.links) if links else 0), units, units, 311)
+    layout = RowLayout(len(skeleton.joints), links=len(skeleton.links) if links else 0)
+    sizes = (layout.x_size, units, units, layout.y_size)
     arrays: dict[str, Any] = {}
     for i, (a, b) in enumerate(pairwise(sizes)):
-        arrays[f"W{i}"] = rng.normal(size=(4, b, a)).astype(np.float32)
-        arrays[f"b{i}"] = np.zeros((4, b), np.float32)
+        arrays[f"W{i}"] = rng.normal(0, a**-0.5, size=(4, b, a)).astype(np.float32)
+        arrays[f"b{i}"] = rng.normal(0, 0.1, size=(4, b)).astype(np.float32)
+    made = walker(skeleton, 2, 0.0)
+    mean, spread = np.zeros(layout.y_size), np.full(layout.y_size, 0.02)
+    mean[layout.y_root_velocity], mean[layout.y_phase_change], mean[layout.y_contacts] = (
+        (0.1, 2.0),
+        0.017,
+        0.5,
+    )
+    mean[layout.y_joint_position] = (made["positions"][0] * [1, 1, 0]).ravel()
+    future = np.arange(layout.future)
+    mean[layout.y_position] = np.concatenate([0.05 * future, 20.0 * future])
+    mean[layout.y_direction] = np.repeat([0.0, 1.0], layout.future)
+    spread[layout.y_joint_position], spread[layout.y_joint_velocity] = 3.0, 0.3
+    spread[layout.y_contacts], spread[layout.y_phase_change] = 0.4, 0.003
+    x_spread = np.full(layout.x_size, 50.0)
+    x_spread[layout.x_gait], x_spread[layout.x_direction], x_spread[layout.x_injury] = 1.0, 1.0, 5.0
+    x_mean = np.zeros(layout.x_size)
+    x_mean[layout.x_joint_position] = mean[layout.y_joint_position]
     meta = {
+        "layout": layout.to_dict(),
         "skeleton": skeleton.to_dict(),
         "links": list(skeleton.link_names) if links else [],
         "gaits": list(GAITS),
     }
+    statistics = {"Xmean": x_mean, "Xstd": x_spread, "Ymean": mean, "Ystd": spread}
+    arrays |= {name: value.astype(np.float32) for name, value in statistics.items()}
     save_npz(path, **arrays, meta=np.array(json.dumps(meta)))
 
 
@@ -415,7 +438,7 @@ def write_all(
     }
     resolved = {
         "name": "example",
-        "configuration": {"training": {"passes": 20}},
+        "configuration": {"training": {"passes": 20}, "runtime": RUNTIME},
         "dataset": {"name": "made_up"},
     }
     write_text(folder / "configuration.yaml", yaml.safe_dump(resolved))

@@ -26,15 +26,7 @@ INK = """(() => {{
 @pytest.fixture(scope="module")
 def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """The page, open in a browser; each test leaves it usable for the next."""
-    path = tools.executable()
-    if path is None:
-        pytest.skip(f"no browser here ({', '.join(tools.BROWSERS)}): the page was not opened in one")
-    folder = tmp_path_factory.mktemp("browser")
-    (folder / "report.html").write_text(page, encoding="utf-8")
-    browser = tools.Browser(path, folder / "profile")
-    browser.open((folder / "report.html").as_uri())
-    yield browser
-    browser.close()
+    yield from tools.opened(page, tmp_path_factory.mktemp("browser"))
 
 
 def show(tab: Any, what: str) -> None:
@@ -78,9 +70,9 @@ def test_the_figure_plays_stops_and_is_scrubbed(tab: Any) -> None:
     show(tab, "stage")
     assert tab.until(INK.format("view") + " > .02")
     tab.run("document.getElementById('stage').focus()")
-    assert text(tab, "play") == "Pause"
+    assert text(tab, "pause") == "Pause"
     tab.press(" ", "Space")
-    assert text(tab, "play") == "Play"
+    assert text(tab, "pause") == "Play"
     scrub(tab, 120)
     assert tab.until("document.getElementById('clock').textContent === '4.0 of 10.0 s'")
     tab.press(".", "Period")

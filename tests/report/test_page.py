@@ -16,6 +16,7 @@ from hobble.report.page import render
 
 SECTIONS = [
     "summary",
+    "play",
     "walking",
     "training",
     "accuracy",
@@ -107,8 +108,10 @@ def test_numbers_of_the_tables_are_whole_in_their_cells(page: str, material: Mat
     assert f'data-v="{row["mean"]}"' in page
 
 
-def test_same_input_same_page(material: Material, play: dict[str, Any], page: str) -> None:
-    assert render(material, play) == page
+def test_same_input_same_page(
+    material: Material, play: dict[str, Any], character: dict[str, Any], page: str
+) -> None:
+    assert render(material, play, character) == page
 
 
 HOSTILE = "<script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}"
@@ -136,6 +139,7 @@ def test_a_network_that_cannot_be_hurt(examples: ModuleType, holden31: Skeleton,
     assert "nothing can hurt it" in text
     assert 'data-chart="sweep-pose"' not in text
     assert 'id="walking"' not in text
+    assert 'id="play"' not in text
 
 
 def test_our_scripts_cannot_end_their_element(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,9 @@
 from hobble.core.files import write_text
 from hobble.report.gather import gather
 from hobble.report.page import render
+from hobble.report.playable import playable
 from hobble.report.scenes import scenes
+from hobble.runtime.network import load_network
 from hobble.workflow.job import job
 
 with job(snakemake):
@@ -27,4 +29,5 @@ with job(snakemake):
     )
     network = material.network
     play = scenes(given.scenarios, network["skeleton"], network["links"])
-    write_text(snakemake.output.html, render(material, play))
+    character = playable(load_network(given.weights), material.resolved["configuration"]["runtime"])
+    write_text(snakemake.output.html, render(material, play, character))

@@ -145,7 +145,7 @@
   const play = (on) => {
     playing = on;
     last = null;
-    find("play").textContent = on ? "Pause" : "Play";
+    find("pause").textContent = on ? "Pause" : "Play";
     view.ask();
   };
   const choose = (index) => {
@@ -161,7 +161,7 @@
 
   choice.addEventListener("change", () => choose(choice.selectedIndex));
   slider.addEventListener("input", () => seek(Number(slider.value)));
-  find("play").addEventListener("click", () => play(!playing));
+  find("pause").addEventListener("click", () => play(!playing));
   find("slow").addEventListener("click", (event) => { rate = rate === 1 ? .25 : 1; toggle(event, rate !== 1); });
   find("trails").addEventListener("click", (event) => { trails = !trails; toggle(event, trails); view.ask(); });
   find("view-reset").addEventListener("click", view.reset);

@@ -27,11 +27,28 @@ from hobble.report.ground_pictures import ground_pictures
 from hobble.report.provenance import commit, machine, versions
 
 TEMPLATES = Path(__file__).parent
-SCRIPTS = ("charts.js", "tables.js", "view.js", "figure.js", "ground.js", "strips.js", "page.js")
+SCRIPTS = (
+    "charts.js",
+    "tables.js",
+    "view.js",
+    "figure.js",
+    "network.js",
+    "character.js",
+    "play.js",
+    "ground.js",
+    "strips.js",
+    "page.js",
+)
 
 
-def render(material: Material, scenes: Mapping[str, Any] | None = None) -> str:
+def render(
+    material: Material,
+    scenes: Mapping[str, Any] | None = None,
+    playable: Mapping[str, Any] | None = None,
+) -> str:
     """The report as one HTML document.
+
+    scenes: of `scenes.scenes`; playable: of `playable.playable`; without them those sections are left out.
 
     Every value is escaped where it stands; data for the scripts is JSON in which no "<" is left.
     """
@@ -47,7 +64,13 @@ def render(material: Material, scenes: Mapping[str, Any] | None = None) -> str:
     strips = data_section.strips(material)
     scenes = dict(scenes or {})
     grounds = ground_pictures(material.terrain, material.network["skeleton"])
-    data = {"charts": _specs(sections), "scenes": scenes, "strips": strips, "grounds": grounds}
+    data = {
+        "charts": _specs(sections),
+        "scenes": scenes,
+        "strips": strips,
+        "grounds": grounds,
+        "playable": playable or {},
+    }
     return environment.get_template("page.html.j2").render(
         material=material,
         title=material.title or material.name,
@@ -56,6 +79,7 @@ def render(material: Material, scenes: Mapping[str, Any] | None = None) -> str:
         lead=findings.lead(material),
         embedded=embedded(data),
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
+        playable=playable or {},
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],
         style=_text("page.css"),

@@ -1,0 +1,204 @@
+// The character: the controller of `hobble.runtime` once more, for one figure. The same steps in the same order, so
+// that one set of vectors tests both. Centimetres, 60 Hz, yaw 0 faces +Z and grows toward +X.
+"use strict";
+Hobble.character = (spec, place = [0, 0], heading = 0) => {
+  const { joints: J, step, x: X, y: Y, gaits, constants: k } = spec, T = 2 * spec.window, M = spec.window;
+  const S = T / step, F = M / step, G = gaits.length, L = spec.links.length, predict = Hobble.network(spec);
+  const { atan2, sin, cos, hypot, floor, min, max, abs, sqrt, PI } = Math;
+  const wrap = (angle) => angle - 2 * PI * floor((angle + PI) / (2 * PI));
+  const mean = new Float32Array(Hobble.bytes(spec.yMean)), x = new Float32Array(X.size);
+  const filled = (n, value) => new Float64Array(n).fill(value);
+
+  const c = {
+    px: filled(T, place[0]), pz: filled(T, place[1]), dx: filled(T, sin(heading)), dz: filled(T, cos(heading)),
+    gait: filled(T * G, 0), ground: filled(S * 3, 0), height: 0, phase: 0, joints: filled(3 * J, 0),
+    velocities: filled(3 * J, 0), pose: filled(3 * J, 0), severity: filled(L, 0), wished: filled(L, 0),
+    velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, lock: [0, 0], hold: [[0, 0], [0, 0]],
+    lift: [0, 0], contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
+  };
+  for (let t = 0; t < T; t++) c.gait[t * G + gaits.indexOf("stand")] = 1;
+  for (let j = 0; j < J; j++) {
+    const [a, b, d] = [0, 1, 2].map((i) => mean[Y.joint_position + 3 * j + i]);
+    c.joints[3 * j] = a * cos(heading) + d * sin(heading) + place[0];
+    c.joints[3 * j + 1] = b;
+    c.joints[3 * j + 2] = d * cos(heading) - a * sin(heading) + place[1];
+  }
+  c.pose.set(c.joints);
+
+  // Wishes, as `ProceduralAnimation.next_pose` takes them: velocity [x, z], facing [x, z] or null, gait or null.
+
+  const facing = (velocity, ahead) => {
+    const going = hypot(...velocity) >= k.still;
+    if (!ahead) return [0, going ? velocity : c.direction];
+    const aside = abs(wrap(atan2(...velocity) - atan2(...ahead)));
+    return [going ? min(1, aside / k.strafeFrom) : 1, ahead];
+  };
+  const shares = (velocity, direction, gait) => {
+    const out = new Array(G).fill(0), speed = hypot(...velocity), name = gait || (speed >= k.jogFrom ? "jog" : "walk");
+    if (speed < k.still) {
+      const [a, b] = [c.dx[M], c.dz[M]];
+      const angle = atan2(direction[0] * b - direction[1] * a, direction[0] * a + direction[1] * b);
+      const turning = abs(angle) > k.turnInPlace ? 1 : 0;
+      out[gaits.indexOf("stand")] = 1 - turning;
+      out[gaits.indexOf("walk")] = turning;
+      if (name !== "crouch") return out;
+    }
+    out[gaits.indexOf(name)] = 1;
+    return out;
+  };
+
+  // The steps of a frame
+
+  const prepare = (velocity, direction, strafe, gait, ground) => {
+    for (let i = 0; i < 2; i++) c.velocity[i] += k.targetMix * (velocity[i] - c.velocity[i]);
+    let now = atan2(...c.direction);
+    now += k.targetMix * wrap(atan2(...direction) - now);
+    c.direction = [sin(now), cos(now)];
+    c.strafe += k.targetMix * (strafe - c.strafe);
+    for (let g = 0; g < G; g++) c.gait[M * G + g] += k.gaitMix * (gait[g] - c.gait[M * G + g]);
+    const biasPosition = .5 + .5 * c.strafe, biasDirection = 2 - 1.5 * c.strafe, goal = atan2(...c.direction);
+    let oldX = c.px[M], oldZ = c.pz[M];
+    for (let i = M + 1; i < T; i++) {
+      const left = 1 - (i - M) / M, stepX = c.px[i] - oldX, stepZ = c.pz[i] - oldZ;
+      let share = 1 - left ** biasPosition;
+      oldX = c.px[i];
+      oldZ = c.pz[i];
+      c.px[i] = c.px[i - 1] + stepX + share * (c.velocity[0] - stepX);
+      c.pz[i] = c.pz[i - 1] + stepZ + share * (c.velocity[1] - stepZ);
+      share = 1 - left ** biasDirection;
+      let yaw = atan2(c.dx[i], c.dz[i]);
+      yaw += share * wrap(goal - yaw);
+      c.dx[i] = sin(yaw);
+      c.dz[i] = cos(yaw);
+      for (let g = 0; g < G; g++) c.gait[i * G + g] = c.gait[M * G + g];
+    }
+    c.height = 0;
+    for (let s = 0; s < S; s++) {
+      const i = s * step, a = k.side * c.dz[i], b = k.side * c.dx[i];
+      c.ground[3 * s] = ground(c.px[i] + a, c.pz[i] - b);
+      c.ground[3 * s + 1] = ground(c.px[i], c.pz[i]);
+      c.ground[3 * s + 2] = ground(c.px[i] - a, c.pz[i] + b);
+      c.height += c.ground[3 * s + 1] / S;
+    }
+    for (let l = 0; l < L; l++) {
+      c.severity[l] += min(max(c.wished[l] - c.severity[l], -spec.severityStep), spec.severityStep);
+    }
+  };
+  const input = () => {
+    let [px, pz, co, si] = [c.px[M], c.pz[M], c.dz[M], c.dx[M]];
+    for (let s = 0; s < S; s++) {
+      const i = s * step, a = c.px[i] - px, b = c.pz[i] - pz;
+      x[X.position + s] = a * co - b * si;
+      x[X.position + S + s] = a * si + b * co;
+      x[X.direction + s] = c.dx[i] * co - c.dz[i] * si;
+      x[X.direction + S + s] = c.dx[i] * si + c.dz[i] * co;
+      for (let g = 0; g < G; g++) x[X.gait + g * S + s] = c.gait[i * G + g];
+      for (let side = 0; side < 3; side++) x[X.terrain + side * S + s] = c.ground[3 * s + side] - c.height;
+    }
+    [px, pz, co, si] = [c.px[M - 1], c.pz[M - 1], c.dz[M - 1], c.dx[M - 1]];
+    for (let j = 0; j < 3 * J; j += 3) {
+      const a = c.joints[j] - px, b = c.joints[j + 2] - pz, p = X.joint_position + j, v = X.joint_velocity + j;
+      x[p] = a * co - b * si;
+      x[p + 1] = c.joints[j + 1] - c.height;
+      x[p + 2] = a * si + b * co;
+      x[v] = c.velocities[j] * co - c.velocities[j + 2] * si;
+      x[v + 1] = c.velocities[j + 1];
+      x[v + 2] = c.velocities[j] * si + c.velocities[j + 2] * co;
+    }
+    for (let l = 0; l < L; l++) x[X.injury + l] = c.severity[l];
+  };
+  const output = (y, ground) => {
+    const si = c.dx[M], co = c.dz[M];
+    c.root = [c.px[M], c.height, c.pz[M]];
+    for (let j = 0; j < 3 * J; j += 3) {
+      const p = Y.joint_position + j, v = Y.joint_velocity + j;
+      const velocity = [y[v] * co + y[v + 2] * si, y[v + 1], y[v + 2] * co - y[v] * si];
+      const point = [y[p] * co + y[p + 2] * si + c.root[0], y[p + 1] + c.root[1], y[p + 2] * co - y[p] * si + c.root[2]];
+      for (let i = 0; i < 3; i++) {
+        c.velocities[j + i] = velocity[i];
+        c.joints[j + i] = .5 * (c.joints[j + i] + velocity[i] + point[i]);
+      }
+    }
+    c.pose.set(c.joints);
+    for (let i = 0; i < 4; i++) c.contacts[i] = y[Y.contacts + i];
+    for (let f = 0; f < 2; f++) placeFoot(f, ground);
+  };
+  const update = (y) => {
+    for (let i = 0; i < M; i++) {
+      c.px[i] = c.px[i + 1];
+      c.pz[i] = c.pz[i + 1];
+      c.dx[i] = c.dx[i + 1];
+      c.dz[i] = c.dz[i + 1];
+      for (let g = 0; g < G; g++) c.gait[i * G + g] = c.gait[(i + 1) * G + g];
+    }
+    const moving = max(0, 1 - c.gait[M * G]) ** .25, [vx, vz] = [y[Y.root_velocity], y[Y.root_velocity + 1]];
+    let yaw = atan2(c.dx[M], c.dz[M]);
+    c.px[M] += moving * (vx * cos(yaw) + vz * sin(yaw));
+    c.pz[M] += moving * (vz * cos(yaw) - vx * sin(yaw));
+    yaw -= moving * y[Y.turn];
+    const si = c.dx[M] = sin(yaw), co = c.dz[M] = cos(yaw);
+    for (let i = M + 1; i < T; i++) {
+      const at = (i - M) / step, n = min(floor(at), F - 2), m = at - n;
+      const blend = (from) => (1 - m) * y[from + n] + m * y[from + n + 1];
+      const a = blend(Y.position), b = blend(Y.position + F), p = blend(Y.direction), q = blend(Y.direction + F);
+      const norm = max(sqrt(p * p + q * q), 1e-6);
+      c.px[i] = c.px[M] + a * co + b * si;
+      c.pz[i] = c.pz[M] + b * co - a * si;
+      c.dx[i] = (p * co + q * si) / norm;
+      c.dz[i] = (q * co - p * si) / norm;
+    }
+    const phase = c.phase + (.9 * moving + .1) * y[Y.phase_change];
+    c.phase = phase - floor(phase);
+  };
+
+  // Feet in contact are held where they landed and kept out of the ground; the leg bends to reach.
+
+  const placeFoot = (f, ground) => {
+    const [hip, knee, heel, toe] = spec.legs[f], at = (j) => c.pose.subarray(3 * j, 3 * j + 3), point = at(toe);
+    let away = [c.hold[f][0] - point[0], c.hold[f][1] - point[2]];
+    const far = c.lock[f] * hypot(...away);
+    if (!spec.footLocking) c.lock[f] = 0;
+    else if (c.contacts[2 * f + 1] >= k.lockAt && far < k.tooFar) {
+      if (c.lock[f] < 1) {
+        away = away.map((v) => v * c.lock[f]);
+        c.hold[f] = [point[0] + away[0], point[2] + away[1]];
+      }
+      c.lock[f] = 1;
+    } else c.lock[f] = max(0, c.lock[f] - k.release);
+    const sunk = [heel, toe].map((j, i) => ground(at(j)[0], at(j)[2]) + spec.sole[i] - at(j)[1]);
+    const up = max(...sunk), rise = max(up, 0) + c.lock[f] * min(up + k.floating, 0);
+    c.lift[f] += k.heightMix * (rise - c.lift[f]);
+    away = away.map((v) => v * c.lock[f]);
+    if (abs(away[0]) + abs(away[1]) + abs(c.lift[f]) < 1e-4) return;
+    const before = Array.from(at(heel));
+    reach(at(hip), at(knee), at(heel), [away[0], c.lift[f], away[1]]);
+    const moved = at(heel).map((v, i) => v - before[i]);
+    for (const j of spec.carried[f]) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
+  };
+  const reach = (hip, knee, heel, shift) => {
+    const { minus, dot } = Hobble.vector, thigh = minus(knee, hip), shank = minus(heel, knee);
+    const upper = hypot(...thigh), lower = hypot(...shank);
+    let way = thigh.map((v, i) => v + shank[i] + shift[i]), distance = hypot(...way);
+    if (distance < 1e-6 || upper < 1e-6 || lower < 1e-6) return;
+    way = way.map((v) => v / distance);
+    distance = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * .999);
+    const cosine = min(max((upper * upper + distance * distance - lower * lower) / (2 * upper * distance), -1), 1);
+    const along = dot(thigh, way), out = thigh.map((v, i) => v - along * way[i]), size = hypot(...out);
+    if (size < 1e-6) return;
+    const sine = sqrt(1 - cosine * cosine) / size;
+    for (let i = 0; i < 3; i++) {
+      knee[i] = hip[i] + upper * (way[i] * cosine + out[i] * sine);
+      heel[i] = hip[i] + way[i] * distance;
+    }
+  };
+
+  c.frame = (velocity, ahead, gait, ground) => {
+    const [strafe, direction] = facing(velocity, ahead);
+    prepare(velocity, direction, strafe, shares(velocity, direction, gait), ground);
+    input();
+    const y = predict(x, c.phase);
+    output(y, ground);
+    update(y);
+  };
+  return c;
+};

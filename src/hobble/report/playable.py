@@ -1,0 +1,127 @@
+"""The trained network, packed to run in the page: weights as 16-bit integers, and all it needs to know."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.report.body import capsules
+from hobble.report.scenes import packed
+from hobble.runtime import animation, feet, trajectory
+from hobble.runtime.network import Network
+
+# Parts of the body that have a slider and a key of their own: label, roles of the ends, key.
+PARTS = (
+    ("left thigh", "left_hip", "left_knee"),
+    ("left shank", "left_knee", "left_heel"),
+    ("left foot", "left_heel", "left_toe"),
+    ("right thigh", "right_hip", "right_knee"),
+    ("right shank", "right_knee", "right_heel"),
+    ("right foot", "right_heel", "right_toe"),
+    ("lower back", "hips", "spine"),
+    ("left upper arm", "left_shoulder", "left_elbow"),
+    ("right upper arm", "right_shoulder", "right_elbow"),
+)
+PRESETS = {
+    "Hurt knee": {"left thigh": 7, "left shank": 7},
+    "Sprained ankle": {"right shank": 6, "right foot": 8},
+    "Bad back": {"lower back": 8},
+    "Knee and back": {"left thigh": 7, "left shank": 7, "lower back": 7},
+}
+
+
+def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
+    """What the page's second implementation of the runtime needs; {} where the network has no skeleton.
+
+    runtime: that section of the configuration. Joint rotations are left out of the outputs: the page draws
+    positions only.
+    """
+    skeleton = network.skeleton
+    if skeleton is None:
+        return {}
+    layout = network.layout
+    outputs = layout.y_joint_rotation.start
+    weights, biases = list(network.weights), list(network.biases)
+    weights[-1], biases[-1] = weights[-1][:, :outputs], biases[-1][:, :outputs]
+    legs = feet.leg_joints(skeleton)
+    parts = body_parts(skeleton, network.links)
+    return {
+        "layers": [_layer(w, b) for w, b in zip(weights, biases, strict=True)],
+        "xMean": packed(network.x_mean.astype(np.float32)),
+        "xScale": packed(
+            np.where(network.x_std > 0, 1 / np.maximum(network.x_std, 1e-30), 0).astype(np.float32)
+        ),
+        "yMean": packed(network.y_mean[:outputs].astype(np.float32)),
+        "yStd": packed(network.y_std[:outputs].astype(np.float32)),
+        "joints": layout.joints,
+        "window": layout.window,
+        "step": layout.step,
+        "x": {name: block.start for name, block in layout.blocks("x").items()} | {"size": layout.x_size},
+        "y": {name: block.start for name, block in layout.blocks("y").items()},
+        "gaits": list(network.gaits),
+        "links": list(network.links),
+        "legs": legs.tolist(),
+        "carried": [np.flatnonzero(row).tolist() for row in feet.carried(skeleton, legs)],
+        "sole": feet.sole_heights(network, legs).tolist(),
+        "capsules": capsules(skeleton.joints, skeleton.parents, skeleton.roles, network.links),
+        "severityStep": runtime["severity_rate"] / 60,
+        "severityScale": runtime["severity_scale"],
+        "footLocking": runtime["foot_locking"],
+        "parts": parts,
+        "presets": [
+            {"name": name, "severities": [[parts[label], value] for label, value in values.items()]}
+            for name, values in PRESETS.items()
+            if all(label in parts for label in values)
+        ],
+        "constants": _constants(),
+    }
+
+
+def body_parts(skeleton: Skeleton, links: tuple[str, ...]) -> dict[str, int]:
+    """Label -> index of the link that the part is, for those that the network knows."""
+    found = {}
+    for label, upper, lower in PARTS:
+        if upper not in skeleton.roles or lower not in skeleton.roles:
+            continue
+        joint, top = skeleton.role(lower), skeleton.role(upper)
+        while joint != top and skeleton.parents[joint] >= 0:
+            name = f"{skeleton.joints[skeleton.parents[joint]]}-{skeleton.joints[joint]}"
+            if name in links:
+                found[label] = links.index(name)  # the last found is the one nearest to the upper end
+            joint = skeleton.parents[joint]
+    return found
+
+
+def _constants() -> dict[str, float]:
+    """The numbers of the Python runtime, so that they stand in one place."""
+    return {
+        "targetMix": trajectory.TARGET_MIX,
+        "gaitMix": trajectory.GAIT_MIX,
+        "still": trajectory.STILL,
+        "strafeFrom": float(animation.STRAFE_FROM),
+        "turnInPlace": float(animation.TURN_IN_PLACE),
+        "jogFrom": animation.JOG_FROM,
+        "side": 25.0,
+        "lockAt": feet.LOCK_AT,
+        "release": feet.RELEASE,
+        "tooFar": feet.TOO_FAR,
+        "heightMix": feet.HEIGHT_MIX,
+        "floating": feet.FLOATING,
+    }
+
+
+def _layer(weights: Array, biases: Array) -> dict[str, Any]:
+    """Control points (K, out, in) as integers of -32767..32767, with a factor for each row."""
+    scale = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30).astype(np.float32)
+    return {
+        "points": weights.shape[0],
+        "rows": weights.shape[1],
+        "columns": weights.shape[2],
+        "weights": packed(np.round(weights / scale[..., None]).astype(np.int16)),
+        "scale": packed(scale),
+        "biases": packed(biases.astype(np.float32)),
+    }
