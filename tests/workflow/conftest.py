@@ -12,8 +12,6 @@ from pathlib import Path
 
 import pytest
 
-PARTS = ("Snakefile", "config", "workflow", "src")
-
 
 @dataclass
 class Workflow:
@@ -54,16 +52,23 @@ class Workflow:
         assert old in text, f"{file} has no {old!r}"
         path.write_text(text.replace(old, new, 1))
 
+    def own_source(self) -> Path:
+        """Make the package a copy that may be edited, and return its folder."""
+        source = self.checkout / "src"
+        real = source.resolve()
+        source.unlink()
+        shutil.copytree(real, source, ignore=shutil.ignore_patterns("__pycache__"))
+        return source / "hobble"
+
 
 def copy_of(root: Path, folder: Path) -> Workflow:
+    """Configuration and rules are copied; the package is linked, so that what numba compiled is found again."""
     checkout = folder / "checkout"
     checkout.mkdir(parents=True)
-    for part in PARTS:
-        source = root / part
-        if source.is_dir():
-            shutil.copytree(source, checkout / part, ignore=shutil.ignore_patterns("__pycache__"))
-        else:
-            shutil.copy2(source, checkout / part)
+    shutil.copy2(root / "Snakefile", checkout)
+    for part in ("config", "workflow"):
+        shutil.copytree(root / part, checkout / part)
+    (checkout / "src").symlink_to(root / "src")
     (folder / "run").mkdir()
     return Workflow(checkout, folder / "run")
 
@@ -88,3 +93,13 @@ def copied(finished: Workflow, tmp_path: Path) -> Workflow:
     target = tmp_path / "copy"
     shutil.copytree(finished.checkout.parent, target, symlinks=True)
     return Workflow(target / "checkout", target / "run")
+
+
+@pytest.fixture(scope="session")
+def clips(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Two good clips with their label and status files."""
+    made = copy_of(root, tmp_path_factory.mktemp("clips"))
+    names = ("injured-left-shank", "walk-straight-1")
+    paths = [f"results/datasets/tiny/synthetic/{name}.bvh" for name in names]
+    made.run("-c2", *paths)
+    return [made.folder / path for path in paths]

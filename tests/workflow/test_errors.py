@@ -14,17 +14,15 @@ DATASET = "skeleton: holden31\nfolder: mine\n"
 
 
 @pytest.fixture
-def mine(finished, workflow):
-    """A user's data set of two good clips, made from the tiny data set's files."""
+def mine(clips: list[Path], workflow):
+    """A user's data set of those two clips."""
     folder = workflow.folder / "mocap" / "mine"
     folder.mkdir(parents=True)
-    made = sorted((finished.folder / "results/datasets/tiny/synthetic").glob("*.bvh"))[:2]
-    for path in made:
+    for path in clips:
         for file in path.parent.glob(f"{path.stem}[._]*"):
             (folder / file.name).write_bytes(file.read_bytes())
     (workflow.checkout / "config/datasets/mine.yaml").write_text(DATASET)
-    workflow.clip = made[0].stem
-    workflow.other = made[1].stem
+    workflow.clip, workflow.other = (path.stem for path in clips)
     workflow.mine = folder
     return workflow
 
@@ -62,7 +60,7 @@ def spoil(lines: list[str], how: str) -> str:
     ("how", "pieces"),
     [
         ("truncated", ("line",)),
-        ("nan", ("line", "11")),
+        ("nan", ("line", "frame 8")),
         ("skeleton", ("LeftT",)),
         ("empty", ("empty",)),
         ("binary", ()),

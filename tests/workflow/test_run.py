@@ -80,7 +80,7 @@ def test_more_passes_retrain_and_leave_the_database(finished) -> None:
 
 
 def test_editing_labels_reruns_from_labels_on(copied) -> None:
-    module = next(p for p in (copied.checkout / "src/hobble/labels").glob("*.py") if p.stem == "contacts")
+    module = copied.own_source() / "labels/contacts.py"
     module.write_text(module.read_text() + "\n_EDITED = 1\n")
     planned = copied.planned(TARGET)
     assert {"labels_clip", "terrain_fits", "database_clip", "database_merge", "training"} <= set(planned)
@@ -88,20 +88,20 @@ def test_editing_labels_reruns_from_labels_on(copied) -> None:
 
 
 def test_editing_a_comment_of_the_page_remakes_only_the_report(copied) -> None:
-    page = copied.checkout / "src/hobble/report/page.html.j2"
+    page = copied.own_source() / "report/page.html.j2"
     page.write_text(page.read_text() + "{# a comment #}\n")
     assert set(copied.planned(TARGET)) == {"report"}
 
 
 def test_editing_a_comment_in_the_code_reruns_nothing(copied) -> None:
-    module = copied.checkout / "src/hobble/core/quat.py"
+    module = copied.own_source() / "core/quat.py"
     module.write_text(module.read_text() + "\n# a comment\n")
     assert "Nothing to be done" in copied.run("-n", TARGET)
 
 
-def test_another_clip_changes_only_its_own_rows_and_the_merge(copied) -> None:
+def test_a_default_said_aloud_reruns_nothing(copied) -> None:
     copied.edit("config/datasets/tiny.yaml", "held_out:", "motion: {fps: 60.0}\nheld_out:")
-    assert "Nothing to be done" in copied.run("-n", TARGET)  # the default, said aloud
+    assert "Nothing to be done" in copied.run("-n", TARGET)
 
 
 @pytest.mark.parametrize("moment", ["database", "training"])
@@ -123,10 +123,10 @@ def test_killed_half_way_the_same_command_ends_with_the_same_bytes(finished, wor
     assert process.poll() is None, "it ended before it could be killed"
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-    assert not (workflow.folder / TARGET).exists()
-    workflow.run("--unlock")
-    workflow.run("-c2", TARGET)
     weights = "results/test/network/weights.npz"
+    assert not (workflow.folder / weights).exists()
+    workflow.run("--unlock")
+    workflow.run("-c2", weights)
     a, b = (np.load(w.folder / weights) for w in (finished, workflow))
     assert all(np.array_equal(a[name], b[name]) for name in a.files)
     assert not list(workflow.folder.rglob("*.part"))
