@@ -62,7 +62,7 @@ class Workflow:
 
 
 def copy_of(root: Path, folder: Path) -> Workflow:
-    """Configuration and rules are copied; the package is linked, so that what numba compiled is found again."""
+    """Rules are copied, the package is linked, so that what numba compiled is found again."""
     checkout = folder / "checkout"
     checkout.mkdir(parents=True)
     shutil.copy2(root / "Snakefile", checkout)
