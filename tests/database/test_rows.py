@@ -28,6 +28,8 @@ MOTION = {
     "handedness": "right",
     "proportions": "clip",
     "defects": "refuse",
+    "loops": 1,
+    "heading": None,
 }
 LABELS = {
     "files": True,

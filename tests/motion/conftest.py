@@ -24,6 +24,8 @@ OPTIONS: dict[str, Any] = {
     "handedness": "auto",
     "proportions": "skeleton",
     "defects": "repair",
+    "loops": 1,
+    "heading": None,
 }
 
 

@@ -23,6 +23,8 @@ class ClipEntry(s.Section):
     recipe: str | None = Field(None, description="synthetic: which plan the walker follows")
     share: s.PositiveFloat = Field(1.0, description="synthetic: length relative to the other clips")
     source_fps: s.PositiveFloat | None = Field(None, description="overrules the file's Frame Time")
+    loops: s.Positive | None = Field(None, description="overrules motion.loops")
+    heading: float | None = Field(None, description="overrules motion.heading")
 
     @model_validator(mode="after")
     def _status_reads(self) -> ClipEntry:

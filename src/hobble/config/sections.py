@@ -49,6 +49,10 @@ class Motion(Section):
     defects: Literal["repair", "refuse"] = Field(
         "repair", description="what to do with frames that are plainly broken; repairs are reported"
     )
+    loops: Positive = Field(1, description="how often a clip that is one short cycle is repeated")
+    heading: float | None = Field(
+        None, description="where a looped clip leads, degrees from +Z towards +X; as in the file by default"
+    )
 
 
 class Labels(Section):

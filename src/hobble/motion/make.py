@@ -17,6 +17,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import Axes, straighten
 from hobble.motion.decode import Decoded, decode, frame_rate
 from hobble.motion.defects import repair
+from hobble.motion.loop import loop_clip
 from hobble.motion.read import Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.retarget import plan, retarget_clip
@@ -53,7 +54,8 @@ def make_clip(
     """Read a BVH file, check it, and put it on the skeleton at the frame rate of `options`.
 
     skeleton: the target's file. maps: the folder of the skeleton files. clip: the name of the clip made.
-    options: the `motion` section of a data set (fps, source_fps, unit, up, handedness, proportions, defects).
+    options: the `motion` section of a data set (fps, source_fps, unit, up, handedness, proportions,
+    defects, loops, heading).
     Returns the clip and its report: `motion/<clip>.json` of docs/artefacts.md.
     Raises InputError for a file that cannot be read, for another skeleton, and for what is broken beyond
     repair or, with defects: refuse, broken at all.
@@ -63,8 +65,13 @@ def make_clip(
     source = load_source(file, target, maps, options)
     resampled = resample(source.clip, options["fps"])
     made, notes = fit_skeleton(resampled, source.match, target.skeleton, options["proportions"])
-    made = replace(made, name=clip)
-    return made, _report(file, source, made, source.notes + notes)
+    cycle = len(made)
+    if options["loops"] > 1:
+        made = loop_clip(made, options["loops"], options["heading"])
+        cycle = len(made) // options["loops"]
+        notes.append(f"The cycle of {cycle} frames was repeated {options['loops']} times, the seams blended.")
+    report = _report(file, source, replace(made, name=clip), source.notes + notes)
+    return replace(made, name=clip), report | {"loops": options["loops"], "cycle_frames": cycle}
 
 
 def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[str, Any]) -> Source:

@@ -178,9 +178,9 @@ class Project:
 
     def motion_options(self, dataset: str, clip: str) -> dict[str, Any]:
         """The motion section, with what the clip's entry overrules."""
-        options = self.options(dataset, "motion")
-        source_fps = self.entry(dataset, clip).source_fps
-        return {**options, "source_fps": source_fps} if source_fps else options
+        keys = {"source_fps", "loops", "heading"}
+        entry = self.entry(dataset, clip).model_dump(include=keys, exclude_none=True)
+        return {**self.options(dataset, "motion"), **entry}
 
     # What a configuration is made from
 
