@@ -1,0 +1,146 @@
+"""A short cycle repeated, each time from where the last one ended, with the seams blended."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.errors import HobbleError
+from hobble.core.quat import Array
+from hobble.motion.root import facing
+
+BLEND = 0.2  # seconds to each side of a seam, at first
+FASTEST = 1.3  # joint speed at a seam, at most, to the highest in the clip; else the blend gets longer
+TURNING = np.radians(20.0)  # a cycle that turns by less is taken to go straight
+UP = np.array([0.0, 1.0, 0.0])
+
+
+def loop_clip(clip: Clip, times: int, heading: float | None = None) -> Clip:
+    """The clip `times` times over: the displacement of one cycle, and its turn, added each time.
+
+    heading: where the first cycle leads, degrees from +Z towards +X; as in the clip by default. The last
+    frame of a cycle may be the first of the next or come just before it. Raises HobbleError for less than
+    four frames.
+    """
+    if len(clip) < 4:
+        raise HobbleError(f"{clip.name}: {len(clip)} frames are no cycle to repeat")
+    cycle = _open(clip)
+    step = _step(cycle)
+    top = _top_speed(clip)
+    reach = max(2, min(round(BLEND * clip.fps), len(cycle) // 2))
+    while True:
+        looped = _repeat(_blended(cycle, step, reach), step, times)
+        if reach >= len(cycle) // 2 or _seam_speed(looped, len(cycle)) <= FASTEST * top:
+            return looped if heading is None else _headed(looped, step, np.radians(heading))
+        reach = min(2 * reach, len(cycle) // 2)
+
+
+def _open(clip: Clip) -> Clip:
+    """The cycle without a last frame that only says again what the first said."""
+    first, second, last = (_pose(clip, i) for i in (0, 1, -1))
+    return _part(clip, slice(0, -1)) if _apart(first, last) < 0.5 * _apart(first, second) else clip
+
+
+def _pose(clip: Clip, frame: int) -> Array:
+    """(J, 3) joints seen from above the ground below the hips, facing +Z."""
+    turn = quat.yaw(-_yaw(clip, frame))
+    place = clip.positions[frame] - clip.positions[frame, 0] * [1, 0, 1]
+    return quat.rotate(turn, place)
+
+
+def _apart(a: Array, b: Array) -> float:
+    return float(np.linalg.norm(a - b, axis=-1).mean())
+
+
+def _yaw(clip: Clip, frame: int) -> float:
+    ahead = facing(clip.skeleton, clip.positions[[frame]], 0.0)[0]
+    return float(np.arctan2(ahead[0], ahead[2]))
+
+
+def _step(cycle: Clip) -> tuple[float, Array]:
+    """What leads from one cycle to the next: a turn about Y, then a shift over the ground."""
+    turn = (_yaw(cycle, -1) - _yaw(cycle, 0) + np.pi) % (2 * np.pi) - np.pi
+    turn = float(turn) if abs(turn) > TURNING else 0.0
+    pace = np.median(np.diff(cycle.root[-4:], axis=0), axis=0)
+    arrival = cycle.root[-1] + pace
+    shift = arrival - quat.rotate(quat.yaw(turn), cycle.root[0])
+    return turn, shift * [1, 0, 1]
+
+
+def _blended(cycle: Clip, step: tuple[float, Array], reach: int) -> Clip:
+    """The cycle with half of what parts its ends taken off each of them, fading over `reach` frames."""
+    turn, frames = step[0], len(cycle)
+    first = cycle.rotations[0].copy()
+    first[0] = quat.mul(quat.yaw(turn), first[0])
+    last = quat.slerp(cycle.rotations[-2], cycle.rotations[-1], np.array(2.0))
+    parts = quat.log(quat.mul(quat.inv(last), first))
+    height = cycle.root[0, 1] - (2 * cycle.root[-1, 1] - cycle.root[-2, 1])
+    n = np.arange(frames)
+    before, after = np.clip(1 - (frames - n) / reach, 0, 1), np.clip(1 - n / reach, 0, 1)
+    weight = 0.5 * (_eased(before) - _eased(after))
+    root = cycle.root + weight[:, None] * height * UP
+    moved = cycle.translations
+    return replace(
+        cycle,
+        rotations=quat.mul(cycle.rotations, quat.exp(weight[:, None, None] * parts)),
+        root=root,
+        translations=None if moved is None else moved + weight[:, None, None] * (moved[0] - moved[-1]),
+    )
+
+
+def _eased(x: Array) -> Array:
+    return x * x * (3 - 2 * x)
+
+
+def _repeat(cycle: Clip, step: tuple[float, Array], times: int) -> Clip:
+    turn, shift = step
+    rotations, roots = [], []
+    place = np.zeros(3)
+    for k in range(times):
+        yaw = quat.yaw(k * turn)
+        turned = cycle.rotations.copy()
+        turned[:, 0] = quat.mul(yaw, turned[:, 0])
+        rotations.append(turned)
+        roots.append(quat.rotate(yaw, cycle.root) + place)
+        place = place + quat.rotate(yaw, shift)
+    moved = cycle.translations
+    return replace(
+        cycle,
+        rotations=quat.continuous(np.concatenate(rotations)),
+        root=np.concatenate(roots),
+        translations=None if moved is None else np.concatenate([moved] * times),
+    )
+
+
+def _headed(clip: Clip, step: tuple[float, Array], heading: float) -> Clip:
+    """The whole turned about its beginning, so that a cycle leads to `heading`."""
+    shift = step[1]
+    if np.hypot(shift[0], shift[2]) < 1.0:
+        return clip
+    turn = quat.yaw(heading - np.arctan2(shift[0], shift[2]))
+    rotations = clip.rotations.copy()
+    rotations[:, 0] = quat.mul(turn, rotations[:, 0])
+    start = clip.root[0] * [1, 0, 1]
+    return replace(clip, rotations=rotations, root=quat.rotate(turn, clip.root - start) + start)
+
+
+def _top_speed(clip: Clip) -> float:
+    return float(np.linalg.norm(np.diff(clip.positions, axis=0), axis=-1).max())
+
+
+def _seam_speed(clip: Clip, cycle: int) -> float:
+    speed = np.linalg.norm(np.diff(clip.positions, axis=0), axis=-1).max(axis=1)
+    return float(speed[: 2 * cycle].max())
+
+
+def _part(clip: Clip, frames: slice) -> Clip:
+    moved = clip.translations
+    return replace(
+        clip,
+        rotations=clip.rotations[frames],
+        root=clip.root[frames],
+        translations=None if moved is None else moved[frames],
+    )

@@ -1,0 +1,124 @@
+"""Short cycles repeated: on and on in one direction, with no jerk where one begins after another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hobble.core import quat
+from hobble.core.errors import HobbleError
+from hobble.motion.loop import loop_clip
+from hobble.motion.retarget import plan, retarget_clip
+from hobble.motion.rig import load_skeleton
+from hobble.motion.root import root_frames, vectors_to_root
+
+
+def part(clip, first, last):
+    return replace(clip, rotations=clip.rotations[first:last], root=clip.root[first:last])
+
+
+def speeds(clip):
+    return np.linalg.norm(np.diff(clip.positions, axis=0), axis=-1).max(axis=1)
+
+
+def bone(clip, start, end, frames):
+    """Unit vectors (frames, 3) from one joint to another, as seen from the root."""
+    way = clip.positions[:, clip.skeleton.role(end)] - clip.positions[:, clip.skeleton.role(start)]
+    way = vectors_to_root(root_frames(clip, 5), way)[:frames]
+    return way / np.linalg.norm(way, axis=-1, keepdims=True)
+
+
+def seams(clip, cycle):
+    speed = speeds(clip)
+    return max(speed[k - 1] for k in range(cycle, len(clip), cycle))
+
+
+@pytest.mark.parametrize("last", [60, 61])
+def test_a_whole_cycle_goes_on_as_the_walk_does(walker, holden31, last):
+    """One cycle is 60 frames; a 61st that repeats the first is noticed."""
+    walk = walker(holden31, 301, 60.0)
+    looped = loop_clip(part(walk, 0, last), 5)
+    assert len(looped) == 300
+    np.testing.assert_allclose(looped.root[:, 2], walk.root[:300, 2], atol=0.5)
+    apart = np.linalg.norm(looped.positions - walk.positions[:300], axis=-1)
+    assert apart.mean() < 1.0
+
+
+@pytest.mark.parametrize("frames", [37, 48, 66])
+def test_seams_of_a_bad_cycle_are_no_faster_than_its_motion(walker, holden31, frames):
+    cycle = part(walker(holden31, 300, 60.0), 5, 5 + frames)
+    looped = loop_clip(cycle, 4)
+    assert seams(looped, frames) <= 1.5 * speeds(cycle).max()
+    assert speeds(looped).max() <= 1.5 * speeds(cycle).max()
+
+
+@pytest.mark.parametrize("heading", [0.0, 90.0, -135.0])
+def test_along_any_heading(walker, holden31, heading):
+    looped = loop_clip(part(walker(holden31, 120, 60.0), 0, 60), 4, heading)
+    way = looped.root[180] - looped.root[0]
+    assert np.degrees(np.arctan2(way[0], way[2])) == pytest.approx(heading, abs=1e-6)
+    assert np.hypot(way[0], way[2]) == pytest.approx(300, rel=0.01)
+
+
+def test_a_cycle_that_turns_goes_on_turning(walker, holden31):
+    walk = part(walker(holden31, 120, 60.0), 0, 60)
+    yaw = np.linspace(0, np.pi / 3, 60)
+    rotations = walk.rotations.copy()
+    rotations[:, 0] = quat.mul(quat.yaw(yaw), rotations[:, 0])
+    way = np.stack([np.sin(yaw), np.zeros(60), np.cos(yaw)], axis=1) * 100 / 60
+    curve = replace(walk, rotations=rotations, root=np.cumsum(way, axis=0) + walk.root * [0, 1, 0])
+    looped = loop_clip(curve, 6)
+    ahead = root_frames(looped, 0).direction
+    turned = np.degrees(np.unwrap(np.arctan2(ahead[:, 0], ahead[:, 2])))
+    assert turned[-1] - turned[0] == pytest.approx(360, abs=15)
+    assert seams(looped, 60) <= 1.5 * speeds(curve).max()
+
+
+def test_too_short_for_a_cycle(walk):
+    with pytest.raises(HobbleError, match="walk: 3 frames are no cycle"):
+        loop_clip(part(walk, 0, 3), 4)
+
+
+def test_a_data_set_can_ask_for_loops(walk, bvh, make):
+    clip, report = make(bvh(part(walk, 0, 121)), loops=4, heading=90.0)
+    assert (len(clip), report["loops"], report["cycle_frames"]) == (240, 4, 60)
+    assert "repeated 4 times" in report["repairs"][-1]
+    assert clip.root[-1, 0] > 380
+    with pytest.raises(HobbleError, match="walk: 2 frames are no cycle"):
+        make(bvh(part(walk, 0, 3)), loops=4)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("file", ["Walk_LLL", "Run_LLL", "Walk_RUL", "LUL_Backwards", "Jog_LLA"])
+def test_injured_cycles_loop_without_a_jerk(shared, make, file):
+    path = shared / f"mocap/ferre/Injured_{file}.bvh"
+    once, _ = make(path)
+    clip, report = make(path, loops=8)
+    assert seams(clip, report["cycle_frames"]) <= 1.5 * speeds(once).max()
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("file", ["Walk_LLL", "Run_LLL"])
+def test_legs_move_as_in_the_authors_own_retargeting(shared, root, make, file):
+    """Their loops of the same motion on 31 joints; their arms hang from shrugged shoulders."""
+    folder = root / "config" / "skeletons"
+    theirs, _ = make(shared / f"mocap/ferre/Injured_{file}_extended_converted.bvh", proportions="clip")
+    ours, _ = make(shared / f"mocap/ferre/Injured_{file}.bvh", skeleton="mixamo55")
+    rig = load_skeleton(folder / "mixamo55.yaml")
+    pairs = {theirs_: mine for mine, theirs_ in rig.maps["holden31"].items()}
+    ours = retarget_clip(ours, plan(ours.skeleton, theirs.skeleton, pairs))
+    for side in ("left", "right"):
+        for a, b in (("hip", "knee"), ("knee", "heel")):
+            ways = []
+            for clip in (ours, theirs):
+                at = clip.positions[:, clip.skeleton.role(f"{side}_{b}")]
+                way = vectors_to_root(
+                    root_frames(clip, 5), at - clip.positions[:, clip.skeleton.role(f"{side}_{a}")]
+                )
+                ways.append(
+                    way[: len(ours) - 1] / np.linalg.norm(way[: len(ours) - 1], axis=-1, keepdims=True)
+                )
+            cosine = np.clip(np.sum(ways[0] * ways[1], axis=-1), -1, 1)
+            assert np.degrees(np.arccos(cosine)).mean() < 12
