@@ -182,3 +182,8 @@ def test_the_matrices_of_ferre_come_out_as_his(shared: Path, holden31, name):
     status = read_status(stem.with_suffix(".txt"), holden31.link_names)
     assert (severity_matrix(status, holden31.link_names) == np.loadtxt(stem)).all()
     assert len(odd_ranges(status, stem)) == 1
+
+
+def test_source_rows_of_a_loop_begin_anew_with_each_cycle():
+    looped = motion(3, 60.0) | {"loops": 2, "cycle_frames": 3}
+    assert source_rows(6, 3, looped).tolist() == [0, 1, 2, 0, 1, 2]

@@ -85,7 +85,8 @@ def source_rows(frames: int, rows: int, motion: Mapping[str, Any]) -> Array:
     fps = motion["source_fps"]
     whole = round(fps)
     ratio = (whole if math.isclose(fps, whole, rel_tol=5e-4) else fps) / 60.0
-    at = np.arange(frames) * ratio + motion.get("source_start", 0)
+    once = np.arange(frames) % motion.get("cycle_frames", frames)  # a looped clip comes back to its beginning
+    at = once * ratio + motion.get("source_start", 0)
     return np.clip(np.floor(at + 1e-6).astype(int), 0, rows - 1)
 
 

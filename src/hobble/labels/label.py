@@ -44,7 +44,8 @@ def label_clip(
     it mostly shows, if that is known. ground: "flat", ... options: the section `labels` of the data set.
     Raises InputError for a file that cannot be used.
     """
-    given = _by_kind(files) if options["files"] else {}
+    # Files beside a cycle that was repeated count the frames of one cycle only.
+    given = _by_kind(files) if options["files"] and motion.get("loops", 1) == 1 else {}
     time = SourceTime(motion["source_frames"], motion["source_fps"], motion.get("source_start", 0))
     warnings: list[str] = []
     swings = find_swings(clip, options["heel_speed"], options["toe_speed"], options["valley_factor"])
