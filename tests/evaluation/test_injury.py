@@ -14,7 +14,13 @@ from scipy.stats import spearmanr
 
 from hobble.evaluation.injury import GAITS, SEVERITIES, Sweep, injury_response, spearman
 
-RUNTIME = {"mode": "cubic", "severity_rate": 10.0, "severity_scale": 1.0, "foot_locking": True}
+RUNTIME = {
+    "mode": "cubic",
+    "severity_rate": 10.0,
+    "severity_scale": 1.0,
+    "foot_locking": True,
+    "steering": 1.0,
+}
 KNEE = "LeftUpLeg-LeftLeg"
 
 

@@ -13,7 +13,13 @@ from hobble.evaluation.tables import write_csv
 from hobble.runtime.controller import STEPS
 from hobble.runtime.waypoints import Waypoint
 
-RUNTIME = {"mode": "cubic", "severity_rate": 10.0, "severity_scale": 1.0, "foot_locking": True}
+RUNTIME = {
+    "mode": "cubic",
+    "severity_rate": 10.0,
+    "severity_scale": 1.0,
+    "foot_locking": True,
+    "steering": 1.0,
+}
 # So near to each other that standing in their midst is arriving at each.
 NEAR = tuple(Waypoint((x, 0.0), "walk", 2.5) for x in (0.0, 30.0, 60.0))
 # Straight ahead of the start, 3 m away, where a figure that glides straight on comes by; then behind it.

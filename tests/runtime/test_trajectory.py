@@ -106,16 +106,40 @@ def test_shares_of_the_wish(strafe: float, position_bias: float, direction_bias:
 
 
 def test_wishes_are_taken_up_at_their_rates() -> None:
-    _, _, gait = path(stand=1.0)
+    position, _, gait = path(0.0, stand=1.0)
     velocity, direction, strafe = np.zeros((1, 2)), np.array([[0.0, 1.0]]), np.zeros(1)
     shares = np.eye(6)[[1]]
     wish = np.array([[2.0, 0.0]]), np.array([[1.0, 0.0]]), np.ones(1), shares
-    trajectory.follow_wish(*wish, velocity, direction, strafe, gait)
+    trajectory.follow_wish(*wish, 0.0, velocity, direction, strafe, gait, position)
     np.testing.assert_allclose(velocity, [[1.8, 0]])
     np.testing.assert_allclose(np.arctan2(*direction[0]), 0.9 * np.pi / 2)
     np.testing.assert_allclose(strafe, 0.9)
     np.testing.assert_allclose(gait[0, MIDDLE], [0.9, 0.1, 0, 0, 0, 0])
     np.testing.assert_allclose(gait[0, MIDDLE - 1], [1, 0, 0, 0, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("steering", "wish", "asked"),
+    [
+        (0.0, (0.0, 2.0), (0.0, 2.0)),
+        (1.0, (0.0, 1.5), (0.0, 1.5)),  # what is reached is not corrected
+        (1.0, (0.0, 2.0), (0.0, 2.5)),
+        (2.0, (0.5, 2.0), (1.5, 3.0)),
+        (1.0, (0.0, 9.0), (0.0, 16.5)),
+        (3.0, (0.0, 9.0), (0.0, 18.0)),  # at most as much again
+        (1.0, (0.0, 0.3), (0.0, 0.0)),
+        (1.0, (0.0, 0.0), (0.0, 0.0)),
+    ],
+)
+def test_steering_asks_for_what_is_missing(steering: float, wish: tuple, asked: tuple) -> None:
+    """The figure glides ahead at 1.5 cm a frame."""
+    position, _, gait = path(1.5)
+    velocity, direction = np.zeros((1, 2)), np.array([[0.0, 1.0]])
+    trajectory.follow_wish(
+        np.array([wish]), direction, np.zeros(1), np.eye(6)[[1]], steering, velocity, direction, np.zeros(1),
+        gait, position,
+    )  # fmt: skip
+    np.testing.assert_allclose(velocity, 0.9 * np.array([asked]), atol=1e-9)
 
 
 def test_the_ground_is_looked_up_on_both_sides() -> None:

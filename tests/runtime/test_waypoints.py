@@ -62,7 +62,7 @@ def test_a_track_of_one_place() -> None:
 
 
 def test_the_character_follows_waypoints(network) -> None:
-    character = ProceduralAnimation(network, waypoints=SQUARE)
+    character = ProceduralAnimation(network, waypoints=SQUARE, steering=0.0)
     pose = character.next_pose()
     np.testing.assert_allclose(pose.root, 0, atol=1e-9)
     np.testing.assert_allclose(character.state.target_velocity, [[0, 0.9 * 2.5]])

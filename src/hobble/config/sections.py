@@ -165,6 +165,9 @@ class Runtime(Section):
     severity_rate: PositiveFloat = Field(10.0, description="largest change of a severity in a second")
     severity_scale: PositiveFloat = Field(1.0, description="severities are divided by this")
     foot_locking: bool = True
+    steering: Annotated[float, Field(ge=0)] = Field(
+        1.0, description="how hard a velocity that is not reached is asked for; 0 is the original runtime"
+    )
 
 
 class Evaluation(Section):

@@ -63,18 +63,25 @@ class ProceduralAnimation:
         severity_rate: float = 10.0,
         severity_scale: float = 1.0,
         foot_locking: bool = True,
+        steering: float = 1.0,
         axes: Axes | None = None,
         position: Any = None,
         facing: Any = None,
     ) -> None:
         if network.skeleton is None:
             raise ValueError("the network carries no skeleton: load it with skeleton=")
-        if characters < 1 or severity_rate <= 0 or severity_scale <= 0:
-            raise ValueError("characters, severity_rate and severity_scale are positive")
+        if characters < 1 or severity_rate <= 0 or severity_scale <= 0 or steering < 0:
+            raise ValueError(
+                "characters, severity_rate and severity_scale are positive, steering not negative"
+            )
         self.network, self.skeleton = network, network.skeleton
         self.characters, self.axes = characters, axes or Axes()
         self.severity_scale = severity_scale
-        self._severity_rate, self._foot_locking = severity_rate, foot_locking
+        self._of_controller = {
+            "severity_rate": severity_rate,
+            "foot_locking": foot_locking,
+            "steering": steering,
+        }
         self._predictor = Predictor(network, mode, storage)
         self._waypoints = waypoints
         self._links = {name: i for i, name in enumerate(network.links)}
@@ -91,8 +98,9 @@ class ProceduralAnimation:
         skeleton: where the file carries none. mode: "constant", "linear" or "cubic". storage: "float32" or
         "int16". characters: how many. waypoints: a track to follow when `next_pose` is given no velocity.
         severity_rate: largest change of a severity in a second; severity_scale: severities are divided by
-        this. foot_locking: hold feet in contact where they landed. axes: the caller's convention. position,
-        facing: as of `reset`. Raises InputError where the file is not a network that fits.
+        this. foot_locking: hold feet in contact where they landed. steering: how hard a velocity that is not
+        reached is asked for, 0 as the original. axes: the caller's convention. position, facing: as of
+        `reset`. Raises InputError where the file is not a network that fits.
         """
         network = load_network(path, skeleton)
         if network.skeleton is None:
@@ -119,9 +127,7 @@ class ProceduralAnimation:
             ahead = self._level(facing, self.axes.directions_in)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
         self.state: Character = standing(self.network, count, np.array(places, float), yaws)
-        self._controller = Controller(
-            self._predictor, self.state, severity_rate=self._severity_rate, foot_locking=self._foot_locking
-        )
+        self._controller = Controller(self._predictor, self.state, **self._of_controller)
         self._wish_gait = np.zeros((count, len(self._gaits)))
 
     @property

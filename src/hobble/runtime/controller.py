@@ -42,7 +42,8 @@ class Controller:
         character: Character,
         *,
         severity_rate: float,
-        foot_locking: bool = True,
+        foot_locking: bool,
+        steering: float,
         side: float = 25.0,
     ) -> None:
         network = predictor.network
@@ -50,7 +51,7 @@ class Controller:
         count = len(character.phase)
         self.predictor, self.character, self.layout = predictor, character, layout
         self.severity_step = severity_rate / FPS
-        self.side, self.foot_locking = side, foot_locking
+        self.side, self.foot_locking, self.steering = side, foot_locking, steering
         self.seconds = np.zeros(len(STEPS))
         self.x = np.zeros((count, layout.x_size), np.float32)
         self.z = np.zeros_like(self.x)
@@ -100,8 +101,8 @@ class Controller:
     ) -> None:
         c = self.character
         trajectory.prepare(
-            velocity, direction, strafe, gait, c.target_velocity, c.target_direction, c.strafe, c.gait,
-            c.position, c.direction, c.severity, c.severity_target, self.severity_step,
+            velocity, direction, strafe, gait, self.steering, c.target_velocity, c.target_direction, c.strafe,
+            c.gait, c.position, c.direction, c.severity, c.severity_target, self.severity_step,
             self.layout.step, self.side, self._points,
         )  # fmt: skip
         if ground is None:

@@ -27,17 +27,26 @@ def wrap(angle: float) -> float:
 
 @njit(cache=True)
 def follow_wish(
-    wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any,
-    velocity: Any, direction: Any, strafe: Any, gait: Any,
+    wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
+    velocity: Any, direction: Any, strafe: Any, gait: Any, position: Any,
 ) -> None:  # fmt: skip
     """Move the smoothed targets toward what the caller asks for; the present frame's gait blends slowly.
 
     wish_velocity, wish_direction, velocity, direction: (C, 2); wish_strafe, strafe: (C,); wish_gait: (C, 6).
+    A network goes on as it has been going: it answers to its past as much as to the bent future. So what the
+    last half of the past window lacks of the wished velocity is asked for on top, `steering` times over, up
+    to as much again as the wish; 0 is the original runtime.
     """
     middle = gait.shape[1] // 2
+    span = middle // 2
     for c in range(velocity.shape[0]):
-        for k in range(2):
-            velocity[c, k] += TARGET_MIX * (wish_velocity[c, k] - velocity[c, k])
+        x, z = wish_velocity[c, 0], wish_velocity[c, 1]
+        more_x = steering * (x - (position[c, middle, 0] - position[c, middle - span, 0]) / span)
+        more_z = steering * (z - (position[c, middle, 1] - position[c, middle - span, 1]) / span)
+        limit = np.sqrt((x * x + z * z) / max(more_x * more_x + more_z * more_z, 1e-12))
+        x, z = x + more_x * min(1.0, limit), z + more_z * min(1.0, limit)
+        velocity[c, 0] += TARGET_MIX * (x - velocity[c, 0])
+        velocity[c, 1] += TARGET_MIX * (z - velocity[c, 1])
         now = np.arctan2(direction[c, 0], direction[c, 1])
         now += TARGET_MIX * wrap(np.arctan2(wish_direction[c, 0], wish_direction[c, 1]) - now)
         direction[c, 0], direction[c, 1] = np.sin(now), np.cos(now)
@@ -89,7 +98,7 @@ def sample_points(position: Any, direction: Any, step: int, side: float, points:
 
 @njit(cache=True)
 def prepare(
-    wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any,
+    wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
     velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
     severity: Any, severity_target: Any, severity_step: float, step: int, side: float, points: Any,
 ) -> None:  # fmt: skip
@@ -97,7 +106,18 @@ def prepare(
 
     In this file because compiled code kept on disk is renewed when its own file changes, not its callees'.
     """
-    follow_wish(wish_velocity, wish_direction, wish_strafe, wish_gait, velocity, target, strafe, gait)
+    follow_wish(
+        wish_velocity,
+        wish_direction,
+        wish_strafe,
+        wish_gait,
+        steering,
+        velocity,
+        target,
+        strafe,
+        gait,
+        position,
+    )
     blend_future(velocity, target, strafe, position, direction, gait)
     sample_points(position, direction, step, side, points)
     for c in range(severity.shape[0]):
