@@ -12,6 +12,7 @@ from hobble.core import quat
 from hobble.core.skeleton import forward_kinematics
 from hobble.runtime import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton, motion_clip
+from hobble.runtime.feet import leg_joints
 from hobble.runtime.network import load_network
 from hobble.runtime.scenarios import generate, hurt_links, scenarios
 
@@ -62,6 +63,21 @@ def test_a_clip_has_the_motion_it_was_made_of(holden31) -> None:
     clip = motion_clip("walk", holden31, positions, rotations)
     np.testing.assert_allclose(clip.positions, positions, atol=1e-9)
     np.testing.assert_allclose(quat.angle(clip.global_rotations, rotations), 0, atol=1e-6)
+
+
+def test_toes_come_to_where_they_were_predicted(holden31) -> None:
+    positions, rotations = motion(holden31)
+    legs = leg_joints(holden31)
+    moved = positions.copy()
+    moved[:, legs[:, 3]] += np.random.default_rng(3).normal(0, 1, (len(positions), 2, 3))
+    clip = motion_clip("walk", holden31, moved, rotations)
+    off = np.linalg.norm(clip.positions[:, legs[:, 3]] - moved[:, legs[:, 3]], axis=-1)
+    assert np.median(off) < 1e-6  # all but legs that are stretched further than they are long
+    feet, others = legs[:, 2], np.setdiff1d(np.arange(31), legs[:, :2])
+    np.testing.assert_allclose(quat.angle(clip.global_rotations[:, feet], rotations[:, feet]), 0, atol=1e-6)
+    np.testing.assert_allclose(
+        quat.angle(clip.global_rotations[:, others], rotations[:, others]), 0, atol=1e-6
+    )
 
 
 def test_bones_are_found_in_a_motion(holden31) -> None:

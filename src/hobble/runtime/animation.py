@@ -77,7 +77,7 @@ class ProceduralAnimation:
         self.network, self.skeleton = network, network.skeleton
         self.characters, self.axes = characters, axes or Axes()
         self.severity_scale = severity_scale
-        self._of_controller = {
+        self._of_controller: dict[str, Any] = {
             "severity_rate": severity_rate,
             "foot_locking": foot_locking,
             "steering": steering,

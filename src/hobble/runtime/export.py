@@ -11,8 +11,10 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
+from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, local_rotations
+from hobble.core.skeleton import Skeleton, forward_kinematics, local_rotations
+from hobble.runtime.feet import leg_joints
 
 FPS = 60.0
 
@@ -20,10 +22,29 @@ FPS = 60.0
 def motion_clip(name: str, skeleton: Skeleton, positions: Array, rotations: Array) -> Clip:
     """A clip of world positions (F, J, 3) in cm and world rotations (F, J, 4) in our axes.
 
-    The root is placed at its position, every other joint by its rotation and the skeleton's bones.
+    The root is placed at its position, every other joint by its rotation and the skeleton's bones. Predicted
+    rotations and positions differ by some millimetres, which at the feet is seen as sliding: legs are bent so
+    that heels come to where they were predicted.
     """
-    local = quat.continuous(local_rotations(skeleton, rotations))
-    return Clip(name, skeleton, FPS, local, np.asarray(positions[:, 0], float))
+    root = np.asarray(positions[:, 0], float)
+    local = local_rotations(skeleton, rotations)
+    world, reached = forward_kinematics(skeleton, local, root)
+    for leg in leg_joints(skeleton):
+        heel, toe = leg[2], leg[3]
+        _reach(world, reached, leg, positions[:, toe] - reached[:, toe] + reached[:, heel])
+    local = quat.continuous(local_rotations(skeleton, world))
+    return Clip(name, skeleton, FPS, local, root)
+
+
+def _reach(world: Array, positions: Array, leg: Array, target: Array) -> None:
+    """Turn thigh and shank in `world` (F, J, 4) so that the heel comes to target (F, 3); the foot keeps its
+    turn."""
+    hip, knee, heel = leg[:3]
+    thigh, shank = positions[:, knee] - positions[:, hip], positions[:, heel] - positions[:, knee]
+    upper, lower = (float(np.linalg.norm(bone, axis=-1).mean()) for bone in (thigh, shank))
+    bent, end = two_bone_knee(positions[:, hip], target, thigh, upper, lower)
+    world[:, hip] = quat.mul(quat.between(thigh, bent - positions[:, hip]), world[:, hip])
+    world[:, knee] = quat.mul(quat.between(shank, end - bent), world[:, knee])
 
 
 def fitted_skeleton(skeleton: Skeleton, positions: Array, rotations: Array) -> Skeleton:
