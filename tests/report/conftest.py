@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from hobble.core.skeleton import Skeleton
+from hobble.report.compare import comparisons
 from hobble.report.gather import Material, gather
 from hobble.report.page import render
 from hobble.report.playable import playable
@@ -74,6 +75,17 @@ def character(network: Network, examples: ModuleType) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="session")
-def page(material: Material, play: dict[str, Any], character: dict[str, Any]) -> str:
+def compared(
+    network: Network, examples: ModuleType, holden31: Skeleton, tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, Any]:
+    folder = tmp_path_factory.mktemp("rows")
+    paths = [examples.rows(folder / f"{clip}.npz", holden31) for clip in ("jog", "walk_turns")]
+    return comparisons(network, paths, {"jog": "train", "walk_turns": "held_out"})
+
+
+@pytest.fixture(scope="session")
+def page(
+    material: Material, play: dict[str, Any], character: dict[str, Any], compared: dict[str, Any]
+) -> str:
     """The report of the examples."""
-    return render(material, play, character)
+    return render(material, play, character, compared)

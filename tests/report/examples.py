@@ -13,6 +13,7 @@ import yaml
 from hobble.core import quat
 from hobble.core.files import save_npz, write_json, write_text
 from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.database.clip_rows import ClipRows, save_clip_rows
 from hobble.database.layout import RowLayout
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
@@ -29,7 +30,13 @@ STAGES = (
 )
 CLIPS = ("walk_straight", "walk_turns", "jog", "crouch", "stand", "strafe", "hurt_left_knee", "hurt_back")
 LINKS = ("LeftUpLeg-LeftLeg", "RightLeg-RightFoot", "Hips-LowerBack")
-RUNTIME = {"mode": "cubic", "severity_rate": 10.0, "severity_scale": 1.0, "foot_locking": True}
+RUNTIME = {
+    "mode": "cubic",
+    "severity_rate": 10.0,
+    "severity_scale": 1.0,
+    "foot_locking": True,
+    "steering": 1.0,
+}
 HELD_OUT = ("walk_turns", "hurt_back")
 
 
@@ -283,6 +290,39 @@ def costs() -> dict[str, Any]:
         "machine": {"system": "Linux x86_64", "processor": "a processor", "cores": 2, "memory_gb": 24.0},
         "versions": {"python": "3.11.2"},
     }
+
+
+def rows(path: Path, skeleton: Skeleton, frames: int = 200, links: bool = True) -> str:
+    """database/clips/<clip>.npz of a straight walk on flat ground: two cycles that share a frame, then a gap."""
+    layout = RowLayout(len(skeleton.joints), links=len(skeleton.links))
+    made = walker(skeleton, frames, 2.2)
+    made["positions"][..., 2] += 7.0
+    local = made["positions"] - made["positions"][:, :1] * [1, 0, 1]
+    frame = np.concatenate([np.arange(60, 101), np.arange(100, 121), np.arange(150, 160)])
+    frame = frame[frame < frames]
+    y = np.zeros((len(frame), layout.y_size))
+    y[:, layout.y_joint_position] = local[frame].reshape(len(frame), -1)
+    root = made["positions"][:, 0][:, [0, 2]]
+    y[:, layout.y_root_velocity] = np.diff(root, axis=0)[frame]
+    count = len(frame)
+    save_clip_rows(
+        path,
+        ClipRows(
+            clip=path.stem,
+            layout=layout,
+            skeleton=skeleton.to_dict(),
+            x=np.zeros((count, layout.x_terrain.start)),
+            y=y,
+            p=made["phase"][frame],
+            severity=np.zeros((count, layout.links)),
+            frame=frame,
+            cycle=np.zeros(count, int),
+            fits=np.ones(count, int),
+            heights=np.zeros((count, 3 * layout.samples)),
+            mean=np.zeros(count),
+        ),
+    )
+    return str(path)
 
 
 def responsivity(rng: np.random.Generator, laps: int = 19) -> dict[str, Any]:

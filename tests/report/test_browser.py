@@ -112,6 +112,19 @@ def test_the_ground_is_drawn(tab: Any) -> None:
     assert tab.until(INK.format("ground") + " > .1")
 
 
+def test_captured_and_predicted_are_drawn_and_stepped_through(tab: Any) -> None:
+    show(tab, "compare-stage")
+    assert tab.until(INK.format("compare-view") + " > .02")
+    assert text(tab, "compare-choice") == "walk_turnsjog"
+    tab.run("document.getElementById('compare-stage').focus()")
+    for _ in range(3):
+        tab.press(".", "Period")
+    assert tab.until("Number(document.getElementById('compare-time').value) === 3")
+    assert tab.until("document.getElementById('compare-reading').textContent.startsWith('held out')")
+    choose(tab, "compare-choice", 1)
+    assert tab.until("document.getElementById('compare-reading').textContent.startsWith('a training clip')")
+
+
 def test_choosers_change_their_pictures(tab: Any, material: Material) -> None:
     choose(tab, "sweeps-choice", 2)
     drawn = "document.querySelector('[data-chart=\"sweep-speed\"]').data[0].y[0]"

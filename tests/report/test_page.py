@@ -109,9 +109,9 @@ def test_numbers_of_the_tables_are_whole_in_their_cells(page: str, material: Mat
 
 
 def test_same_input_same_page(
-    material: Material, play: dict[str, Any], character: dict[str, Any], page: str
+    material: Material, play: dict[str, Any], character: dict[str, Any], compared: dict[str, Any], page: str
 ) -> None:
-    assert render(material, play, character) == page
+    assert render(material, play, character, compared) == page
 
 
 HOSTILE = "<script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}"

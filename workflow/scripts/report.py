@@ -1,6 +1,7 @@
 """Creates results/<configuration>/report.html from evaluation, clip reports and generated motion."""
 
 from hobble.core.files import write_text
+from hobble.report.compare import comparisons
 from hobble.report.gather import gather
 from hobble.report.page import render
 from hobble.report.playable import playable
@@ -29,5 +30,7 @@ with job(snakemake):
     )
     network = material.network
     play = scenes(given.scenarios, network["skeleton"], network["links"])
-    character = playable(load_network(given.weights), material.resolved["configuration"]["runtime"])
-    write_text(snakemake.output.html, render(material, play, character))
+    trained = load_network(given.weights)
+    character = playable(trained, material.resolved["configuration"]["runtime"])
+    compared = comparisons(trained, given.get("rows", []), asked.splits)
+    write_text(snakemake.output.html, render(material, play, character, compared))

@@ -35,6 +35,7 @@ SCRIPTS = (
     "network.js",
     "character.js",
     "play.js",
+    "compare.js",
     "ground.js",
     "strips.js",
     "page.js",
@@ -45,10 +46,12 @@ def render(
     material: Material,
     scenes: Mapping[str, Any] | None = None,
     playable: Mapping[str, Any] | None = None,
+    compared: Mapping[str, Any] | None = None,
 ) -> str:
     """The report as one HTML document.
 
-    scenes: of `scenes.scenes`; playable: of `playable.playable`; without them those sections are left out.
+    scenes: of `scenes.scenes`; playable: of `playable.playable`; compared: of `compare.comparisons`; without
+    them those parts are left out.
 
     Every value is escaped where it stands; data for the scripts is JSON in which no "<" is left.
     """
@@ -70,6 +73,7 @@ def render(
         "strips": strips,
         "grounds": grounds,
         "playable": playable or {},
+        "compare": compared or {},
     }
     return environment.get_template("page.html.j2").render(
         material=material,
@@ -80,6 +84,7 @@ def render(
         embedded=embedded(data),
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable=playable or {},
+        compared=[clip["name"] for clip in (compared or {}).get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],
         style=_text("page.css"),

@@ -93,13 +93,17 @@
     const c = character, { context, paint } = view;
     context.lineWidth = 5;
     context.lineCap = "round";
-    for (const [x, z, age] of trail) view.segment([x - 3, floor(x, z), z], [x + 3, floor(x, z), z], paint.ink, .3 * (1 - age / 240));
+    for (const { from, to, age } of trail) view.segment(from, to, paint.ink, .35 * (1 - age / 360));
     context.lineCap = "butt";
     context.lineWidth = 2;
     for (let i = 5; i < c.px.length; i += 5) {
       const [a, b] = [i - 5, i].map((t) => [c.px[t], floor(c.px[t], c.pz[t]), c.pz[t]]);
       view.segment(a, b, paint.accent, i > c.px.length / 2 ? .8 : .3);
     }
+  };
+  const sole = (j) => {
+    const [x, z] = [character.pose[3 * j], character.pose[3 * j + 2]];
+    return [x, floor(x, z), z];
   };
   const posed = () => {
     const points = [];
@@ -110,6 +114,7 @@
     const most = Math.max(0, ...links.map((l) => character.severity[l])) * spec.severityScale;
     return Hobble.severityColour(paint, most);
   });
+  const stood = [false, false];
   let eye = null, last = null, owed = 0, told = 0;
   const move = (now) => {
     owed = Math.min(4, owed + (last === null ? 1 : (now - last) * .06));
@@ -118,10 +123,12 @@
       const before = performance.now(), { velocity, ahead, gait } = wish();
       character.frame(velocity, ahead, gait, floor);
       milliseconds += .05 * (performance.now() - before - milliseconds);
-      trail.forEach((print) => { print[2]++; });
-      trail = trail.filter((print) => print[2] < 240);
-      spec.legs.forEach(([, , , toe], f) => {
-        if (character.contacts[2 * f + 1] > .5) trail.push([character.pose[3 * toe], character.pose[3 * toe + 2], 0]);
+      trail.forEach((print) => { print.age++; });
+      trail = trail.filter((print) => print.age < 360);
+      spec.legs.forEach(([, , heel, toe], f) => {
+        const down = character.lock[f] === 1;
+        if (down && !stood[f]) trail.push({ from: sole(heel), to: sole(toe), age: 0 });
+        stood[f] = down;
       });
       if (!character.pose.every(Number.isFinite)) { fall++; start(); } // a network that has learnt nothing runs away
     }

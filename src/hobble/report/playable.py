@@ -71,6 +71,7 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
         "severityStep": runtime["severity_rate"] / 60,
         "severityScale": runtime["severity_scale"],
         "footLocking": runtime["foot_locking"],
+        "steering": runtime["steering"],
         "parts": parts,
         "presets": [
             {"name": name, "severities": [[parts[label], value] for label, value in values.items()]}

@@ -41,24 +41,40 @@ def scenes(path: str | Path, skeleton: Mapping[str, Any], links: Sequence[str] =
     roles = dict(skeleton.get("roles") or {})
     stride = max(1, round(float(data["fps"]) / FPS))
     names = [str(name) for name in data["names"]]
+    feet = [joints.index(roles[r]) for r in FEET] if all(r in roles for r in FEET) else []
+    keep, shapes = drawn_joints(capsules(joints, parents, roles, links), feet)
     return {
         "fps": float(data["fps"]) / stride,
-        "joints": len(joints),
+        "joints": len(keep),
         "unit": UNIT,
         "links": list(links),
-        "feet": [joints.index(roles[r]) for r in FEET] if all(r in roles for r in FEET) else [],
-        "capsules": capsules(joints, parents, roles, links),
-        "scenarios": [_scenario(data, name, stride, links) for name in names],
+        "feet": [keep.index(j) for j in feet],
+        "capsules": shapes,
+        "scenarios": [_scenario(data, name, stride, links, keep) for name in names],
     }
 
 
-def _scenario(data: Mapping[str, Array], name: str, stride: int, links: Sequence[str]) -> dict[str, Any]:
+def drawn_joints(
+    shapes: Sequence[Mapping[str, Any]], others: Sequence[int] = ()
+) -> tuple[list[int], list[dict[str, Any]]]:
+    """The joints that are drawn, the root first, and the capsules with indices into these alone.
+
+    A figure of 191 joints is drawn by some twenty of them; the rest need not lie in the page.
+    """
+    ends = ("a", "b", "from")
+    keep = sorted({0, *others, *(shape[end] for shape in shapes for end in ends if end in shape)})
+    return keep, [{k: keep.index(v) if k in ends else v for k, v in shape.items()} for shape in shapes]
+
+
+def _scenario(
+    data: Mapping[str, Array], name: str, stride: int, links: Sequence[str], keep: list[int]
+) -> dict[str, Any]:
     positions = np.asarray(data[f"{name}/positions"], float)[::stride]
     out: dict[str, Any] = {
         "name": readable(name),
         "description": WORDS.get(name, ""),
         "frames": len(positions),
-        **pack_positions(positions),
+        **pack_positions(positions, keep),
     }
     contacts, phase = data.get(f"{name}/contacts"), data.get(f"{name}/phase")
     if contacts is not None:
@@ -76,10 +92,10 @@ def _scenario(data: Mapping[str, Array], name: str, stride: int, links: Sequence
     return out
 
 
-def pack_positions(positions: Array) -> dict[str, str]:
-    """Positions (F, J, 3) in cm: `root` as float32, `pose` as int16 steps of UNIT from the root joint."""
+def pack_positions(positions: Array, keep: Sequence[int] | slice = slice(None)) -> dict[str, str]:
+    """Positions (F, J, 3): `root` as float32 cm, `pose` as int16 steps of UNIT from it, joints to keep."""
     root = positions[:, 0].astype(np.float32)
-    steps = np.round((positions - root[:, None].astype(float)) / UNIT)
+    steps = np.round((positions[:, keep] - root[:, None].astype(float)) / UNIT)
     return {"root": packed(root), "pose": packed(np.clip(steps, -32767, 32767).astype(np.int16))}
 
 

@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import base64
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.core.skeleton import Skeleton
+from hobble.report.compare import in_world, travelled
+from hobble.report.scenes import UNIT
+from hobble.runtime.network import Network
+
+
+def positions(clip: dict[str, Any], table: str, joints: int) -> np.ndarray:
+    root = np.frombuffer(base64.b64decode(clip["root"]), "<f4").reshape(-1, 1, 3)
+    return root + UNIT * np.frombuffer(base64.b64decode(clip[table]), "<i2").reshape(-1, joints, 3)
+
+
+def test_a_root_that_moves_ahead_and_turns_goes_in_a_circle() -> None:
+    frames = 360
+    velocity, turn = np.tile([0.0, 1.0], (frames, 1)), np.full(frames, -2 * np.pi / frames)
+    place, yaw = travelled(velocity, turn)
+    assert yaw[90] == pytest.approx(np.pi / 2)  # a negative turn of the world is one to the left, to +X
+    centre = place.mean(axis=0)
+    assert np.linalg.norm(place - centre, axis=1) == pytest.approx(frames / (2 * np.pi), rel=1e-3)
+    assert centre[0] > 0
+    ahead = in_world(np.tile([[0.0, 0, 1]], (frames, 1, 1)), place, yaw, np.zeros((frames, 1)))
+    assert ahead[:-1, 0, ::2] == pytest.approx(place[1:], abs=1e-9)
+
+
+def test_captured_motion_comes_back(
+    compared: dict[str, Any], examples: ModuleType, holden31: Skeleton
+) -> None:
+    clip = compared["clips"][0]
+    assert (clip["name"], clip["split"], clip["frames"]) == ("walk_turns", "held_out", 31)
+    made = examples.walker(holden31, 200, 2.2)["positions"][60:121:2]
+    found = positions(clip, "pose", compared["joints"])
+    # The same motion, begun at the origin; the walker's path is straight up to its frame 66 and bends after.
+    assert found[:, :, 1] == pytest.approx(_drawn(made, compared, holden31)[:, :, 1], abs=0.02)
+    step = np.linalg.norm(np.diff(found[:, 0, ::2], axis=0), axis=1)
+    assert step == pytest.approx(np.linalg.norm(np.diff(made[:, 0, ::2], axis=0), axis=1), abs=1e-3)
+
+
+def _drawn(made: np.ndarray, compared: dict[str, Any], skeleton: Skeleton) -> np.ndarray:
+    from hobble.report.body import capsules
+    from hobble.report.scenes import drawn_joints
+
+    keep, _ = drawn_joints(capsules(skeleton.joints, skeleton.parents, skeleton.roles))
+    assert len(keep) == compared["joints"]
+    return made[:, keep]
+
+
+def test_the_error_is_the_distance_of_what_is_drawn(compared: dict[str, Any], network: Network) -> None:
+    """Over all joints, of which the drawn ones are most."""
+    clip = compared["clips"][0]
+    apart = np.linalg.norm(
+        positions(clip, "pose", compared["joints"]) - positions(clip, "predicted", compared["joints"]),
+        axis=-1,
+    )
+    assert np.corrcoef(apart.mean(axis=1), clip["error"])[0, 1] > 0.95
+    assert np.mean(clip["error"]) == pytest.approx(apart.mean(), rel=0.3)
