@@ -293,7 +293,7 @@ def costs() -> dict[str, Any]:
 
 
 def rows(path: Path, skeleton: Skeleton, frames: int = 200, links: bool = True) -> str:
-    """database/clips/<clip>.npz of a straight walk on flat ground: two cycles that share a frame, then a gap."""
+    """database/clips/<clip>.npz of a straight walk on flat ground; two cycles share a frame."""
     layout = RowLayout(len(skeleton.joints), links=len(skeleton.links))
     made = walker(skeleton, frames, 2.2)
     made["positions"][..., 2] += 7.0

@@ -51,9 +51,7 @@ rule report:
         motion=lambda w: project.of_dataset(w.configuration, "motion/{clip}.json"),
         labels=lambda w: project.of_dataset(w.configuration, "labels/{clip}.json"),
         injuries=lambda w: project.of_dataset(w.configuration, "injury/{clip}.json"),
-        rows=lambda w: project.of_dataset(
-            w.configuration, "database/clips/{clip}.npz"
-        ),
+        rows=lambda w: project.of_dataset(w.configuration, "database/clips/{clip}.npz"),
         terrain=lambda w: project.of_dataset(
             w.configuration, "terrain/clips/{clip}.npz"
         ),
