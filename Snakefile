@@ -1,4 +1,5 @@
 # From motion capture to a character that can be hurt. Targets: results/<configuration>/report.html
+import os
 import sys
 from pathlib import Path
 
@@ -6,7 +7,8 @@ from hobble.core.errors import HobbleError
 from hobble.workflow.project import Project
 
 try:
-    project = Project(Path(workflow.basedir), config)
+    # Relative, so that a checkout can be moved without making anything again.
+    project = Project(Path(os.path.relpath(workflow.basedir)), config)
     project.check(
         argument for argument in sys.argv[1:] if argument.startswith("results/")
     )
