@@ -23,16 +23,16 @@ def figure() -> Skeleton:
 
 
 def clip_rows(name: str, rows: int, fits: int, seed: int) -> ClipRows:
-    """Rows whose Y is a smooth function of X and the phase, with some noise."""
+    """Rows whose Y is a smooth function of two columns of X and of the phase, with some noise."""
     skeleton = figure()
     layout = RowLayout(joints=4, links=1)
     rng = np.random.default_rng(seed)
     columns = layout.x_terrain.start
     x = rng.normal(0, 2, (rows, columns)).astype(np.float32)
     p = np.linspace(0, 3, rows, endpoint=False).astype(np.float32) % 1
-    mix = np.random.default_rng(7).normal(0, columns**-0.5, (2, columns, layout.y_size))
+    mix = np.random.default_rng(7).normal(0, 0.2, (2, 2, layout.y_size))
     turn = np.cos(2 * np.pi * p)[:, None]
-    y = np.tanh(x @ mix[0]) * (1 + turn) + np.tanh(x @ mix[1]) * (1 - turn)
+    y = np.tanh(x[:, :2] @ mix[0]) * (1 + turn) + np.tanh(x[:, :2] @ mix[1]) * (1 - turn)
     heights = rng.normal(0, 5, (rows * fits, 3 * layout.samples)).astype(np.float32)
     return ClipRows(
         name,

@@ -1,11 +1,6 @@
 """Creates a configuration's network weights, training history and last checkpoint from its database."""
 
-import os
 from pathlib import Path
-
-# Threads that wait must sleep: spinning ones starve each other wherever another process wants a core. With
-# five others at work on two cores: 170 samples a second spinning, 7,000 sleeping. Read as torch is imported.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from hobble.training.run import run
 from hobble.workflow.job import job

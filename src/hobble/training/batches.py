@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import torch
@@ -13,9 +12,8 @@ from hobble.database.reader import Block, Database
 
 TRAIN = "train"
 BLOCK_ROWS = 4096
-LOOK_EVERY = (
-    2048  # samples between looks at the losses, so that an accelerator is not waited for at each batch
-)
+LOOK_EVERY = 2048  # samples between looks at the losses: an accelerator is not waited for at each batch
+DIVERGED = 100.0  # predicting nothing but the mean has an error of 1
 NAMED = 8  # clips that a message names
 
 
@@ -35,7 +33,7 @@ def batches(
 
 
 class Watch:
-    """Adds up the losses of a section, and stops the training at the first that is no finite number.
+    """Adds up the losses of a section, and stops the training where it diverges.
 
     where: the pass and section, as a person would say it. clips: names by index.
     """
@@ -44,6 +42,7 @@ class Watch:
         self.where, self.clips = where, clips
         self.samples, self._batches, self._total, self._new = 0, 0, 0.0, 0
         self._waiting: list[tuple[torch.Tensor, Block]] = []
+        self._worst: tuple[float, int, Block] | None = None
 
     def add(self, loss: torch.Tensor, batch: Block) -> None:
         """Note a batch and its loss, a scalar on any device."""
@@ -53,38 +52,42 @@ class Watch:
             self._look()
 
     def mean(self) -> float:
-        """The mean loss over the section's samples; raises HobbleError where one is not finite."""
+        """The mean loss over the section's samples; raises HobbleError where that is no learning any more."""
         self._look()
-        return self._total / max(self.samples, 1)
+        mean = self._total / max(self.samples, 1)
+        if mean > DIVERGED and self._worst is not None:
+            raise HobbleError(self._message(f"its error is {mean:.3g} on the average", *self._worst[1:]))
+        return mean
 
     def _look(self) -> None:
         if not self._waiting:
             return
         losses = torch.stack([loss for loss, _ in self._waiting]).double().cpu().numpy()
-        for loss, (_, batch) in zip(losses, self._waiting, strict=True):
+        for loss, (_, batch) in zip(losses.tolist(), self._waiting, strict=True):
             self._batches += 1
             if not np.isfinite(loss):
-                raise HobbleError(self._message(batch))
+                raise HobbleError(self._message("its error is not a finite number", self._batches, batch))
+            if loss > DIVERGED and (self._worst is None or loss > self._worst[0]):
+                self._worst = (loss, self._batches, batch)
             self.samples += len(batch.p)
-            self._total += float(loss) * len(batch.p)
+            self._total += loss * len(batch.p)
         self._waiting.clear()
         self._new = 0
 
-    def _message(self, batch: Block) -> str:
-        what = f"training diverged in {self.where}, batch {self._batches}: its error is not a finite number"
+    def _message(self, what: str, number: int, batch: Block) -> str:
+        text = f"training diverged in {self.where}, batch {number}: {what}"
         bad = ~(np.isfinite(batch.x).all(1) & np.isfinite(batch.y).all(1) & np.isfinite(batch.p))
         if bad.any():
-            rows = [
-                f"{self.clips[c]} frame {f}" for c, f in zip(batch.clip[bad], batch.frame[bad], strict=True)
-            ]
-            return f"{what}, since these rows of the database are not: {_some(rows)}. Look at the clip there."
-        names = [self.clips[c] for c in np.unique(batch.clip)]
+            places = zip(batch.clip[bad], batch.frame[bad], strict=True)
+            rows = _some([f"{self.clips[clip]} frame {frame}" for clip, frame in places])
+            return f"{text}, since rows of the database are not: {rows}. Look at the clip there."
+        names = _some([self.clips[clip] for clip in np.unique(batch.clip)])
         return (
-            f"{what}. It holds frames of {_some(names)}. The last checkpoint is kept. "
+            f"{text}. The batch holds frames of {names}. The last checkpoint is kept. "
             "Lower training.learning_rate, or look for broken frames in these clips."
         )
 
 
-def _some(names: list[Any]) -> str:
+def _some(names: list[str]) -> str:
     more = len(names) - NAMED
     return ", ".join(names[:NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -97,6 +97,8 @@ class Saver:
 
     def __init__(self, path: Path, recipe: str) -> None:
         self.path, self.recipe = path, recipe
+        for left_by_a_kill in path.parent.glob(f".{path.name}.*.part"):
+            left_by_a_kill.unlink()
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="checkpoint")
         self._pending: Future[None] | None = None
 

@@ -12,6 +12,7 @@ from torch import Tensor
 from hobble.training.network import Network
 from hobble.training.step import Step
 
+WORTH_A_THREAD = 100_000  # numbers, some 20 microseconds of work
 ODD = np.uint64(0x9E3779B97F4A7C15)
 
 
@@ -32,6 +33,7 @@ class FusedStep(Step):
         masks = []
         for number, width in enumerate(self.network.sizes[:-1]):
             masks.append(self._buffer(f"mask {number}", rows, width))
+            team(rows * width)
             self.counter = np.uint64(_draw(masks[-1].numpy(), self.counter, self.keep))
         return masks
 
@@ -45,12 +47,14 @@ class FusedStep(Step):
         """As in `Step`, in one sweep."""
         e = self._buffer(f"e {number}", len(x), c.shape[1] * (x.shape[1] + 1), self.factors.dtype)
         slope = self._buffer(f"slope {number}", *x.shape)
+        team(e.numel())
         _expand(x.numpy(), c.numpy(), mask.numpy(), bits(e), slope.numpy())
         return e, slope
 
     def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
         """As in `Step`, in one sweep."""
         d = self._buffer(f"d {number}", *slope.shape)
+        team(de.numel())
         _contract(bits(de), c.numpy(), slope.numpy(), d.numpy())
         return d
 
@@ -60,6 +64,12 @@ class FusedStep(Step):
         if key not in self.buffers or len(self.buffers[key]) < rows:
             self.buffers[key] = torch.empty(rows, width, dtype=dtype or self.network.flat.dtype)
         return self.buffers[key][:rows]
+
+
+def team(values: int) -> None:
+    """Give the next compiled loop as many threads as pay for `values` numbers: waking one takes a while."""
+    most = min(torch.get_num_threads(), numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    numba.set_num_threads(max(1, min(most, values // WORTH_A_THREAD)))
 
 
 def bits(array: Tensor) -> np.ndarray:

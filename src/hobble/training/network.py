@@ -89,8 +89,9 @@ def coefficients(p: Tensor, control_points: int) -> Tensor:
         ],
         dim=1,
     )
-    out = torch.zeros(len(p), control_points, dtype=p.dtype, device=p.device)
-    return out.scatter_(1, torch.remainder(index, control_points), cubic)
+    knots = torch.arange(control_points, device=p.device)
+    picked = torch.remainder(index, control_points)[:, :, None] == knots
+    return torch.sum(cubic[:, :, None] * picked, dim=1)
 
 
 def expand(x: Tensor, c: Tensor) -> Tensor:

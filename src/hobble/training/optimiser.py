@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from hobble.training.fused import bits, widened
+from hobble.training.fused import bits, team, widened
 from hobble.training.network import Network
 
 EPSILON = 1e-8
@@ -64,6 +64,7 @@ def _sweep(
 def _sweep_on_cpu(w: Tensor, m: Tensor, v: Tensor, g: Tensor, *numbers: float) -> None:
     """The same in one pass over memory, whose bandwidth is all that bounds it."""
     arrays = [bits(array.flatten(0, 1)) for array in (w, m, v, g)]
+    team(w.numel())
     _fused(*arrays, *(arrays[0].dtype.type(n) for n in (*numbers, EPSILON)))
 
 

@@ -69,11 +69,11 @@ def begin(
         if path is None or not path.exists():
             continue
         data = load_npz(path)
-        if int(data["sections"]) > goal:
-            log.warning("%s is past %d passes already; not going on from it", path, training["passes"])
+        if int(data.get("sections", 0)) > goal:
+            log.warning("%s is past %d passes; starting anew", path, training["passes"])
             continue
         unpack(data, state, path)
-        if str(data["recipe"]) != recipe:
+        if str(data.get("recipe")) != recipe:
             log.warning("%s was made with other settings, data or code; going on from it all the same", path)
         log.info("going on from %s, after section %d of %d", path, state.sections, goal)
         break

@@ -1,0 +1,46 @@
+"""The optimiser's two ways are one."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from hobble.training import optimiser
+from hobble.training.network import initialise
+from hobble.training.optimiser import Adam
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16])
+def test_the_compiled_sweep_is_the_plain_one(dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch) -> None:
+    networks = [initialise((40, 30, 20), 4, 1) for _ in range(2)]
+    generator = torch.Generator().manual_seed(1)
+    adams = [Adam(network, 0.01, 0.9, 0.999, 0.1) for network in networks]
+    for _ in range(5):
+        gradients = [torch.randn(layer.shape, generator=generator).to(dtype) for layer in networks[0].layers]
+        adams[0].step(gradients)
+        with monkeypatch.context() as patch:
+            patch.setattr(optimiser, "_sweep_on_cpu", optimiser._sweep)
+            adams[1].step(gradients)
+    assert torch.allclose(networks[0].flat, networks[1].flat, rtol=1e-4, atol=1e-6)
+    assert torch.allclose(adams[0].first, adams[1].first, rtol=1e-4, atol=1e-6)
+
+
+def test_only_the_l1_term_moves_weights_that_have_no_gradient() -> None:
+    network = initialise((8, 6, 4), 4, 1)
+    network.layers[0][0, 0, 0] = 0.0
+    before = network.flat.clone()
+    adam = Adam(network, 0.001, 0.9, 0.999, 0.01)
+    adam.step([torch.zeros_like(layer) for layer in network.layers])
+    old, new = network.views(before), network.layers
+    for was, now in zip(old, new, strict=True):
+        assert torch.equal(was[:, :, -1], now[:, :, -1])  # biases are not weighed
+        moved = was[:, :, :-1] - now[:, :, :-1]
+        assert torch.all(torch.sign(moved) == torch.sign(was[:, :, :-1]))
+    assert float(new[0][0, 0, 0]) == 0
+
+
+def test_the_share_of_a_layer_in_the_l1_term() -> None:
+    """.01 * mean|W| / 6 for three layers: the original has six arrays, three of weights, three of biases."""
+    network = initialise((342, 512, 512, 311), 4, 1)
+    slopes = optimiser.l1_slopes(network, 0.01)
+    assert slopes == pytest.approx([0.01 / 6 / (4 * n) for n in (342 * 512, 512 * 512, 512 * 311)])

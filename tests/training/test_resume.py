@@ -1,0 +1,192 @@
+"""A training that was interrupted, prolonged or handed on ends at the bits of one that never stopped."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from hobble.core.errors import InputError
+from hobble.core.files import load_npz, save_npz
+from hobble.database.layout import CONTACTS, GAITS, RowLayout
+from hobble.database.reader import Database
+from hobble.training.checkpoint import pack
+from hobble.training.run import run
+from hobble.training.start import recipe_hash
+from hobble.training.train import train
+
+Settings = dict[str, Any]
+
+PROCESS = """
+import json, sys
+from pathlib import Path
+from hobble.database.reader import Database
+from hobble.training.train import train
+train(Database.open(sys.argv[1], 64), checkpoints=Path(sys.argv[2]), threads=2, **json.loads(sys.argv[3]))
+"""
+
+
+def test_killed_at_any_moment_it_ends_at_the_same_bits(
+    small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
+) -> None:
+    settings = {"network": network, "training": training | {"passes": 40}}
+    killed = tmp_path / "killed"
+    command = [sys.executable, "-c", PROCESS, str(small_database), str(killed), json.dumps(settings)]
+    for wait in (0.02, 0.0):
+        before = _sections(killed)
+        process = subprocess.Popen(command)
+        while process.poll() is None and _sections(killed) == before:
+            time.sleep(0.005)
+        time.sleep(wait)
+        process.send_signal(signal.SIGKILL)
+        assert process.wait() == -signal.SIGKILL
+        assert before < _sections(killed) < 120
+    (next(killed.iterdir()) / ".checkpoint.npz.1.part").write_bytes(b"what a kill leaves")
+    final = train(data, **settings, checkpoints=killed, threads=2)
+    undisturbed = train(data, **settings, checkpoints=tmp_path / "undisturbed", threads=2)
+    assert torch.equal(final.network.flat, undisturbed.network.flat)
+    assert torch.equal(final.adam.second, undisturbed.adam.second)
+    assert final.best is not None
+    assert undisturbed.best is not None
+    assert torch.equal(final.best, undisturbed.best)
+    assert len(final.history) == 120
+    assert not list(killed.rglob("*.part"))
+
+
+def _sections(folder: Path) -> int:
+    paths = list(folder.glob("*/checkpoint.npz"))
+    return int(load_npz(paths[0])["sections"]) if paths else 0
+
+
+def test_more_passes_go_on_and_fewer_start_anew(
+    data: Database, network: Settings, training: Settings, tmp_path: Path
+) -> None:
+    def to(passes: int, folder: str) -> torch.Tensor:
+        settings = training | {"passes": passes}
+        state = train(data, network=network, training=settings, checkpoints=tmp_path / folder, threads=2)
+        assert len(state.history) == 3 * passes
+        return state.network.flat
+
+    to(1, "a")
+    three = to(3, "a")
+    assert len(list((tmp_path / "a").iterdir())) == 1
+    assert torch.equal(three, to(3, "b"))
+    assert torch.equal(to(2, "b"), to(2, "c"))
+
+
+def test_one_configuration_continues_another_as_if_it_were_one(
+    small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
+) -> None:
+    def go(name: str, passes: int, start: str | None) -> dict[str, np.ndarray]:
+        folder = tmp_path / name
+        run(
+            small_database,
+            configuration=name,
+            network=network,
+            training=training | {"passes": passes, "continues": start},
+            checkpoints=folder / "checkpoints",
+            threads=2,
+            start=tmp_path / start / "checkpoint.npz" if start else None,
+            code="fingerprint",
+            weights=folder / "weights.npz",
+            history=folder / "history.csv",
+            checkpoint=folder / "checkpoint.npz",
+        )
+        return load_npz(folder / "weights.npz")
+
+    go("holden", 2, None)
+    continued, scratch = go("holden-xt", 4, "holden"), go("scratch", 4, None)
+    for name in continued:
+        if name != "meta":
+            assert np.array_equal(continued[name], scratch[name]), name
+    assert len((tmp_path / "holden-xt" / "history.csv").read_text().splitlines()) == 1 + 4 * 3
+    assert json.loads(str(continued["meta"]))["passes"] == 4
+    assert [f["steps"] for f in _checkpoints(tmp_path)] == [288, 144, 288]
+
+
+def _checkpoints(folder: Path) -> list[dict[str, np.ndarray]]:
+    return [load_npz(folder / name / "checkpoint.npz") for name in ("holden-xt", "holden", "scratch")]
+
+
+def test_weights_are_all_that_a_runtime_needs(
+    small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
+) -> None:
+    files = {name: tmp_path / name for name in ("weights", "history", "checkpoint")}
+    settings = {"network": network, "training": training, "threads": 2, "start": None, "code": None}
+    run(small_database, configuration="small", checkpoints=tmp_path / "c", **settings, **files)
+    first = files["weights"].read_bytes()
+    run(small_database, configuration="small", checkpoints=tmp_path / "d", **settings, **files)
+    assert files["weights"].read_bytes() == first
+    weights = load_npz(files["weights"])
+    meta = json.loads(str(weights["meta"]))
+    assert RowLayout.from_dict(meta["layout"]) == data.layout
+    assert list(meta["skeleton"]["joints"]) == list(data.skeleton["joints"])
+    assert (meta["gaits"], meta["contacts"]) == (list(GAITS), list(CONTACTS))
+    assert (meta["links"], meta["configuration"]) == (["Hips-LeftLeg"], "small")
+    assert weights["W0"].shape == (4, 24, data.layout.x_size)
+    assert weights["b2"].shape == (4, data.layout.y_size)
+    block = next(data.blocks("held_out", 0, 0, data.manifest.visits, 0))
+    p, y = np.array([0.25, 0.5]), []
+    for row, phase in enumerate(p):  # at a control point the network is that control point's
+        x = block.x[row]
+        for layer in range(3):
+            x = weights[f"W{layer}"][int(phase * 4)] @ x + weights[f"b{layer}"][int(phase * 4)]
+            x = np.where(x > 0, x, np.expm1(x)) if layer < 2 else x
+        y.append(x)
+    state = train(data, network=network, training=training, checkpoints=tmp_path / "c", threads=2)
+    ours = state.network(torch.from_numpy(block.x[:2]), torch.from_numpy(p.astype(np.float32)))
+    assert np.allclose(ours.numpy(), np.stack(y), rtol=1e-4, atol=1e-4)
+
+
+def test_a_checkpoint_of_another_network_is_refused(
+    data: Database, network: Settings, training: Settings, tmp_path: Path
+) -> None:
+    state = train(data, network=network, training=training, checkpoints=tmp_path / "a", threads=2)
+    save_npz(tmp_path / "other.npz", **pack(state, "x"))
+    with pytest.raises(
+        InputError, match=r"other\.npz: holds a network of \d+-24-24-\d+ units.* not of .*-30-30-"
+    ):
+        train(
+            data,
+            network=network | {"units": 30},
+            training=training,
+            checkpoints=tmp_path / "b",
+            start=tmp_path / "other.npz",
+        )
+
+
+@pytest.mark.parametrize("damage", ["cut", "other"])
+def test_a_damaged_checkpoint_is_named(
+    data: Database, network: Settings, training: Settings, tmp_path: Path, damage: str
+) -> None:
+    arguments: Settings = {"network": network, "training": training, "threads": 2}
+    train(data, **arguments, checkpoints=tmp_path)
+    path = next(tmp_path.glob("*/checkpoint.npz"))
+    if damage == "cut":
+        path.write_bytes(path.read_bytes()[:5000])
+    else:
+        save_npz(path, something=np.zeros(3))
+    with pytest.raises(InputError, match=r"checkpoint\.npz"):
+        train(data, **arguments, checkpoints=tmp_path)
+
+
+def test_the_name_of_a_training_says_what_determines_it(
+    data: Database, network: Settings, training: Settings
+) -> None:
+    name = recipe_hash(network, training, data, "code")
+    assert name == recipe_hash(network, training | {"passes": 99, "continues": "x"}, data, "code")
+    others = [
+        recipe_hash(network | {"units": 25}, training, data, "code"),
+        recipe_hash(network, training | {"learning_rate": 0.1}, data, "code"),
+        recipe_hash(network, training, data, "other code"),
+        recipe_hash(network, training | {"sections": 4}, data, "code"),
+    ]
+    assert len({name, *others}) == 5

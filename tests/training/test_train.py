@@ -1,0 +1,183 @@
+"""A training learns, says how, gives the same bits again, and stops where it diverges."""
+
+from __future__ import annotations
+
+import csv
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from hobble.core import files
+from hobble.core.errors import HobbleError, InputError
+from hobble.database.reader import Block, Database
+from hobble.training import checkpoint, start, train
+from hobble.training.batches import batches
+from hobble.training.checkpoint import State
+from hobble.training.held_out import HeldOut
+from hobble.training.history import columns, write_history
+from hobble.training.network import initialise
+
+Settings = dict[str, Any]
+Run = Callable[..., State]
+
+
+@pytest.fixture
+def run(data: Database, network: Settings, training: Settings, tmp_path: Path) -> Run:
+    """Train with some settings changed, checkpoints under `folder`."""
+
+    def go(folder: str = "checkpoints", begin: Path | None = None, **changes: Any) -> State:
+        return train.train(
+            data,
+            network=network,
+            training=training | changes,
+            checkpoints=tmp_path / folder,
+            threads=2,
+            start=begin,
+        )
+
+    return go
+
+
+def test_it_learns_and_generalises(run: Run) -> None:
+    state = run(passes=20, dropout=0.0, l1=0.0)
+    first, last = state.history[0], state.history[-1]
+    assert last[4] < 0.02 * first[4]
+    assert last[5] < 0.8 * first[5]
+    assert state.best_mse == min(row[5] for row in state.history)
+
+
+def test_batches_are_the_sections_samples_in_order(data: Database) -> None:
+    seen = list(batches(data, 1, 2, 3, seed=5, size=32))
+    blocks = list(data.blocks("train", 1, 2, 3, 5))
+    assert [len(batch.p) for batch in seen[:-1]] == [32] * (len(seen) - 1)
+    assert 0 < len(seen[-1].p) <= 32
+    for mine, theirs in zip(zip(*seen, strict=True), zip(*blocks, strict=True), strict=True):
+        assert np.array_equal(np.concatenate(mine), np.concatenate(theirs))
+    assert sum(len(batch.p) for batch in seen) == data.section_pairs("train", 2, 3)
+
+
+def test_the_same_again_gives_the_same_bits(run: Run) -> None:
+    one, again = run("one"), run("two")
+    assert torch.equal(one.network.flat, again.network.flat)
+    assert torch.equal(one.adam.second, again.adam.second)
+    drop_seconds = [[v for i, v in enumerate(row) if i != 3] for row in one.history]
+    assert drop_seconds == [[v for i, v in enumerate(row) if i != 3] for row in again.history]
+    assert not torch.equal(one.network.flat, run("three", seed=2).network.flat)
+
+
+@pytest.mark.parametrize(("batch", "precision"), [(300, "auto"), (32, "bfloat16"), (5000, "float32")])
+def test_batches_of_any_size_train(run: Run, batch: int, precision: str) -> None:
+    state = run(batch=batch, precision=precision, passes=4)
+    assert state.samples == 4 * 2300
+    assert state.history[-1][4] < state.history[0][4]
+
+
+def test_history_counts_and_agrees_with_the_network(run: Run, data: Database, tmp_path: Path) -> None:
+    state = run()
+    path = tmp_path / "history.csv"
+    write_history(path, data.layout.blocks("y"), state.history)
+    rows = list(csv.DictReader(path.open()))
+    assert list(rows[0]) == columns(data.layout.blocks("y"))
+    assert [(row["pass"], row["section"]) for row in rows] == [(p, s) for p in "12" for s in "123"]
+    assert [int(row["samples"]) for row in rows] == [766, 1533, 2300, 3066, 3833, 4600]
+    seconds = [float(row["seconds"]) for row in rows]
+    assert seconds == sorted(seconds)
+    block = next(data.blocks("held_out", 0, 0, data.manifest.visits, 0))
+    assert len(block.p) == data.rows("held_out")
+    y = state.network(torch.from_numpy(block.x), torch.from_numpy(block.p)).numpy()
+    squares = (y - block.y) ** 2
+    assert float(rows[-1]["held_out_mse"]) == pytest.approx(float(squares.mean()), rel=1e-5)
+    for name, part in data.layout.blocks("y").items():
+        assert float(rows[-1][f"held_out_{name}"]) == pytest.approx(float(squares[:, part].mean()), rel=1e-5)
+
+
+def test_without_held_out_clips_the_errors_are_left_empty(
+    run: Run, monkeypatch: pytest.MonkeyPatch, data: Database, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(HeldOut, "_stream", lambda self: iter(()))
+    write_history(tmp_path / "history.csv", data.layout.blocks("y"), run(passes=1).history)
+    row = next(csv.DictReader((tmp_path / "history.csv").open()))
+    assert row["held_out_mse"] == row["held_out_turn"] == ""
+    assert float(row["train_mse"]) > 0
+
+
+def test_a_held_out_sample_is_a_part_of_the_whole(data: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    network = initialise((data.layout.x_size, 8, data.layout.y_size), 4, 1)
+    held_out = HeldOut(data, torch.device("cpu"), 0)
+    assert sum(len(part[0]) for part in held_out.sample) == 70
+    assert held_out.errors(network) == held_out.whole(network)
+
+
+def poisoned(data: Database, monkeypatch: pytest.MonkeyPatch, turn: int, value: float) -> None:
+    """Make row 40 of section `turn` wrong."""
+    blocks = Database.blocks
+
+    def wrong(self: Database, split: str, p: int, section: int, sections: int, *rest: int) -> Any:
+        for block in blocks(self, split, p, section, sections, *rest):
+            if split == "train" and p * sections + section == turn:
+                block.y[40, 3] = value
+            yield block
+
+    monkeypatch.setattr(Database, "blocks", wrong)
+
+
+def test_no_number_in_a_row_stops_it_and_names_the_row(
+    run: Run, data: Database, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    clean: Block = next(data.blocks("train", 1, 1, 3, 1))
+    poisoned(data, monkeypatch, 4, np.nan)
+    with pytest.raises(HobbleError) as error:
+        run()
+    text = str(error.value)
+    assert "pass 2 of 2, section 2 of 3, batch 2:" in text
+    assert f"{data.clips[clean.clip[40]]} frame {clean.frame[40]}" in text
+    kept = files.load_npz(next(tmp_path.glob("checkpoints/*/checkpoint.npz")))
+    assert int(kept["sections"]) == 4
+    assert np.isfinite(kept["weights"]).all()
+
+
+def test_after_the_cause_is_gone_it_goes_on_as_if_nothing_had_been(
+    run: Run, data: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        poisoned(data, patch, 4, np.nan)
+        with pytest.raises(HobbleError):
+            run()
+    assert torch.equal(run().network.flat, run("undisturbed").network.flat)
+
+
+def test_divergence_stops_it_and_names_the_clips(run: Run) -> None:
+    with pytest.raises(
+        HobbleError, match=r"diverged in pass 1 of 2, section \d of 3, batch \d+: .*hop.*walk"
+    ):
+        run(learning_rate=300.0)
+
+
+def test_a_full_disk_ends_in_a_message(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: Any, **__: Any) -> None:
+        raise InputError("checkpoint.npz", "the disk is full")
+
+    monkeypatch.setattr(checkpoint, "save_npz", full)
+    with pytest.raises(HobbleError, match="disk is full"):
+        run()
+
+
+def test_cuda_where_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    assert start.device("auto").type == "cpu"
+    with pytest.raises(HobbleError, match=r"training\.device is cuda"):
+        start.device("cuda")
+
+
+def test_each_section_is_logged_with_speed_and_time_left(run: Run, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO):
+        run()
+    lines = [r.getMessage() for r in caplog.records if "samples/s" in r.getMessage()]
+    assert len(lines) == 6
+    assert lines[0].startswith("pass 1 of 2, section 1 of 3: error ")
+    assert lines[-1].endswith("0 s left")
