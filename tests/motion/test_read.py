@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
 from hobble.motion.read import read_bvh
@@ -58,6 +62,7 @@ def test_reads_names_offsets_channels_and_values(written):
 
 VARIANTS = {
     "crlf": lambda s: s.replace("\n", "\r\n"),
+    "carriage returns only": lambda s: s.replace("\n", "\r"),
     "byte order mark": lambda s: "\ufeff" + s,
     "tabs": lambda s: s.replace(" ", "\t").replace("\tLeg", " Leg").replace("End\tSite", "End Site"),
     "trailing blanks": lambda s: s.replace("\n", "  \n") + "\n\n",
@@ -101,6 +106,7 @@ BROKEN = {
         "'-1.#IND' is not a number",
         24,
     ),
+    "python's underscores": (lambda s: s.replace("1.5e1", "1_5"), "'1_5' is not a number", 24),
     "decimal comma": (lambda s: s.replace("1.5e1", "1,5"), "decimal comma", 24),
     "a value missing": (lambda s: s.replace("7 8 9\n", "7 8\n"), "8 values where the joints have 9", 23),
     "a value too many": (lambda s: s.replace("7 8 -9\n", "7 8 -9 1\n"), "10 values", 24),
@@ -124,6 +130,8 @@ BROKEN = {
         8,
     ),
     "offset nan": (lambda s: s.replace("OFFSET 1 -2e1 3.5", "OFFSET 1 nan 2"), "not finite", 8),
+    "no brace": (lambda s: s.replace("ROOT Hips\n{", "ROOT Hips"), "OFFSET outside", 3),
+    "joint in joint": (lambda s: s.replace("ROOT Hips\n{", "ROOT Hips\nJOINT a\n{"), "brace is missing", 3),
     "no offset": (lambda s: s.replace("\t\tOFFSET 1 -2e1 3.5\n", ""), "no OFFSET", 17),
     "brace too many": (lambda s: s.replace("}\nMOTION", "}\n}\nMOTION"), "closing brace too many", 20),
     "frame time nought": (lambda s: s.replace("0.0333333", "0"), "makes no sense", 22),
@@ -181,3 +189,23 @@ def test_every_shared_file_loads(shared):
         clip = read_bvh(file)
         assert len(clip.names) in (31, 55)
         assert len(clip) == clip.declared
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.data())
+def test_whatever_happens_to_a_file_ends_in_a_clip_or_one_message(tmp_path_factory, data):
+    text = bytearray(SMALL.encode())
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(text) - 1))
+        cut = data.draw(st.integers(0, 30))
+        text[at : at + cut] = data.draw(
+            st.binary(max_size=4) | st.sampled_from([b"nan", b"{", b"}", b"\n", b"-1 "])
+        )
+        text = text or bytearray(b" ")
+    path = tmp_path_factory.getbasetemp() / "mangled.bvh"
+    path.write_bytes(bytes(text))
+    with contextlib.suppress(InputError):
+        clip = read_bvh(path)
+        assert np.isfinite(clip.values).all()
+        assert np.isfinite(clip.offsets).all()
+        assert clip.values.shape == (len(clip), sum(len(c) for c in clip.channels))

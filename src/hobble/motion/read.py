@@ -7,6 +7,7 @@ names with spaces or prefixes, braces anywhere. What the numbers mean is the wor
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NoReturn
@@ -87,6 +88,8 @@ def _bytes(path: Path) -> bytes:
     if b"\0" in data[:65536] or b"\0" in data[-65536:]:
         raise InputError(path, "binary data, not a BVH text file", fix=_EXPORT)
     data = data.removeprefix(b"\xef\xbb\xbf")
+    if b"\n" not in data:
+        data = data.replace(b"\r", b"\n")  # an old Macintosh's lines
     if not data[:4096].lstrip()[:9].upper() == b"HIERARCHY":
         raise InputError(path, "not a BVH file: it does not begin with HIERARCHY", line=1)
     return data
@@ -142,6 +145,8 @@ class _Hierarchy:
 
     def _joint(self, name: str) -> None:
         names = self.header.names
+        if self.pending is not None:
+            self.fail("an opening brace is missing")
         if not name:
             self.fail("a joint without a name")
         if name in self.seen:
@@ -254,7 +259,7 @@ def _motion(path: Path, data: bytes, at: int, header: _Header) -> Bvh:
             fix=_EXPORT,
         )
     first = max(line_frames, line_time) + 1
-    values = _values(path, data[body:], width, declared, first)
+    values = _values(path, data, body, width, declared, first)
     return Bvh(
         path,
         tuple(header.names),
@@ -281,20 +286,22 @@ def _declaration(path: Path, head: list[bytes], key: bytes, line: int) -> tuple[
     raise InputError(path, f"truncated: no {name!r} after MOTION", line=line + 1, fix=_EXPORT)
 
 
-def _values(path: Path, body: bytes, width: int, declared: int, first_line: int) -> Array:
-    """The table (F, width), one line a frame; falls back on a slower, explaining reader."""
-    try:
-        table = np.loadtxt(io.BytesIO(body), dtype=float, comments=None, ndmin=2)
-    except ValueError:
-        table = _explained(path, body, width, declared, first_line)
-    if table.size == 0:
+def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_line: int) -> Array:
+    """The table (F, width), one line a frame from `at` on; falls back on a slower, explaining reader."""
+    text = io.BytesIO(data)  # shares the bytes; a slice would copy a file of 100 MB
+    text.seek(at)
+    if not re.compile(rb"\S").search(data, at):
         raise InputError(path, f"truncated: declares {declared} frames and holds none", line=first_line)
+    try:
+        table = np.loadtxt(text, dtype=float, comments=None, ndmin=2)
+    except ValueError:
+        table = _explained(path, data[at:], width, first_line)
     if table.shape[1] != width:
-        table = _explained(path, body, width, declared, first_line)
+        table = _explained(path, data[at:], width, first_line)
     bad = ~np.isfinite(table).all(axis=1)
     if bad.any():
         frame = int(np.argmax(bad))
-        line = _line_of(body, frame, first_line)
+        line = _line_of(data[at:], frame, first_line)
         raise InputError(path, "a value is NaN or infinite", line=line, frame=frame + 1, fix=_EXPORT)
     if abs(len(table) - declared) > 1:
         what = "truncated: declares" if len(table) < declared else "declares"
@@ -302,13 +309,13 @@ def _values(path: Path, body: bytes, width: int, declared: int, first_line: int)
     return table
 
 
-def _explained(path: Path, body: bytes, width: int, declared: int, first_line: int) -> Array:
+def _explained(path: Path, body: bytes, width: int, first_line: int) -> Array:
     """Frames that run over several lines are read; anything else is refused with its line."""
     lines = body.split(b"\n")
     counts = np.array([len(raw.split()) for raw in lines])
     used = np.flatnonzero(counts)
-    wrapped = len(used) > 1 and counts[used].sum() == width * declared and len(used) >= 2 * declared
-    if not wrapped:
+    whole = counts.sum() % width == 0 and counts.sum() > 0
+    if not (whole and (counts[used] < width).all()):
         for n, i in enumerate(used):
             if counts[i] == width:
                 continue
@@ -317,15 +324,20 @@ def _explained(path: Path, body: bytes, width: int, declared: int, first_line: i
             raise InputError(path, problem, line=first_line + int(i), frame=n + 1, fix=_EXPORT)
     for i in used:
         for word in lines[i].split():
-            try:
-                float(word)
-            except ValueError:
+            if not _number(word):
                 shown = word[:40].decode("latin-1")
-                problem = f"{shown!r} is not a number"
-                if b"," in word:
-                    problem += " (a decimal comma?)"
-                raise InputError(path, problem, line=first_line + int(i), fix=_EXPORT) from None
-    return np.array(body.split(), float).reshape(-1, width)
+                comma = " (a decimal comma?)" if b"," in word else ""
+                problem = f"{shown!r} is not a number{comma}"
+                raise InputError(path, problem, line=first_line + int(i), fix=_EXPORT)
+    return np.array([float(word) for word in body.split()]).reshape(-1, width)
+
+
+def _number(word: bytes) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return b"_" not in word
 
 
 def _line_of(body: bytes, frame: int, first_line: int) -> int | None:
