@@ -192,6 +192,8 @@ def test_wishes_that_make_no_sense(network) -> None:
     character = ProceduralAnimation(network, characters=2)
     with pytest.raises(ValueError, match="not a finite vector"):
         character.next_pose((0, np.nan))
+    with pytest.raises(ValueError, match="heights that are not finite"):
+        character.next_pose((0, 1), terrain=lambda x, z: x * np.nan)
     with pytest.raises(ValueError, match="1 gaits for 2 characters"):
         character.next_pose((0, 1), gait=["walk"])
     for options in ({"characters": 0}, {"severity_rate": 0}, {"severity_scale": -1}):

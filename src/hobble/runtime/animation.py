@@ -22,6 +22,7 @@ from hobble.runtime.trajectory import STILL
 from hobble.runtime.waypoints import Follower, Waypoint
 
 JOG_FROM = 5.0  # cm a frame: between walking at 2.5 and jogging at 7.5
+TERRAIN_SIDE = 25.0  # centimetres from the path to the side heights, where a network does not tell
 TURN_IN_PLACE = np.radians(20)  # a standing figure steps around to face what is further aside than this
 
 
@@ -81,6 +82,7 @@ class ProceduralAnimation:
             "severity_rate": severity_rate,
             "foot_locking": foot_locking,
             "steering": steering,
+            "side": float(network.meta.get("terrain_side", TERRAIN_SIDE)),
         }
         self._predictor = Predictor(network, mode, storage)
         self._waypoints = waypoints
@@ -152,7 +154,7 @@ class ProceduralAnimation:
         heal; None leaves all as they were. terrain: None for flat at zero, a function of two ground
         coordinates (arrays) to heights, a `ground.Heightmap` or a 2D array.
         Raises KeyError for a link or gait that the network does not have, ValueError for a severity out of
-        range.
+        range, or vectors or heights that are not finite.
         """
         velocity, ahead, gait = self._wish(target_velocity, facing, gait)
         strafe, direction = self._facing(velocity, ahead)

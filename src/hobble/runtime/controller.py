@@ -32,8 +32,8 @@ Ground = Callable[[Array, Array], Array]
 class Controller:
     """Runs characters of one network; `seconds` (6,) holds what each of STEPS took in the last frame.
 
-    severity_rate: largest change of a severity in a second; side: centimetres from the path to the side
-    heights. foot_locking: hold feet in contact where they landed.
+    severity_rate: largest change of a severity in a second; foot_locking: hold feet in contact where they
+    landed; steering: as of `trajectory.follow_wish`; side: centimetres from the path to the side heights.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Controller:
         severity_rate: float,
         foot_locking: bool,
         steering: float,
-        side: float = 25.0,
+        side: float,
     ) -> None:
         network = predictor.network
         layout = network.layout
@@ -78,8 +78,7 @@ class Controller:
         wish_gait: Array,
         ground: Ground | None,
     ) -> None:
-        """Run one frame; wishes as `trajectory.follow_wish`, ground: heights (N,) of world x, z (N,), or
-        flat."""
+        """Run one frame; wishes as of `trajectory.follow_wish`; ground gives heights (N,) at x, z (N,)."""
         clock = perf_counter
         t0 = clock()
         self._prepare(wish_velocity, wish_direction, wish_strafe, wish_gait, ground)
@@ -108,8 +107,8 @@ class Controller:
         if ground is None:
             c.ground[:] = 0.0
         else:
-            flat = self._points.reshape(-1, 2)
-            c.ground[:] = np.asarray(ground(flat[:, 0], flat[:, 1])).reshape(c.ground.shape)
+            level = self._points.reshape(-1, 2)
+            c.ground[:] = _heights(ground, level[:, 0], level[:, 1]).reshape(c.ground.shape)
         c.root_height[:] = c.ground[:, :, 1].mean(axis=1)
 
     def _input(self) -> None:
@@ -128,7 +127,7 @@ class Controller:
         if ground is not None:
             points = self.pose_position[:, self._legs[:, 2:].reshape(-1)]
             at = np.ascontiguousarray(points).reshape(-1, 3)
-            self._foot_ground[:] = np.asarray(ground(at[:, 0], at[:, 2])).reshape(self._foot_ground.shape)
+            self._foot_ground[:] = _heights(ground, at[:, 0], at[:, 2]).reshape(self._foot_ground.shape)
         else:
             self._foot_ground[:] = 0.0
         feet.place_feet(
@@ -142,11 +141,19 @@ class Controller:
         trajectory.advance(self.y, self._y_columns, c.position, c.direction, c.gait, c.phase)
 
 
+def _heights(ground: Ground, x: Array, z: Array) -> Array:
+    """The caller's ground at x, z (N,); raises ValueError where it is not finite, which would stay in the
+    state."""
+    heights = np.asarray(ground(x, z), float)
+    if not np.isfinite(heights).all():
+        raise ValueError("the terrain has heights that are not finite")
+    return heights
+
+
 @njit(cache=True)
 def _fill_input(
     position: Any, direction: Any, gait: Any, ground: Any, height: Any, joints: Any, velocities: Any,
-    severity: Any,
-    at: Any, step: int, x: Any,
+    severity: Any, at: Any, step: int, x: Any,
 ) -> None:  # fmt: skip
     """Fill rows X; at: first columns of the blocks of X in order."""
     middle, samples = position.shape[1] // 2, ground.shape[1]
