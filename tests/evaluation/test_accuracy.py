@@ -16,6 +16,7 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.database.clip_rows import ClipRows, expanded, save_clip_rows
 from hobble.database.layout import RowLayout
 from hobble.evaluation.accuracy import (
+    QUANTILES,
     Errors,
     clip_errors,
     equivalent_joints,
@@ -149,6 +150,8 @@ def test_a_clips_figures_are_those_of_all_its_pairs(weights, fits):
     assert got["mean"] == pytest.approx(np.concatenate(relative).mean())
     assert got["sd"] == pytest.approx(np.concatenate(relative).std())
     assert got["position_error_cm"] == pytest.approx(np.concatenate(distance).mean())
+    for name, share in QUANTILES.items():
+        assert got[name] == pytest.approx(np.quantile(np.concatenate(relative), share), rel=0.05)
 
 
 def test_batches_do_not_show(weights, monkeypatch):

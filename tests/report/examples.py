@@ -142,7 +142,7 @@ def accuracy(clips: tuple[str, ...], rng: np.random.Generator) -> dict[str, Any]
         for name in (clip, f"{clip}_mirror"):
             held_out = clip in HELD_OUT
             mean = float(rng.uniform(0.03, 0.05) * (1.5 if held_out else 1))
-            quantiles = [mean * k for k in (0.3, 0.6, 0.9, 1.2, 2.1)]
+            spread = {"p05": 0.3, "p25": 0.6, "p50": 0.9, "p75": 1.2, "p95": 2.1}
             rows.append(
                 {
                     "clip": name,
@@ -151,7 +151,7 @@ def accuracy(clips: tuple[str, ...], rng: np.random.Generator) -> dict[str, Any]
                     "mean": mean,
                     "sd": mean * 0.7,
                     "position_error_cm": 55 * mean,
-                    "quantiles": quantiles,
+                    **{key: mean * k for key, k in spread.items()},
                 }
             )
     out: dict[str, Any] = {"configuration": "example", "joints": 31, "clips": rows}

@@ -28,7 +28,10 @@ from hobble.runtime.network import Network, load_network
 LEAST = 1e-3  # cm; below this a joint stands at the root itself and a relative error says nothing
 SPLITS = ("train", "held_out")
 REFERENCE = "holden31"
-COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm")
+QUANTILES = {"p05": 0.05, "p25": 0.25, "p50": 0.5, "p75": 0.75, "p95": 0.95}
+COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
+# Bins of the relative error, a fiftieth wide, from which quantiles are read: no error needs to be kept.
+EDGES = np.concatenate([[0.0], np.geomspace(1e-4, 1e2, 701)])
 
 log = logging.getLogger("hobble")
 
@@ -39,12 +42,20 @@ class Errors:
 
     frames: int = 0
     moments: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
+    histogram: Array = field(default_factory=lambda: np.zeros(len(EDGES) - 1), repr=False)
 
     def __add__(self, other: Errors) -> Errors:
-        return Errors(self.frames + other.frames, self.moments + other.moments)
+        return Errors(
+            self.frames + other.frames, self.moments + other.moments, self.histogram + other.histogram
+        )
+
+    def quantile(self, share: float) -> float:
+        """The relative error that `share` of frames and joints stay below, to a hundredth of itself."""
+        below = np.concatenate([[0.0], np.cumsum(self.histogram)])
+        return float(np.interp(share * below[-1], below, EDGES))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data; None where there was no frame."""
+        """Plain data, with quantiles of the relative error; None where there was no frame."""
         if not self.frames:
             return {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}
         mean, sd = self.moments.mean, self.moments.std
@@ -53,6 +64,7 @@ class Errors:
             "mean": float(mean[0]),
             "sd": float(sd[0]),
             "position_error_cm": float(mean[1]),
+            **{name: self.quantile(share) for name, share in QUANTILES.items()},
         }
 
 
@@ -68,12 +80,14 @@ def joint_errors(layout: RowLayout, truth: Array, predicted: Array, joints: Sequ
 def clip_errors(network: Network, rows: ClipRows, joints: Sequence[int]) -> Errors:
     """The errors over every frame and fit of a clip, a batch at a time."""
     layout = network.layout
-    total = Moments.nothing(2)
+    total, histogram = Moments.nothing(2), np.zeros(len(EDGES) - 1)
     for pairs in expanded(rows, links=layout.links > 0):
         errors = joint_errors(layout, pairs.y, predict(network, pairs.x, pairs.p), joints)
         weights = np.repeat(pairs.weight / len(joints), len(joints))
-        total = total + Moments.of(errors.reshape(-1, 2), weights)
-    return Errors(len(rows), total)
+        errors = errors.reshape(-1, 2)
+        total = total + Moments.of(errors, weights)
+        histogram += np.histogram(np.minimum(errors[:, 0], EDGES[-1]), EDGES, weights=weights)[0]
+    return Errors(len(rows), total, histogram)
 
 
 def measure(

@@ -127,12 +127,8 @@ def clip_boxes(material: Material) -> Chart | None:
 
 def quantiles(row: dict[str, Any]) -> list[float] | None:
     """The 5th, 25th, 50th, 75th and 95th percentile of a clip's error, or None."""
-    source = row.get("quantiles")
-    if isinstance(source, dict):
-        source = [source.get(key) for key in QUANTILES]
-    if not isinstance(source, list) or len(source) != len(QUANTILES) or any(v is None for v in source):
-        return None
-    return source
+    found = [row[key] for key in QUANTILES if row.get(key) is not None]
+    return found if len(found) == len(QUANTILES) else None
 
 
 def accuracy_table(material: Material) -> Table:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
@@ -108,7 +109,7 @@ def readable(name: str) -> str:
     return name.replace("_", " ").capitalize()
 
 
-def packed(array: Array) -> str:
+def packed(array: NDArray[Any]) -> str:
     """The little-endian bytes of an array as base64."""
     array = np.ascontiguousarray(array)
     return base64.b64encode(array.astype(array.dtype.newbyteorder("<")).tobytes()).decode("ascii")
