@@ -162,10 +162,24 @@ def test_angles_that_wrap_do_not_show(walk, bvh, make):
     """The same angles written as 181 and -179 degrees by turns give the same rotations between the frames."""
     spun = replace(walk, rotations=walk.rotations.copy())
     spun.rotations[:, 0] = quat.mul(quat.yaw(np.linspace(0, 4 * np.pi, len(walk))), spun.rotations[:, 0])
-    clip, _ = make(bvh(spun, decimals=6), fps=50.0)
+    clip, report = make(bvh(spun, decimals=6, order="YXZ"), fps=50.0)
     step = quat.angle(clip.rotations[1:], clip.rotations[:-1])
     assert step.max() < 0.5
+    assert "wrap" in report["notes"][0]
+    assert "first Hips, frames" in report["notes"][0]
+    assert report["repairs"] == []
     assert np.sum(clip.rotations[1:] * clip.rotations[:-1], axis=-1).min() > 0
+
+
+def test_a_joint_that_flips_where_it_is_is_named(walk, bvh, make):
+    flipped = replace(walk, rotations=walk.rotations.copy())
+    thumb = walk.skeleton.index("LThumb")
+    half = quat.from_axis_angle(np.array([0.0, 0, 1.0]), 3.0)
+    flipped.rotations[50:60, thumb] = quat.mul(flipped.rotations[50:60, thumb], half)
+    _, report = make(bvh(flipped))
+    assert any(
+        "LThumb spins by up to 172 degrees" in s and "between frames 50 and 51" in s for s in report["notes"]
+    )
 
 
 def test_six_channels_that_repeat_the_offsets_are_dropped_and_said(walk, bvh, make):

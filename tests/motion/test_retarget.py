@@ -171,6 +171,8 @@ def test_foreign_rigs_are_recognised_by_their_names(walker, rigs, bvh, make):
         assert report["rig"] == name
         assert made.skeleton.name == "holden31"
         assert len(made) == 119
+        assert 0.9 < report["scale"] < 1.1
+        assert "bone lengths of holden31" in make(path, proportions="clip")[1]["repairs"][-1]
         lowest = made.positions[..., 1].min(axis=1)
         assert -3 < lowest.min() < lowest.max() < 6
 

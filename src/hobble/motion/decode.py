@@ -12,19 +12,23 @@ from hobble.motion.read import Bvh
 
 STANDARD_RATES = (120, 60, 30, 24, 25, 50, 100, 90, 48, 72, 144, 180, 200, 240, 250, 300, 15, 20, 12, 10)
 
+BLOCK = 4096  # frames at a time, so that intermediate results stay small
+
 
 @dataclass(frozen=True)
 class Decoded:
     """F frames of J joints, in the file's unit.
 
     rotations: (F, J, 4) local. root: (F, 3). offsets: (J, 3). translations: (F, J, 3) local positions where
-    some joint but the root really moves in its parent, else None. notes: what was found out, in sentences.
+    some joint but the root really moves in its parent, else None. repairs: sentences on channels dropped or
+    kept. notes: sentences on what needs no repair.
     """
 
     rotations: Array = field(repr=False)
     root: Array = field(repr=False)
     offsets: Array = field(repr=False)
     translations: Array | None = field(repr=False)
+    repairs: list[str]
     notes: list[str]
 
 
@@ -62,12 +66,30 @@ def decode(bvh: Bvh, still: float) -> Decoded:
         groups.setdefault(channels, []).append(j)
     for channels, members in groups.items():
         turns = [i for i, name in enumerate(channels) if name.endswith("rotation")]
-        if turns:
-            columns = starts[members][:, None] + np.array(turns)
-            order = "".join(channels[i][0] for i in turns)
-            rotations[:, members] = quat.from_euler(np.radians(bvh.values[:, columns]), order)
-    root, offsets, translations, notes = _positions(bvh, starts, still)
-    return Decoded(quat.continuous(rotations), root, offsets, translations, notes)
+        columns = starts[members][:, None] + np.array(turns, int)
+        order = "".join(channels[i][0] for i in turns)
+        for first in range(0, frames if turns else 0, BLOCK):
+            angles = np.radians(bvh.values[first : first + BLOCK, columns])
+            rotations[first : first + BLOCK, members] = quat.from_euler(angles, order)
+    root, offsets, translations, repairs = _positions(bvh, starts, still)
+    notes = _wraps(bvh, starts)
+    return Decoded(quat.continuous(rotations), root, offsets, translations, repairs, notes)
+
+
+def _wraps(bvh: Bvh, starts: Array) -> list[str]:
+    """A sentence on angles that leap by half a turn or more, as they do when they wrap at 360 degrees."""
+    channels = enumerate(bvh.channels)
+    turning = [starts[j] + i for j, names in channels for i, name in enumerate(names) if "rot" in name]
+    leaps = np.abs(np.diff(bvh.values[:, turning], axis=0)) > 180.0
+    if not leaps.any():
+        return []
+    after, column = (int(x) for x in np.argwhere(leaps)[0])
+    joint = bvh.names[int(np.searchsorted(starts, turning[column], side="right")) - 1]
+    times = int(leaps.any(axis=1).sum())
+    return [
+        f"Angles wrap by up to a whole turn between {times} pairs of frames (first {joint}, frames "
+        f"{after + 1} and {after + 2}); as rotations they go on smoothly."
+    ]
 
 
 def _positions(bvh: Bvh, starts: Array, still: float) -> tuple[Array, Array, Array | None, list[str]]:

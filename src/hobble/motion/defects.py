@@ -24,6 +24,8 @@ TELEPORT = 30.0  # cm: a jump of the root that is no seam of a loop
 HEAD, TAIL = 0.5, 1.0  # seconds: pieces up to this long before the first and after the last jump are cut off
 BRIDGE = 0.25  # seconds: pieces up to this long between two jumps are bridged
 BLEND = 0.1  # seconds to each side over which a jump in the pose is smoothed
+FLIP = np.radians(100.0)  # a joint turning by more from one frame to the next has flipped
+BLOCK = 4096  # frames at a time
 NO_POSE = 0.75  # share of joints without any rotation in a frame that holds no pose
 
 
@@ -52,39 +54,53 @@ class Jump:
 
 def repair(clip: Clip) -> Repaired:
     """Find broken frames and mend what can be mended; a sound clip comes back as it is."""
-    clip, sentences = _mend_glitches(clip)
-    left, bridges = _short_pieces(clip, find_jumps(clip))
-    for start, end, _ in bridges:
-        clip = _interpolate(clip, start, end)
+    glitches = _find_glitches(clip)
+    draft = _copy(clip) if glitches else clip
+    sentences = []
+    for frame, size, joint in glitches:
+        _interpolate(draft, frame, frame)
+        sentences.append(
+            f"Frame {frame + 1} is off by {size:.0f} cm at {joint}; the middle of its neighbours replaces it."
+        )
+    left, bridges = _short_pieces(draft, find_jumps(draft))
+    if not left and not bridges:
+        return Repaired(draft, 0, sentences)
     first, last = _without_edges(len(clip), clip.fps, left)
     teleports = [jump.after for jump in left if jump.root > TELEPORT and first <= jump.after < last]
     edges = [first - 1, *teleports, last]
     first, last = max(((a + 1, b) for a, b in pairwise(edges)), key=lambda part: part[1] - part[0])
+    mended = _copy(draft)
     for start, end, jump in bridges:
+        _interpolate(mended, start, end)
         if first <= start <= end <= last:
             sentences.append(f"{jump}; {_frames(start, end)} were bridged by interpolation.")
     for jump in left:
         if first <= jump.after < last:
-            clip = _smooth(clip, jump.after)
+            _smooth(mended, jump.after)
             sentences.append(f"{jump}; the motion was blended over {BLEND:g} s to each side.")
     if first > 0:
         sentences.append(_cut_sentence(clip, 0, first - 1, left, first - 1))
     if last < len(clip) - 1:
         sentences.append(_cut_sentence(clip, last + 1, len(clip) - 1, left, last))
-    return Repaired(_cut(clip, first, last), first, sentences)
+    return Repaired(_cut(mended, first, last), first, sentences)
 
 
 def find_jumps(clip: Clip) -> list[Jump]:
     """Transitions in which some joint moves much further than in the three before and the three after."""
     if len(clip) < 3:
         return []
-    step = np.diff(clip.positions, axis=0)
-    off = np.linalg.norm(step - _running_median(step, 3), axis=-1)
     limit = JUMP + JUMP_AT_30 * (30.0 / clip.fps) ** 2
-    return [
-        Jump(int(i), float(off[i].max()), clip.skeleton.joints[int(off[i].argmax())], float(off[i, 0]))
-        for i in np.flatnonzero(off.max(axis=1) > limit)
-    ]
+    jumps = []
+    for first in range(0, len(clip) - 1, BLOCK):
+        # Three transitions more to either side, so that medians do not end at a block.
+        start = max(0, first - 3)
+        step = np.diff(clip.positions[start : first + BLOCK + 4], axis=0)
+        off = np.linalg.norm(step - _running_median(step, 3), axis=-1)
+        for i in np.flatnonzero(off.max(axis=1) > limit):
+            if first <= start + i < first + BLOCK:
+                joint = clip.skeleton.joints[int(off[i].argmax())]
+                jumps.append(Jump(int(start + i), float(off[i].max()), joint, float(off[i, 0])))
+    return jumps
 
 
 def _running_median(values: Array, reach: int) -> Array:
@@ -96,25 +112,42 @@ def _running_median(values: Array, reach: int) -> Array:
     return np.median(windows, axis=0)
 
 
-def _mend_glitches(clip: Clip) -> tuple[Clip, list[str]]:
-    """Replace single frames that lie far off the middle between their neighbours by that middle."""
+def _find_glitches(clip: Clip) -> list[tuple[int, float, str]]:
+    """Single frames far off the middle between their neighbours: frame, cm, the joint furthest off."""
     if len(clip) < 5:
-        return clip, []
-    p = clip.positions
-    off = np.linalg.norm(p[1:-1] - 0.5 * (p[:-2] + p[2:]), axis=-1)
-    size = np.concatenate([[0.0], off.max(axis=1), [0.0]])
+        return []
     limit = GLITCH + GLITCH_AT_30 * (30.0 / clip.fps) ** 2
+    size, joint = np.zeros(len(clip)), np.zeros(len(clip), int)
+    for first in range(1, len(clip) - 1, BLOCK):
+        p = clip.positions[first - 1 : first + BLOCK + 1]
+        off = np.linalg.norm(p[1:-1] - 0.5 * (p[:-2] + p[2:]), axis=-1)
+        size[first : first + len(off)], joint[first : first + len(off)] = off.max(axis=1), off.argmax(axis=1)
     # A step in the motion raises two frames alike; a single wrong frame raises itself twice its neighbours.
     alone = size[1:-1] > 1.5 * np.maximum(size[:-2], size[2:])
     alone[[0, -1]] = False
+    found = np.flatnonzero((size[1:-1] > limit) & alone) + 1
+    return [(int(i), float(size[i]), clip.skeleton.joints[joint[i]]) for i in found]
+
+
+def flips(clip: Clip, first: int) -> list[str]:
+    """A sentence for each joint that spins faster than a living one can, while it stays where it is.
+
+    first: the source's frame at which the clip begins. Thumbs and other ends of captured rigs do, where their
+    markers did not tell how they were turned.
+    """
+    limit = FLIP * min(1.0, 120.0 / clip.fps)
     sentences = []
-    for i in np.flatnonzero((size[1:-1] > limit) & alone) + 1:
-        joint = clip.skeleton.joints[int(off[i - 1].argmax())]
-        clip = _interpolate(clip, int(i), int(i))
-        sentences.append(
-            f"Frame {i + 1} is off by {size[i]:.0f} cm at {joint}; the middle of its neighbours replaces it."
-        )
-    return clip, sentences
+    for j, name in enumerate(clip.skeleton.joints):
+        q = clip.rotations[:, j]
+        half = np.arccos(np.clip(np.abs(np.sum(q[1:] * q[:-1], axis=-1)), 0.0, 1.0))
+        after = np.flatnonzero(2 * half > limit)
+        if len(after):
+            most, frame = np.degrees(2 * half.max()), first + int(after[0]) + 1
+            sentences.append(
+                f"{name} spins by up to {most:.0f} degrees from one frame to the next, {len(after)} times "
+                f"(first between frames {frame} and {frame + 1}); left as it is."
+            )
+    return sentences
 
 
 def _without_edges(frames: int, fps: float, jumps: list[Jump]) -> tuple[int, int]:
@@ -161,49 +194,53 @@ def _short_pieces(clip: Clip, jumps: list[Jump]) -> tuple[list[Jump], list[tuple
     return left, bridges
 
 
-def _interpolate(clip: Clip, start: int, end: int) -> Clip:
+def _copy(clip: Clip) -> Clip:
+    """A clip whose arrays may be changed; its positions must not have been asked for before that."""
+    moved = clip.translations
+    return replace(
+        clip,
+        rotations=clip.rotations.copy(),
+        root=clip.root.copy(),
+        translations=None if moved is None else moved.copy(),
+    )
+
+
+def _interpolate(draft: Clip, start: int, end: int) -> None:
     """Replace the frames start..end by what leads from the frame before to the frame after."""
-    a, b = start - 1, end + 1
+    a, b, here = start - 1, end + 1, slice(start, end + 1)
     share = (np.arange(start, end + 1) - a) / (b - a)
-    rotations, root = clip.rotations.copy(), clip.root.copy()
-    rotations[start : end + 1] = quat.slerp(rotations[a][None], rotations[b][None], share[:, None])
-    root[start : end + 1] = root[a] + (root[b] - root[a]) * share[:, None]
-    translations = None
-    if clip.translations is not None:
-        translations = clip.translations.copy()
-        step = translations[b] - translations[a]
-        translations[start : end + 1] = translations[a] + step * share[:, None, None]
-    return replace(clip, rotations=rotations, root=root, translations=translations)
+    draft.rotations[here] = quat.slerp(draft.rotations[a][None], draft.rotations[b][None], share[:, None])
+    draft.root[here] = draft.root[a] + (draft.root[b] - draft.root[a]) * share[:, None]
+    if draft.translations is not None:
+        step = draft.translations[b] - draft.translations[a]
+        draft.translations[here] = draft.translations[a] + step * share[:, None, None]
 
 
-def _smooth(clip: Clip, after: int) -> Clip:
+def _smooth(draft: Clip, after: int) -> None:
     """Blend a jump in the pose away: half of it, fading out, is added before it and taken off after it.
 
     What the root jumps sideways is taken off all that follows, so that the path goes on where it was.
     """
     a, b = after, after + 1
-    reach = max(2, round(BLEND * clip.fps))
-    apart = quat.log(quat.mul(quat.inv(clip.rotations[a]), clip.rotations[b]))
-    n = np.arange(len(clip))
+    reach = max(2, round(BLEND * draft.fps))
+    apart = quat.log(quat.mul(quat.inv(draft.rotations[a]), draft.rotations[b]))
+    here = slice(max(0, b - reach), min(len(draft), b + reach))
+    n = np.arange(here.start, here.stop)
     fade = np.clip(1 - np.where(n <= a, a - n, n - b) / reach, 0.0, 1.0)
     weight = np.where(n <= a, 0.5, -0.5) * fade * fade * (3 - 2 * fade)
-    rotations = quat.mul(clip.rotations, quat.exp(weight[:, None, None] * apart))
-    root = clip.root.copy()
-    near = np.diff(root[max(0, a - 3) : b + 4], axis=0)
-    jump = root[b] - root[a] - np.median(near, axis=0)
-    root += weight[:, None] * jump * [0, 1, 0]
+    draft.rotations[here] = quat.mul(draft.rotations[here], quat.exp(weight[:, None, None] * apart))
+    root = draft.root
+    jump = root[b] - root[a] - np.median(np.diff(root[max(0, a - 3) : b + 4], axis=0), axis=0)
+    root[here] += weight[:, None] * jump * [0, 1, 0]
     root[b:] -= jump * [1, 0, 1]
-    return replace(clip, rotations=quat.continuous(rotations), root=root)
 
 
 def _cut(clip: Clip, first: int, last: int) -> Clip:
-    if first == 0 and last == len(clip) - 1:
-        return clip
     part = slice(first, last + 1)
     moved = clip.translations
     return replace(
         clip,
-        rotations=clip.rotations[part],
+        rotations=quat.continuous(clip.rotations[part]),
         root=clip.root[part],
         translations=None if moved is None else moved[part],
     )

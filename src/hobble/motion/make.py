@@ -16,7 +16,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import Axes, straighten
 from hobble.motion.decode import Decoded, decode, frame_rate
-from hobble.motion.defects import repair
+from hobble.motion.defects import flips, repair
 from hobble.motion.loop import loop_clip
 from hobble.motion.read import Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
@@ -40,6 +40,7 @@ class Source:
     unit_name: str
     axes: Axes
     first_frame: int
+    repairs: list[str]
     notes: list[str]
 
 
@@ -64,33 +65,34 @@ def make_clip(
     file = read_bvh(bvh)
     source = load_source(file, target, maps, options)
     resampled = resample(source.clip, options["fps"])
-    made, notes = fit_skeleton(resampled, source.match, target.skeleton, options["proportions"])
-    cycle = len(made)
-    if options["loops"] > 1:
-        made = loop_clip(made, options["loops"], options["heading"])
-        cycle = len(made) // options["loops"]
-        notes.append(f"The cycle of {cycle} frames was repeated {options['loops']} times, the seams blended.")
-    report = _report(file, source, replace(made, name=clip), source.notes + notes)
-    return replace(made, name=clip), report | {"loops": options["loops"], "cycle_frames": cycle}
+    fitted = fit_skeleton(resampled, source.match, target.skeleton, options["proportions"])
+    made, said, loops = fitted.clip, source.repairs + fitted.repairs, options["loops"]
+    if loops > 1:
+        made = loop_clip(made, loops, options["heading"])
+        said.append(f"The cycle was repeated {loops} times, each {len(made) // loops} frames, seams blended.")
+    made = replace(made, name=clip)
+    extra = {"loops": loops, "cycle_frames": len(made) // loops, "scale": fitted.scale}
+    return made, _report(file, source, made) | extra | {"repairs": said, "notes": source.notes}
 
 
 def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[str, Any]) -> Source:
     """A file's motion in centimetres and Y up on its own rig, checked and where allowed repaired."""
-    notes = _frame_count(file, options["defects"])
+    repairs = _frame_count(file, options["defects"])
     rig = _rig(file)
     match = match_rig(file.path, rig, target, maps)
     rig = replace(rig, roles=match.roles)
     unit, unit_name = _unit(file.path, rig, options["unit"])
     decoded = decode(file, STILL / unit)
-    notes += decoded.notes
+    repairs += decoded.repairs
     fps = options["source_fps"] or frame_rate(file.frame_time, file.frame_time_text)
     clip = _scaled(file.path.stem, rig, decoded, fps, unit)
     clip, axes = straighten(clip, options["up"], options["handedness"])
     repaired = repair(clip)
     if repaired.sentences and options["defects"] == "refuse":
         raise InputError(file.path, repaired.sentences[0], fix="Set motion.defects: repair to mend it so.")
-    notes += repaired.sentences
-    return Source(repaired.clip, match, unit, unit_name, axes, repaired.first, notes)
+    repairs += repaired.sentences
+    notes = decoded.notes + flips(repaired.clip, repaired.first)
+    return Source(repaired.clip, match, unit, unit_name, axes, repaired.first, repairs, notes)
 
 
 def _rig(file: Bvh) -> Skeleton:
@@ -146,25 +148,29 @@ def resample(clip: Clip, fps: float) -> Clip:
     )
 
 
-def fit_skeleton(clip: Clip, match: Match, target: Skeleton, proportions: str) -> tuple[Clip, list[str]]:
+@dataclass(frozen=True)
+class Fitted:
+    """A clip on the joints of the target, how far its path was scaled for that, and what it cost."""
+
+    clip: Clip
+    scale: float
+    repairs: list[str]
+
+
+def fit_skeleton(clip: Clip, match: Match, target: Skeleton, proportions: str) -> Fitted:
     """The clip's motion on the target skeleton, or on its joints with the clip's own bone lengths."""
+    moving = clip.translations is not None
     if match.same:
-        order = np.array([clip.skeleton.index(name) for name in target.joints])
-        own = _reordered(clip, order, target)
-        if np.abs(own.skeleton.offsets - target.offsets).max() <= SAME:
-            own = replace(own, skeleton=target)
-            return own, _kept(own)
-        if proportions == "clip":
-            return own, _kept(own)
-    made = retarget_clip(clip, plan(clip.skeleton, target, match.sources))
-    notes = []
-    if clip.translations is not None:
-        notes.append(DROPPED)
-    return made, notes
-
-
-def _kept(clip: Clip) -> list[str]:
-    return [] if clip.translations is None else [KEPT]
+        own = _reordered(clip, np.array([clip.skeleton.index(name) for name in target.joints]), target)
+        same = np.abs(own.skeleton.offsets - target.offsets).max() <= SAME
+        if same or proportions == "clip":
+            own = replace(own, skeleton=target) if same else own
+            return Fitted(own, 1.0, [KEPT] if moving else [])
+    how = plan(clip.skeleton, target, match.sources)
+    repairs = [DROPPED] if moving else []
+    if proportions == "clip":
+        repairs.append(f"Its rig is {match.rig}, so that it was put on the bone lengths of {target.name}.")
+    return Fitted(retarget_clip(clip, how), round(how.scale, 6), repairs)
 
 
 def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
@@ -174,7 +180,7 @@ def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
     return Clip(clip.name, skeleton, clip.fps, clip.rotations[:, order], clip.root, translations)
 
 
-def _report(file: Bvh, source: Source, made: Clip, repairs: list[str]) -> dict[str, Any]:
+def _report(file: Bvh, source: Source, made: Clip) -> dict[str, Any]:
     data = file.path.read_bytes()
     return {
         "clip": made.name,
@@ -192,5 +198,4 @@ def _report(file: Bvh, source: Source, made: Clip, repairs: list[str]) -> dict[s
         "handedness": source.axes.handedness,
         "rest_facing": source.axes.facing,
         "rig": source.match.rig,
-        "repairs": repairs,
     }
