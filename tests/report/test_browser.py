@@ -129,7 +129,7 @@ def test_choosers_change_their_pictures(tab: Any, material: Material) -> None:
     choose(tab, "sweeps-choice", 2)
     drawn = "document.querySelector('[data-chart=\"sweep-speed\"]').data[0].y[0]"
     assert tab.run(drawn) == pytest.approx(material.injury["rows"][22]["speed"])
-    choose(tab, "strip-clip", 12)
+    choose(tab, "strip-clip", 6)
     assert "eftUpLeg-LeftLeg" in text(tab, "strip")
 
 

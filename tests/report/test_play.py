@@ -5,16 +5,19 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from hobble.core.skeleton import Skeleton
+from hobble.report.formats import embedded
 from hobble.report.playable import PARTS, body_parts, playable
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.network import Network
+from hobble.runtime.network import Network, load_network
 
 FRAMES = 120
 
@@ -151,11 +154,21 @@ def test_playing_says_nothing_and_asks_for_nothing(tab: Any) -> None:
     assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in tab.requests)
 
 
+def test_the_largest_network_leaves_room_in_the_page(
+    examples: ModuleType, root: Path, tmp_path: Path, page: str
+) -> None:
+    """191 joints and two layers of 512: with plotly.js and everything else the page is to be under 25 MB."""
+    data = yaml.safe_load((root / "config/skeletons/ava191.yaml").read_text())
+    skeleton = Skeleton.from_dict({"name": "ava191", **{k: v for k, v in data.items() if k != "maps"}})
+    examples.weights(tmp_path / "weights.npz", skeleton, units=512)
+    spec = playable(load_network(tmp_path / "weights.npz"), examples.RUNTIME)
+    assert len(embedded(spec)) < 17e6
+    assert len(page) < 7e6
+
+
 def test_a_network_without_links_can_still_be_played(
     examples: ModuleType, holden31: Skeleton, tmp_path: Any
 ) -> None:
-    from hobble.runtime.network import load_network
-
     examples.weights(tmp_path / "weights.npz", holden31, links=False)
     spec = playable(load_network(tmp_path / "weights.npz"), examples.RUNTIME)
     assert spec["links"] == []

@@ -164,6 +164,6 @@ def beside_published(material: Material) -> Table:
         Column.number("mean"),
         Column.number("sd"),
         Column.number("position error, cm"),
-        Column("source"),
+        Column("source", kind="long"),
     ]
     return Table(f"{material.name}-published", columns, rows, "Beside the published figures")

@@ -39,7 +39,7 @@ Hobble.rgb = (token) => (Hobble.colour(token).match(/[\d.]+/g) || [0, 0, 0]).sli
     return out;
   };
   const axis = () => ({
-    gridcolor: "@line", zerolinecolor: "@line", linecolor: "@line", tickcolor: "@line", automargin: true,
+    gridcolor: "@line", zerolinecolor: "@line", linecolor: "@line", tickcolor: "@line",
     title: { standoff: 10, font: { size: 12, color: "@soft" } }, tickfont: { size: 11.5, color: "@soft" },
   });
   const layout = (spec, narrow) => resolve(merge({

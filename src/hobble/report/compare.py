@@ -15,8 +15,8 @@ from hobble.report.body import capsules
 from hobble.report.scenes import FPS, UNIT, drawn_joints, pack_positions, packed
 from hobble.runtime.network import Network
 
-CLIPS = 8
-LONGEST = 20 * 60  # frames of a clip that are shown
+CLIPS = 6
+LONGEST = 12 * 60  # frames of a clip that are shown
 
 
 def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str, Any]:

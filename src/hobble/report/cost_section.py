@@ -127,7 +127,7 @@ def speed_published(material: Material) -> Table | None:
         rows.append(
             [f"prediction alone, {entry['mode']} phase", entry["milliseconds"], sources[entry["source"]]]
         )
-    columns = [Column("network"), Column.number("ms a frame"), Column("source")]
+    columns = [Column("network"), Column.number("ms a frame"), Column("source", kind="long")]
     return Table(f"{material.name}-published-speed", columns, rows, "Beside the published figures")
 
 

@@ -172,15 +172,16 @@ def remarks_table(material: Material) -> Table | None:
 
 
 def strips(material: Material) -> list[dict[str, Any]]:
-    """The label strip of each clip that has one, with what hurts along it."""
+    """The label strip of each clip that has one, with what hurts along it; mirrors would say it twice."""
     injuries = {report["clip"]: report for report in material.injuries}
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
+    known = {report["clip"] for report in material.labels}
     out = []
     for report in material.labels:
-        strip = report.get("strip")
-        if not strip or not strip.get("seconds"):
+        strip, clip = report.get("strip"), report["clip"]
+        mirrors = clip.endswith("_mirror") and clip.removesuffix("_mirror") in known
+        if mirrors or not strip or not strip.get("seconds"):
             continue
-        clip = report["clip"]
         length = lengths.get(clip) or strip["seconds"][-1]
         hurt = (injuries.get(clip) or {}).get("hurt") or {}
         status = [

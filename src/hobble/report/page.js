@@ -42,7 +42,10 @@
     for (const entry of entries) seen[entry.isIntersecting ? "add" : "delete"](entry.target.id);
     const here = [...links.keys()].find((id) => seen.has(id));
     links.forEach((link, id) => {
-      if (id === here) link.setAttribute("aria-current", "true"); else link.removeAttribute("aria-current");
+      if (id !== here) { link.removeAttribute("aria-current"); return; }
+      link.setAttribute("aria-current", "true");
+      const strip = link.closest("ol"); // on a narrow screen the contents scroll sideways
+      if (strip.scrollWidth > strip.clientWidth) strip.scrollLeft = link.offsetLeft - 24;
     });
   }, { rootMargin: "-20% 0px -60%" });
   document.querySelectorAll("main section[id]").forEach((section) => watch.observe(section));

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hobble.report.charts import Chart, axis, line
+from hobble.report.charts import Chart, axis, line, log_axis
 from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
 
@@ -36,7 +36,7 @@ def learning_curve(material: Material) -> Chart:
         traces,
         {
             "xaxis": axis("pass", rangemode="tozero"),
-            "yaxis": axis("mean squared error", type="log", dtick="D2"),
+            "yaxis": log_axis("mean squared error", [v for t in traces for v in t["y"]]),
         },
     )
 
@@ -61,7 +61,7 @@ def block_curves(material: Material) -> Chart | None:
         traces,
         {
             "xaxis": axis("pass", rangemode="tozero"),
-            "yaxis": axis("mean squared error", type="log", dtick="D2"),
+            "yaxis": log_axis("mean squared error", [v for t in traces for v in t["y"]]),
         },
         height=380,
     )
