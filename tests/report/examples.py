@@ -406,6 +406,7 @@ def injury_sweep(rng: np.random.Generator, links: tuple[str, ...] = LINKS) -> di
                     "from_healthy_cm": sweep[-1]["from_healthy"] - sweep[0]["from_healthy"],
                     "speed_share": sweep[-1]["speed"] / sweep[0]["speed"],
                     "settle_seconds": 0.8,
+                    "after_healing_cm": 0.1,
                     "acceleration_share": 1.3,
                 }
             )

@@ -260,6 +260,13 @@ def _injury(material: Material) -> Iterator[Hint]:
             f"The pose does not follow severity steadily for {', '.join(rough[:4])}.",
             "See whether its curve jumps: then in-between severities are missing from the data.",
         )
+    stuck = [r["link"] for r in walks if (r.get("after_healing_cm") or 0) > 2]
+    if stuck:
+        yield Hint(
+            "note",
+            f"After healing, the walk does not quite come back for {', '.join(stuck[:4])}.",
+            "The network is caught in a limp that it would see as a gait of its own.",
+        )
     if not deaf and not rough:
         yield Hint("good", "Every link's severity shifts the walk, and steadily.", "")
 
