@@ -1,0 +1,162 @@
+"""Training steps a second, with Adam, dropout and the L1 term, in the ways there are, measured in one run.
+
+    python benchmarks/training.py [--batches 32,256,1024] [--threads 2] [--turns 7] [--sizes 342,512,512,311]
+
+Each turn gives every way a moment of the machine, and the best turn counts: other work comes and goes. The
+floor is the time that the products alone take, at their own best, with the same factors.
+
+- per sample: weights built for every sample, differentiated by autograd, PyTorch's Adam (sixty-four samples
+  at a time, since 1,024 need 5 GB);
+- blended: outputs of the control points blended, otherwise the same: what a careful author writes first;
+- PyTorch, float32: `hobble.training.step.Step`, the way that other devices take;
+- fused, float32: `hobble.training.fused.FusedStep`, the default below batch 256;
+- fused, bfloat16: the same with factors rounded to bfloat16, the default from there on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from itertools import pairwise
+
+import hobble.training  # noqa: F401 - first, since it says how threads wait
+
+# isort: split
+import torch
+from torch import Tensor
+
+from hobble.training.fused import FusedStep
+from hobble.training.network import coefficients, initialise
+from hobble.training.optimiser import Adam
+from hobble.training.products import bfloat16_is_fast, product
+from hobble.training.start import use_threads
+from hobble.training.step import Step
+
+KEEP, L1, RATE, POINTS = 0.7, 0.01, 1e-4, 4
+PART = 64
+Batch = tuple[Tensor, Tensor, Tensor]
+
+
+def dropped(x: Tensor) -> Tensor:
+    return x * (torch.rand_like(x) < KEEP) / KEEP
+
+
+def per_sample(layers: list[Tensor], x: Tensor, c: Tensor) -> Tensor:
+    for number, layer in enumerate(layers):
+        blended = torch.einsum("bk,oki->boi", c, layer)
+        x = torch.baddbmm(blended[:, :, -1:], blended[:, :, :-1], dropped(x)[:, :, None])[:, :, 0]
+        x = torch.nn.functional.elu(x) if number < len(layers) - 1 else x
+    return x
+
+
+def blended(layers: list[Tensor], x: Tensor, c: Tensor) -> Tensor:
+    for number, layer in enumerate(layers):
+        each = torch.einsum("bi,oki->bko", dropped(x), layer[:, :, :-1]) + layer[:, :, -1].T
+        x = torch.einsum("bk,bko->bo", c, each)
+        x = torch.nn.functional.elu(x) if number < len(layers) - 1 else x
+    return x
+
+
+def by_autograd(forward: Callable, part: int, sizes: tuple[int, ...]) -> Callable[[Batch], None]:
+    layers = [layer.clone().requires_grad_() for layer in initialise(sizes, POINTS, 1).layers]
+    adam = torch.optim.Adam(layers, lr=RATE)
+
+    def step(batch: Batch) -> None:
+        adam.zero_grad()
+        for start in range(0, len(batch[0]), part):
+            x, y, p = (array[start : start + part] for array in batch)
+            error = torch.sum((forward(layers, x, coefficients(p, POINTS)) - y) ** 2) / batch[1].numel()
+            error.backward()
+        (L1 / (2 * len(layers)) * sum(layer[:, :, :-1].abs().mean() for layer in layers)).backward()
+        adam.step()
+
+    return step
+
+
+def by_hand(kind: type[Step], half: bool, sizes: tuple[int, ...]) -> Callable[[Batch], None]:
+    network = initialise(sizes, POINTS, 1)
+    adam, step = Adam(network, RATE, 0.9, 0.999, L1), kind(network, 1 - KEEP, half)
+
+    def go(batch: Batch) -> None:
+        step(*batch, step.masks(len(batch[0])))
+        adam.step(step.gradients)
+
+    return go
+
+
+def products(half: bool, sizes: tuple[int, ...]) -> Callable[[Batch], None]:
+    """Nothing but a step's products: outputs, gradients of weights and of all inputs but the first."""
+    dtype = torch.bfloat16 if half else torch.float32
+    weights = [torch.randn(out, POINTS * (size + 1)).to(dtype) for size, out in pairwise(sizes)]
+    inputs: dict[int, list[tuple[Tensor, Tensor]]] = {}
+
+    def go(batch: Batch) -> None:
+        rows = len(batch[0])
+        if rows not in inputs:
+            shapes = [weight.shape for weight in weights]
+            inputs[rows] = [
+                (torch.randn(rows, i).to(dtype), torch.randn(rows, o).to(dtype)) for o, i in shapes
+            ]
+        for number, ((e, d), weight) in enumerate(zip(inputs[rows], weights, strict=True)):
+            product(e, weight)
+            product(d.T, e.T)
+            if number:
+                product(d, weight.T)
+
+    return go
+
+
+def seconds(work: Callable[[Batch], None], batch: Batch) -> float:
+    """Of one call, over at least a tenth of a second."""
+    calls, start = 0, time.perf_counter()
+    while (spent := time.perf_counter() - start) < 0.1 or not calls:
+        work(batch)
+        calls += 1
+    return spent / calls
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--batches", default="32,256,1024")
+    parser.add_argument("--sizes", default="342,512,512,311")
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--turns", type=int, default=7)
+    options = parser.parse_args()
+    use_threads(options.threads)
+    torch.manual_seed(1)
+    sizes = tuple(int(size) for size in options.sizes.split(","))
+    ways = {
+        "per sample": by_autograd(per_sample, PART, sizes),
+        "blended": by_autograd(blended, 1 << 30, sizes),
+        "PyTorch, float32": by_hand(Step, False, sizes),
+        "fused, float32": by_hand(FusedStep, False, sizes),
+        "floor, float32": products(False, sizes),
+    }
+    if bfloat16_is_fast():
+        ways["fused, bfloat16"] = by_hand(FusedStep, True, sizes)
+        ways["floor, bfloat16"] = products(True, sizes)
+    inputs = sum(size * out for size, out in pairwise(sizes[:2]))
+    all_layers = sum(size * out for size, out in pairwise(sizes))
+    flop = 2 * POINTS * (3 * all_layers - inputs)
+    print(
+        f"{'-'.join(map(str, sizes))}, {options.threads} threads, {flop / 1e6:.1f} MFLOP of products a sample"
+    )
+    for rows in map(int, options.batches.split(",")):
+        batch = (torch.randn(rows, sizes[0]), torch.randn(rows, sizes[-1]), torch.rand(rows))
+        best = dict.fromkeys(ways, float("inf"))
+        for turn in range(options.turns + 1):
+            for name, work in ways.items():
+                if name == "per sample" and turn > 2:
+                    continue
+                spent = seconds(work, batch)
+                best[name] = min(best[name], spent) if turn else best[name]
+        print(f"\nbatch {rows:16} samples/s    ms a step   x per sample   x blended   GFLOP/s")
+        for name, spent in best.items():
+            ratios = f"{best['per sample'] / spent:11.1f} {best['blended'] / spent:13.1f}"
+            speed = f"{rows / spent:11,.0f} {spent * 1e3:12.2f}"
+            print(f"{name:20} {speed} {ratios} {flop * rows / spent / 1e9:9.0f}")
+
+
+if __name__ == "__main__":
+    main()
