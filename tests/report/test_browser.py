@@ -177,6 +177,7 @@ def test_prints_every_chart_in_light(tab: Any) -> None:
     tab.run("dispatchEvent(new Event('beforeprint'))")
     assert tab.run("getComputedStyle(document.body).backgroundColor") == "rgb(252, 251, 248)"
     assert tab.run("document.querySelectorAll('details:not([open])').length") <= 3
+    assert tab.run(INK.format("compare-view")) > 0.02
     tab.run("dispatchEvent(new Event('afterprint'))")
     assert len(tab.send("Page.printToPDF")["data"]) > 100_000
 

@@ -30,6 +30,7 @@
     opened.forEach((details) => { details.open = true; });
     recolour();
     Hobble.drawAll();
+    Hobble.views.forEach((drawn) => drawn());
   });
   addEventListener("afterprint", () => {
     opened.forEach((details) => { details.open = false; });

@@ -12,6 +12,9 @@ Hobble.css = (c, alpha = 1) => `rgba(${c.map((v) => Math.round(Math.min(255, Mat
 // Numbers that lie in the page as base64.
 Hobble.bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
 
+// Draws every view, also those that were never scrolled to: for printing.
+Hobble.views = [];
+
 // draw(now, view) is called when something asked for it and the canvas can be seen.
 Hobble.view = (canvas, home, draw) => {
   const { dot, cross, minus, unit, mix } = Hobble.vector, { css } = Hobble;
@@ -174,6 +177,7 @@ Hobble.view = (canvas, home, draw) => {
   };
   Hobble.onTheme.push(recolour);
   recolour();
+  Hobble.views.push(() => paint(performance.now()));
   new ResizeObserver(() => {
     view.W = canvas.clientWidth;
     view.H = canvas.clientHeight;
