@@ -110,7 +110,7 @@ def test_all_walk_healthy_before_the_onset(hurtable) -> None:
     sweep = Sweep(hurtable, KNEE, "walk", 2.0, RUNTIME)
     same = sweep.world[: sweep.onset]
     np.testing.assert_allclose(same, same[:, :1].repeat(11, axis=1), atol=1e-3)
-    worst = sweep.world[sweep.frames - 1]
+    worst = sweep.world[sweep.healing - 1]
     assert np.abs(worst - worst[:1]).max() > 1e-3
 
 

@@ -1,7 +1,7 @@
 """The response to injury: every link's severity swept from 0 to 10 while walking and jogging.
 
-Eleven characters walk side by side, one for each severity, healthy at first; the injury comes on at a quarter
-of the walk at the runtime's rate, and the last half is measured.
+Eleven characters walk side by side, one for each severity: healthy until they are up to speed, then hurt, at
+the runtime's rate, for `seconds`, of which the last half is measured, then healing for half as long.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from hobble.runtime.network import Network
 FPS = 60
 SEVERITIES = np.arange(11.0)
 GAITS = {"walk": 2.5, "jog": 7.0}  # cm a frame asked for
+WALK_IN = 3 * FPS  # frames until a figure that stood is up to speed
 PHASES = 24  # bins of the cycle in which poses are compared
 SETTLED = 0.1  # share of the final change within which a response counts as settled
 REASON = "this network has no severity inputs"
@@ -71,14 +72,14 @@ class Sweep:
     ) -> None:
         assert network.skeleton is not None
         self.skeleton = network.skeleton
-        self.frames = max(8, round(seconds * FPS))
-        self.onset, self.measured = self.frames // 4, self.frames // 2
+        frames = max(8, round(seconds * FPS))
+        self.onset, self.healing = WALK_IN, WALK_IN + frames
+        self.late = slice(self.healing - frames // 2, self.healing)
         animation = ProceduralAnimation(network, characters=len(SEVERITIES), **runtime)
         poses = []
-        for f in range(2 * self.frames - self.onset):
-            injury = {link: SEVERITIES if self.onset <= f < self.frames else 0.0}
+        for f in range(self.healing + frames // 2):
+            injury = {link: SEVERITIES if self.onset <= f < self.healing else 0.0}
             poses.append(animation.next_pose((0.0, GAITS[gait]), gait=gait, injury=injury))
-        self.late = slice(self.measured, self.frames)
         self.world = np.array([p.positions for p in poses])
         self.root = np.array([p.root for p in poses])
         yaw = np.array([p.yaw for p in poses])
@@ -91,6 +92,7 @@ class Sweep:
         late = self.late
         cycles = [self._cycle(c) for c in range(len(SEVERITIES))]
         rough = acceleration(self.world[late])
+        normal = float(np.mean(self._apart(0, cycles[0])[late]))
         rows = []
         for c, severity in enumerate(SEVERITIES):
             row: dict[str, Any] = {"severity": float(severity)}
@@ -99,9 +101,9 @@ class Sweep:
             )
             row["from_healthy"] = float(np.mean(self._apart(c, cycles[0])[late]))
             row["from_worst"] = float(np.mean(self._apart(c, cycles[-1])[late]))
-            row["after_healing"] = float(np.mean(self._apart(c, cycles[0])[-FPS:]))
+            row["after_healing"] = float(np.mean(self._apart(c, cycles[0])[-self._period(c) :]))
             row["largest_acceleration"] = float(rough[:, c].max())
-            row["settle_seconds"] = self._settle(self._apart(c, cycles[0])[: self.frames]) if c else 0.0
+            row["settle_seconds"] = self._settle(c, self._apart(c, cycles[0]), normal) if c else 0.0
             rows.append({k: None if v is None else round(v, 5) for k, v in row.items()})
         return rows
 
@@ -144,15 +146,19 @@ class Sweep:
         bins = np.minimum((self.phase[:, c] * PHASES).astype(int), PHASES - 1)
         return np.linalg.norm(self.local[:, c] - cycle[bins], axis=-1).mean(axis=-1)
 
-    def _settle(self, apart: Array) -> float:
-        """Seconds from onset until the pose's distance from healthy, over a second, stays near its final
-        value."""
-        window = min(FPS, self.frames - self.measured)
-        smooth = np.convolve(apart, np.ones(window) / window, mode="valid")
-        before, after = smooth[max(0, self.onset - window)], smooth[-1]
-        out = np.abs(smooth - after) > SETTLED * max(abs(after - before), 1e-9)
-        last = int(np.flatnonzero(out)[-1]) + 1 if np.any(out) else 0
-        return max(0.0, (last + window - 1 - self.onset) / FPS)
+    def _period(self, c: int) -> int:
+        """Frames of a cycle of character c in the measured part, at most a second and a half."""
+        rate = np.mod(np.diff(self.phase[self.late, c]), 1.0).mean()
+        return int(np.clip(round(1 / max(rate, 1e-3)), 10, 3 * FPS // 2))
+
+    def _settle(self, c: int, apart: Array, normal: float) -> float:
+        """Seconds from the onset until the pose's distance from healthy, over a cycle, stays near its
+        last."""
+        window = min(self._period(c), self.late.stop - self.late.start)
+        smooth = np.convolve(apart[self.onset : self.healing], np.ones(window) / window, mode="valid")
+        out = np.abs(smooth - smooth[-1]) > SETTLED * max(abs(smooth[-1] - normal), 1e-9)
+        last = int(np.flatnonzero(out)[-1]) + window if np.any(out) else 0
+        return last / FPS
 
 
 def spearman(x: Sequence[float] | Array, y: Sequence[float | None]) -> float | None:
