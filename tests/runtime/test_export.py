@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -125,6 +126,11 @@ def test_which_link_each_scenario_hurts(hurtable, network) -> None:
         "left_arm": "LeftArm-LeftForeArm",
     }
     assert hurt_links(network) == {}
+    mean = np.zeros_like(hurtable.x_mean)
+    mean[hurtable.layout.x_injury.start + hurtable.links.index("LowerBack-Spine")] = 0.1
+    trained = hurt_links(replace(hurtable, x_mean=mean))
+    assert trained["lower_back"] == "LowerBack-Spine"
+    assert trained["left_knee"] == "LeftUpLeg-LeftLeg"
     assert len(scenarios(hurtable)) == len(scenarios(network)) + 5
 
 
