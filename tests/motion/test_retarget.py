@@ -230,3 +230,17 @@ def test_a_real_walk_keeps_its_look(shared, root, rigs, options):
 
     assert np.abs(knee(made) - knee(clip)).mean() < 5
     assert np.abs(lean(made) - lean(clip)).mean() < 3
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("file", ["105_10", "105_29", "105_16", "105_26", "08_03"])
+def test_knees_do_not_snap_where_legs_are_nearly_straight(shared, make, file):
+    """Feet of other proportions ask the leg to be longer than it is; the hips come down rather than that."""
+    source, _ = make(shared / f"mocap/cmu/{file}.bvh", proportions="clip")
+    made, report = make(shared / f"mocap/cmu/{file}.bvh")
+    for side in ("left", "right"):
+        before, after = (
+            np.linalg.norm(np.diff(c.positions[:, c.skeleton.role(f"{side}_knee")], 2, axis=0), axis=-1)
+            for c in (source, made)
+        )
+        assert after.max() < report["scale"] * before.max() + 5.5

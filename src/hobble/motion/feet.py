@@ -10,7 +10,8 @@ from hobble.core.quat import Array
 STANDING = 0.8  # cm a frame at 60 Hz: a heel slower than this is treated as standing
 SHORTEST = 1 / 20  # seconds
 RAMP = 1 / 15  # seconds over which the tilt sets in
-MOST_TILT = np.radians(6.0) / 2  # half the angle by which a foot is tilted at most
+MOST_TILT = np.radians(6.0)
+LOW = 2.5  # cm of height of the ankle above the ball from which on tilting helps
 
 
 def level_heels(foot: Array, heel: Array, toe: Array, fps: float) -> Array:
@@ -20,23 +21,22 @@ def level_heels(foot: Array, heel: Array, toe: Array, fps: float) -> Array:
     move it further over the ground. foot: (F, 3) from heel to ball in the world, of the figure to be kept
     from sliding. heel, toe: (F, 3) where the source has them, scaled.
     """
-    length = np.linalg.norm(foot[0])
     apart = toe - foot - heel
-    share = np.zeros(len(heel))
-    wanted = foot.copy()
+    missing = np.zeros_like(foot)
     for first, last in standing_runs(heel, STANDING * 60.0 / fps, round(fps * SHORTEST)):
         here = slice(first, last)
-        level = toe[here] - heel[here] - apart[here].mean(axis=0)
-        level[:, 1] = 0.0
-        across = np.linalg.norm(level, axis=1, keepdims=True)
-        level *= np.minimum(1.0, length / np.maximum(across, 1e-9))
-        drop = np.sqrt(np.maximum(length**2 - np.sum(level**2, axis=1), 0.0))
-        level[:, 1] = np.sign(foot[here, 1]) * drop
-        wanted[here] = level
-        share[here] = _eased(last - first, round(fps * RAMP), first == 0, last == len(heel))
-    tilt = quat.log(quat.between(foot, wanted))
-    size = np.linalg.norm(tilt, axis=-1, keepdims=True)
-    return quat.exp(tilt * np.minimum(1.0, MOST_TILT / np.maximum(size, 1e-9)) * share[:, None])
+        share = _eased(last - first, round(fps * RAMP), first == 0, last == len(heel))
+        missing[here] = (apart[here] - apart[here].mean(axis=0)) * share[:, None]
+    level = foot * [1, 0, 1]
+    across = np.linalg.norm(level, axis=1, keepdims=True)
+    ahead = level / np.maximum(across, 1e-9)
+    side = np.cross([0.0, 1.0, 0.0], ahead)
+    # Raising the heel by an angle moves it level by that times its height; where it has none, nothing helps.
+    height = foot[:, 1]
+    pitch = np.sum(missing * ahead, axis=1) * height / (height**2 + LOW**2)
+    yaw = np.sum(missing * side, axis=1) / np.maximum(across[:, 0], LOW)
+    tilt = quat.from_axis_angle(side, MOST_TILT * np.tanh(pitch / MOST_TILT))
+    return quat.mul(quat.yaw(MOST_TILT * np.tanh(yaw / MOST_TILT)), tilt)
 
 
 def standing_runs(point: Array, slow: float, shortest: int) -> list[tuple[int, int]]:

@@ -137,6 +137,8 @@ class _Hierarchy:
         }.get(word.upper())
         if handler is None:
             self.fail(f"{word[:40]!r} where a joint, OFFSET, CHANNELS or a brace should stand")
+        if self.pending is not None and word != "{":
+            self.fail("an opening brace is missing")
         handler(rest.strip())
 
     def _hierarchy(self, rest: str) -> None:
@@ -145,8 +147,6 @@ class _Hierarchy:
 
     def _joint(self, name: str) -> None:
         names = self.header.names
-        if self.pending is not None:
-            self.fail("an opening brace is missing")
         if not name:
             self.fail("a joint without a name")
         if name in self.seen:

@@ -27,6 +27,11 @@ from hobble.motion.rig import leg_length
 
 # Joints that point along a limb: role -> the role at the other end of the bone.
 LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "heel"}
+SIDES = ("left", "right")
+# Stretch of the source's leg from which on, and from which fully, the target's must not be straighter.
+BENT, NEARLY_STRAIGHT = 0.88, 0.95
+SMOOTH = 0.08  # seconds to either side over which the hips come down
+MOST_DROP = 6.0  # cm
 STRAIGHT = 0.5  # cm: a knee nearer than this to the line from hip to ankle is taken to point forward
 
 
@@ -40,7 +45,9 @@ class Retarget:
     arms: (J, 3) where a joint is in its leader's frame; for one of `joints`, in that of its parent's leader.
     levels: joints of `joints` below the hips, those together whose parents' leaders are placed before them.
     forward: (3,) where the target's rest pose faces.
-    scale: legs of the target to legs of the source. lift: cm added to the height of the hips after scaling.
+    pelvis: (3,) from the target's hips to the middle between its legs.
+    scale: legs of the target to legs of the source. lift: cm that the
+    legs are higher above the ground than the source's, scaled, because the ankles are.
     """
 
     source: Skeleton = field(repr=False)
@@ -52,6 +59,7 @@ class Retarget:
     arms: Array = field(repr=False)
     levels: tuple[Array, ...] = field(repr=False)
     forward: Array = field(repr=False)
+    pelvis: Array = field(repr=False)
     scale: float
     lift: float
 
@@ -64,7 +72,7 @@ def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Reta
     """
     pairs = sorted((target.index(mine), source.index(theirs)) for mine, theirs in sources.items())
     joints, follows = (np.array(side) for side in zip(*pairs, strict=True))
-    for role in ("hips", *(f"{s}_{part}" for s in ("left", "right") for part in ("hip", "knee", "heel"))):
+    for role in ("hips", *(f"{s}_{part}" for s in SIDES for part in ("hip", "knee", "heel"))):
         if target.role(role) not in joints:
             raise HobbleError(
                 f"no joint of {source.name} moves {target.roles[role]} ({role}) of {target.name}"
@@ -75,11 +83,23 @@ def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Reta
     for i, pair in enumerate(pairs):
         turns[i] = bones.get(pair, turns[i])
     scale = leg_length(target) / leg_length(source)
-    lift = _standing(target, to_target) - scale * _standing(source, quat.inv(from_source))
     leaders, arms = _leaders(target, joints)
-    levels = _levels(target, joints, leaders)
-    forward = quat.rotate(rest_frame(target), np.array([0.0, 0.0, 1.0]))
-    return Retarget(source, target, joints, follows, turns, leaders, arms, levels, forward, scale, lift)
+    rest = rest_positions(target)
+    middle = 0.5 * (rest[target.role("left_hip")] + rest[target.role("right_hip")])
+    return Retarget(
+        source=source,
+        target=target,
+        joints=joints,
+        follows=follows,
+        turns=turns,
+        leaders=leaders,
+        arms=arms,
+        levels=_levels(target, joints, leaders),
+        forward=quat.rotate(rest_frame(target), np.array([0.0, 0.0, 1.0])),
+        pelvis=middle - rest[target.role("hips")],
+        scale=scale,
+        lift=_ankle(target, to_target) - scale * _ankle(source, quat.inv(from_source)),
+    )
 
 
 def _limb_bones(
@@ -88,7 +108,7 @@ def _limb_bones(
     """(target joint, source joint) of each limb bone -> the turn that makes it point as the source's does."""
     a, b = rest_positions(target), rest_positions(source)
     out = {}
-    for side in ("left", "right"):
+    for side in SIDES:
         for start, end in LIMB_BONES.items():
             roles = f"{side}_{start}", f"{side}_{end}"
             if not all(role in s.roles for role in roles for s in (source, target)):
@@ -100,12 +120,10 @@ def _limb_bones(
     return out
 
 
-def _standing(skeleton: Skeleton, to_upright: Array) -> float:
-    """Height of the hips above the balls of the feet with straight legs, in the skeleton's unit."""
+def _ankle(skeleton: Skeleton, to_upright: Array) -> float:
+    """Height of the ankles above the balls of the feet in the rest pose, in the skeleton's unit."""
     p = quat.rotate(to_upright, rest_positions(skeleton))[:, 1]
-    drop = [p[skeleton.role("hips")] - p[skeleton.role(f"{s}_hip")] for s in ("left", "right")]
-    ankle = [p[skeleton.role(f"{s}_heel")] - p[skeleton.role(f"{s}_toe")] for s in ("left", "right")]
-    return float(np.mean(drop) + leg_length(skeleton) + np.mean(ankle))
+    return float(np.mean([p[skeleton.role(f"{s}_heel")] - p[skeleton.role(f"{s}_toe")] for s in SIDES]))
 
 
 def _leaders(target: Skeleton, joints: Array) -> tuple[Array, Array]:
@@ -131,13 +149,13 @@ def _levels(target: Skeleton, joints: Array, leaders: Array) -> tuple[Array, ...
 def retarget_clip(clip: Clip, how: Retarget) -> Clip:
     """The clip's motion on the target."""
     rotations = _carried(how, clip.global_rotations)
-    for side in ("left", "right"):
+    for side in SIDES:
         heel, toe = (clip.positions[:, how.source.role(f"{side}_{part}")] for part in ("heel", "toe"))
         joint, ball = how.target.role(f"{side}_heel"), how.target.role(f"{side}_toe")
         foot = quat.rotate(rotations[:, joint], how.arms[ball])
         tilt = level_heels(foot, heel * how.scale, toe * how.scale, clip.fps)
         rotations[:, joint] = quat.mul(tilt, rotations[:, joint])
-    positions, rotations = _posed(how, clip.positions, rotations)
+    positions, rotations = _posed(how, clip.positions, rotations, clip.fps)
     local = quat.continuous(local_rotations(how.target, rotations))
     return Clip(clip.name, how.target, clip.fps, local, positions[:, 0])
 
@@ -157,11 +175,18 @@ def _carried(how: Retarget, rotations: Array) -> Array:
     return out
 
 
-def _posed(how: Retarget, source: Array, rotations: Array) -> tuple[Array, Array]:
-    """World positions and rotations of the target's joints, the feet where the source's are, scaled."""
-    hips = source[..., how.source.role("hips"), :] * how.scale + np.array([0.0, how.lift, 0.0])
-    for side in ("left", "right"):
-        _reach(how, rotations, hips, side, source[..., how.source.role(f"{side}_toe"), :] * how.scale)
+def _posed(how: Retarget, source: Array, rotations: Array, fps: float | None = None) -> tuple[Array, Array]:
+    """World positions and rotations of the target's joints, the feet where the source's are, scaled.
+
+    fps: of successive frames, over which the hips come down smoothly; None for single poses.
+    """
+    hips = _hips(how, source, rotations)
+    legs = [_Leg(how, source, rotations, hips, side) for side in SIDES]
+    drop = np.max([leg.drop() for leg in legs], axis=0)
+    drop = (drop if fps is None else _smoothed(drop, fps))[..., None] * [0.0, 1.0, 0.0]
+    hips = hips - drop
+    for leg in legs:
+        leg.bend(leg.start - drop)
     positions = np.empty((*rotations.shape[:-1], 3))
     positions[..., how.target.role("hips"), :] = hips
     parents = np.array(how.target.parents)
@@ -177,22 +202,64 @@ def _posed(how: Retarget, source: Array, rotations: Array) -> tuple[Array, Array
     return positions, rotations
 
 
-def _reach(how: Retarget, rotations: Array, hips: Array, side: str, toe: Array) -> None:
-    """Bend a leg so that the ball of the foot gets to `toe` (..., 3); the foot stays turned as it is."""
-    hip, knee, heel, ball = (how.target.role(f"{side}_{part}") for part in ("hip", "knee", "heel", "toe"))
-    start, joint = hips, hip
-    while joint != how.target.role("hips"):
-        above = how.leaders[how.target.parents[joint]]
-        start = start + quat.rotate(rotations[..., above, :], how.arms[joint])
-        joint = above
-    thigh, shank = how.arms[knee], how.arms[heel]
-    ankle = toe - quat.rotate(rotations[..., heel, :], how.arms[ball])
-    upper, lower = rotations[..., hip, :], rotations[..., knee, :]
-    pole = _knee_direction(upper, lower, thigh, shank, how.forward)
-    lengths = float(np.linalg.norm(thigh)), float(np.linalg.norm(shank))
-    middle, end = two_bone_knee(start, ankle, pole, *lengths)
-    rotations[..., hip, :] = aim(upper, thigh, middle - start)
-    rotations[..., knee, :] = aim(lower, shank, end - middle)
+def _hips(how: Retarget, source: Array, rotations: Array) -> Array:
+    """Where the hips go: so that the middle between the legs is where the source's is, scaled.
+
+    Rigs disagree on where in the pelvis their first joint lies; legs and feet must fit all the same.
+    """
+    middle = 0.5 * sum(source[..., how.source.role(f"{side}_hip"), :] for side in SIDES)
+    arm = quat.rotate(rotations[..., how.target.role("hips"), :], how.pelvis)
+    return middle * how.scale + np.array([0.0, how.lift, 0.0]) - arm
+
+
+def _smoothed(drop: Array, fps: float) -> Array:
+    """A curve (F,) that runs smoothly above `drop`: its highest value near by, averaged over a while."""
+    reach = max(1, round(SMOOTH * fps))
+    padded = np.pad(drop, 2 * reach, mode="edge")
+    highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=-1)
+    window = np.hanning(2 * reach + 3)[1:-1]
+    return np.convolve(highest, window / window.sum(), mode="valid")
+
+
+class _Leg:
+    """One leg of the target: from where it starts to where the foot has to be.
+
+    rotations: (..., J, 4) of the target's joints, in which `bend` turns thigh and shank.
+    """
+
+    def __init__(self, how: Retarget, source: Array, rotations: Array, hips: Array, side: str) -> None:
+        roles = [f"{side}_{part}" for part in ("hip", "knee", "heel", "toe")]
+        self.hip, self.knee, heel, ball = (how.target.role(role) for role in roles)
+        self.forward, self.rotations = how.forward, rotations
+        self.thigh, self.shank = how.arms[self.knee], how.arms[heel]
+        self.start, joint = hips, self.hip
+        while joint != how.target.role("hips"):
+            above = how.leaders[how.target.parents[joint]]
+            self.start = self.start + quat.rotate(rotations[..., above, :], how.arms[joint])
+            joint = above
+        toe = source[..., how.source.role(roles[3]), :] * how.scale
+        self.ankle = toe - quat.rotate(rotations[..., heel, :], how.arms[ball])
+        a, b, c = (source[..., how.source.role(role), :] for role in roles[:3])
+        length = np.linalg.norm(b - a, axis=-1) + np.linalg.norm(c - b, axis=-1)
+        self.stretch = np.linalg.norm(c - a, axis=-1) / length
+
+    def drop(self) -> Array:
+        """(...) cm by which the hips must come down so that the leg is no straighter than the source's."""
+        reach = self.stretch * (np.linalg.norm(self.thigh) + np.linalg.norm(self.shank))
+        way = self.start - self.ankle
+        level = np.minimum(way[..., 0] ** 2 + way[..., 2] ** 2, reach**2)
+        need = np.maximum(way[..., 1] - np.sqrt(reach**2 - level), 0.0)
+        share = np.clip((self.stretch - BENT) / (NEARLY_STRAIGHT - BENT), 0.0, 1.0)
+        return np.minimum(need, MOST_DROP) * share * share * (3 - 2 * share)
+
+    def bend(self, start: Array) -> None:
+        """Turn thigh and shank so that the ankle gets where it has to be; the foot stays turned as it is."""
+        upper, lower = self.rotations[..., self.hip, :], self.rotations[..., self.knee, :]
+        pole = _knee_direction(upper, lower, self.thigh, self.shank, self.forward)
+        lengths = float(np.linalg.norm(self.thigh)), float(np.linalg.norm(self.shank))
+        middle, end = two_bone_knee(start, self.ankle, pole, *lengths)
+        self.rotations[..., self.hip, :] = aim(upper, self.thigh, middle - start)
+        self.rotations[..., self.knee, :] = aim(lower, self.shank, end - middle)
 
 
 def _knee_direction(hip: Array, knee: Array, thigh: Array, shank: Array, ahead: Array) -> Array:
