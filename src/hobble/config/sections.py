@@ -91,6 +91,9 @@ class Terrain(Section):
     deepest: PositiveFloat | None = Field(
         1.0, description="no foot goes further below the ground, cm; null as in the original: not looked at"
     )
+    bend_flat: bool = Field(
+        True, description="bend flat ground under cycles whose feet are off by more than `deepest`"
+    )
     seed: int = 1
 
 

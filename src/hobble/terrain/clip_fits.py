@@ -1,10 +1,10 @@
-"""The terrain of one clip: heights at the trajectory's sample points under each cycle, for each of its fits."""
+"""The terrain of one clip: heights at the trajectory's sample points under each cycle, for each fit."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,8 @@ from hobble.core.errors import InputError
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import RootFrames, root_frames
-from hobble.terrain.feet import Feet, feet_of
-from hobble.terrain.ground import Ground, fit_cycle
+from hobble.terrain.feet import Feet, Mask, feet_of
+from hobble.terrain.ground import Ground, fit_cycle, flat_ground
 from hobble.terrain.patches import Patches
 from hobble.terrain.picture import Picture, picture_cycles, picture_of
 
@@ -27,10 +27,11 @@ log = logging.getLogger("hobble.terrain")
 class ClipFits:
     """The fits of C cycles, R rows in all; row r has fits[r] = K fits, whose heights lie together.
 
-    frame, cycle, fits: (R,). heights: (sum of fits, 36): to the left, centre, to the right of 12 samples, cm in
-    the clip's world. patch, error: (C, 10); -1 and 0 on flat ground. foot_error: (C, 10, 2) mean and largest distance of a foot in
-    contact from its ground. foot_below: (C, 10) how far the lowest foot is below the ground, contact or
-    not, 0 where none is. heel_height, toe_height: of the joints above their soles.
+    frame, cycle, fits: (R,). heights: (sum of fits, 36): to the left, centre, to the right of 12 samples, cm
+    in the clip's world. patch, error: (C, 10); -1 and 0 on flat ground. foot_error: (C, 10, 2) mean and
+    largest distance of a foot in contact from its ground. foot_below: (C, 10) how far the lowest foot is
+    below the ground, contact or not, 0 where none is. heel_height, toe_height: of the joints above their
+    soles.
     """
 
     frame: np.ndarray = field(repr=False)
@@ -56,8 +57,8 @@ def clip_fits(
 ) -> ClipFits:
     """Fit the ground under every cycle of a clip.
 
-    labels: `contacts` (F, 4) and `cycles` (C, 2). ground: "flat", "rocky", "jumpy" or "beam". options, database:
-    those sections of the data set. Raises InputError where the labels do not belong to the clip.
+    labels: `contacts` (F, 4) and `cycles` (C, 2). ground: "flat", "rocky", "jumpy" or "beam". options,
+    database: those sections of the data set. Raises InputError where the labels do not belong to the clip.
     """
     cycles, contacts = np.asarray(labels["cycles"], int), np.asarray(labels["contacts"], bool)
     window, step = database["window"], database["step"]
@@ -67,101 +68,77 @@ def clip_fits(
             "terrain.patches",
             f"{len(patches)} patches are fewer than the {options['fits']} fits of a cycle",
         )
+    root = root_frames(clip, database["facing_sigma"])
+    samples = sample_points(root, database["terrain_side"])
+    feet = _feet(clip, contacts, cycles, window, ground == "flat", options)
+    offsets = np.arange(-window, window, step)
+    heights: list[Array] = [np.zeros((0, 3 * len(offsets)))]
+    fitted, pictures = [], []
+    shown = picture_cycles(len(cycles))
+    for c, (start, end) in enumerate(cycles):
+        around = slice(start - window, end + window)
+        fit = _ground(feet, around, samples, patches, ground, options)
+        heights.append(_heights(fit, samples, start, end, offsets))
+        fitted.append((fit, feet.soles[around], feet.contacts[around]))
+        if c in shown and np.any(heights[-1]):
+            pictures.append(picture_of(clip, c, fit, feet, around))
+    frame, cycle = _rows(cycles)
+    return ClipFits(
+        frame=frame,
+        cycle=cycle,
+        fits=np.array([len(fit.chosen) for fit, _, _ in fitted], np.int32)[cycle],
+        heights=np.concatenate(heights).astype(np.float32),
+        **_accounts(fitted, options["fits"]),
+        heel_height=feet.heel_height,
+        toe_height=feet.toe_height,
+        pictures=tuple(pictures),
+    )
+
+
+def _feet(
+    clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: Mapping[str, Any]
+) -> Feet:
+    """Soles and contacts; where no foot stands all through a cycle, its lowest points count as contacts."""
     counted = np.zeros(len(clip), bool)
     for start, end in cycles:
         counted[start - window : end + window] = True
     names = ("heel_height", "toe_height", "sole", "deepest")
-    feet = feet_of(
-        clip, contacts, np.flatnonzero(counted), ground == "flat", **{n: options[n] for n in names}
-    )
-    root = root_frames(clip, database["facing_sigma"])
-    offsets = np.arange(-window, window, step)
-    if ground == "flat":
-        return _flat(cycles, feet, offsets, options["fits"], window)
-    return _fitted(clip, cycles, feet, root, offsets, patches, ground, options, database)
-
-
-def _fitted(
-    clip: Clip,
-    cycles: np.ndarray,
-    feet: Feet,
-    root: RootFrames,
-    offsets: np.ndarray,
-    patches: Patches,
-    kind: str,
-    options: Mapping[str, Any],
-    database: Mapping[str, Any],
-) -> ClipFits:
-    window, fits = database["window"], options["fits"]
-    samples = sample_points(root, database["terrain_side"])
-    left = samples[0] - samples[1]
-    left /= np.linalg.norm(left, axis=-1, keepdims=True)
-    heights, errors, chosen, accuracy, below, pictures = [], [], [], [], [], []
-    shown = picture_cycles(len(cycles))
-    for c, (start, end) in enumerate(cycles):
+    feet = feet_of(clip, contacts, np.flatnonzero(counted), flat, **{n: options[n] for n in names})
+    contacts = feet.contacts.copy()
+    for start, end in cycles:
         around = slice(start - window, end + window)
-        soles, contacts = feet.soles[around], feet.contacts[around]
-        if not contacts.any():
+        if not contacts[around].any():
             log.warning("%s: no foot stands in frames %d to %d; the lowest count", clip.name, start, end)
-            contacts = soles[..., 1] <= np.quantile(soles[..., 1], 0.05)
-        ground = fit_cycle(
-            patches,
-            soles,
-            contacts,
-            root.position[around],
-            left[around],
-            kind,
-            fits=fits,
-            smoothing=options["smoothing"],
-            deepest=options["deepest"],
-        )
-        heights.append(_heights(ground, samples, start, end, offsets))
-        distance = ground.at(soles[..., [0, 2]].reshape(-1, 2)) - soles[..., 1].ravel()
-        accuracy.append(_foot_error(distance[:, contacts.ravel()]))
-        below.append(np.maximum(distance.max(axis=1), 0))
-        chosen.append(ground.chosen)
-        errors.append(ground.error)
-        if c in shown:
-            pictures.append(picture_of(clip, c, ground, feet, around))
-    frame, cycle = _rows(cycles)
-    samples_in_row = 3 * len(offsets)
-    return ClipFits(
-        frame,
-        cycle,
-        np.full(len(frame), fits, np.int32),
-        np.concatenate([np.zeros((0, samples_in_row)), *heights]).astype(np.float32),
-        np.array(chosen, np.int32).reshape(-1, fits),
-        np.array(errors, np.float32).reshape(-1, fits),
-        np.array(accuracy, np.float32).reshape(-1, fits, 2),
-        np.array(below, np.float32).reshape(-1, fits),
-        feet.heel_height,
-        feet.toe_height,
-        tuple(pictures),
-    )
+            height = feet.soles[around][..., 1]
+            contacts[around] = height <= np.quantile(height, 0.05)
+    return replace(feet, contacts=contacts)
 
 
-def _flat(cycles: np.ndarray, feet: Feet, offsets: np.ndarray, fits: int, window: int) -> ClipFits:
-    """Flat ground lies at zero: one fit, that counts as often as the others' ten."""
-    accuracy, below = np.zeros((len(cycles), fits, 2)), np.zeros((len(cycles), fits))
-    for c, (start, end) in enumerate(cycles):
-        around = slice(start - window, end + window)
-        height, contacts = feet.soles[around][..., 1], feet.contacts[around]
-        if contacts.any():
-            accuracy[c] = _foot_error(-height[contacts][None])
-        below[c] = max(-height.min(), 0)
-    frame, cycle = _rows(cycles)
-    return ClipFits(
-        frame,
-        cycle,
-        np.ones(len(frame), np.int32),
-        np.zeros((len(frame), 3 * len(offsets)), np.float32),
-        np.full((len(cycles), fits), -1, np.int32),
-        np.zeros((len(cycles), fits), np.float32),
-        accuracy.astype(np.float32),
-        below.astype(np.float32),
-        feet.heel_height,
-        feet.toe_height,
-    )
+def _ground(
+    feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: Mapping[str, Any]
+) -> Ground:
+    """The fits of the cycle that, with its window, takes the frames `around`."""
+    soles, contacts = feet.soles[around], feet.contacts[around]
+    corrected = {n: options[n] for n in ("smoothing", "deepest")}
+    if kind == "flat":
+        return flat_ground(soles, contacts, **corrected, bent=options["bend_flat"])
+    path = samples[1, around]
+    sides = samples[0, around] - path
+    sides = sides / np.linalg.norm(sides, axis=-1, keepdims=True)
+    return fit_cycle(patches, soles, contacts, path, sides, kind, fits=options["fits"], **corrected)
+
+
+def _accounts(fitted: Sequence[tuple[Ground, Array, Mask]], fits: int) -> dict[str, Any]:
+    """What is told of every fit of every cycle; a single fit is told as often as the others' `fits`."""
+    patch, error = np.zeros((len(fitted), fits), np.int32), np.zeros((len(fitted), fits), np.float32)
+    foot_error, foot_below = np.zeros((*error.shape, 2), np.float32), np.zeros_like(error)
+    for c, (ground, soles, contacts) in enumerate(fitted):
+        above = ground.above(soles)
+        apart = np.abs(above[:, contacts])
+        patch[c], error[c] = ground.chosen, ground.error
+        foot_error[c] = np.stack([apart.mean(axis=1), apart.max(axis=1)], axis=-1)
+        foot_below[c] = np.maximum(above.max(axis=(1, 2)), 0)
+    return {"patch": patch, "error": error, "foot_error": foot_error, "foot_below": foot_below}
 
 
 def sample_points(root: RootFrames, side: float) -> Array:
@@ -179,12 +156,6 @@ def _heights(ground: Ground, samples: Array, start: int, end: int, offsets: np.n
     return np.moveaxis(heights[:, :, at], 2, 0).reshape(-1, 3 * len(offsets))
 
 
-def _foot_error(distance: Array) -> Array:
-    """Mean and largest distance (K, 2) of (K, N) signed distances."""
-    size = np.abs(distance)
-    return np.stack([size.mean(axis=1), size.max(axis=1)], axis=-1)
-
-
 def _rows(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     frames = [np.arange(start, end + 1) for start, end in cycles]
     numbers = [np.full(len(f), c) for c, f in enumerate(frames)]
@@ -195,7 +166,7 @@ def _rows(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def _check(clip: Clip, cycles: np.ndarray, contacts: Array, window: int) -> None:
+def _check(clip: Clip, cycles: np.ndarray, contacts: Mask, window: int) -> None:
     if contacts.shape != (len(clip), 4):
         raise InputError(
             clip.name,
@@ -212,7 +183,7 @@ def _check(clip: Clip, cycles: np.ndarray, contacts: Array, window: int) -> None
 
 
 def save_fits(path: str | Path, fits: ClipFits) -> None:
-    """Write the fits as one npz; what a picture needs is stacked under names that begin with `picture_`."""
+    """Write the fits as one npz; what a `Picture` holds goes under picture0_x, picture0_z, ..., picture1_x, ..."""
     arrays = {f.name: np.asarray(getattr(fits, f.name)) for f in fields(fits) if f.name != "pictures"}
     for k, picture in enumerate(fits.pictures):
         arrays |= {f"picture{k}_{f.name}": np.asarray(getattr(picture, f.name)) for f in fields(picture)}

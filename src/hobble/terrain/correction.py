@@ -1,7 +1,7 @@
 """What a patch still lacks after it was chosen: the ground is bent so that it meets the feet.
 
-First the original's way: the residual at the contacts is added as a surface of radial basis functions. Then, where
-a foot is still below the ground, the ground is dug out around it.
+First the original's way: the residual at the contacts is added as a surface of radial basis functions. Then,
+where a foot is still below the ground, the ground is dug out around it.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hobble.core.quat import Array
+from hobble.terrain.feet import Mask
 
 STEEPEST = 2.0  # cm of depth per cm: the walls of what is dug out
 
@@ -27,8 +28,8 @@ class Stances:
     count: Array = field(repr=False)
 
 
-def stances(soles: Array, contacts: Array, longest: int) -> Stances:
-    """Gather runs of contact of each joint, cut into pieces of at most `longest` frames.
+def stances(soles: Array, contacts: Mask, longest: int) -> Stances:
+    """Gather the runs of each joint in which `contacts` is true, cut into pieces of at most `longest` frames.
 
     soles: (T, 4, 3). contacts: (T, 4) bool.
     """
@@ -47,11 +48,20 @@ def stances(soles: Array, contacts: Array, longest: int) -> Stances:
     return Stances(np.stack([mean[0], mean[2]], axis=1), mean[1], count.astype(float))
 
 
+def together(a: Stances, b: Stances) -> Stances:
+    """The points of both."""
+    return Stances(
+        np.concatenate([a.place, b.place]),
+        np.concatenate([a.height, b.height]),
+        np.concatenate([a.count, b.count]),
+    )
+
+
 @dataclass(frozen=True)
 class Bend:
-    """K surfaces of radial basis functions phi(r) = r / spread about the same N places.
+    """A surface of radial basis functions phi(r) = r / spread about N places.
 
-    places: (N, 2). weights: (N, K). spread: the mean distance of the places, cm.
+    places: (N, 2) x and z. weights: (N,). spread: the mean distance of the places, cm.
     """
 
     places: Array = field(repr=False)
@@ -59,31 +69,40 @@ class Bend:
     spread: float
 
     def at(self, points: Array) -> Array:
-        """Heights (K, M) at points (M, 2)."""
-        return (distances(points, self.places) / self.spread @ self.weights).T
+        """Heights (M,) at points (M, 2)."""
+        from hobble.terrain.kernels import distance_sum
+
+        return distance_sum(*_columns(points), *_columns(self.places), self.weights / self.spread)
 
 
-def bend(places: Array, residual: Array, count: Array, smoothing: float) -> Bend:
-    """The surfaces through `residual` (K, N) at `places` (N, 2), regularised by `smoothing`.
+def bends(points: Stances, residual: Array, smoothing: float) -> list[Bend]:
+    """The surfaces through each row of `residual` (K, N) at N points, regularised by `smoothing`.
 
-    count: (N,) how many equal points each place stands for. A place that stands for m points has a diagonal of
-    smoothing / m, and weighs m in the mean distance: that is exactly what m points at one place come to.
+    A point that counts m times has a diagonal of smoothing / m, and weighs m in the mean distance: that is
+    exactly what m points at one place come to.
     """
-    apart = distances(places, places)
-    spread = float(count @ apart @ count / count.sum() ** 2)
+    apart = distances(points.place, points.place)
+    spread = float(points.count @ apart @ points.count / points.count.sum() ** 2)
     if spread < 1e-6:
-        return Bend(places[:1], np.zeros((1, len(residual))), 1.0)
-    matrix = apart / spread - np.diag(smoothing / count)
-    return Bend(places, np.linalg.solve(matrix, residual.T), spread)
+        return [Bend(points.place[:1], np.zeros(1), 1.0)] * len(residual)
+    matrix = apart / spread - np.diag(smoothing / points.count)
+    return [Bend(points.place, w, spread) for w in np.linalg.solve(matrix, residual.T).T]
 
 
-def dug_out(ground: Array, points: Array, feet: Array, soles: Array) -> Array:
-    """Ground (M,) at points (M, 2), lowered to let every foot at feet (N, 2) through down to soles (N,)."""
-    if not len(feet):
+def dug_out(ground: Array, points: Array, places: Array, heights: Array) -> Array:
+    """Ground (M,) at points (M, 2), where it is above them lowered to `heights` (N,) at places (N, 2)."""
+    from hobble.terrain.kernels import lowest_cone
+
+    if not len(places):
         return ground
-    return np.minimum(ground, (distances(points, feet) * STEEPEST + soles).min(axis=1))
+    return np.minimum(ground, lowest_cone(*_columns(points), *_columns(places), heights, STEEPEST))
 
 
 def distances(a: Array, b: Array) -> Array:
     """(M, 2) and (N, 2) -> (M, N)."""
-    return np.hypot(a[:, None, 0] - b[None, :, 0], a[:, None, 1] - b[None, :, 1])
+    x, z = a[:, None, 0] - b[None, :, 0], a[:, None, 1] - b[None, :, 1]
+    return np.sqrt(x * x + z * z)
+
+
+def _columns(points: Array) -> tuple[Array, Array]:
+    return np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+
+Mask = NDArray[np.bool_]
 
 ROLES = ("left_heel", "left_toe", "right_heel", "right_toe")
 HEEL = np.array([True, False, True, False])
@@ -23,14 +26,14 @@ class Feet:
     """
 
     soles: Array = field(repr=False)
-    contacts: Array = field(repr=False)
+    contacts: Mask = field(repr=False)
     heel_height: float
     toe_height: float
 
 
 def feet_of(
     clip: Clip,
-    contacts: Array,
+    contacts: Mask,
     frames: np.ndarray,
     flat: bool,
     *,
@@ -41,24 +44,30 @@ def feet_of(
 ) -> Feet:
     """The soles of a clip. A height of "auto" is found from the clip or its skeleton.
 
-    frames: those that count, (N,). On flat ground, which lies at zero, "auto" is the median height of the joints in
-    contact, or less where a foot would otherwise go further than `deepest` (cm) below the ground. Elsewhere the toe
-    joint is `sole` cm above the ground, and the heel as much higher as in the skeleton's rest pose.
+    frames: those that count, (N,). On flat ground, which lies at zero, "auto" is the median height of the
+    joints in contact, or a little less where that keeps every foot from going further than `deepest` (cm)
+    below the ground. Elsewhere the toe joint is `sole` cm above the ground, and the heel as much higher as in
+    the skeleton's rest pose.
     """
     joints = clip.positions[:, [clip.skeleton.role(role) for role in ROLES]].copy()
-    contacts = np.asarray(contacts, bool)
-    found: dict[str, float] = {}
-    for name, wanted, columns in (("heel", heel_height, HEEL), ("toe", toe_height, ~HEEL)):
+    found: list[float] = []
+    for wanted, columns in ((heel_height, HEEL), (toe_height, ~HEEL)):
+        heights, down = joints[frames][:, columns, 1], contacts[frames][:, columns]
         if wanted != "auto":
-            found[name] = float(wanted)
-        elif flat and contacts[frames][:, columns].any():
-            heights, down = joints[frames][:, columns, 1], contacts[frames][:, columns]
-            median = float(np.median(heights[down]))
-            found[name] = median if deepest is None else min(median, float(heights.min()) + deepest)
+            found.append(float(wanted))
+        elif flat and down.any():
+            found.append(_flat_height(heights, down, deepest))
         else:
-            found[name] = sole + (heel_above_toe(clip.skeleton) if name == "heel" else 0.0)
-    joints[..., 1] -= np.where(HEEL, found["heel"], found["toe"])
-    return Feet(joints, contacts, found["heel"], found["toe"])
+            found.append(sole + (heel_above_toe(clip.skeleton) if columns is HEEL else 0.0))
+    joints[..., 1] -= np.where(HEEL, *found)
+    return Feet(joints, contacts, *found)
+
+
+def _flat_height(heights: Array, down: Array, deepest: float | None) -> float:
+    """The median height in contact; up to `deepest` less where that keeps every foot above -deepest."""
+    median = float(np.median(heights[down]))
+    wanted = float(heights.min()) + (deepest or 0.0)
+    return wanted if deepest is not None and median - deepest <= wanted < median else median
 
 
 def heel_above_toe(skeleton: Skeleton) -> float:

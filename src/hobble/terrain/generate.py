@@ -67,7 +67,7 @@ def stairs(rng: np.random.Generator, cell: float) -> Array:
 
 
 def slope(rng: np.random.Generator, cell: float) -> Array:
-    """Ramps of up to 12 degrees, with bends every one to four metres, and a fall of up to 5 degrees across."""
+    """Ramps of up to 12 degrees that bend every one to four metres, with a fall of up to 5 degrees across."""
     along = np.arange(CELLS) * cell
     knots, levels = [0.0], [0.0]
     while knots[-1] < along[-1]:

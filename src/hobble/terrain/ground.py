@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.terrain.correction import Bend, bend, distances, dug_out, stances
+from hobble.terrain.correction import Bend, bends, distances, dug_out, stances, together
+from hobble.terrain.feet import Mask
 from hobble.terrain.patches import Patches
-from hobble.terrain.search import Footing, best_patches
 
 PIECE = 8  # frames of a stance that are one point
+FINE_PIECE = 4  # likewise of a foot that is below the ground
 BESIDE = (35.0, 50.0)  # cm from the path, to each side
 NEAREST = 25.0  # cm that these keep from the rest of the path
 
@@ -21,34 +22,40 @@ NEAREST = 25.0  # cm that these keep from the rest of the path
 class Ground:
     """K fits of one cycle: functions of the ground's x and z.
 
-    chosen, error: (K,) patches and their errors, the best first. centre: (2,) where the patches lie. level: (K,) what is
-    added to a patch. surfaces: what is added to meet the contacts. dug: for each fit the places (N, 2) and
-    heights (N,) that it is dug out to.
+    patches: None for flat ground. chosen, error: (K,) patches and their errors, the best first. centre: (2,)
+    where the patches lie. level: (K,) what is added to a patch. surfaces: for each fit what is added to meet
+    the feet. dug: for each fit the places (N, 2) and heights (N,) that it is dug out to.
     """
 
-    patches: Patches = field(repr=False)
+    patches: Patches | None = field(repr=False)
     chosen: np.ndarray
     error: Array
     centre: Array = field(repr=False)
     level: Array = field(repr=False)
-    surfaces: Sequence[Bend] = field(repr=False)
+    surfaces: Sequence[Bend] = field(default=(), repr=False)
     dug: Sequence[tuple[Array, Array]] = field(default=(), repr=False)
 
     def at(self, points: Array) -> Array:
         """Heights (K, M) at world points (M, 2) x and z, cm."""
-        cells = self.patches.cells(points, self.centre)
-        heights = self.patches.at(self.chosen, cells) + self.level[:, None]
-        for surface in self.surfaces:
-            heights = heights + surface.at(points)
-        for k, (places, soles) in enumerate(self.dug):
-            heights[k] = dug_out(heights[k], points, places, soles)
+        heights = np.tile(self.level[:, None], len(points))
+        if self.patches is not None:
+            heights += self.patches.at(self.chosen, self.patches.cells(points, self.centre))
+        for k, surface in enumerate(self.surfaces):
+            heights[k] += surface.at(points)
+        for k, (places, lowered) in enumerate(self.dug):
+            heights[k] = dug_out(heights[k], points, places, lowered)
         return heights
+
+    def above(self, soles: Array) -> Array:
+        """How far the ground is above each sole (..., 3), (K, ...), cm; below it where negative."""
+        heights = self.at(soles[..., [0, 2]].reshape(-1, 2))
+        return heights.reshape(-1, *soles.shape[:-1]) - soles[..., 1]
 
 
 def fit_cycle(
     patches: Patches,
     soles: Array,
-    contacts: Array,
+    contacts: Mask,
     path: Array,
     sides: Array,
     kind: str,
@@ -59,11 +66,13 @@ def fit_cycle(
 ) -> Ground:
     """Fit the ground under one cycle and the window about it.
 
-    soles: (T, 4, 3) of heels and toes, cm. contacts: (T, 4) bool, some of them true. path: (T, 2) x and z of the
-    root; sides: (T, 2) the unit vector to the left. kind: "rocky", "jumpy" or "beam", what
-    the error asks for besides. smoothing: of the residual's radial basis functions. deepest: no foot may go
-    further below the ground (cm); None asks nothing.
+    soles: (T, 4, 3) of heels and toes, cm. contacts: (T, 4) bool, some of them true. path: (T, 2) x and z
+    of the root; sides: (T, 2) the unit vector to the left. kind: "rocky", "jumpy" or "beam", what the error
+    asks for besides. smoothing: of the residual's radial basis functions. deepest: no foot may go further
+    below the ground (cm); None asks nothing.
     """
+    from hobble.terrain.search import Footing, best_patches  # compiled: flat clips need none of it
+
     where, height = soles[..., [0, 2]], soles[..., 1]
     centre, level = where[contacts].mean(axis=0), height[contacts].mean()
     cells = patches.cells(where.reshape(-1, 2), centre).reshape(where.shape)
@@ -72,27 +81,51 @@ def fit_cycle(
     footing = Footing(table[contacts], table[~contacts], kind == "jumpy", beside)
     chosen, error = best_patches(patches, footing, fits)
     patch_level = patches.at(chosen, cells[contacts]).mean(axis=1, dtype=float)
-    plain = Ground(patches, chosen, error, centre, level - patch_level, ())
-    met = meet_contacts(plain, soles, contacts, smoothing)
-    return met if deepest is None else let_through(met, soles, deepest)
+    plain = Ground(patches, chosen, error, centre, level - patch_level)
+    return meet_feet(plain, soles, contacts, smoothing, deepest)
 
 
-def meet_contacts(ground: Ground, soles: Array, contacts: Array, smoothing: float) -> Ground:
-    """Add the surface of what is left between the ground and the feet in contact."""
+def flat_ground(
+    soles: Array, contacts: Mask, *, smoothing: float, deepest: float | None, bent: bool
+) -> Ground:
+    """Flat ground lies at zero: one fit.
+
+    Where the feet in contact are further than `deepest` (cm) from it on average, or one is further below it,
+    since the floor or the capture was uneven, it is bent to meet them if `bent`.
+    """
+    plain = Ground(None, np.array([-1]), np.zeros(1), np.zeros(2), np.zeros(1))
+    height = soles[..., 1]
+    if deepest is None or not bent:
+        return plain
+    if np.abs(height[contacts]).mean() <= deepest and height.min() >= -deepest:
+        return plain
+    return meet_feet(plain, soles, contacts, smoothing, deepest)
+
+
+def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None) -> Ground:
+    """Add the surface of what is left between the ground and the feet in contact.
+
+    Feet that are then below the ground (by more than half of `deepest`) join those points, and the surface is
+    made again; what little still covers a foot is dug out.
+    """
     standing = stances(soles, contacts, PIECE)
-    residual = standing.height - ground.at(standing.place)
-    return replace(ground, surfaces=(bend(standing.place, residual, standing.count, smoothing),))
-
-
-def let_through(ground: Ground, soles: Array, deepest: float) -> Ground:
-    """Dig the ground out where a foot, in contact or not, is below it by more than half of `deepest`."""
-    where, height = soles[..., [0, 2]].reshape(-1, 2), soles[..., 1].ravel()
-    below = ground.at(where) - height > deepest / 2
-    return replace(ground, dug=[(where[row], height[row] + deepest / 2) for row in below])
+    residual = standing.height - plain.at(standing.place)
+    surfaces = bends(standing, residual, smoothing)
+    ground = replace(plain, surfaces=surfaces)
+    if deepest is None:
+        return ground
+    for k, covered in enumerate(ground.above(soles) > deepest / 2):
+        if covered.any():
+            points = together(standing, stances(soles, covered & ~contacts, FINE_PIECE))
+            rest = points.height - plain.at(points.place)[k]
+            surfaces[k] = bends(points, rest[None], smoothing)[0]
+    ground = replace(plain, surfaces=surfaces)
+    dug = [(soles[c][:, [0, 2]], soles[c][:, 1] + deepest / 2) for c in ground.above(soles) > deepest / 2]
+    return replace(ground, dug=dug)
 
 
 def beside_path(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:
-    """Where there must be no ground beside a beam: (N, 4) cells of a point off the path, and of its point on it."""
+    """(N, 4) cells of points beside the path, where a beam has no ground, and of their points on the path."""
     off = np.concatenate([path + sign * d * sides for d in BESIDE for sign in (1, -1)])
     on = np.tile(path, (2 * len(BESIDE), 1))
     free = distances(off, path).min(axis=1) > NEAREST

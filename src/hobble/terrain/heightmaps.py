@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.errors import InputError
+from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.terrain.generate import generate
 
@@ -28,9 +29,9 @@ def heightmaps(
 ) -> list[Heightmap]:
     """The heightmaps that a data set lists.
 
-    entries: `kind`, `seed`, and `cell` and `height_scale` where they differ from the general ones. files: those
-    of the entries of kind `file`, in their order. cell: cm a cell. height_scale: what the heights of files
-    are multiplied by to make them cm. Raises InputError for a file that cannot be used.
+    entries: `kind`, `seed`, and `cell` and `height_scale` where they differ from the general ones. files:
+    those of the entries of kind `file`, in their order. cell: cm a cell. height_scale: what the heights of
+    files are multiplied by to make them cm. Raises InputError for a file that cannot be used.
     """
     given = iter(files)
     out = []
@@ -53,14 +54,14 @@ def heightmaps(
 def elevation(cell: float) -> Array:
     """The elevation model of a real landscape that matplotlib carries, true to scale: cm.
 
-    Its 3 arc seconds are 92.6 m north to south and 74.3 m east to west at 36.6 degrees north; columns are resampled
-    so that cells are square, and one cell becomes `cell` centimetres. Slopes reach 36 degrees.
+    Its 3 arc seconds are 92.6 m north to south and 74.3 m east to west at 36.6 degrees north; columns are
+    resampled so that cells are square, and one cell becomes `cell` centimetres. Slopes reach 36 degrees.
     """
-    from matplotlib import cbook
+    import matplotlib
 
-    with cbook.get_sample_data("jacksboro_fault_dem.npz") as data:
-        metres = data["elevation"].astype(float)
-        latitude = (float(data["ymin"]) + float(data["ymax"])) / 2
+    data = load_npz(Path(matplotlib.get_data_path(), "sample_data", "jacksboro_fault_dem.npz"))
+    metres = data["elevation"].astype(float)
+    latitude = (float(data["ymin"]) + float(data["ymax"])) / 2
     narrow = np.cos(np.radians(latitude))
     columns = np.arange(metres.shape[1])
     wanted = np.arange(0, metres.shape[1] - 1, 1 / narrow)
@@ -72,8 +73,9 @@ def elevation(cell: float) -> Array:
 def read_heights(path: str | Path) -> Array:
     """Heights (rows, columns) as a file has them: a text matrix, an image, a NumPy array.
 
-    .txt .csv .dat .asc: numbers in rows, apart by spaces, commas or semicolons. .npy; .npz: its only array of two
-    dimensions, or the one called `heights` or `elevation`. .png .tif .tiff: grey values. Raises InputError.
+    .txt .csv .dat .asc: numbers in rows, apart by spaces, commas or semicolons. .npy; .npz: its only array of
+    two dimensions, or the one called `heights` or `elevation`. .png .tif .tiff: grey values. Raises
+    InputError.
     """
     path = Path(path)
     if not path.is_file():
@@ -124,8 +126,6 @@ def _npy(path: Path) -> Array:
 
 
 def _npz(path: Path) -> Array:
-    from hobble.core.files import load_npz
-
     arrays = {name: a for name, a in load_npz(path).items() if a.ndim == 2}
     for name in ("heights", "elevation", *arrays):
         if name in arrays and (len(arrays) == 1 or name in ("heights", "elevation")):

@@ -1,7 +1,7 @@
 """Patches of ground: views of a few heightmaps, drawn at random.
 
-A patch is not stored as cells: it is a heightmap and the affine map that takes the patch's cells to cells of the
-heightmap, with the mean height to take off. Twenty thousand of them are 1 MB where their cells were 600.
+A patch is not stored as cells: it is a heightmap and the affine map that takes the patch's cells to cells of
+the heightmap, with the mean height to take off. Twenty thousand of them are 1 MB where their cells were 600.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from hobble.core.quat import Array
 from hobble.terrain.heightmaps import Heightmap
 
 BATCH = 1_000
+HOLE = 1e9
 FEWEST = 1 / 1_000  # of the crops of a map have to pass
 
 
@@ -25,9 +26,9 @@ FEWEST = 1 / 1_000  # of the crops of a map have to pass
 class Patches:
     """P views of M heightmaps.
 
-    heights: all maps one after another, row by row, cm, float32. starts: (M,) where each begins. shapes: (M, 2)
-    rows and columns. names: (M,). which: (P,) the map of each view. affine: (P, 2, 3): row, column of the map =
-    affine (u, v, 1) for the cell (u, v) from the middle of the patch, u along the world's x, v along z.
+    heights: all maps one after another, row by row, cm, float32. starts: (M,) where each begins. shapes: (M,
+    2) rows and columns. names: (M,). which: (P,) the map of each view. affine: (P, 2, 3): row, column of the
+    map = affine (u, v, 1) for the cell (u, v) from the middle of the patch, u along the world's x, v along z.
     mean: (P,) height to take off. cell: centimetres a cell of the patch. size: cells a side.
     """
 
@@ -50,7 +51,8 @@ class Patches:
         return self.heights, self.starts, self.shapes, self.which, self.affine, self.mean
 
     def cells(self, points: Array, centre: Array) -> Array:
-        """World points (N, 2) x and z in cm, as cells (N, 2) from the middle of a patch that lies at `centre` (2,).
+        """World points (N, 2) x and z in cm, as cells (N, 2) from the middle of a patch that lies at
+        `centre` (2,).
 
         Beyond its edge a patch goes on as at its edge.
         """
@@ -60,7 +62,7 @@ class Patches:
 
     def at(self, chosen: Sequence[int] | np.ndarray, cells: Array) -> Array:
         """Heights (K, N) of the K chosen patches at cells (N, 2) from their middle, cm."""
-        from hobble.terrain.sampling import view_heights
+        from hobble.terrain.kernels import view_heights
 
         k = np.asarray(chosen, int)
         maps = self.heights, self.starts, self.shapes
@@ -76,11 +78,11 @@ def draw_patches(
     goes further than `highest` from its mean is dropped and drawn again. Raises InputError naming a map
     that is too small, or from which (almost) nothing passes.
     """
-    from hobble.terrain.sampling import view_extents
+    from hobble.terrain.kernels import view_extents
 
     if not maps:
         raise HobbleError("terrain.heightmaps names no heightmap, so there is nothing to draw patches from.")
-    flat, starts, shapes = _joined(maps)
+    flat, starts, shapes = _joined(maps, cell)
     shares = [count // len(maps) + (i < count % len(maps)) for i in range(len(maps))]
     which, affines, means = [], [], []
     for i, (heightmap, share) in enumerate(zip(maps, shares, strict=True)):
@@ -96,9 +98,10 @@ def draw_patches(
             affines.append(affine[keep])
             means.append(mean[keep])
             if found < FEWEST * drawn:
+                passed = f"{found} of {drawn} crops" if found else f"none of {drawn} crops"
                 raise InputError(
                     heightmap.name,
-                    f"{found or 'none'} of {drawn} crops of {size} cells stays within {highest:g} cm of its mean",
+                    f"{passed} of {size} cells stays within {highest:g} cm of its mean",
                     fix="Lower its height_scale, or leave this heightmap out.",
                 )
         which.append(np.full(share, i, np.int32))
@@ -125,10 +128,21 @@ def load_patches(path: str | Path) -> Patches:
         ) from error
 
 
-def _joined(maps: Sequence[Heightmap]) -> tuple[Array, np.ndarray, np.ndarray]:
+def _joined(maps: Sequence[Heightmap], cell: float) -> tuple[Array, np.ndarray, np.ndarray]:
     shapes = np.array([m.heights.shape for m in maps], np.int64)
-    flat = np.concatenate([m.heights.astype(np.float32).ravel() for m in maps])
+    flat = np.concatenate([_without_holes(m, cell).astype(np.float32).ravel() for m in maps])
     return flat, _starts(shapes), shapes
+
+
+def _without_holes(heightmap: Heightmap, cell: float) -> Array:
+    """Heights with holes (nan) made so high that no patch that shows one passes, even between its cells."""
+    holes = np.isnan(heightmap.heights)
+    if not holes.any():
+        return heightmap.heights
+    from scipy.ndimage import maximum_filter
+
+    reach = 1 + int(np.ceil(cell / heightmap.cell))
+    return np.where(maximum_filter(holes, 2 * reach + 1), HOLE, heightmap.heights)
 
 
 def _starts(shapes: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What a picture of a fit needs: the ground as a grid, the feet over time, and the figure at three moments."""
+"""What a picture of a fit needs: the ground as a grid, the feet over time, the figure at three moments."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.terrain.feet import Feet
+from hobble.terrain.feet import Feet, Mask
 from hobble.terrain.ground import Ground
 
 GRID = 24
@@ -20,8 +20,8 @@ MOST = 2
 class Picture:
     """One fit, the best, of one cycle; centimetres in the clip's world.
 
-    x, z: (G,) of the grid; ground: (G, G) heights at x[i], z[j]. soles: (T, 4, 3), contacts: (T, 4). pose: (3, J, 3)
-    joints at the beginning, the middle and the end of the cycle; parents: (J,).
+    x, z: (G,) of the grid; ground: (G, G) heights at x[i], z[j]. soles: (T, 4, 3), contacts: (T, 4). pose:
+    (3, J, 3) joints at the beginning, the middle and the end of the cycle; parents: (J,).
     """
 
     cycle: int
@@ -29,7 +29,7 @@ class Picture:
     z: Array = field(repr=False)
     ground: Array = field(repr=False)
     soles: Array = field(repr=False)
-    contacts: Array = field(repr=False)
+    contacts: Mask = field(repr=False)
     pose: Array = field(repr=False)
     parents: np.ndarray = field(repr=False)
 

@@ -1,0 +1,232 @@
+"""Compiled loops: bilinear heights of patches, the extent and the error of a patch, sums over distances.
+
+A patch is a view of a heightmap. Its cell (u, v), counted from the middle of the patch along the world's x
+and z, shows the map at row, column = A (u, v, 1). Maps of any size lie one after another in one float32
+array; `starts` and `shapes` say where. All loops are over plain arrays, so that one compiled version serves
+every data set. They are in one file because what numba compiled and kept is only made anew when the file
+of the function that was called has changed.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+DOWN_WEIGHT = 0.1
+JUMP_HEIGHT = 5.0
+BEAM_HEIGHT = 40.0
+FAST = {"reassoc", "contract", "nsz", "nnan"}  # lets sums be vectorised; no height is nan
+ONE = np.uint32(1)
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def height(heights, rows, columns, r, c):
+    """Bilinear height of one map at row r, column c (float32, inside the map)."""
+    i = min(np.int32(r), np.int32(rows - 2))
+    j = min(np.int32(c), np.int32(columns - 2))
+    fr = r - np.float32(i)
+    fc = c - np.float32(j)
+    k = np.uint32(i * np.int32(columns) + j)  # unsigned: no test for negative indices
+    below = k + np.uint32(columns)
+    near = heights[k] + fc * (heights[k + ONE] - heights[k])
+    far = heights[below] + fc * (heights[below + ONE] - heights[below])
+    return near + fr * (far - near)
+
+
+@numba.njit(cache=True, inline="always")
+def map_of(heights, starts, shapes, m):
+    """The cells of map m, its rows and its columns."""
+    rows, columns = shapes[m, 0], shapes[m, 1]
+    return heights[starts[m] : starts[m] + rows * columns], rows, columns
+
+
+@numba.njit(cache=True)
+def view_heights(heights, starts, shapes, which, affine, mean, points):
+    """Heights (P, N) of P patches at the same N points (N, 2), in cells from the middle, inside the patch."""
+    out = np.empty((len(which), len(points)), np.float32)
+    for p in range(len(which)):
+        cells, rows, columns = map_of(heights, starts, shapes, which[p])
+        a = affine[p]
+        for n in range(len(points)):
+            u, v = points[n, 0], points[n, 1]
+            r = a[0, 0] * u + a[0, 1] * v + a[0, 2]
+            c = a[1, 0] * u + a[1, 1] * v + a[1, 2]
+            out[p, n] = height(cells, rows, columns, r, c) - mean[p]
+    return out
+
+
+@numba.njit(cache=True)
+def view_extents(heights, starts, shapes, which, affine, size, highest):
+    """Mean height of each of P views over its `size` x `size` cells, and whether no cell is further from it
+    than `highest`.
+
+    Returns mean (P,), passes (P,). A view whose coarse cells differ by more than twice `highest` cannot pass
+    and is not looked at any further; its mean is 0.
+    """
+    mean = np.zeros(len(which), np.float32)
+    passes = np.zeros(len(which), np.bool_)
+    half = size // 2
+    seen = np.empty(size * size, np.float32)
+    for p in range(len(which)):
+        cells, rows, columns = map_of(heights, starts, shapes, which[p])
+        a = affine[p]
+        low, high = np.float32(np.inf), np.float32(-np.inf)
+        for i in range(0, size, 8):
+            for j in range(0, size, 8):
+                u, v = np.float32(i - half), np.float32(j - half)
+                r = a[0, 0] * u + a[0, 1] * v + a[0, 2]
+                c = a[1, 0] * u + a[1, 1] * v + a[1, 2]
+                h = height(cells, rows, columns, r, c)
+                low, high = min(low, h), max(high, h)
+        if not high - low <= 2 * highest:
+            continue
+        total = 0.0
+        n = 0
+        for i in range(size):
+            for j in range(size):
+                u, v = np.float32(i - half), np.float32(j - half)
+                r = a[0, 0] * u + a[0, 1] * v + a[0, 2]
+                c = a[1, 0] * u + a[1, 1] * v + a[1, 2]
+                seen[n] = height(cells, rows, columns, r, c)
+                total += seen[n]
+                n += 1
+        middle = total / n
+        passes[p] = True
+        for k in range(n):
+            if not abs(seen[k] - middle) <= highest:
+                passes[p] = False
+                break
+        mean[p] = middle
+    return mean, passes
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def distance_sum(x, z, place_x, place_z, weights):
+    """(M,): at each point x, z (M,) the sum of its distances from N places, weighed by `weights` (N,)."""
+    out = np.empty(len(x))
+    for m in range(len(x)):
+        total = 0.0
+        for n in range(len(weights)):
+            a, b = x[m] - place_x[n], z[m] - place_z[n]
+            total += weights[n] * np.sqrt(a * a + b * b)
+        out[m] = total
+    return out
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def lowest_cone(x, z, place_x, place_z, heights, steepness):
+    """(M,): at each point x, z (M,) the lowest of the cones that rise by `steepness` from N places."""
+    out = np.empty(len(x))
+    for m in range(len(x)):
+        lowest = np.inf
+        for n in range(len(heights)):
+            a, b = x[m] - place_x[n], z[m] - place_z[n]
+            lowest = min(lowest, heights[n] + steepness * np.sqrt(a * a + b * b))
+        out[m] = lowest
+    return out
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def _down_means(heights, rows, columns, a, points):
+    """How far the patch is above the first foot in contact; mean, mean square of how much further above all.
+
+    That keeps the numbers small for a patch that fits, and so exact in single precision.
+    """
+    u, v, foot = points
+    (ru, rv, r0), (cu, cv, c0) = a
+    first = height(heights, rows, columns, ru * u[0] + rv * v[0] + r0, cu * u[0] + cv * v[0] + c0)
+    first -= foot[0]
+    total, squares = np.float32(0), np.float32(0)
+    for k in range(len(u)):
+        r = ru * u[k] + rv * v[k] + r0
+        c = cu * u[k] + cv * v[k] + c0
+        d = height(heights, rows, columns, r, c) - first - foot[k]
+        total += d
+        squares += d * d
+    return first, total / len(u), squares / len(u)
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def _up_sum(heights, rows, columns, a, offset, points, jumps):
+    """Sum of squares of how far the ground is above feet that are up, or too far below them in jumps."""
+    u, v, foot = points
+    (ru, rv, r0), (cu, cv, c0) = a
+    lowest = -np.float32(JUMP_HEIGHT) if jumps else -np.float32(1e9)
+    squares = np.float32(0)
+    for k in range(len(u)):
+        r = ru * u[k] + rv * v[k] + r0
+        c = cu * u[k] + cv * v[k] + c0
+        d = height(heights, rows, columns, r, c) - offset - foot[k]
+        d = max(d, np.float32(0)) + min(d - lowest, np.float32(0))
+        squares += d * d
+    return squares
+
+
+@numba.njit(cache=True, fastmath=FAST)
+def _beside_sum(heights, rows, columns, a, points):
+    """Sum of squares of how far the ground beside the path is above BEAM_HEIGHT below the path."""
+    u, v, path_u, path_v = points
+    (ru, rv, r0), (cu, cv, c0) = a
+    squares = np.float32(0)
+    for k in range(len(u)):
+        r = ru * u[k] + rv * v[k] + r0
+        c = cu * u[k] + cv * v[k] + c0
+        d = height(heights, rows, columns, r, c) + np.float32(BEAM_HEIGHT)
+        r = ru * path_u[k] + rv * path_v[k] + r0
+        c = cu * path_u[k] + cv * path_v[k] + c0
+        d = max(d - height(heights, rows, columns, r, c), np.float32(0))
+        squares += d * d
+    return squares
+
+
+@numba.njit(cache=True)
+def _error(heights, rows, columns, a, tables, jumps, limit):
+    """The error of one patch, or infinity as soon as it is known to lie above `limit`."""
+    down, up_head, up_rest, beside = tables
+    first, offset, squares = _down_means(heights, rows, columns, a, down)
+    error = DOWN_WEIGHT * max(squares - offset * offset, 0.0)
+    if error > limit:
+        return np.inf
+    offset = np.float32(first + offset)
+    count = len(up_head[0]) + len(up_rest[0])
+    if count:
+        squares = _up_sum(heights, rows, columns, a, offset, up_head, jumps)
+        if error + squares / count > limit:
+            return np.inf
+        squares += _up_sum(heights, rows, columns, a, offset, up_rest, jumps)
+        error += squares / count
+    if len(beside[0]) and error <= limit:
+        error += _beside_sum(heights, rows, columns, a, beside) / len(beside[0])
+    return error
+
+
+@numba.njit(cache=True, inline="always")
+def _terms(a):
+    return (a[0, 0], a[0, 1], a[0, 2]), (a[1, 0], a[1, 1], a[1, 2])
+
+
+@numba.njit(cache=True)
+def view_errors(heights, starts, shapes, which, affine, tables, jumps):
+    """The error (P,) of every view. tables: see `hobble.terrain.search`."""
+    out = np.empty(len(which))
+    for p in range(len(which)):
+        cells, rows, columns = map_of(heights, starts, shapes, which[p])
+        out[p] = _error(cells, rows, columns, _terms(affine[p]), tables, jumps, np.inf)
+    return out
+
+
+@numba.njit(cache=True)
+def search_views(heights, starts, shapes, which, affine, tables, jumps, count):
+    """Indices and errors (count,) of the views of lowest error, the best first; of equal ones the first."""
+    best = np.full(count, -1)
+    errors = np.full(count, np.inf)
+    for p in range(len(which)):
+        cells, rows, columns = map_of(heights, starts, shapes, which[p])
+        error = _error(cells, rows, columns, _terms(affine[p]), tables, jumps, errors[-1])
+        if error < errors[-1]:
+            k = count - 1
+            while k > 0 and errors[k - 1] > error:
+                errors[k], best[k] = errors[k - 1], best[k - 1]
+                k -= 1
+            errors[k], best[k] = error, p
+    return best, errors
