@@ -25,7 +25,7 @@ def main() -> None:
     print(f"{'recipe':15s} {'walk s':>7s} {'write s':>8s} {'x real time':>12s}")
     for recipe, injured in (
         ("walk-straight", None),
-        ("jog-turns", None),
+        ("jog", None),
         ("steps", None),
         (None, "LowerBack-Spine"),
     ):

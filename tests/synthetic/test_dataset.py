@@ -40,7 +40,8 @@ def test_clips_name_recipes_and_links_that_there_are(root, name):
 
 def test_every_link_that_can_be_hurt_is(dataset):
     assert {e["injured"] for e in dataset["clips"].values() if "injured" in e} == set(LINKS)
-    assert {e["recipe"] for e in dataset["clips"].values() if "recipe" in e} == set(RECIPES) - {"injured"}
+    used = {e["recipe"] for e in dataset["clips"].values() if "recipe" in e}
+    assert used == set(RECIPES) - {"injured", "walk-straight"}  # the latter is a tiny data set's
 
 
 def test_turns_go_left_as_much_as_right_and_every_gait_has_its_share(dataset):

@@ -15,7 +15,7 @@ from hobble.synthetic.files import footsteps_text, gait_text, status_text
 from hobble.synthetic.path import gait_keys
 from hobble.synthetic.recipes import Segment
 
-RECIPES = ["walk-straight", "walk-turns", "jog", "walk-jog-walk", "uneven", "crouch"]
+RECIPES = ["walk-straight", "walk", "jog", "walk-jog-walk", "uneven", "crouch"]
 
 
 @pytest.mark.parametrize("recipe", RECIPES)
@@ -32,7 +32,7 @@ def test_footsteps_are_landings_of_the_right_and_the_left_foot_in_turn(written, 
 
 
 def test_every_landing_of_the_motion_has_its_line(written):
-    clip = written("any", recipe="walk-turns")
+    clip = written("any", recipe="walk")
     for side in ("Right", "Left"):
         down = clip.down(side)
         lands = np.flatnonzero(~down[:-1] & down[1:]) + 1

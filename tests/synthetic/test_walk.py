@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hobble.core import quat
+from hobble.synthetic.clip import generate, walk
+from hobble.synthetic.recipes import Segment
+
 SIDES = ("Left", "Right")
+FEET = [(side, joint) for side in SIDES for joint in ("Foot", "ToeBase")]
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +24,7 @@ def brisk(clip, side):
 
 
 @pytest.mark.parametrize(
-    ("joint", "published", "within"), [("hip", 40, 9), ("knee", 60, 8), ("ankle", 30, 9)]
+    ("joint", "published", "within"), [("hip", 40, 3.5), ("knee", 60, 3.5), ("ankle", 30, 3.5)]
 )
 def test_range_of_motion_is_that_of_people_at_1_3_metres_a_second(walking, joint, published, within):
     ranges = []
@@ -29,6 +34,32 @@ def test_range_of_motion_is_that_of_people_at_1_3_metres_a_second(walking, joint
     assert len(ranges) > 8
     assert abs(np.mean(ranges) - published) < within
     assert np.std(ranges) < 5
+
+
+def test_stance_knee_yields_at_the_landing_and_straightens_again(walking):
+    for side in SIDES:
+        knee = walking.angles(side)["knee"]
+        for a, b in brisk(walking, side):
+            early, later = knee[a : a + (b - a) // 5], knee[a + (b - a) // 5 : a + (b - a) * 2 // 5]
+            assert 12 < early.max() < 30
+            assert later.min() < 15 < early.max()
+
+
+def test_jog_grows_with_speed(holden31):
+    stride, flight = [], []
+    for speed in (210, 280, 350, 420):
+        made = walk("m", holden31, [Segment("jog", speed, seconds=12)], 720, None, "flat", 60, 1)
+        places = dict(zip(holden31.joints, np.moveaxis(made.clip.positions, 1, 0), strict=True))
+        part = slice(made.right[2], made.right[-2])
+        cycles = len(made.right) - 4
+        seconds = (part.stop - part.start) / 60 / cycles
+        assert 1.3 < 1 / seconds < 1.6
+        stride.append(np.ptp(places["Hips"][part, 2]) / cycles)
+        still = [np.sum(np.diff(places[f"{s}{j}"], axis=0) ** 2, axis=1) < 0.02 for s, j in FEET]
+        flight.append(1 - np.any(still, axis=0)[part].mean())
+    assert (np.diff(stride) > 20).all()
+    assert (np.diff(flight) > 0.03).all()
+    assert flight[0] > 0.15
 
 
 def test_both_feet_are_down_for_a_fifth_of_the_cycle(walking):
@@ -53,7 +84,7 @@ def test_walking_never_flies_and_jogging_does(walking, written):
 def test_heel_leaves_before_the_toe(walking):
     heel, toe = walking.contact("RightFoot"), walking.contact("RightToeBase")
     for a, b in brisk(walking, "Right"):
-        heel_off = a + np.flatnonzero(heel[a:b])[-1]
+        heel_off = a + np.flatnonzero(heel[a : b - 2])[-1]  # not the next landing
         toe_off = a + np.flatnonzero(toe[a:b])[-1]
         assert 8 < toe_off - heel_off < 30
         assert heel[a + 1 : heel_off].all()
@@ -81,8 +112,8 @@ def test_hips_are_highest_in_mid_stance_and_head_stays_level(walking):
     assert np.degrees(np.arccos(neck[:, 1] / np.linalg.norm(neck, axis=1))).max() < 15
 
 
-ALL = ["walk-straight", "walk-turns", "walk-curves", "walk-speeds", "jog", "jog-turns", "crouch", "strafe"]
-ALL += ["backward", "stop-and-go", "walk-jog-walk", "slopes", "steps", "uneven"]
+ALL = ["walk-straight", "walk", "jog", "crouch", "sidesteps", "stop-and-go", "walk-jog-walk"]
+ALL += ["slopes", "steps", "uneven"]
 
 
 @pytest.mark.parametrize("recipe", ALL)
@@ -93,9 +124,20 @@ def test_no_leg_is_stretched_and_nothing_jerks(written, recipe):
         assert knee.min() > 4
         hip, ankle = clip.joint(f"{side}UpLeg"), clip.joint(f"{side}Foot")
         assert np.linalg.norm(hip - ankle, axis=1).max() < 0.9985 * 81
-        assert np.abs(np.diff(knee)).max() < (27 if recipe == "steps" else 18)  # degrees a frame
+        assert np.abs(np.diff(knee)).max() < (15 if "jog" in recipe else 12)  # degrees a frame
     acceleration = np.diff(clip.positions, 2, axis=0) * 36  # m/s2
-    assert np.linalg.norm(acceleration, axis=2).max() < (320 if recipe in ("steps", "jog") else 200)
+    assert np.linalg.norm(acceleration, axis=2).max() < (320 if recipe == "jog" else 200)
+
+
+def test_no_joint_turns_fast(holden31, dataset):
+    """No more than 15 degrees a frame from its parent, in any clip of the embedded data set."""
+    total = sum(entry.get("share", 1) for entry in dataset["clips"].values())
+    for name, entry in dataset["clips"].items():
+        frames = round(dataset["synthetic"]["frames"] * entry.get("share", 1) / total)
+        made = generate(name, holden31, frames, entry.get("recipe"), entry.get("injured"), 120, 1)
+        turns = np.degrees(quat.angle(made.clip.rotations[2::2], made.clip.rotations[:-2:2]))
+        frame, joint = np.unravel_index(np.argmax(turns), turns.shape)
+        assert turns.max() < 15, f"{name}: {holden31.joints[joint]} at frame {frame}"
 
 
 @pytest.mark.parametrize("recipe", ALL)
@@ -110,14 +152,16 @@ def test_a_foot_that_is_down_does_not_slide(written, recipe):
             if b - a > 5:
                 inner = place[a + 1 : b - 2]
                 lengths.append(b - a)
-                # A heel may begin to rise slowly; nothing else moves a joint that counts as down.
-                assert np.ptp(inner[:, [0, 2]], axis=0).max() < 0.45
+                # A heel may begin to rise slowly, or sink as the figure stands up out of a crouch; nothing
+                # else moves a joint that counts as down.
+                sinks = recipe == "crouch" and joint.endswith("Foot")
+                assert np.ptp(inner[:, [0, 2]], axis=0).max() < (0.9 if sinks else 0.45)
         assert len(lengths) >= 3
 
 
-@pytest.mark.parametrize("recipe", ["crouch", "stop-and-go", "strafe", "backward"])
+@pytest.mark.parametrize("recipe", ["crouch", "stop-and-go", "sidesteps"])
 def test_gaits_look_like_themselves(written, recipe):
-    clip = written("any", recipe=recipe, frames=1000)
+    clip = written("any", recipe=recipe, frames=1200)
     head, hips = clip.joint("Head")[:, 1], clip.joint("Hips")
     travel = np.diff(hips, axis=0)
     ahead = np.sum(travel * clip.facing[:-1], axis=1)
@@ -129,12 +173,11 @@ def test_gaits_look_like_themselves(written, recipe):
     if recipe == "stop-and-go":
         assert (np.linalg.norm(travel, axis=1) < 0.1).mean() > 0.15
         assert ahead.max() > 3
-    if recipe == "strafe":
+    if recipe == "sidesteps":
         assert np.percentile(aside, 97) > 0.6
         assert np.percentile(aside, 3) < -0.6
         ankles = clip.joint("LeftFoot") - clip.joint("RightFoot")
         assert np.linalg.norm(ankles, axis=1).min() > 7
-    if recipe == "backward":
         assert np.percentile(ahead, 10) < -0.7
 
 

@@ -16,11 +16,12 @@ from hobble.synthetic.ground import Ground
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
 HEEL = np.array([0.0, -4.2, -3.0])  # the back of the sole from the ankle, nearly
-ROLL = 2.8  # the heel rises slowly at first, then fast
-READY = 0.85  # share of the swing after which the foot is pitched for its landing
-FOLLOW = 0.7  # share of the pitch rate at which it leaves that the foot keeps
-SPEED_LEFT = 0.3  # share of its mean speed over ground that the foot has left as it lands
-EARLY = 0.8  # below 1 the foot has most of its way behind it before half of its time
+READY = 0.95  # share of the swing after which the foot is pitched for its landing
+KICK = 0.68  # below 1 the foot is highest before half of its time
+FOLLOW = 0.45  # share of the pitch rate at which it leaves that the foot keeps
+SPEED_LEFT = 0.36  # share of its mean speed over ground that the foot has left as it lands
+EARLY = 0.81  # below 1 the foot has most of its way behind it before half of its time
+RISE, SETTLE = 0.5, 0.3  # shares of the swing in which the foot goes up and comes down over what it clears
 SOLE_HEIGHT = 2.0  # a moving joint of the foot keeps at least this and the clearance over the ground
 
 
@@ -64,6 +65,7 @@ class _Roll:
     rest: Array
     flat: float
     heel_off: float
+    power: float
 
     @classmethod
     def of(cls, step: Stance, style: Style, side: int) -> _Roll:
@@ -79,6 +81,7 @@ class _Roll:
             np.radians(style.rest_pitch),
             float(flat),
             float(heel_off),
+            float(np.interp(step.leave, t, style.roll)),
         )
 
     def pitch(self, t: Array | float, lands: bool = True, leaves: bool = True) -> Array:
@@ -88,7 +91,7 @@ class _Roll:
         rise = np.clip((u - self.heel_off) / (1 - self.heel_off), 0, None)
         rest = np.interp(t, np.arange(len(self.rest)), self.rest)
         landing = (self.land - rest) * (1 - _ease(down)) if lands else 0.0
-        return np.asarray(rest + landing + ((self.off - rest) * rise**ROLL if leaves else 0.0))
+        return np.asarray(rest + landing + ((self.off - rest) * rise**self.power if leaves else 0.0))
 
     def toe(self, pitch: Array) -> Array:
         """(3,) the toe joint: still where the heel is up, on an arc about the ankle where the toe is up."""
@@ -113,7 +116,7 @@ def _swing(foot: Foot, here: _Roll, there: _Roll, style: Style, side: int, groun
     if not len(t):
         return
     u = (t - start) / (end - start)
-    bump = np.sin(np.pi * u) ** 2
+    bump = np.sin(np.pi * u**KICK) ** 2
     p0, p1 = here.pitch(start), there.pitch(end)
     rate = (p0 - here.pitch(start - 0.01)) / 0.01 * (end - start) * READY
     pitch = _hermite(p0, rate * FOLLOW, p1, 0.0, np.minimum(u / READY, 1))
@@ -129,8 +132,8 @@ def _swing(foot: Foot, here: _Roll, there: _Roll, style: Style, side: int, groun
     toe += quat.rotate(turn, np.array([SIGN[side], 0.0, 0.0])) * (style.swing_out[t, side] * bump)[:, None]
     toe[:, 1] += (
         _lack(toe, rotation, toes, style.clearance[t, side] * bump, ground)
-        * _ease(u / 0.25)
-        * _ease((1 - u) / 0.1)
+        * _ease(u / RISE)
+        * _ease((1 - u) / SETTLE)
     )
     foot.ankle[t], foot.foot[t], foot.toes[t] = toe - quat.rotate(rotation, FOOT), rotation, toes
 
@@ -142,7 +145,7 @@ def _lack(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Gr
     lack = np.zeros(len(toe))
     for point in (toe, tip, heel):
         lack = np.maximum(lack, ground(point[:, 0], point[:, 2]) + SOLE_HEIGHT + clearance - point[:, 1])
-    return smooth_above(lack, max(1, len(toe) // 18))
+    return smooth_above(lack, max(1, len(toe) // 14))
 
 
 def smooth_above(values: Array, frames: int) -> Array:

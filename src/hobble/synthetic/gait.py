@@ -16,24 +16,25 @@ from hobble.synthetic.path import GAITS, Path
 # name: for each gait (value at the gait's reference speed, change per m/s). Degrees, centimetres, shares.
 REFERENCE_SPEED = (0.0, 1.3, 2.8, 0.8)
 TABLE: dict[str, tuple[tuple[float, float], ...]] = {
-    "duty": ((0.64, 0), (0.60, -0.06), (0.335, -0.045), (0.64, -0.06)),  # share of the cycle on the ground
-    "land_pitch": ((0, 0), (20, 6), (8, 2), (-24, 0)),  # of the foot as it lands, + toe up
-    "off_pitch": ((-15, 0), (-56, -13), (-48, -4), (-58, -8)),  # as it leaves
+    "duty": ((0.64, 0), (0.604, -0.06), (0.365, -0.05), (0.64, -0.06)),  # share of the cycle on the ground
+    "land_pitch": ((0, 0), (16, 6), (15, 2), (-24, 0)),  # of the foot as it lands, + toe up
+    "off_pitch": ((-15, 0), (-53, -13), (-49, -1), (-58, -8)),  # as it leaves
     "rest_pitch": ((0, 0), (0, 0), (0, 0), (-24, 0)),  # while it stands
-    "flat": ((0.15, 0), (0.13, 0), (0.18, 0), (0.15, 0)),  # share of stance until the toe is down
-    "heel_off": ((0.6, 0), (0.46, -0.05), (0.30, 0), (0.45, 0)),  # share of stance when the heel leaves
-    "lift": ((2, 0), (1.4, 1), (8, 3), (4, 0)),  # of the swinging foot over the line of its ends
-    "clearance": ((1, 0), (1.5, 0), (3, 0), (2, 0)),  # least height of the swinging sole
-    "behind": ((4, 0), (11.7, 5.5), (12, 5), (10, 5)),  # of an ankle behind the body in mid-stance
+    "flat": ((0.15, 0), (0.14, 0), (0.30, 0), (0.15, 0)),  # share of stance until the toe is down
+    "heel_off": ((0.6, 0), (0.32, -0.03), (0.30, 0), (0.48, 0)),  # share of stance when the heel leaves
+    "roll": ((2.8, 0), (3.2, 0), (2.6, 0), (1.9, 0)),  # power of the heel's rise: slow at first, then fast
+    "lift": ((2, 0), (0.3, 1), (3, 3), (4, 0)),  # of the swinging foot over the line of its ends
+    "clearance": ((1, 0), (2.5, 0), (3, 0), (2, 0)),  # least height of the swinging sole
+    "behind": ((4, 0), (9.9, 5.5), (7.5, 3), (10, 5)),  # of an ankle behind the body in mid-stance
     "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # of an ankle from the path
     "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),
-    "height": ((94.6, 0), (93.7, -1.0), (91.5, -0.5), (57, 0)),  # of the hips above the ground
-    "bob": ((0, 0), (1.8, 1.2), (-3.0, 0.3), (0.8, 0)),  # + highest in mid-stance, - lowest
+    "height": ((94.6, 0), (94.8, -1.0), (94.5, -0.8), (55, 0)),  # of the hips above the ground
+    "bob": ((0, 0), (1.3, 1.2), (-2.0, 0.3), (0.8, 0)),  # + highest in mid-stance, - lowest
     "sway": ((1.6, 0), (2.2, -0.8), (0.8, 0), (2.5, 0)),
-    "pelvis_yaw": ((0.3, 0), (6, 2), (6, 1), (5, 0)),
-    "pelvis_list": ((1.0, 0), (4, 1), (4, 0), (3, 0)),
-    "pelvis_tilt": ((3, 0), (4, 1), (9, 1), (34, 0)),
-    "lean": ((1, 0), (3, 2), (10, 2), (66, 0)),  # of the trunk, forward
+    "pelvis_yaw": ((0.3, 0), (9, 2), (6, 1), (5, 0)),
+    "pelvis_list": ((1.0, 0), (6, 1), (4, 0), (3, 0)),
+    "pelvis_tilt": ((3, 0), (7, 1), (6, 1), (34, 0)),
+    "lean": ((1, 0), (3, 2), (10, 2), (69, 0)),  # of the trunk, forward
     "chest_yaw": ((0.3, 0), (4, 2), (9, 2), (4, 0)),
     "arm_swing": ((0.8, 0), (17, 12), (27, 4), (9, 0)),
     "arm_mean": ((1, 0), (-1, 0), (-8, 0), (14, 0)),  # + forward
@@ -72,6 +73,7 @@ class Style:
     rest_pitch: Array
     flat: Array
     heel_off: Array
+    roll: Array
     lift: Array
     clearance: Array
     behind: Array
@@ -132,8 +134,8 @@ def healthy_style(path: Path) -> Style:
 def _frequencies(speed: Array) -> Array:
     """(F, 4) cycles a second of each gait: cadence grows with the square root of walking speed."""
     stand = np.full_like(speed, 1 / 1.5)
-    walk = 0.965 * np.sqrt(np.maximum(speed, 0.5) / 1.3)
-    jog = 1.34 + 0.10 * (np.clip(speed, 1.5, 5.0) - 2.8)
+    walk = 1.042 * np.sqrt(np.maximum(speed, 0.5) / 1.3)
+    jog = 1.41 + 0.08 * (np.clip(speed, 1.5, 5.0) - 2.8)
     crouch = 0.80 * np.sqrt(np.maximum(speed, 0.5) / 0.8)
     assert len(GAITS) == 4
     return np.stack([stand, walk, jog, crouch], axis=1)

@@ -11,11 +11,12 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.synthetic.feet import Foot, smooth_above
 from hobble.synthetic.gait import LEFT, RIGHT, SIGN, Style
-from hobble.synthetic.ground import Ground
+from hobble.synthetic.ground import Ground, flat
 from hobble.synthetic.path import Path
 
 X, Y, Z = np.eye(3)
-STRETCH = 0.9975  # of the leg's length, at most: the knee keeps 8 degrees of bend
+STRETCH = {True: 0.9975, False: 0.98}  # of the leg's length, at most, on flat and on other ground
+SMOOTH = {True: 0.03, False: 0.06}  # seconds over which the hips come down to where the legs reach
 
 
 def _turn(axis: Array, degrees: Array) -> Array:
@@ -67,7 +68,7 @@ def _over(style: Style, phase: Array, side: int) -> Array:
 
 def _pelvis(style: Style, phase: Array, yaw: Array, noise: Array) -> Array:
     turn = style.pelvis_yaw * _wave(phase, 0.0) + 0.6 * noise[:, 0]
-    lean = -style.pelvis_list * _wave(phase, 0.12)
+    lean = -style.pelvis_list * _wave(phase, 0.25)
     lean = (
         lean
         + style.hike[:, LEFT] * _over(style, phase, RIGHT)
@@ -107,17 +108,20 @@ def _root(
     root = np.stack([x, height, z], axis=1)
     excess = np.zeros(len(path))
     for side, name in ((LEFT, "Left"), (RIGHT, "Right")):
-        excess = np.maximum(excess, _too_high(skeleton, root, hips, feet[side], name))
-    return root - np.stack([0 * x, smooth_above(excess, round(0.07 * path.fps)), 0 * x], axis=1)
+        excess = np.maximum(
+            excess, _too_high(skeleton, root, hips, feet[side], name, STRETCH[ground is flat])
+        )
+    down = smooth_above(excess, round(SMOOTH[ground is flat] * path.fps))
+    return root - np.stack([0 * x, down, 0 * x], axis=1)
 
 
-def _too_high(skeleton: Skeleton, root: Array, hips: Array, foot: Foot, side: str) -> Array:
-    """(F,) cm by which the hip joint is further from the ankle than the leg may reach."""
+def _too_high(skeleton: Skeleton, root: Array, hips: Array, foot: Foot, side: str, stretch: float) -> Array:
+    """(F,) cm by which the hip joint is further from the ankle than this share of the leg's length."""
     joint = root + quat.rotate(hips, skeleton.offsets[skeleton.index(f"{side}UpLeg")])
     upper, lower = leg_lengths(skeleton, side)
     away = joint - foot.ankle
     level = np.minimum(away[:, 0] ** 2 + away[:, 2] ** 2, (0.9 * (upper + lower)) ** 2)
-    highest = np.sqrt((STRETCH * (upper + lower)) ** 2 - level)
+    highest = np.sqrt((stretch * (upper + lower)) ** 2 - level)
     return np.maximum(away[:, 1] - highest, 0.0)
 
 
