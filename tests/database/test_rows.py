@@ -26,6 +26,7 @@ MOTION = {
     "unit": 5.6444,
     "up": "Y",
     "handedness": "right",
+    "facing": None,
     "proportions": "clip",
     "defects": "refuse",
     "loops": 1,

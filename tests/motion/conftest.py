@@ -22,6 +22,7 @@ OPTIONS: dict[str, Any] = {
     "unit": "auto",
     "up": "auto",
     "handedness": "auto",
+    "facing": None,
     "proportions": "skeleton",
     "defects": "repair",
     "loops": 1,

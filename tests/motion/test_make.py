@@ -104,6 +104,17 @@ def test_axes_can_be_overruled(walk, bvh, make):
     np.testing.assert_allclose(clip.positions[..., 1], walk.positions[::2, :, 2], atol=1e-4)
 
 
+def test_where_the_figure_faces_can_be_overruled(walk, bvh, make):
+    path = bvh(walk)
+    as_it_is, report = make(path)
+    assert report["facing"] == pytest.approx(0, abs=1)
+    clip, report = make(path, facing=90.0)
+    assert report["facing"] == pytest.approx(90.0)
+    np.testing.assert_allclose(clip.root[0], as_it_is.root[0], atol=1e-9)
+    assert clip.root[-1, 0] - clip.root[0, 0] > 190
+    np.testing.assert_allclose(clip.positions[..., 1], as_it_is.positions[..., 1], atol=1e-9)
+
+
 def test_a_wrong_frame_time_can_be_overruled(walk, bvh, make):
     path = bvh(walk, edit=lambda s: s.replace("0.00833333", "0.06666667"))
     wrong, report = make(path)

@@ -43,6 +43,9 @@ class Motion(Section):
     handedness: Literal["auto", "right", "left"] = Field(
         "auto", description="of the file's coordinates; a left-handed file has x negated"
     )
+    facing: float | None = Field(
+        None, description="where the figure faces first, degrees from +Z towards +X; as in the file by default"
+    )
     proportions: Literal["skeleton", "clip"] = Field(
         "skeleton", description="retarget onto the skeleton's bone lengths, or keep each clip's own"
     )

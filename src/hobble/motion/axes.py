@@ -140,3 +140,12 @@ def _turned(clip: Clip, world: Array, rest: Array) -> Clip:
         root=quat.rotate(world, clip.root),
         translations=None if clip.translations is None else quat.rotate(rest, clip.translations),
     )
+
+
+def turned(clip: Clip, angle: float) -> Clip:
+    """The clip turned about the vertical through where it begins, radians from +Z towards +X."""
+    turn = quat.yaw(angle)
+    rotations = clip.rotations.copy()
+    rotations[:, 0] = quat.mul(turn, rotations[:, 0])
+    start = clip.root[0] * [1, 0, 1]
+    return replace(clip, rotations=rotations, root=quat.rotate(turn, clip.root - start) + start)

@@ -10,6 +10,7 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
+from hobble.motion.axes import turned
 from hobble.motion.root import facing
 
 BLEND = 0.2  # seconds to each side of a seam, at first
@@ -120,11 +121,7 @@ def _headed(clip: Clip, step: tuple[float, Array], heading: float) -> Clip:
     shift = step[1]
     if np.hypot(shift[0], shift[2]) < 1.0:
         return clip
-    turn = quat.yaw(heading - np.arctan2(shift[0], shift[2]))
-    rotations = clip.rotations.copy()
-    rotations[:, 0] = quat.mul(turn, rotations[:, 0])
-    start = clip.root[0] * [1, 0, 1]
-    return replace(clip, rotations=rotations, root=quat.rotate(turn, clip.root - start) + start)
+    return turned(clip, heading - float(np.arctan2(shift[0], shift[2])))
 
 
 def _top_speed(clip: Clip) -> float:

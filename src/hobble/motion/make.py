@@ -14,7 +14,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.motion.axes import Axes, straighten
+from hobble.motion.axes import Axes, straighten, turned
 from hobble.motion.decode import Decoded, decode, frame_rate
 from hobble.motion.defects import flips, repair
 from hobble.motion.loop import loop_clip
@@ -22,6 +22,7 @@ from hobble.motion.read import Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import Match, Target, clean_names, leg_length, load_skeleton, match_rig, unit_of
+from hobble.motion.root import facing
 
 STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
 SAME = 1e-3  # cm: offsets this near to the skeleton's are the skeleton's
@@ -55,8 +56,8 @@ def make_clip(
     """Read a BVH file, check it, and put it on the skeleton at the frame rate of `options`.
 
     skeleton: the target's file. maps: the folder of the skeleton files. clip: the name of the clip made.
-    options: the `motion` section of a data set (fps, source_fps, unit, up, handedness, proportions,
-    defects, loops, heading).
+    options: the `motion` section of a data set (fps, source_fps, unit, up, handedness, facing,
+    proportions, defects, loops, heading).
     Returns the clip and its report: `motion/<clip>.json` of docs/artefacts.md.
     Raises InputError for a file that cannot be read, for another skeleton, and for what is broken beyond
     repair or, with defects: refuse, broken at all.
@@ -70,9 +71,17 @@ def make_clip(
     if loops > 1:
         made = loop_clip(made, loops, options["heading"])
         said.append(f"The cycle was repeated {loops} times, each {len(made) // loops} frames, seams blended.")
+    if options["facing"] is not None:
+        made = turned(made, np.radians(options["facing"]) - first_facing(made))
     made = replace(made, name=clip)
     extra = {"loops": loops, "cycle_frames": len(made) // loops, "scale": fitted.scale}
     return made, _report(file, source, made) | extra | {"repairs": said, "notes": source.notes}
+
+
+def first_facing(clip: Clip) -> float:
+    """Where the figure faces in its first frame, radians from +Z towards +X."""
+    ahead = facing(clip.skeleton, clip.positions[:1], 0.0)[0]
+    return float(np.arctan2(ahead[0], ahead[2]))
 
 
 def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[str, Any]) -> Source:
@@ -192,6 +201,7 @@ def _report(file: Bvh, source: Source, made: Clip) -> dict[str, Any]:
         "source_fps": source.clip.fps,
         "frames": len(made),
         "seconds": round(len(made) / made.fps, 3),
+        "facing": round(float(np.degrees(first_facing(made))), 1) + 0.0,
         "unit": source.unit,
         "unit_name": source.unit_name,
         "up": source.axes.up,
