@@ -202,3 +202,14 @@ def test_standing_has_slow_cycles_with_both_feet_still(written):
             assert (b - a) / 60 == pytest.approx(1.5, abs=0.15)
             assert np.ptp(hips[part, 0] + hips[part, 2]) > 0.3  # weight shifts
     assert still >= 2
+
+
+def test_no_foot_goes_through_the_edge_of_a_step(holden31):
+    made = generate("steps-1", holden31, 673, "steps", None, 120, 1)
+    places = dict(zip(holden31.joints, np.moveaxis(made.clip.positions, 1, 0), strict=True))
+    for side in SIDES:
+        toe = places[f"{side}ToeBase"]
+        ahead = (toe - places[f"{side}Foot"]) * [1, 0, 1]
+        tip = toe + 6 * ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
+        for point in (toe, tip):
+            assert (point[:, 1] - made.ground(point[:, 0], point[:, 2])).min() > -0.5

@@ -21,7 +21,7 @@ KICK = 0.68  # below 1 the foot is highest before half of its time
 FOLLOW = 0.45  # share of the pitch rate at which it leaves that the foot keeps
 SPEED_LEFT = 0.36  # share of its mean speed over ground that the foot has left as it lands
 EARLY = 0.81  # below 1 the foot has most of its way behind it before half of its time
-RISE, SETTLE = 0.5, 0.3  # shares of the swing in which the foot goes up and comes down over what it clears
+RISE, SETTLE = 0.36, 0.3  # shares of the swing in which the foot goes up and comes down over what it clears
 SOLE_HEIGHT = 2.0  # a moving joint of the foot keeps at least this and the clearance over the ground
 
 

@@ -17,7 +17,9 @@ FOOT = np.array([0.0, -4.5, 13.5])  # from ankle to toe joint in a foot that sta
 STAY = (7.0, np.radians(12.0))  # a standing figure leaves its foot where it would move less than this
 APART = 8.0  # least distance between the ankles, across the way
 STILL = 12.0  # cm/s; slower than this the figure stands
-SOLE = np.array([-11.0, -5.0, 0.0, 6.0, 13.5, 20.5, 27.0])  # along the foot from below the ankle, with room
+SOLE = np.array(
+    [-11.0, -5.0, 0.0, 6.0, 13.5, 20.5, 27.0, 32.0, 37.0]
+)  # along the foot, room before a step too
 SHIFTS = sorted(np.arange(-20.0, 21.0, 2.0), key=abs)  # how far a foot is moved to keep it off an edge
 
 
