@@ -9,7 +9,8 @@ import pytest
 
 from hobble.core.clip import load_clip, save_clip
 from hobble.core.errors import HobbleError
-from hobble.motion.mirror import mirror_clip
+from hobble.motion.make import first_facing
+from hobble.motion.mirror import mirror_clip, mirror_report
 from hobble.motion.rig import load_skeleton
 
 FLIP = np.array([-1.0, 1.0, 1.0])
@@ -21,6 +22,14 @@ def test_every_joint_is_where_its_counterpart_was(walk):
     np.testing.assert_allclose(mirrored.positions, walk.positions[:, swap] * FLIP, atol=1e-9)
     assert mirrored.name == "walk_mirror"
     assert not np.allclose(mirrored.positions, walk.positions, atol=1)
+
+
+def test_the_report_says_what_it_is_the_mirror_of(walk, bvh, make):
+    clip, report = make(bvh(walk), facing=30.0)
+    said = mirror_report(report, "walk_mirror")
+    assert (said["clip"], said["mirror_of"], said["facing"]) == ("walk_mirror", "walk", -30.0)
+    assert said["repairs"] == report["repairs"]
+    assert first_facing(mirror_clip(clip, "m")) == pytest.approx(np.radians(-30.0))
 
 
 def test_a_lopsided_rig_is_mirrored_with_its_bones(walk):

@@ -2,11 +2,10 @@
 
 from hobble.core.clip import load_clip, save_clip
 from hobble.core.files import read_json, write_json
-from hobble.motion.mirror import mirror_clip
+from hobble.motion.mirror import mirror_clip, mirror_report
 from hobble.workflow.job import job
 
 with job(snakemake):
     clip = mirror_clip(load_clip(snakemake.input.clip), snakemake.params.clip)
-    report = read_json(snakemake.input.report)
     save_clip(snakemake.output.clip, clip)
-    write_json(snakemake.output.report, report | {"clip": clip.name, "mirror_of": report["clip"]})
+    write_json(snakemake.output.report, mirror_report(read_json(snakemake.input.report), clip.name))

@@ -44,7 +44,7 @@ class Motion(Section):
         "auto", description="of the file's coordinates; a left-handed file has x negated"
     )
     facing: float | None = Field(
-        None, description="where the figure faces first, degrees from +Z towards +X; as in the file by default"
+        None, description="where the figure faces first, degrees from +Z towards +X; else as in the file"
     )
     proportions: Literal["skeleton", "clip"] = Field(
         "skeleton", description="retarget onto the skeleton's bone lengths, or keep each clip's own"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -42,3 +44,8 @@ def mirror_clip(clip: Clip, name: str) -> Clip:
         clip.root * FLIP,
         translations,
     )
+
+
+def mirror_report(report: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """The report of the clip mirrored: as that of its original, facing the other way."""
+    return {**report, "clip": name, "mirror_of": report["clip"], "facing": 0.0 - report["facing"]}
