@@ -38,7 +38,8 @@ def test_reach_is_two_bone_ik(holden31: Skeleton, x: float, y: float, z: float) 
         np.linalg.norm(before[knee] - before[hip]),
         np.linalg.norm(before[heel] - before[knee]),
     )
-    pole = before[knee] - before[hip]
+    leg = before[heel] - before[hip]
+    pole = quat.rotate(quat.between(leg, leg + shift), before[knee] - before[hip])
     expected = two_bone_knee(before[hip], before[heel] + shift, pole, upper, lower)
     np.testing.assert_allclose(position[knee], expected[0], atol=1e-6)
     np.testing.assert_allclose(position[heel], expected[1], atol=1e-6)
@@ -49,6 +50,17 @@ def test_reach_is_two_bone_ik(holden31: Skeleton, x: float, y: float, z: float) 
         np.testing.assert_allclose(moved, position[child] - position[joint], atol=1e-6)
     others = [j for j in range(len(position)) if j not in (hip, knee)]
     np.testing.assert_array_equal(rotation[others], turned[others])
+
+
+def test_the_knee_stays_on_its_side(holden31: Skeleton) -> None:
+    """A heel moved by so little at a time moves the knee by little, all the way round under the hip."""
+    hip, knee, heel, _ = leg_joints(holden31)[0]
+    knees = []
+    for z in np.linspace(-70, 90, 321):
+        position, rotation = crouched(holden31)
+        reach(position, rotation, hip, knee, heel, 0.0, 0.0, z)
+        knees.append(position[knee] - position[hip])
+    assert np.linalg.norm(np.diff(knees, axis=0), axis=1).max() < 2
 
 
 class Feet:

@@ -69,16 +69,21 @@ def reach(
     tx, ty, tz = position[knee, 0] - hx, position[knee, 1] - hy, position[knee, 2] - hz
     lx, ly, lz = position[heel, 0] - hx - tx, position[heel, 1] - hy - ty, position[heel, 2] - hz - tz
     upper, lower = np.sqrt(tx * tx + ty * ty + tz * tz), np.sqrt(lx * lx + ly * ly + lz * lz)
-    wx, wy, wz = tx + lx + sx, ty + ly + sy, tz + lz + sz
-    distance = np.sqrt(wx * wx + wy * wy + wz * wz)
-    if distance < 1e-6 or upper < 1e-6 or lower < 1e-6:
+    ax, ay, az = tx + lx, ty + ly, tz + lz
+    wx, wy, wz = ax + sx, ay + sy, az + sz
+    before, distance = np.sqrt(ax * ax + ay * ay + az * az), np.sqrt(wx * wx + wy * wy + wz * wz)
+    if min(before, distance, upper, lower) < 1e-6:
         return
+    ax, ay, az = ax / before, ay / before, az / before
     wx, wy, wz = wx / distance, wy / distance, wz / distance
     distance = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * 0.999)
     cosine = (upper * upper + distance * distance - lower * lower) / (2 * upper * distance)
     cosine = min(max(cosine, -1.0), 1.0)
-    along = tx * wx + ty * wy + tz * wz
-    ox, oy, oz = tx - along * wx, ty - along * wy, tz - along * wz
+    # The knee's side of the leg, turned with the leg: the side seen from the new leg alone may be the back.
+    along = tx * ax + ty * ay + tz * az
+    ox, oy, oz = tx - along * ax, ty - along * ay, tz - along * az
+    turn = (ox * wx + oy * wy + oz * wz) / max(1 + ax * wx + ay * wy + az * wz, 1e-6)
+    ox, oy, oz = ox - turn * (ax + wx), oy - turn * (ay + wy), oz - turn * (az + wz)
     size = np.sqrt(ox * ox + oy * oy + oz * oz)
     if size < 1e-6:
         return

@@ -89,7 +89,7 @@ def hurt_links(network: Network) -> dict[str, str]:
         path = [child]
         while path[-1] != top and skeleton.parents[path[-1]] >= 0:
             path.append(skeleton.parents[path[-1]])
-        # The link nearest the upper joint (thigh, shank, upper arm, lower back), of those hurt in training if any.
+        # The link nearest the upper joint, of those that were hurt in training if any.
         pairs = [f"{skeleton.joints[p]}-{skeleton.joints[c]}" for c, p in pairwise(path)]
         for links in (network.hurt_links, network.links):
             if name not in out and (known := [pair for pair in reversed(pairs) if pair in links]):
