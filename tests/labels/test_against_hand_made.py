@@ -134,11 +134,10 @@ def test_the_mirror_has_the_phase_of_the_release(shared: Path, read, options):
 
 
 CLIPS = [
-    ("walk-turns", None),
+    ("walk", None),
     ("jog", None),
     ("walk-jog-walk", None),
-    ("strafe", None),
-    ("backward", None),
+    ("sidesteps", None),
     (None, "LeftUpLeg-LeftLeg"),
     (None, "RightFoot-RightToeBase"),
 ]
@@ -155,8 +154,10 @@ def test_automatic_labels_of_made_walks_are_exact(root: Path, read, options, tmp
     by_hand, automatic, _ = both_ways(read, paths["bvh"], options)
     assert phase_difference(by_hand, automatic) < 0.04
     plain = by_hand.gait.max(axis=1) > 0.9
-    assert (by_hand.gait.argmax(axis=1) == automatic.gait.argmax(axis=1))[plain].mean() >= 0.9
-    if recipe == "strafe":
+    # A badly hurt walker's jog is slower than a healthy walk and keeps a foot on the ground: a walk, to the eye.
+    enough = 0.8 if injured else 0.9
+    assert (by_hand.gait.argmax(axis=1) == automatic.gait.argmax(axis=1))[plain].mean() >= enough
+    if recipe == "sidesteps":
         return  # where it turns back, one foot is put down again within 2 cm: no step that motion shows
     ours, theirs = matched(by_hand, automatic, 20, 580)
     assert [foot for _, foot in ours] == [foot for _, foot in theirs]
