@@ -78,7 +78,7 @@ def clip_fits(
     for c, (start, end) in enumerate(cycles):
         around = slice(start - window, end + window)
         fit = _ground(feet, around, samples, patches, ground, options)
-        heights.append(_heights(fit, samples, start, end, offsets))
+        heights.append(heights_under(fit, samples, start, end, offsets))
         fitted.append((fit, feet.soles[around], feet.contacts[around]))
         if c in shown and np.any(heights[-1]):
             pictures.append(picture_of(clip, c, fit, feet, around))
@@ -147,7 +147,7 @@ def sample_points(root: RootFrames, side: float) -> Array:
     return np.stack([root.position + side * left, root.position, root.position - side * left])
 
 
-def _heights(ground: Ground, samples: Array, start: int, end: int, offsets: np.ndarray) -> Array:
+def heights_under(ground: Ground, samples: Array, start: int, end: int, offsets: np.ndarray) -> Array:
     """(rows of the cycle times fits, 3 times samples); every point of the path is looked at once."""
     first, last = start + offsets[0], end + offsets[-1]
     points = samples[:, first : last + 1]
@@ -183,7 +183,7 @@ def _check(clip: Clip, cycles: np.ndarray, contacts: Mask, window: int) -> None:
 
 
 def save_fits(path: str | Path, fits: ClipFits) -> None:
-    """Write the fits as one npz; what a `Picture` holds goes under picture0_x, picture0_z, ..., picture1_x, ..."""
+    """Write the fits as one npz, with what a `Picture` holds under picture0_x, picture0_z, ..., ...."""
     arrays = {f.name: np.asarray(getattr(fits, f.name)) for f in fields(fits) if f.name != "pictures"}
     for k, picture in enumerate(fits.pictures):
         arrays |= {f"picture{k}_{f.name}": np.asarray(getattr(picture, f.name)) for f in fields(picture)}

@@ -13,7 +13,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.terrain.feet import Mask
 
-STEEPEST = 2.0  # cm of depth per cm: the walls of what is dug out
+STEEPNESS = 2.0  # cm of height per cm: the walls of what is dug out
 
 
 @dataclass(frozen=True)
@@ -89,13 +89,33 @@ def bends(points: Stances, residual: Array, smoothing: float) -> list[Bend]:
     return [Bend(points.place, w, spread) for w in np.linalg.solve(matrix, residual.T).T]
 
 
-def dug_out(ground: Array, points: Array, places: Array, heights: Array) -> Array:
-    """Ground (M,) at points (M, 2), where it is above them lowered to `heights` (N,) at places (N, 2)."""
-    from hobble.terrain.kernels import lowest_cone
+@dataclass(frozen=True)
+class Pits:
+    """Cones that the ground is dug out to: N places (N, 2), heights (N,) and steepness (N,) in cm per cm."""
 
-    if not len(places):
-        return ground
-    return np.minimum(ground, lowest_cone(*_columns(points), *_columns(places), heights, STEEPEST))
+    places: Array = field(repr=False)
+    heights: Array = field(repr=False)
+    steepness: Array = field(repr=False)
+
+    def of(self, ground: Array, points: Array) -> Array:
+        """Ground (M,) at points (M, 2), lowered to the cones where it is above them."""
+        from hobble.terrain.kernels import lowest_cone
+
+        if not len(self.places):
+            return ground
+        cones = lowest_cone(*_columns(points), *_columns(self.places), self.heights, self.steepness)
+        return np.minimum(ground, cones)
+
+
+def pits(soles: Array, standing: Stances, depth: float) -> Pits:
+    """What lets soles (N, 3) be no more than `depth` cm below the ground.
+
+    As steep as they must be to leave alone the ground under feet that stand beside them, on a step say.
+    """
+    places, heights = soles[:, [0, 2]], soles[:, 1] + depth
+    apart = np.maximum(distances(places, standing.place), 1e-3)
+    needed = ((standing.height - heights[:, None]) / apart).max(axis=1)
+    return Pits(places, heights, np.maximum(needed, STEEPNESS))
 
 
 def distances(a: Array, b: Array) -> Array:

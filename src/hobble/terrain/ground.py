@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.terrain.correction import Bend, bends, distances, dug_out, stances, together
+from hobble.terrain.correction import Bend, Pits, Stances, bends, distances, pits, stances, together
 from hobble.terrain.feet import Mask
 from hobble.terrain.patches import Patches
 
@@ -24,7 +24,7 @@ class Ground:
 
     patches: None for flat ground. chosen, error: (K,) patches and their errors, the best first. centre: (2,)
     where the patches lie. level: (K,) what is added to a patch. surfaces: for each fit what is added to meet
-    the feet. dug: for each fit the places (N, 2) and heights (N,) that it is dug out to.
+    the feet. dug: for each fit what is dug out of it.
     """
 
     patches: Patches | None = field(repr=False)
@@ -33,7 +33,7 @@ class Ground:
     centre: Array = field(repr=False)
     level: Array = field(repr=False)
     surfaces: Sequence[Bend] = field(default=(), repr=False)
-    dug: Sequence[tuple[Array, Array]] = field(default=(), repr=False)
+    dug: Sequence[Pits] = field(default=(), repr=False)
 
     def at(self, points: Array) -> Array:
         """Heights (K, M) at world points (M, 2) x and z, cm."""
@@ -42,8 +42,8 @@ class Ground:
             heights += self.patches.at(self.chosen, self.patches.cells(points, self.centre))
         for k, surface in enumerate(self.surfaces):
             heights[k] += surface.at(points)
-        for k, (places, lowered) in enumerate(self.dug):
-            heights[k] = dug_out(heights[k], points, places, lowered)
+        for k, out in enumerate(self.dug):
+            heights[k] = out.of(heights[k], points)
         return heights
 
     def above(self, soles: Array) -> Array:
@@ -105,23 +105,34 @@ def flat_ground(
 def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None) -> Ground:
     """Add the surface of what is left between the ground and the feet in contact.
 
-    Feet that are then below the ground (by more than half of `deepest`) join those points, and the surface is
-    made again; what little still covers a foot is dug out.
+    Feet that are then below the ground join those points, and the surface is made again, unless that takes it
+    away from the feet in contact; what still covers a foot is dug out.
     """
     standing = stances(soles, contacts, PIECE)
     residual = standing.height - plain.at(standing.place)
-    surfaces = bends(standing, residual, smoothing)
-    ground = replace(plain, surfaces=surfaces)
+    ground = replace(plain, surfaces=bends(standing, residual, smoothing))
     if deepest is None:
         return ground
-    for k, covered in enumerate(ground.above(soles) > deepest / 2):
-        if covered.any():
-            points = together(standing, stances(soles, covered & ~contacts, FINE_PIECE))
-            rest = points.height - plain.at(points.place)[k]
-            surfaces[k] = bends(points, rest[None], smoothing)[0]
+    above = ground.above(soles)
+    covered = above > deepest / 2
+    lower = [
+        _joined(plain, k, standing, stances(soles, c & ~contacts, FINE_PIECE), smoothing) if c.any() else same
+        for k, (c, same) in enumerate(zip(covered, ground.surfaces, strict=True))
+    ]
+    lowered = replace(plain, surfaces=lower)
+    apart, farther = (np.abs(h[:, contacts]).mean(axis=1) for h in (above, lowered.above(soles)))
+    keep = farther <= np.maximum(apart, deepest / 2)
+    surfaces = [new if k else old for k, new, old in zip(keep, lower, ground.surfaces, strict=True)]
     ground = replace(plain, surfaces=surfaces)
-    dug = [(soles[c][:, [0, 2]], soles[c][:, 1] + deepest / 2) for c in ground.above(soles) > deepest / 2]
+    dug = [pits(soles[c], standing, deepest / 2) for c in ground.above(soles) > deepest / 2]
     return replace(ground, dug=dug)
+
+
+def _joined(plain: Ground, k: int, standing: Stances, covered: Stances, smoothing: float) -> Bend:
+    """The surface of fit k through the feet in contact and through those that it covered."""
+    points = together(standing, covered)
+    residual = points.height - plain.at(points.place)[k]
+    return bends(points, residual[None], smoothing)[0]
 
 
 def beside_path(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:

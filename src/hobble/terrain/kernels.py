@@ -115,13 +115,13 @@ def distance_sum(x, z, place_x, place_z, weights):
 
 @numba.njit(cache=True, fastmath=FAST)
 def lowest_cone(x, z, place_x, place_z, heights, steepness):
-    """(M,): at each point x, z (M,) the lowest of the cones that rise by `steepness` from N places."""
+    """(M,): at each point x, z (M,) the lowest of the cones that rise by `steepness` (N,) from N places."""
     out = np.empty(len(x))
     for m in range(len(x)):
         lowest = np.inf
         for n in range(len(heights)):
             a, b = x[m] - place_x[n], z[m] - place_z[n]
-            lowest = min(lowest, heights[n] + steepness * np.sqrt(a * a + b * b))
+            lowest = min(lowest, heights[n] + steepness[n] * np.sqrt(a * a + b * b))
         out[m] = lowest
     return out
 

@@ -105,7 +105,7 @@ def draw_patches(
                     fix="Lower its height_scale, or leave this heightmap out.",
                 )
         which.append(np.full(share, i, np.int32))
-    names = np.array([m.name for m in maps])
+    names = np.array([Path(m.name).name for m in maps])
     views = np.concatenate(which), np.concatenate(affines), np.concatenate(means)
     return Patches(flat, starts, shapes, names, *views, cell, size)
 
@@ -164,7 +164,7 @@ def _draw(rng: np.random.Generator, heightmap: Heightmap, cell: float, size: int
     low, high = -reach.min(axis=1), np.array(heightmap.heights.shape) - 1 - reach.max(axis=1)
     fits = np.all(high >= low, axis=1)
     if not fits.any():
-        needed = int(np.ceil(size * scale)) + 1
+        needed = int(np.ceil((size - 1) * scale)) + 1
         rows, columns = heightmap.heights.shape
         raise InputError(
             heightmap.name,

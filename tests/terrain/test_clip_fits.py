@@ -1,0 +1,237 @@
+"""Whole clips: honest geometry, the order of heights, flat clips, and refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.motion.root import RootFrames, root_frames
+from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
+from hobble.terrain.feet import HEEL, feet_of, heel_above_toe
+from hobble.terrain.patches import Patches
+
+GROUNDS = {
+    "level": lambda x, z: np.zeros_like(z),
+    "slope": lambda x, z: 0.2 * z + 0.05 * x,
+    "waves": lambda x, z: 12 * np.sin(z / 70) + 5 * np.sin(x / 9),
+    "steps": lambda x, z: 15 * np.clip(np.floor(z / 60) % 6, 0, 4),
+}
+
+
+@pytest.mark.parametrize("kind", ["rocky", "jumpy", "beam"])
+@pytest.mark.parametrize("name", GROUNDS)
+def test_feet_stand_on_the_ground_and_never_in_it(
+    made: SimpleNamespace, patches: Patches, name: str, kind: str
+) -> None:
+    walk = made.walk(GROUNDS[name])
+    fits = clip_fits(walk.clip, walk.labels, patches, kind, made.options(), made.database())
+    assert fits.patch.shape == (len(walk.labels["cycles"]), 10)
+    assert fits.foot_error[..., 0].max() < 1
+    assert fits.foot_below.max() <= 1
+    assert np.all(np.diff(fits.error, axis=1) >= 0)
+
+
+def test_as_in_the_original_nobody_looks_at_feet_below_the_ground(
+    made: SimpleNamespace, patches: Patches
+) -> None:
+    walk = made.walk(GROUNDS["steps"])
+    fits = clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(deepest=None), made.database())
+    assert fits.foot_error[..., 0].max() < 1
+    assert fits.foot_below.max() > 1
+
+
+def test_rows_are_each_cycles_frames_and_heights_those_of_the_fits(
+    made: SimpleNamespace, patches: Patches
+) -> None:
+    walk = made.walk(GROUNDS["slope"])
+    fits = clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(), made.database())
+    cycles = walk.labels["cycles"]
+    assert fits.frame.tolist() == [f for a, b in cycles for f in range(a, b + 1)]
+    assert fits.cycle.tolist() == [c for c, (a, b) in enumerate(cycles) for _ in range(a, b + 1)]
+    assert fits.fits.tolist() == [10] * len(fits.frame)
+    assert fits.heights.shape == (10 * len(fits.frame), 36)
+    assert fits.heights.dtype == np.float32
+    centre = fits.heights.reshape(-1, 10, 3, 12)[:, :, 1]
+    z = 2.2 * (fits.frame[:, None] + np.arange(-60, 60, 10))
+    near = np.abs(np.arange(-60, 60, 10)) <= 30
+    assert np.abs(centre - 0.2 * z[:, None])[..., near].mean() < 3
+
+
+def test_heights_are_left_then_centre_then_right_from_the_past_to_the_future() -> None:
+    """On a ground whose height tells the place, the numbers tell where they were taken."""
+    frames = 200
+    angle = np.linspace(0, 2, frames)
+    direction = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=-1)
+    position = np.stack([3.0 * np.arange(frames), np.zeros(frames)], axis=-1)
+    root = RootFrames(position, direction, np.zeros((frames, 4)), np.zeros(frames - 1))
+    samples = sample_points(root, 25.0)
+    left = np.stack([np.cos(angle), -np.sin(angle)], axis=-1)  # +X of the facing frame
+    assert np.allclose(samples[0], position + 25 * left)
+    assert np.allclose(samples[2], position - 25 * left)
+    ground = SimpleNamespace(at=lambda points: np.stack([points[:, 0], 7 + points[:, 1]]))
+    heights = heights_under(ground, samples, 70, 72, np.arange(-60, 60, 10)).reshape(3, 2, 3, 12)
+    for row in range(3):
+        for side in range(3):
+            at = samples[side, 70 + row + np.arange(-60, 60, 10)]
+            assert np.allclose(heights[row, 0, side], at[:, 0])
+            assert np.allclose(heights[row, 1, side], 7 + at[:, 1])
+
+
+def test_left_is_the_left_hand_side_of_the_figure(made: SimpleNamespace) -> None:
+    walk = made.walk(GROUNDS["level"])
+    left, centre, _ = sample_points(root_frames(walk.clip, 20.0), 25.0)
+    heel = walk.clip.positions[:, walk.clip.skeleton.role("left_heel")][:, [0, 2]]
+    assert np.all(np.sum((left - centre) * (heel - centre), axis=1) > 0)
+
+
+def test_flat_ground_is_zero_and_one_fit(made: SimpleNamespace, patches: Patches) -> None:
+    walk = made.walk(GROUNDS["level"])
+    fits = clip_fits(walk.clip, walk.labels, patches, "flat", made.options(), made.database())
+    assert np.all(fits.fits == 1)
+    assert fits.heights.shape == (len(fits.frame), 36)
+    assert np.all(fits.heights == 0)
+    assert np.all(fits.patch == -1)
+    assert fits.foot_error.shape == (len(walk.labels["cycles"]), 10, 2)
+    assert fits.foot_error.max() < 0.01
+
+
+@pytest.mark.parametrize("bent", [True, False])
+def test_a_floor_that_is_not_flat_is_bent_only_if_asked(
+    made: SimpleNamespace, patches: Patches, bent: bool
+) -> None:
+    walk = made.walk(GROUNDS["waves"])
+    options = made.options(bend_flat=bent)
+    fits = clip_fits(walk.clip, walk.labels, patches, "flat", options, made.database())
+    assert np.all(fits.fits == 1)
+    assert np.any(fits.heights != 0) is np.bool_(bent)
+    assert (fits.foot_error[..., 0].max() < 1) is np.bool_(bent)
+    assert (fits.foot_below.max() <= 1) is np.bool_(bent)
+
+
+def test_the_same_clip_gives_the_same_bytes(made: SimpleNamespace, patches: Patches, tmp_path: Path) -> None:
+    walk = made.walk(GROUNDS["waves"])
+    for name in "ab":
+        fits = clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(), made.database())
+        save_fits(tmp_path / name, fits)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_the_file_has_what_the_database_and_a_picture_need(
+    made: SimpleNamespace, patches: Patches, tmp_path: Path
+) -> None:
+    walk = made.walk(GROUNDS["waves"])
+    fits = clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(), made.database())
+    save_fits(tmp_path / "f.npz", fits)
+    data = np.load(tmp_path / "f.npz")
+    assert {"frame", "cycle", "fits", "heights", "patch", "error", "foot_error", "foot_below"} <= {*data}
+    assert data["pictures"] == 2
+    assert data["picture0_ground"].shape == (24, 24)
+    assert data["picture1_soles"].shape[1:] == (4, 3)
+    soles, x, z = data["picture0_soles"], data["picture0_x"], data["picture0_z"]
+    assert x[0] < soles[..., 0].min() < soles[..., 0].max() < x[-1]
+    assert z[0] < soles[..., 2].min() < soles[..., 2].max() < z[-1]
+
+
+def test_no_cycles_no_rows(made: SimpleNamespace, patches: Patches, tmp_path: Path) -> None:
+    walk = made.walk(GROUNDS["waves"])
+    labels = {**walk.labels, "cycles": np.zeros((0, 2), int)}
+    for kind in ("flat", "rocky"):
+        fits = clip_fits(walk.clip, labels, patches, kind, made.options(), made.database())
+        save_fits(tmp_path / "f.npz", fits)
+        assert fits.heights.shape == (0, 36)
+        assert fits.patch.shape == (0, 10)
+        assert len(fits.frame) == len(fits.fits) == 0
+
+
+def test_where_no_foot_ever_stands_the_lowest_points_count(
+    made: SimpleNamespace, patches: Patches, caplog: pytest.LogCaptureFixture
+) -> None:
+    walk = made.walk(GROUNDS["level"])
+    labels = {**walk.labels, "contacts": np.zeros((len(walk.clip), 4), bool)}
+    fits = clip_fits(walk.clip, labels, patches, "rocky", made.options(), made.database())
+    assert "no foot stands in frames 64 to 128" in caplog.text
+    assert np.isfinite(fits.heights).all()
+    assert fits.foot_error[..., 0].max() < 1
+
+
+def test_labels_of_another_clip_are_refused(made: SimpleNamespace, patches: Patches) -> None:
+    walk = made.walk(GROUNDS["level"])
+    few = {**walk.labels, "contacts": walk.labels["contacts"][1:]}
+    with pytest.raises(InputError, match=r"figure: labels have contacts of shape \(419, 4\) for 420 frames"):
+        clip_fits(walk.clip, few, patches, "rocky", made.options(), made.database())
+    late = {**walk.labels, "cycles": np.array([[64, 128], [300, 400]])}
+    with pytest.raises(InputError, match="frame 300: the cycle of frames 300 to 400 has no 60 frames"):
+        clip_fits(walk.clip, late, patches, "rocky", made.options(), made.database())
+    with pytest.raises(InputError, match="300 patches are fewer than the 400 fits"):
+        clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(fits=400), made.database())
+
+
+AUTO = {"heel_height": "auto", "toe_height": "auto", "sole": 4.0, "deepest": 1.0}
+
+
+def test_heights_of_joints_above_their_soles(made: SimpleNamespace, holden31: Skeleton) -> None:
+    walk = made.walk(GROUNDS["level"])
+    contacts, frames = walk.labels["contacts"], np.arange(60, 360)
+    flat = feet_of(walk.clip, contacts, frames, True, **AUTO)
+    assert (flat.heel_height, flat.toe_height) == (pytest.approx(7.0), pytest.approx(2.5))
+    assert np.abs(flat.soles[contacts][:, 1]).max() < 1e-9
+    uneven = feet_of(walk.clip, contacts, frames, False, **AUTO)
+    assert (uneven.heel_height, uneven.toe_height) == (8.5, 4.0)
+    given = feet_of(walk.clip, contacts, frames, True, **AUTO | {"heel_height": 5.0, "toe_height": 4.5})
+    expected = walk.clip.positions[:, -4:, 1] - np.where(HEEL, 5.0, 4.5)
+    assert np.allclose(given.soles[..., 1], expected)
+    assert heel_above_toe(holden31) == pytest.approx(4.5)
+
+
+def test_a_single_low_frame_lowers_the_soles_a_fault_of_capture_does_not(made: SimpleNamespace) -> None:
+    walk = made.walk(GROUNDS["level"])
+    frames = np.arange(60, 360)
+    for depth, expected in ((1.6, 2.5 - 0.6), (9.0, 2.5)):
+        feet = walk.clip.positions[:, -4:].copy()
+        feet[100, 1, 1] = 2.5 - depth
+        clip = made.figure(feet, walk.clip.root)
+        found = feet_of(clip, walk.labels["contacts"], frames, True, **AUTO)
+        assert found.toe_height == pytest.approx(expected)
+        assert replace(found).heel_height == pytest.approx(7.0)
+
+
+@pytest.mark.shared
+def test_real_clips_are_honest_too(shared: Path, root: Path, made: SimpleNamespace) -> None:
+    """Uneven ground, a limp, and the original's own flat clip, whose ground stays at zero."""
+    from hobble.config.sections import Labels, Motion, Terrain
+    from hobble.labels.label import label_clip
+    from hobble.motion.make import make_clip
+
+    patches = made.patches(2_000)
+    terrain = Terrain().model_dump(mode="json")
+    skeletons = root / "config/skeletons"
+    for file, kind in (
+        ("cmu/03_04", "rocky"),
+        ("cmu/105_16", "flat"),
+        ("pfnn/LocomotionFlat09_000", "flat"),
+        ("pfnn/LocomotionFlat09_000", "rocky"),
+    ):
+        bvh = shared / f"mocap/{file}.bvh"
+        clip, report = make_clip(
+            bvh,
+            skeletons / "holden31.yaml",
+            str(skeletons),
+            clip=bvh.stem,
+            skeleton_name="holden31",
+            options=Motion().model_dump(mode="json"),
+        )
+        beside = [p for s in (".phase", "_footsteps.txt") if (p := bvh.with_name(bvh.stem + s)).is_file()]
+        labels, _ = label_clip(clip, beside, report, "walk", kind, Labels().model_dump(mode="json"))
+        arrays = {"contacts": labels.contacts, "cycles": labels.cycles}
+        fits = clip_fits(clip, arrays, patches, kind, terrain, made.database())
+        assert len(fits.frame) > 60, file
+        assert fits.foot_error[..., 0].max() < 1, file
+        assert fits.foot_below.max() <= 1, file
+        if file.startswith("pfnn") and kind == "flat":
+            assert np.all(fits.heights == 0)

@@ -1,0 +1,96 @@
+"""The surface that is added to meet the feet, and what is dug out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.terrain.correction import STEEPNESS, Stances, bends, distances, pits, stances
+
+
+def points(seed: int, count: int = 12) -> tuple[Stances, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    place = rng.uniform(-200, 200, (count, 2))
+    return Stances(place, np.zeros(count), np.ones(count)), rng.normal(0, 5, (3, count))
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000))
+def test_without_smoothing_the_surface_goes_through_every_point(seed: int) -> None:
+    at, residual = points(seed)
+    for surface, wanted in zip(bends(at, residual, 0.0), residual, strict=True):
+        assert np.allclose(surface.at(at.place), wanted, atol=1e-6)
+
+
+def test_it_is_the_regularised_system_of_the_original() -> None:
+    at, residual = points(1)
+    spread = distances(at.place, at.place).mean()
+    phi = distances(at.place, at.place) / spread
+    weights = np.linalg.solve(phi - 0.1 * np.eye(12), residual[0])
+    elsewhere = np.random.default_rng(5).uniform(-300, 300, (40, 2))
+    expected = distances(elsewhere, at.place) / spread @ weights
+    assert np.allclose(bends(at, residual, 0.1)[0].at(elsewhere), expected)
+
+
+def test_a_point_that_counts_m_times_is_m_points_at_one_place() -> None:
+    at, residual = points(2, 6)
+    count = np.array([1, 2, 5, 1, 3, 8])
+    many = Stances(np.repeat(at.place, count, axis=0), np.zeros(20), np.ones(20))
+    few = Stances(at.place, at.height, count.astype(float))
+    elsewhere = np.random.default_rng(5).uniform(-300, 300, (40, 2))
+    one = bends(many, np.repeat(residual, count, axis=1), 0.1)
+    other = bends(few, residual, 0.1)
+    for a, b in zip(one, other, strict=True):
+        assert np.allclose(a.at(elsewhere), b.at(elsewhere), atol=1e-9)
+
+
+def test_points_that_are_all_at_one_place_bend_nothing() -> None:
+    at = Stances(np.full((3, 2), 7.0), np.zeros(3), np.ones(3))
+    (surface,) = bends(at, np.ones((1, 3)), 0.1)
+    assert np.all(surface.at(np.zeros((4, 2))) == 0)
+
+
+def test_stances_are_runs_of_one_joint_cut_to_length() -> None:
+    soles = np.zeros((20, 4, 3))
+    soles[:, :, 0] = np.arange(4) * 10.0
+    soles[:, :, 1] = np.arange(20)[:, None]
+    contacts = np.zeros((20, 4), bool)
+    contacts[2:7, 0] = True
+    contacts[8:10, 0] = True
+    contacts[5:10, 3] = True
+    found = stances(soles, contacts, longest=3)
+    assert found.count.tolist() == [3, 2, 2, 3, 2]
+    assert found.place[:, 0].tolist() == [0, 0, 0, 30, 30]
+    assert found.height.tolist() == [3, 5.5, 8.5, 6, 8.5]
+    assert found.count.sum() == contacts.sum()
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000))
+def test_digging_lets_feet_through_and_touches_nothing_that_is_far(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    soles = rng.uniform(-50, 50, (5, 3)) * [1, 0.1, 1] - [0, 5, 0]
+    standing = Stances(rng.uniform(-50, 50, (4, 2)), np.full(4, -20.0), np.ones(4))
+    where = np.concatenate([soles[:, [0, 2]], rng.uniform(-100, 100, (50, 2))])
+    ground = rng.uniform(0, 5, 55)
+    dug = pits(soles, standing, 0.5).of(ground, where)
+    assert np.all(dug[:5] <= soles[:, 1] + 0.5 + 1e-9)
+    assert np.all(dug <= ground)
+    far = distances(where, soles[:, [0, 2]]).min(axis=1) > 15 / STEEPNESS
+    assert np.array_equal(dug[far], ground[far])
+    assert pits(soles[:0], standing, 0.5).of(ground, where) is ground
+
+
+def test_digging_is_as_steep_as_it_may_be_and_as_it_must_be() -> None:
+    along = np.column_stack([np.linspace(-40, 40, 801), np.zeros(801)])
+    sole = np.array([[0.0, -8.0, 0.0]])
+    far = Stances(np.array([[30.0, 0.0]]), np.array([3.0]), np.ones(1))
+    dug = pits(sole, far, 0.0).of(np.full(801, 3.0), along)
+    assert dug.min() == pytest.approx(-8)
+    assert np.abs(np.diff(dug)).max() == pytest.approx(STEEPNESS * 0.1)
+    near = Stances(np.array([[1.0, 0.0]]), np.array([3.0]), np.ones(1))
+    dug = pits(sole, near, 0.0).of(np.full(801, 3.0), along)
+    assert dug.min() == pytest.approx(-8)
+    assert dug[410] == pytest.approx(3.0)

@@ -1,0 +1,116 @@
+"""Heightmaps from files and generators."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from hobble.core.errors import InputError
+from hobble.terrain.generate import KINDS, generate
+from hobble.terrain.heightmaps import elevation, heightmaps, read_heights
+
+CELL = 3.937007874
+RAMP = np.add.outer(np.arange(5.0), 10 * np.arange(4.0))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_equal_seeds_give_equal_ground_and_others_do_not(kind: str) -> None:
+    one = generate(kind, 3, CELL)
+    assert one.shape == (400, 400)
+    assert np.array_equal(one, generate(kind, 3, CELL))
+    assert not np.array_equal(one, generate(kind, 4, CELL))
+    assert np.isfinite(one).all()
+    assert 20 < np.ptp(one) < 400
+
+
+def test_beams_are_narrow_and_stand_more_than_40_cm_above_the_floor() -> None:
+    ground = generate("beams", 0, CELL)
+    assert set(np.unique(ground)) - {0.0} == set(ground[ground > 0])
+    assert ground[ground > 0].min() > 40
+    assert (ground > 0).mean() < 0.2
+
+
+def test_the_elevation_model_is_true_to_scale() -> None:
+    heights = elevation(CELL)
+    assert heights.shape == (344, 323)  # 3 arc seconds are shorter from east to west: 403 columns before
+    assert np.ptp(heights) == pytest.approx((1076 - 236) * CELL / 92.6, rel=0.01)
+    steepest = np.degrees(np.arctan(np.hypot(*np.gradient(heights, CELL)).max()))
+    assert 25 < steepest < 40
+
+
+def write(path: Path, heights: np.ndarray) -> None:
+    if path.suffix == ".txt":
+        np.savetxt(path, heights)
+    elif path.suffix == ".csv":
+        np.savetxt(path, heights, delimiter=",", header="heights")
+    elif path.suffix == ".npy":
+        np.save(path, heights)
+    elif path.suffix == ".npz":
+        np.savez(path, dx=np.array(1.0), elevation=heights)
+    elif path.suffix == ".png":
+        Image.fromarray(heights.astype(np.uint16)).save(path)
+    else:
+        Image.fromarray(heights.astype(np.float32)).save(path)
+
+
+@pytest.mark.parametrize("suffix", [".txt", ".csv", ".npy", ".npz", ".png", ".tif"])
+def test_every_kind_of_file_is_read_alike(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"map{suffix}"
+    write(path, RAMP)
+    assert np.array_equal(read_heights(path), RAMP)
+
+
+def test_files_are_scaled_and_may_say_their_own_cell_and_scale(tmp_path: Path) -> None:
+    write(tmp_path / "a.txt", RAMP)
+    write(tmp_path / "b.txt", RAMP)
+    entries = [
+        {"kind": "file", "seed": 0, "cell": None, "height_scale": None},
+        {"kind": "hills", "seed": 0, "cell": None, "height_scale": 0.5},
+        {"kind": "file", "seed": 0, "cell": 10.0, "height_scale": 2.0},
+    ]
+    maps = heightmaps(entries, [tmp_path / "a.txt", tmp_path / "b.txt"], cell=CELL, height_scale=3.0)
+    assert np.array_equal(maps[0].heights, 3 * RAMP)
+    assert np.array_equal(maps[1].heights, generate("hills", 0, CELL) / 2)
+    assert np.array_equal(maps[2].heights, 2 * RAMP)
+    assert [m.cell for m in maps] == [CELL, CELL, 10.0]
+
+
+BAD = {
+    "empty.txt": (b"", "holds no heights"),
+    "word.txt": (b"1 2 3\n4 five 6\n", "line 2: not a number: 'five'"),
+    "ragged.txt": (b"1 2 3\n4 5 6\n7 8\n", "line 3: 2 heights where the rows above have 3"),
+    "row.txt": (b"1 2 3\n", "has rows and columns"),
+    "binary.txt": (bytes(range(256)), "not text"),
+    "nan.txt": (b"nan nan\nnan nan\n", "no finite height"),
+    "not.png": (b"\x89PNG\r\n\x1a\n" + b"rubbish" * 9, "not an image"),
+    "not.npy": (b"rubbish", "not an array file"),
+    "not.npz": (b"rubbish", "not an npz file"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_file_is_refused_by_name(tmp_path: Path, name: str) -> None:
+    content, says = BAD[name]
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=name) as raised:
+        read_heights(tmp_path / name)
+    assert says in str(raised.value)
+
+
+def test_a_missing_file_and_an_npz_that_could_mean_two_arrays_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such heightmap"):
+        read_heights(tmp_path / "gone.txt")
+    np.savez(tmp_path / "two.npz", a=RAMP, b=RAMP)
+    with pytest.raises(InputError, match="which array holds the heights"):
+        read_heights(tmp_path / "two.npz")
+
+
+@pytest.mark.shared
+def test_the_original_heightmap(shared: Path) -> None:
+    path = shared / "mocap/pfnn/hmap_001_smooth.txt"
+    (made,) = heightmaps([{"kind": "file", "seed": 0}], [path], cell=CELL, height_scale=3.0)
+    assert made.heights.shape == (504, 302)
+    assert np.allclose(made.heights, 3 * np.loadtxt(path))

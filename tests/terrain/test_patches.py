@@ -1,0 +1,146 @@
+"""Patches: views of heightmaps, their means, and the rule of 50 cm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import map_coordinates
+
+from hobble.core.errors import HobbleError, InputError
+from hobble.terrain.heightmaps import Heightmap
+from hobble.terrain.patches import Patches, draw_patches, load_patches, save_patches
+
+CELL = 3.937007874
+SIZE = 128
+CELLS = np.stack(np.meshgrid(*[np.arange(SIZE) - SIZE // 2] * 2, indexing="ij"), -1).reshape(-1, 2)
+CELLS = CELLS.astype(np.float32)
+
+
+def plane(a: float, b: float, rows: int = 260, columns: int = 300, cell: float = CELL) -> Heightmap:
+    return Heightmap("plane", np.add.outer(a * np.arange(rows), b * np.arange(columns)), cell)
+
+
+def draw(*maps: Heightmap, count: int = 40, highest: float = 50.0, seed: int = 1) -> Patches:
+    return draw_patches(maps, count=count, cell=CELL, size=SIZE, highest=highest, seed=seed)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.integers(0, 99))
+def test_views_of_a_plane_are_exactly_planes_through_their_middle(a: float, b: float, seed: int) -> None:
+    patches = draw(plane(a, b), count=5, seed=seed)
+    points = np.random.default_rng(seed).uniform(-64, 63, (50, 2)).astype(np.float32)
+    turn = patches.affine[:, :, :2].astype(float)
+    slope = np.einsum("i,pij->pj", [a, b], turn)
+    middle = np.array([-0.5, -0.5])  # of the cells -64 .. 63
+    expected = np.einsum("pj,nj->pn", slope, points - middle)
+    assert np.allclose(patches.at(range(5), points), expected, atol=1e-3)
+
+
+def test_heights_between_cells_are_bilinear(patches: Patches) -> None:
+    k = np.arange(0, len(patches), 23)
+    points = np.random.default_rng(0).uniform(-64, 63, (200, 2)).astype(np.float32)
+    for p, heights in zip(k, patches.at(k, points), strict=True):
+        m = patches.which[p]
+        rows, columns = patches.shapes[m]
+        start = patches.starts[m]
+        cells = patches.heights[start : start + rows * columns].reshape(rows, columns)
+        at = patches.affine[p].astype(float) @ np.column_stack([points, np.ones(len(points))]).T
+        assert np.allclose(
+            heights, map_coordinates(cells.astype(float), at, order=1) - patches.mean[p], atol=0.02
+        )
+
+
+def test_every_patch_has_mean_zero_and_no_cell_beyond_the_limit(patches: Patches) -> None:
+    heights = patches.at(np.arange(len(patches)), CELLS)
+    assert np.abs(heights.mean(axis=1)).max() < 1e-3
+    assert np.abs(heights).max() <= 50.001
+
+
+def test_no_crop_that_passes_is_left_out() -> None:
+    """On a cliff only the crops that pass are drawn, wherever the cliff runs through them."""
+    cliff = np.zeros((400, 400))
+    cliff[200:] = 60.0
+    heights = draw(Heightmap("cliff", cliff, CELL), count=200).at(range(200), CELLS)
+    share = (heights > heights.min(axis=1, keepdims=True) + 30).mean(axis=1)
+    spread = np.ptp(heights, axis=1)
+    assert np.abs(heights).max() <= 50.001
+    assert np.any(spread > 59)
+    assert np.all((spread < 50.1) | ((share > 1 / 6 - 0.02) & (share < 5 / 6 + 0.02)))
+
+
+def test_views_are_turned_both_ways_flipped_and_spread_over_the_map(patches: Patches) -> None:
+    one_map = patches.affine[patches.which == 0]
+    turn = one_map[:, :, :2]
+    assert np.allclose(np.linalg.det(turn) ** 2, 1, atol=1e-5)
+    assert 0.3 < (np.linalg.det(turn) > 0).mean() < 0.7
+    directions = np.degrees(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
+    assert len(np.unique(np.floor(directions / 90))) == 4
+    assert np.all(np.ptp(one_map[:, :, 2], axis=0) > 150)
+
+
+def test_patches_are_shared_evenly_among_the_maps() -> None:
+    patches = draw(plane(0, 0), plane(0.1, 0), plane(0, 0.1), count=11)
+    assert np.bincount(patches.which).tolist() == [4, 4, 3]
+
+
+def test_a_map_with_wider_cells_is_seen_at_its_own_scale() -> None:
+    wide = plane(0.2, 0.0, rows=100, columns=100, cell=4 * CELL)
+    patches = draw(wide, count=5)
+    slope = np.linalg.norm(patches.affine[:, 0, :2], axis=1) * 0.2
+    heights = patches.at(range(5), CELLS)
+    assert np.allclose(slope, 0.2 / 4, atol=1e-5)
+    assert np.all(np.ptp(heights, axis=1) < 0.2 / 4 * 128 * 1.5)
+
+
+def test_no_patch_shows_a_hole() -> None:
+    heights = plane(0.1, 0.1).heights.copy()
+    heights[130, 150] = np.nan
+    patches = draw(Heightmap("holed", heights, CELL), count=30)
+    points = np.random.default_rng(0).uniform(-64, 63, (20_000, 2)).astype(np.float32)
+    assert np.abs(patches.at(range(30), points)).max() <= 50
+
+
+def test_the_same_seed_draws_the_same_and_another_does_not(tmp_path: Path) -> None:
+    files = [tmp_path / f"{n}.npz" for n in "abc"]
+    for file, seed in zip(files, (1, 1, 2), strict=True):
+        save_patches(file, draw(plane(0.1, 0.2), count=20, seed=seed))
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert files[0].read_bytes() != files[2].read_bytes()
+
+
+def test_patches_come_back_from_their_file_and_are_small(tmp_path: Path, patches: Patches) -> None:
+    save_patches(tmp_path / "p.npz", patches)
+    back = load_patches(tmp_path / "p.npz")
+    assert np.array_equal(back.at(range(9), CELLS), patches.at(range(9), CELLS))
+    views = sum(getattr(patches, n).nbytes for n in ("which", "affine", "mean"))
+    assert views / len(patches) * 20_000 < 1e6
+
+
+def test_what_cannot_be_drawn_is_refused_by_name() -> None:
+    with pytest.raises(InputError, match="plane: none of 1000 crops of 128 cells stays within 50 cm"):
+        draw(plane(0, 0), plane(3, 3))
+    with pytest.raises(InputError, match="plane: 90 x 300 cells are too few for patches of 128 x 128"):
+        draw(plane(0, 0, rows=90))
+    with pytest.raises(HobbleError, match="no heightmap"):
+        draw()
+
+
+def test_a_damaged_file_is_refused(tmp_path: Path, patches: Patches) -> None:
+    path = tmp_path / "p.npz"
+    np.savez(path, heights=np.zeros(3))
+    with pytest.raises(InputError, match=r"p\.npz: not a file of patches"):
+        load_patches(path)
+
+
+def test_beyond_its_edge_a_patch_goes_on_as_at_its_edge(patches: Patches) -> None:
+    world = np.array([[400.0, 0.0], [63 * CELL, 0.0], [0.0, -400.0], [0.0, -64 * CELL]])
+    heights = patches.at([3], patches.cells(world, np.zeros(2)))[0]
+    assert heights[0] == heights[1]
+    assert heights[2] == heights[3]
+    moved = replace(patches).cells(world + 5.0, np.array([5.0, 5.0]))
+    assert np.allclose(moved, patches.cells(world, np.zeros(2)))
