@@ -182,17 +182,21 @@ Hobble.character = (spec, place = [0, 0], heading = 0) => {
   const reach = (hip, knee, heel, shift) => {
     const { minus, dot } = Hobble.vector, thigh = minus(knee, hip), shank = minus(heel, knee);
     const upper = hypot(...thigh), lower = hypot(...shank);
-    let way = thigh.map((v, i) => v + shank[i] + shift[i]), distance = hypot(...way);
-    if (distance < 1e-6 || upper < 1e-6 || lower < 1e-6) return;
-    way = way.map((v) => v / distance);
-    distance = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * .999);
-    const cosine = min(max((upper * upper + distance * distance - lower * lower) / (2 * upper * distance), -1), 1);
-    const along = dot(thigh, way), out = thigh.map((v, i) => v - along * way[i]), size = hypot(...out);
+    const leg = thigh.map((v, i) => v + shank[i]), before = hypot(...leg);
+    const aim = leg.map((v, i) => v + shift[i]), distance = hypot(...aim);
+    if (min(before, distance, upper, lower) < 1e-6) return;
+    const was = leg.map((v) => v / before), way = aim.map((v) => v / distance);
+    const length = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * .999);
+    const cosine = min(max((upper * upper + length * length - lower * lower) / (2 * upper * length), -1), 1);
+    // The knee's side of the leg, turned with the leg.
+    const along = dot(thigh, was), side = thigh.map((v, i) => v - along * was[i]);
+    const turn = dot(side, way) / max(1 + dot(was, way), 1e-6);
+    const out = side.map((v, i) => v - turn * (was[i] + way[i])), size = hypot(...out);
     if (size < 1e-6) return;
     const sine = sqrt(1 - cosine * cosine) / size;
     for (let i = 0; i < 3; i++) {
       knee[i] = hip[i] + upper * (way[i] * cosine + out[i] * sine);
-      heel[i] = hip[i] + way[i] * distance;
+      heel[i] = hip[i] + way[i] * length;
     }
   };
 
