@@ -4,7 +4,9 @@ A patch is a view of a heightmap. Its cell (u, v), counted from the middle of th
 and z, shows the map at row, column = A (u, v, 1). Maps of any size lie one after another in one float32
 array; `starts` and `shapes` say where. All loops are over plain arrays, so that one compiled version serves
 every data set. They are in one file because what numba compiled and kept is only made anew when the file
-of the function that was called has changed.
+of the function that was called has changed. Only the functions called from outside are kept: what they call
+is then always compiled along with them, and not at times taken from disk, where the compiler cannot look
+into it and may round sums in another order.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ FAST = {"reassoc", "contract", "nsz", "nnan"}  # lets sums be vectorised; no hei
 ONE = np.uint32(1)
 
 
-@numba.njit(cache=True, fastmath=FAST)
+@numba.njit(fastmath=FAST)
 def height(heights, rows, columns, r, c):
     """Bilinear height of one map at row r, column c (float32, inside the map)."""
     i = min(np.int32(r), np.int32(rows - 2))
@@ -33,7 +35,7 @@ def height(heights, rows, columns, r, c):
     return near + fr * (far - near)
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(inline="always")
 def map_of(heights, starts, shapes, m):
     """The cells of map m, its rows and its columns."""
     rows, columns = shapes[m, 0], shapes[m, 1]
@@ -126,7 +128,7 @@ def lowest_cone(x, z, place_x, place_z, heights, steepness):
     return out
 
 
-@numba.njit(cache=True, fastmath=FAST)
+@numba.njit(fastmath=FAST)
 def _down_means(heights, rows, columns, a, points):
     """How far the patch is above the first foot in contact; mean, mean square of how much further above all.
 
@@ -146,7 +148,7 @@ def _down_means(heights, rows, columns, a, points):
     return first, total / len(u), squares / len(u)
 
 
-@numba.njit(cache=True, fastmath=FAST)
+@numba.njit(fastmath=FAST)
 def _up_sum(heights, rows, columns, a, offset, points, jumps):
     """Sum of squares of how far the ground is above feet that are up, or too far below them in jumps."""
     u, v, foot = points
@@ -162,7 +164,7 @@ def _up_sum(heights, rows, columns, a, offset, points, jumps):
     return squares
 
 
-@numba.njit(cache=True, fastmath=FAST)
+@numba.njit(fastmath=FAST)
 def _beside_sum(heights, rows, columns, a, points):
     """Sum of squares of how far the ground beside the path is above BEAM_HEIGHT below the path."""
     u, v, path_u, path_v = points
@@ -179,7 +181,7 @@ def _beside_sum(heights, rows, columns, a, points):
     return squares
 
 
-@numba.njit(cache=True)
+@numba.njit
 def _error(heights, rows, columns, a, tables, jumps, limit):
     """The error of one patch, or infinity as soon as it is known to lie above `limit`."""
     down, up_head, up_rest, beside = tables
@@ -200,7 +202,7 @@ def _error(heights, rows, columns, a, tables, jumps, limit):
     return error
 
 
-@numba.njit(cache=True, inline="always")
+@numba.njit(inline="always")
 def _terms(a):
     return (a[0, 0], a[0, 1], a[0, 2]), (a[1, 0], a[1, 1], a[1, 2])
 
