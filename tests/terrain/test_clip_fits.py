@@ -14,6 +14,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.root import RootFrames, root_frames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
 from hobble.terrain.feet import HEEL, feet_of, heel_above_toe
+from hobble.terrain.ground import fit_cycle
 from hobble.terrain.patches import Patches
 
 GROUNDS = {
@@ -35,6 +36,17 @@ def test_feet_stand_on_the_ground_and_never_in_it(
     assert fits.foot_error[..., 0].max() < 1
     assert fits.foot_below.max() <= 1
     assert np.all(np.diff(fits.error, axis=1) >= 0)
+
+
+def test_patch_and_feet_are_level_with_each_other_on_average(made: SimpleNamespace, patches: Patches) -> None:
+    walk = made.walk(GROUNDS["slope"])
+    soles = walk.clip.positions[60:200, -4:] - np.array([0.0, 3.0, 0.0])
+    contacts, path = walk.labels["contacts"][60:200], walk.clip.root[60:200, [0, 2]]
+    sides = np.tile([1.0, 0.0], (len(path), 1))
+    ground = fit_cycle(patches, soles, contacts, path, sides, "rocky", fits=5, smoothing=0.1, deepest=1.0)
+    patch = replace(ground, surfaces=(), dug=())
+    assert np.allclose(patch.above(soles)[:, contacts].mean(axis=1), 0, atol=1e-3)
+    assert np.allclose(ground.centre, soles[contacts][:, [0, 2]].mean(axis=0))
 
 
 def test_as_in_the_original_nobody_looks_at_feet_below_the_ground(

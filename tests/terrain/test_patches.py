@@ -98,11 +98,19 @@ def test_a_map_with_wider_cells_is_seen_at_its_own_scale() -> None:
 
 
 def test_no_patch_shows_a_hole() -> None:
-    heights = plane(0.1, 0.1).heights.copy()
-    heights[130, 150] = np.nan
-    patches = draw(Heightmap("holed", heights, CELL), count=30)
-    points = np.random.default_rng(0).uniform(-64, 63, (20_000, 2)).astype(np.float32)
-    assert np.abs(patches.at(range(30), points)).max() <= 50
+    """Not even where its cells, four times as wide as those of the map, pass by on both sides of one."""
+    heights = plane(0.02, 0.02, 800, 800).heights.copy()
+    heights[100:-100:150, 100:-100:150] = np.nan
+    patches = draw_patches(
+        [Heightmap("holed", heights, CELL / 4)], count=40, cell=CELL, size=32, highest=50.0, seed=1
+    )
+    points = np.random.default_rng(0).uniform(-16, 15, (40_000, 2)).astype(np.float32)
+    at = np.einsum("pij,nj->pin", patches.affine, np.column_stack([points, np.ones(len(points))]))
+    seen = at.astype(int)
+    for beside in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        rows, columns = seen[:, 0] + beside[0], seen[:, 1] + beside[1]
+        assert not np.isnan(heights[rows, columns]).any()
+    assert np.isfinite(patches.heights).all()
 
 
 def test_the_same_seed_draws_the_same_and_another_does_not(tmp_path: Path) -> None:

@@ -105,24 +105,18 @@ def flat_ground(
 def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None) -> Ground:
     """Add the surface of what is left between the ground and the feet in contact.
 
-    Feet that are then below the ground join those points, and the surface is made again, unless that takes it
-    away from the feet in contact; what still covers a foot is dug out.
+    Feet that are then below the ground (by more than half of `deepest`) join those points, and the surface is
+    made again; what still covers a foot is dug out.
     """
     standing = stances(soles, contacts, PIECE)
     residual = standing.height - plain.at(standing.place)
     ground = replace(plain, surfaces=bends(standing, residual, smoothing))
     if deepest is None:
         return ground
-    above = ground.above(soles)
-    covered = above > deepest / 2
-    lower = [
+    surfaces = [
         _joined(plain, k, standing, stances(soles, c & ~contacts, FINE_PIECE), smoothing) if c.any() else same
-        for k, (c, same) in enumerate(zip(covered, ground.surfaces, strict=True))
+        for k, (c, same) in enumerate(zip(ground.above(soles) > deepest / 2, ground.surfaces, strict=True))
     ]
-    lowered = replace(plain, surfaces=lower)
-    apart, farther = (np.abs(h[:, contacts]).mean(axis=1) for h in (above, lowered.above(soles)))
-    keep = farther <= np.maximum(apart, deepest / 2)
-    surfaces = [new if k else old for k, new, old in zip(keep, lower, ground.surfaces, strict=True)]
     ground = replace(plain, surfaces=surfaces)
     dug = [pits(soles[c], standing, deepest / 2) for c in ground.above(soles) > deepest / 2]
     return replace(ground, dug=dug)

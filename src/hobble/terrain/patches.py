@@ -78,36 +78,53 @@ def draw_patches(
     goes further than `highest` from its mean is dropped and drawn again. Raises InputError naming a map
     that is too small, or from which (almost) nothing passes.
     """
-    from hobble.terrain.kernels import view_extents
-
     if not maps:
         raise HobbleError("terrain.heightmaps names no heightmap, so there is nothing to draw patches from.")
-    flat, starts, shapes = _joined(maps, cell)
     shares = [count // len(maps) + (i < count % len(maps)) for i in range(len(maps))]
-    which, affines, means = [], [], []
-    for i, (heightmap, share) in enumerate(zip(maps, shares, strict=True)):
-        rng = np.random.default_rng([seed, i])
-        found, drawn = 0, 0
-        while found < share:
-            affine = _draw(rng, heightmap, cell, size)
-            index = np.full(len(affine), i, np.int32)
-            mean, passes = view_extents(flat, starts, shapes, index, affine, size, highest)
-            drawn += BATCH
-            keep = np.flatnonzero(passes)[: share - found]
-            found += len(keep)
-            affines.append(affine[keep])
-            means.append(mean[keep])
-            if found < FEWEST * drawn:
-                passed = f"{found} of {drawn} crops" if found else f"none of {drawn} crops"
-                raise InputError(
-                    heightmap.name,
-                    f"{passed} of {size} cells stays within {highest:g} cm of its mean",
-                    fix="Lower its height_scale, or leave this heightmap out.",
-                )
-        which.append(np.full(share, i, np.int32))
-    names = np.array([Path(m.name).name for m in maps])
-    views = np.concatenate(which), np.concatenate(affines), np.concatenate(means)
-    return Patches(flat, starts, shapes, names, *views, cell, size)
+    drawn = [
+        _draw_from(heightmap, share, cell, size, highest, np.random.default_rng([seed, i]))
+        for i, (heightmap, share) in enumerate(zip(maps, shares, strict=True))
+    ]
+    shapes = np.array([m.heights.shape for m in maps], np.int64)
+    return Patches(
+        heights=np.concatenate([np.nan_to_num(m.heights).astype(np.float32).ravel() for m in maps]),
+        starts=_starts(shapes),
+        shapes=shapes,
+        names=np.array([Path(m.name).name for m in maps]),
+        which=np.repeat(np.arange(len(maps), dtype=np.int32), shares),
+        affine=np.concatenate([affine for affine, _ in drawn]),
+        mean=np.concatenate([mean for _, mean in drawn]),
+        cell=cell,
+        size=size,
+    )
+
+
+def _draw_from(
+    heightmap: Heightmap, share: int, cell: float, size: int, highest: float, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """`share` views (share, 2, 3) of one map that pass, and their means (share,)."""
+    from hobble.terrain.kernels import view_extents
+
+    one = _with_holes_marked(heightmap, cell).astype(np.float32)
+    alone = one.ravel(), np.zeros(1, np.int64), np.array([one.shape], np.int64)
+    affines, means = [np.zeros((0, 2, 3), np.float32)], [np.zeros(0, np.float32)]
+    found, drawn = 0, 0
+    while found < share:
+        affine = _views(rng, heightmap, cell, size)
+        mean, passes = view_extents(*alone, np.zeros(len(affine), np.int32), affine, size, highest)
+        keep = np.flatnonzero(passes)[: share - found]
+        affines.append(affine[keep])
+        means.append(mean[keep])
+        found += len(keep)
+        drawn += BATCH
+        if found < share and found < FEWEST * drawn:
+            passed = f"{found} of {drawn} crops" if found else f"none of {drawn} crops"
+            raise InputError(
+                heightmap.name,
+                f"{passed} of {size} cells stays within {highest:g} cm of its mean",
+                fix="Lower its height_scale, or leave this heightmap out.",
+            )
+    return np.concatenate(affines), np.concatenate(means)
 
 
 def save_patches(path: str | Path, patches: Patches) -> None:
@@ -128,14 +145,9 @@ def load_patches(path: str | Path) -> Patches:
         ) from error
 
 
-def _joined(maps: Sequence[Heightmap], cell: float) -> tuple[Array, np.ndarray, np.ndarray]:
-    shapes = np.array([m.heights.shape for m in maps], np.int64)
-    flat = np.concatenate([_without_holes(m, cell).astype(np.float32).ravel() for m in maps])
-    return flat, _starts(shapes), shapes
-
-
-def _without_holes(heightmap: Heightmap, cell: float) -> Array:
-    """Heights with holes (nan) made so high that no patch that shows one passes, even between its cells."""
+def _with_holes_marked(heightmap: Heightmap, cell: float) -> Array:
+    """Heights with holes (nan), and what is so near that a patch's cells may pass by on both sides, so high
+    that no patch passes that shows them."""
     holes = np.isnan(heightmap.heights)
     if not holes.any():
         return heightmap.heights
@@ -150,7 +162,7 @@ def _starts(shapes: np.ndarray) -> np.ndarray:
     return np.cumsum(sizes) - sizes
 
 
-def _draw(rng: np.random.Generator, heightmap: Heightmap, cell: float, size: int) -> Array:
+def _views(rng: np.random.Generator, heightmap: Heightmap, cell: float, size: int) -> Array:
     """BATCH views (BATCH, 2, 3) of a map, every cell inside it."""
     scale = cell / heightmap.cell
     half = size // 2
