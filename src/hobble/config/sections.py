@@ -172,7 +172,7 @@ class Runtime(Section):
     severity_scale: PositiveFloat = Field(1.0, description="severities are divided by this")
     foot_locking: bool = True
     steering: Annotated[float, Field(ge=0)] = Field(
-        1.0, description="how hard a velocity that is not reached is asked for; 0 is the original runtime"
+        2.0, description="how hard a velocity that is not reached is asked for; 0 is the original runtime"
     )
 
 

@@ -64,7 +64,7 @@ class ProceduralAnimation:
         severity_rate: float = 10.0,
         severity_scale: float = 1.0,
         foot_locking: bool = True,
-        steering: float = 1.0,
+        steering: float = 2.0,
         axes: Axes | None = None,
         position: Any = None,
         facing: Any = None,
