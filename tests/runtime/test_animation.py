@@ -214,7 +214,7 @@ def test_terrain_as_function_heightmap_and_array(network) -> None:
     heights = hills(grid[None, :], grid[:, None])
     coarse = Heightmap(heights, cell)
     motions = [
-        [p.positions for p in walk(ProceduralAnimation(network), 40, terrain=terrain)]
+        [p.positions for p in walk(ProceduralAnimation(network, steering=1.0), 40, terrain=terrain)]
         for terrain in (hills, coarse, None)
     ]
     np.testing.assert_allclose(motions[0], motions[1], atol=0.2)
