@@ -10,9 +10,6 @@ import yaml
 
 from hobble.core.skeleton import Skeleton
 
-# As workflow/scripts/training.py does, and for the same reason; read when torch is first imported.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-
 ROOT = Path(__file__).resolve().parents[1]
 
 

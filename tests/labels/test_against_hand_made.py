@@ -154,7 +154,7 @@ def test_automatic_labels_of_made_walks_are_exact(root: Path, read, options, tmp
     by_hand, automatic, _ = both_ways(read, paths["bvh"], options)
     assert phase_difference(by_hand, automatic) < 0.04
     plain = by_hand.gait.max(axis=1) > 0.9
-    # A badly hurt walker's jog is slower than a healthy walk and keeps a foot on the ground: a walk, to the eye.
+    # A badly hurt walker's jog is slower than a walk and keeps a foot on the ground: a walk, to the eye.
     enough = 0.8 if injured else 0.9
     assert (by_hand.gait.argmax(axis=1) == automatic.gait.argmax(axis=1))[plain].mean() >= enough
     if recipe == "sidesteps":

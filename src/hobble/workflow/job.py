@@ -42,8 +42,10 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
         logger.error("ran out of memory. Give the job more, or make the data set or the batch smaller.")
         sys.exit(1)
     except Exception as error:
-        to_file.stream.write(traceback.format_exc())
+        trace = traceback.format_exc()
         logger.error("%s: %s. %s See %s", type(error).__name__, error, BUG, path)
+        with open(path, "a", encoding="utf-8") as file:
+            file.write(trace)
         sys.exit(1)
     finally:
         logging.shutdown()
