@@ -126,6 +126,37 @@ def test_a_floor_that_is_not_flat_is_bent_only_if_asked(
     assert (fits.foot_below.max() <= 1) is np.bool_(bent)
 
 
+def test_a_foot_that_dips_into_a_flat_floor_makes_a_pit_and_nothing_else(
+    made: SimpleNamespace, patches: Patches
+) -> None:
+    walk = made.walk(GROUNDS["level"])
+    contacts = walk.labels["contacts"]
+    frame = np.flatnonzero(~contacts[:, 1] & (np.arange(420) > 100))[5]
+    feet = walk.clip.positions[:, -4:].copy()
+    feet[frame, 1, 1] = 2.5 - 4
+    clip = made.figure(feet, walk.clip.root)
+    fits = clip_fits(clip, walk.labels, patches, "flat", made.options(), made.database())
+    assert np.all(fits.heights == 0)
+    assert fits.foot_error.max() < 0.01
+    assert 0 < fits.foot_below.max() <= 1
+    options = made.options(bend_flat=False)
+    as_it_is = clip_fits(clip, walk.labels, patches, "flat", options, made.database())
+    assert as_it_is.foot_below.max() == pytest.approx(4)
+
+
+def test_a_heel_held_up_over_its_standing_toe_is_not_on_a_flat_floor(
+    made: SimpleNamespace, patches: Patches
+) -> None:
+    """As in a crouch on the balls of the feet: the heels keep still, so that their labels say contact."""
+    walk = made.walk(GROUNDS["level"])
+    feet = walk.clip.positions[:, -4:].copy()
+    feet[:, [0, 2], 1] += 5
+    clip = made.figure(feet, walk.clip.root)
+    fits = clip_fits(clip, walk.labels, patches, "flat", made.options(), made.database())
+    assert np.all(fits.heights == 0)
+    assert fits.foot_error.max() < 0.01
+
+
 def test_the_same_clip_gives_the_same_bytes(made: SimpleNamespace, patches: Patches, tmp_path: Path) -> None:
     walk = made.walk(GROUNDS["waves"])
     for name in "ab":

@@ -95,7 +95,7 @@ class Terrain(Section):
         1.0, description="no foot goes further below the ground, cm; null as in the original: not looked at"
     )
     bend_flat: bool = Field(
-        True, description="bend flat ground under cycles whose feet are off by more than `deepest`"
+        True, description="let flat ground give way where feet are off by more than `deepest`; else zero"
     )
     seed: int = 1
 

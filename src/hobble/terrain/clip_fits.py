@@ -15,7 +15,7 @@ from hobble.core.errors import InputError
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import RootFrames, root_frames
-from hobble.terrain.feet import Feet, Mask, feet_of
+from hobble.terrain.feet import Feet, Mask, feet_of, held_up
 from hobble.terrain.ground import Ground, fit_cycle, flat_ground
 from hobble.terrain.patches import Patches
 from hobble.terrain.picture import Picture, picture_cycles, picture_of
@@ -98,13 +98,17 @@ def clip_fits(
 def _feet(
     clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: Mapping[str, Any]
 ) -> Feet:
-    """Soles and contacts; where no foot stands all through a cycle, its lowest points count as contacts."""
+    """Soles, and contacts that are on the ground.
+
+    On flat ground a heel that is held up, still, over its standing toe is not. Where no foot stands all
+    through a cycle, its lowest points count as contacts.
+    """
     counted = np.zeros(len(clip), bool)
     for start, end in cycles:
         counted[start - window : end + window] = True
     names = ("heel_height", "toe_height", "sole", "deepest")
     feet = feet_of(clip, contacts, np.flatnonzero(counted), flat, **{n: options[n] for n in names})
-    contacts = feet.contacts.copy()
+    contacts = feet.contacts & ~held_up(feet) if flat else feet.contacts.copy()
     for start, end in cycles:
         around = slice(start - window, end + window)
         if not contacts[around].any():

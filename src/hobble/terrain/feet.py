@@ -14,6 +14,7 @@ from hobble.core.skeleton import Skeleton
 Mask = NDArray[np.bool_]
 
 ROLES = ("left_heel", "left_toe", "right_heel", "right_toe")
+HELD_UP = 2.0  # cm
 HEEL = np.array([True, False, True, False])
 
 
@@ -61,6 +62,13 @@ def feet_of(
             found.append(sole + (heel_above_toe(clip.skeleton) if columns is HEEL else 0.0))
     joints[..., 1] -= np.where(HEEL, *found)
     return Feet(joints, contacts, *found)
+
+
+def held_up(feet: Feet) -> Mask:
+    """(F, 4) whether a joint is HELD_UP cm or more above the other of its foot, which is in contact."""
+    other = [1, 0, 3, 2]
+    height = feet.soles[..., 1]
+    return (height - height[:, other] > HELD_UP) & feet.contacts[:, other]
 
 
 def _flat_height(heights: Array, down: Array, deepest: float | None) -> float:

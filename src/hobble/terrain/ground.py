@@ -90,23 +90,23 @@ def flat_ground(
 ) -> Ground:
     """Flat ground lies at zero: one fit.
 
-    Where the feet in contact are further than `deepest` (cm) from it on average, or one is further below it,
-    since the floor or the capture was uneven, it is bent to meet them if `bent`.
+    If `bent`: where a foot is further below it than `deepest` (cm) it is dug out, and where the feet in
+    contact are further from it than that on average, since the floor or the capture was uneven, it is bent
+    to meet them.
     """
     plain = Ground(None, np.array([-1]), np.zeros(1), np.zeros(2), np.zeros(1))
-    height = soles[..., 1]
     if deepest is None or not bent:
         return plain
-    if np.abs(height[contacts]).mean() <= deepest and height.min() >= -deepest:
-        return plain
-    return meet_feet(plain, soles, contacts, smoothing, deepest)
+    if np.abs(soles[contacts][:, 1]).mean() > deepest:
+        return meet_feet(plain, soles, contacts, smoothing, deepest)
+    return replace(plain, dug=_dug(plain, soles, stances(soles, contacts, PIECE), deepest))
 
 
 def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None) -> Ground:
     """Add the surface of what is left between the ground and the feet in contact.
 
     Feet that are then below the ground (by more than half of `deepest`) join those points, and the surface is
-    made again; what still covers a foot is dug out.
+    made again; where it still covers a foot by more than `deepest` it is dug out.
     """
     standing = stances(soles, contacts, PIECE)
     residual = standing.height - plain.at(standing.place)
@@ -118,8 +118,12 @@ def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, dee
         for k, (c, same) in enumerate(zip(ground.above(soles) > deepest / 2, ground.surfaces, strict=True))
     ]
     ground = replace(plain, surfaces=surfaces)
-    dug = [pits(soles[c], standing, deepest / 2) for c in ground.above(soles) > deepest / 2]
-    return replace(ground, dug=dug)
+    return replace(ground, dug=_dug(ground, soles, standing, deepest))
+
+
+def _dug(ground: Ground, soles: Array, standing: Stances, deepest: float) -> list[Pits]:
+    """For each fit what lets through the feet that are further below it than `deepest`, to half of that."""
+    return [pits(soles[covered], standing, deepest / 2) for covered in ground.above(soles) > deepest]
 
 
 def _joined(plain: Ground, k: int, standing: Stances, covered: Stances, smoothing: float) -> Bend:
