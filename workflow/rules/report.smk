@@ -8,7 +8,9 @@ rule configuration:
         mem_mb=500,
         runtime=5,
     params:
-        resolved=lambda w: project.resolved(w.configuration),
+        name=lambda w: w.configuration,
+        base=str(project.base),
+        digest=lambda w: project.digest(w.configuration),
         code=project.code("configuration"),
     script:
         "../scripts/configuration.py"

@@ -1,9 +1,14 @@
-"""Creates results/<configuration>/configuration.yaml from the resolved configuration in the rule's params."""
+"""Creates results/<configuration>/configuration.yaml: every key of the configuration and data set, resolved."""
+
+from pathlib import Path
 
 import yaml
 
 from hobble.core.files import write_text
 from hobble.workflow.job import job
+from hobble.workflow.project import Project
 
 with job(snakemake):
-    write_text(snakemake.output.yaml, yaml.safe_dump(snakemake.params.resolved, sort_keys=False))
+    project = Project(Path(snakemake.params.base), snakemake.config)
+    resolved = project.resolved(snakemake.params.name)
+    write_text(snakemake.output.yaml, yaml.safe_dump(resolved, sort_keys=False))

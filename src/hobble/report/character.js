@@ -50,10 +50,10 @@ Hobble.character = (spec, place = [0, 0], heading = 0) => {
   // The steps of a frame
 
   const prepare = (velocity, direction, strafe, gait, ground) => {
-    // What the last half of the past lacks of the wished velocity is asked for on top, up to as much again.
+    // What the last half of the past lacks of the wished velocity is asked for on top, up to twice the wish.
     const span = floor(M / 2), past = [c.px[M] - c.px[M - span], c.pz[M] - c.pz[M - span]];
     const more = velocity.map((v, i) => spec.steering * (v - past[i] / span));
-    const limit = min(1, sqrt((velocity[0] ** 2 + velocity[1] ** 2) / max(more[0] ** 2 + more[1] ** 2, 1e-12)));
+    const limit = min(1, 2 * sqrt((velocity[0] ** 2 + velocity[1] ** 2) / max(more[0] ** 2 + more[1] ** 2, 1e-12)));
     for (let i = 0; i < 2; i++) c.velocity[i] += k.targetMix * (velocity[i] + more[i] * limit - c.velocity[i]);
     let now = atan2(...c.direction);
     now += k.targetMix * wrap(atan2(...direction) - now);

@@ -14,6 +14,7 @@ from numba import njit
 
 from hobble.database.layout import RowLayout
 
+STEERING_LIMIT = 2.0  # with 1, a network that saw few starts stands for seconds before it sets off
 TARGET_MIX = 0.9
 GAIT_MIX = 0.1
 STILL = 0.1  # cm a frame: a slower wish is a wish to stand
@@ -35,7 +36,7 @@ def follow_wish(
     wish_velocity, wish_direction, velocity, direction: (C, 2); wish_strafe, strafe: (C,); wish_gait: (C, 6).
     A network goes on as it has been going: it answers to its past as much as to the bent future. So what the
     last half of the past window lacks of the wished velocity is asked for on top, `steering` times over, up
-    to as much again as the wish; 0 is the original runtime.
+    to STEERING_LIMIT times the wish; 0 is the original runtime.
     """
     middle = gait.shape[1] // 2
     span = middle // 2
@@ -43,7 +44,7 @@ def follow_wish(
         x, z = wish_velocity[c, 0], wish_velocity[c, 1]
         more_x = steering * (x - (position[c, middle, 0] - position[c, middle - span, 0]) / span)
         more_z = steering * (z - (position[c, middle, 1] - position[c, middle - span, 1]) / span)
-        limit = np.sqrt((x * x + z * z) / max(more_x * more_x + more_z * more_z, 1e-12))
+        limit = STEERING_LIMIT * np.sqrt((x * x + z * z) / max(more_x * more_x + more_z * more_z, 1e-12))
         x, z = x + more_x * min(1.0, limit), z + more_z * min(1.0, limit)
         velocity[c, 0] += TARGET_MIX * (x - velocity[c, 0])
         velocity[c, 1] += TARGET_MIX * (z - velocity[c, 1])

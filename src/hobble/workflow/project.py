@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import hashlib
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -78,6 +80,11 @@ class Project:
     def _check_dataset(self, name: str) -> None:
         self.catalogue.skeleton(self.dataset(name).skeleton)
         self.selected(name, "all")
+
+    def digest(self, configuration: str) -> str:
+        """A short name for all that `resolved` says, so that a dry run does not print it."""
+        text = json.dumps(self.resolved(configuration), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     # Clips
 
