@@ -1,4 +1,4 @@
-"""Creates results/<configuration>/configuration.yaml: every key of the configuration and data set, resolved."""
+"""Creates results/<configuration>/configuration.yaml: every key of it and of its data set, resolved."""
 
 from pathlib import Path
 
