@@ -132,3 +132,15 @@ def test_killed_half_way_the_same_command_ends_with_the_same_bytes(finished, wor
     a, b = (np.load(w.folder / weights) for w in (finished, workflow))
     assert all(np.array_equal(a[name], b[name]) for name in a.files)
     assert not list(workflow.folder.rglob("*.part"))
+
+
+def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> None:
+    more = "extends: test\ntraining:\n  passes: 3\n  continues: test\n"
+    (copied.checkout / "config/more.yaml").write_text(more)
+    weights = "results/more/network/weights.npz"
+    assert copied.planned(weights) == {"training": 1}
+    copied.run("-c2", weights)
+    rows = (copied.folder / "results/more/network/history.csv").read_text().splitlines()
+    begun = (copied.folder / "results/test/network/history.csv").read_text().splitlines()
+    assert rows[: len(begun)] == begun
+    assert len(rows) == 1 + 3 * 10

@@ -13,7 +13,7 @@ with job(snakemake):
         training=snakemake.params.training,
         checkpoints=Path(snakemake.params.checkpoints),
         threads=snakemake.threads,
-        start=Path(snakemake.input.checkpoint) if snakemake.input.checkpoint else None,
+        start=Path(snakemake.input.checkpoint[0]) if snakemake.input.checkpoint else None,
         code=snakemake.params.get("code"),
         weights=Path(snakemake.output.weights),
         history=Path(snakemake.output.history),

@@ -82,7 +82,7 @@ def key_figures(material: Material) -> list[Figure]:
         kept = sum(material.split(report["clip"]) == "held_out" for report in material.motion)
         beside = f"{len(material.motion)} clips, {kept} of them held out"
         value, _, unit = duration(seconds).partition(" ")
-        figures.append(Figure("Motion learnt from", value, unit, beside))
+        figures.append(Figure("Motion in all", value, unit, beside))
     network = material.network
     figures.append(
         Figure(

@@ -74,11 +74,15 @@ class Project:
             elif name:
                 model = self.configuration(name)
                 for other in filter(None, (model.network_of, model.training.continues)):
+                    if other == name:
+                        raise HobbleError(f"configuration {name} cannot go on from itself")
                     self.configuration(other)
                 self._check_dataset(model.dataset)
 
     def _check_dataset(self, name: str) -> None:
         self.catalogue.skeleton(self.dataset(name).skeleton)
+        for clip in self.clips(name):
+            self.source(name, clip)
         self.selected(name, "all")
 
     def digest(self, configuration: str) -> str:
