@@ -43,11 +43,9 @@ class Project:
         """The resolved data set `name`."""
         return self.catalogue.dataset(name)
 
-    def options(self, dataset: str, *sections: str) -> dict[str, Any]:
-        """Plain values of one section of a data set, or of several by name."""
-        model = self.dataset(dataset)
-        values = {s: getattr(model, s).model_dump(mode="json") for s in sections}
-        return values[sections[0]] if len(sections) == 1 else values
+    def options(self, dataset: str, section: str) -> dict[str, Any]:
+        """Plain values of one section of a data set."""
+        return getattr(self.dataset(dataset), section).model_dump(mode="json")
 
     def section(self, configuration: str, name: str) -> dict[str, Any]:
         """Plain values of one section of a configuration."""
