@@ -23,10 +23,12 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
     on the terminal and the whole traceback in the log.
     """
     path = snakemake.log[0]
-    os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+    with contextlib.suppress(OSError):
+        os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+        open(path, "w").close()
     logger = logging.getLogger("hobble")
     logger.setLevel(logging.INFO)
-    to_file = logging.FileHandler(path, mode="w", encoding="utf-8")
+    to_file = _LogFile(path, encoding="utf-8", delay=True)
     to_file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     to_terminal = logging.StreamHandler(sys.stderr)
     to_terminal.setLevel(logging.WARNING)
@@ -42,10 +44,24 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
         logger.error("ran out of memory. Give the job more, or make the data set or the batch smaller.")
         sys.exit(1)
     except Exception as error:
-        trace = traceback.format_exc()
         logger.error("%s: %s. %s See %s", type(error).__name__, error, BUG, path)
-        with open(path, "a", encoding="utf-8") as file:
-            file.write(trace)
+        logger.removeHandler(to_terminal)
+        logger.error("%s", traceback.format_exc())
         sys.exit(1)
     finally:
         logging.shutdown()
+
+
+class _LogFile(logging.FileHandler):
+    """A log that goes without what it cannot write: on a full disk the message still reaches the terminal, alone."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        with contextlib.suppress(OSError):
+            super().emit(record)
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        pass
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):
+            super().close()
