@@ -116,12 +116,17 @@ def test_a_bad_configuration_ends_before_the_dag(workflow, override: str, messag
 
 @pytest.fixture
 def small_disk(workflow) -> Iterator[Path]:
-    """The run's folder on a file system of its own that is too small."""
-    mount = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(workflow.folder)]
+    """The run's results on a file system of their own that is too small; Snakemake's own notes lie elsewhere.
+
+    Where Snakemake cannot write its notes either, it adds a traceback of its own to our message.
+    """
+    results = workflow.folder / "results"
+    results.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(results)]
     if subprocess.run(mount, capture_output=True).returncode:
         pytest.skip("this user may not mount a small file system")
-    yield workflow.folder
-    subprocess.run(["umount", "-l", str(workflow.folder)], check=True)
+    yield results
+    subprocess.run(["umount", "-l", str(results)], check=True)
 
 
 def test_a_disk_that_fills(workflow, small_disk: Path) -> None:
@@ -130,7 +135,7 @@ def test_a_disk_that_fills(workflow, small_disk: Path) -> None:
     assert "the disk is full" in text
     assert "Traceback" not in text
     assert not list(small_disk.rglob("*.part"))
-    whole = {p: p.read_bytes() for p in small_disk.rglob("results/datasets/tiny/synthetic/*.bvh")}
+    whole = {p: p.read_bytes() for p in small_disk.rglob("datasets/tiny/synthetic/*.bvh")}
     subprocess.run(["mount", "-o", "remount,size=300m", str(small_disk)], check=True)
     workflow.run("-c2", target)
     assert {p: p.read_bytes() for p in whole} == whole
