@@ -15,7 +15,7 @@ import yaml
 from hobble.core.errors import InputError
 from hobble.core.files import read_json
 
-PUBLISHED = Path(__file__).with_name("published.yaml")
+PUBLISHED = Path(__file__).parents[1] / "evaluation" / "published.yaml"
 COUNTED = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 
 

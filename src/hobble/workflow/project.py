@@ -232,7 +232,12 @@ class Project:
     def templates(self) -> list[str]:
         """The page's templates; a change in one re-makes only the reports."""
         folder = self.base / "src" / "hobble" / "report"
-        return sorted(str(p) for p in folder.iterdir() if p.suffix in {".j2", ".css", ".js", ".yaml"})
+        files = [str(p) for p in folder.iterdir() if p.suffix in {".j2", ".css", ".js", ".yaml"}]
+        return sorted([*files, self.published()])
+
+    def published(self) -> str:
+        """The file of published figures that stand beside ours."""
+        return str(self.base / "src" / "hobble" / "evaluation" / "published.yaml")
 
     def skeleton_file(self, dataset: str) -> str:
         """Path of the data set's skeleton."""
