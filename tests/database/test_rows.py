@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from hobble.config import sections
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
@@ -17,44 +19,27 @@ from hobble.database.layout import GAITS, RowLayout
 from hobble.database.rows import clip_rows, cycle_frames, cycle_phase, phase_change
 from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
+from hobble.terrain.clip_fits import clip_fits
+from hobble.terrain.heightmaps import Heightmap
+from hobble.terrain.patches import draw_patches
 
 NAME = "LocomotionFlat09_000"
 OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0}
-MOTION = {
-    "fps": 60.0,
-    "source_fps": None,
-    "unit": 5.6444,
-    "up": "Y",
-    "handedness": "right",
-    "facing": None,
-    "proportions": "clip",
-    "defects": "refuse",
-    "loops": 1,
-    "heading": None,
-}
-LABELS = {
-    "files": True,
-    "contact_threshold": 0.02,
-    "phase_zero": "right",
-    "heel_speed": 0.375,
-    "toe_speed": 0.0875,
-    "valley_factor": 2.875,
-    "shortest_step": 5,
+# A data set as the original made it: what differs from the defaults, as a configuration would say it.
+ORIGINAL = {
+    "motion": {"proportions": "clip", "defects": "refuse"},
+    "labels": {},
+    "terrain": {
+        "flat_level": "feet",
+        "heel_height": 5.0,
+        "toe_height": 4.0,
+        "held_up": None,
+        "deepest": None,
+        "bend_flat": False,
+    },
+    "database": {},
 }
 IN_CENTIMETRES = ("position", "joint_position")
-
-
-def original_level(clip: Clip, start: int, end: int) -> float:
-    """Where the original puts flat ground under a cycle: at the mean height of the soles in contact.
-
-    It looks at 60 frames to each side; the stretch's last frame has no velocity and repeats the contacts of
-    the one before. Soles are 5 cm below the heel joint and 4 cm below the toe joint.
-    """
-    joints = [clip.skeleton.role(f"{side}_{part}") for side in ("left", "right") for part in ("heel", "toe")]
-    feet = clip.positions[start - 60 : end + 61, joints]
-    moving = np.sum(np.diff(feet, axis=0) ** 2, axis=-1) >= 0.02
-    contacts = ~np.concatenate([moving, moving[-1:]])
-    return float((feet[..., 1] - [5, 4, 5, 4])[contacts].mean())
 
 
 def flat_terrain(cycles: np.ndarray, levels: np.ndarray) -> dict[str, np.ndarray]:
@@ -75,18 +60,33 @@ def original(shared: Path) -> dict[str, np.ndarray]:
         return dict(file)
 
 
-@pytest.fixture(scope="module")
-def rows(shared: Path, root: Path) -> ClipRows:
+def options(section: str, **changed: object) -> dict[str, Any]:
+    """A section of the original's data set, as its stage gets it."""
+    model = getattr(sections, section.capitalize())
+    return model(**ORIGINAL[section] | changed).model_dump(mode="json")
+
+
+def rows_as_configured(shared: Path, root: Path, **terrain: object) -> ClipRows:
+    """The rows of the reference clip, stage by stage, by nothing but the configuration."""
     skeletons = root / "config" / "skeletons"
     folder = shared / "mocap" / "pfnn"
     clip, report = make_clip(
-        folder / f"{NAME}.bvh", skeletons / "holden31.yaml", skeletons, NAME, "holden31", MOTION
+        folder / f"{NAME}.bvh", skeletons / "holden31.yaml", skeletons, NAME, "holden31", options("motion")
     )
     files = [folder / f"{NAME}{end}" for end in (".phase", ".gait", "_footsteps.txt", "_gait.txt")]
-    labels, _ = label_clip(clip, files, report, "walk", "flat", LABELS)
-    levels = np.array([original_level(clip, *cycle) for cycle in labels.cycles])
+    labels = vars(label_clip(clip, files, report, "walk", "flat", options("labels"))[0])
+    ground, database = options("terrain", **terrain), options("database")
+    any_map = Heightmap("any", np.zeros((200, 200)), ground["cell"])
+    drawn = {name: ground[name] for name in ("cell", "size", "highest", "seed")}
+    fits = clip_fits(clip, labels, draw_patches([any_map], count=10, **drawn), "flat", ground, database)
     severity = np.zeros((len(clip), len(clip.skeleton.links)), np.float32)
-    return clip_rows(NAME, clip, vars(labels), severity, flat_terrain(labels.cycles, levels), **OPTIONS)
+    window = {name: database[name] for name in OPTIONS}
+    return clip_rows(NAME, clip, labels, severity, vars(fits), **window)
+
+
+@pytest.fixture(scope="module")
+def rows(shared: Path, root: Path) -> ClipRows:
+    return rows_as_configured(shared, root)
 
 
 @pytest.mark.shared
@@ -119,6 +119,17 @@ def test_the_comparison_would_notice_a_millimetre(rows, original):
         AssertionError, match=r"y joint_position \(LeftToeBase x\), column 47: off by 0\.1000"
     ):
         test_the_original_rows_column_by_column(moved, original)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    "change", [{"flat_level": "zero"}, {"held_up": 2.0}, {"heel_height": "auto"}, {"toe_height": "auto"}]
+)
+def test_each_of_the_originals_settings_is_needed(shared, root, original, change):
+    """All but `deepest` and `bend_flat`, since this clip's feet are nowhere off by that much."""
+    other = rows_as_configured(shared, root, **change)
+    with pytest.raises(AssertionError, match="x joint_position"):
+        test_the_original_rows_column_by_column(other, original)
 
 
 @pytest.fixture(scope="module")

@@ -157,6 +157,16 @@ def test_a_heel_held_up_over_its_standing_toe_is_not_on_a_flat_floor(
     assert fits.foot_error.max() < 0.01
 
 
+def test_flat_ground_may_lie_where_the_feet_are_as_in_the_original(
+    made: SimpleNamespace, patches: Patches
+) -> None:
+    walk = made.walk(lambda x, z: np.full_like(z, 3.0))
+    for level, expected in (("zero", 0.0), ("feet", 3.0)):
+        options = made.options(flat_level=level, deepest=None)
+        fits = clip_fits(walk.clip, walk.labels, patches, "flat", options, made.database())
+        assert np.allclose(fits.heights, expected, atol=1e-5)
+
+
 def test_the_same_clip_gives_the_same_bytes(made: SimpleNamespace, patches: Patches, tmp_path: Path) -> None:
     walk = made.walk(GROUNDS["waves"])
     for name in "ab":

@@ -15,6 +15,9 @@ PositiveFloat = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0, lt=1)]
 Ground = Literal["flat", "rocky", "jumpy", "beam"]
 Gait = Literal["stand", "walk", "jog", "crouch", "jump", "bump"]
+# What results/compare/ sets side by side where --config compare names nothing else: the published sizes and
+# passes, and the figure that can be hurt.
+COMPARED = ("holden", "holden-xl", "holden-xt", "injured")
 
 
 class Section(BaseModel):
@@ -95,7 +98,17 @@ class Terrain(Section):
         1.0, description="no foot goes further below the ground, cm; null as in the original: not looked at"
     )
     bend_flat: bool = Field(
-        True, description="let flat ground give way where feet are off by more than `deepest`; else zero"
+        True, description="let flat ground give way where feet are off by more than `deepest`; else level"
+    )
+    flat_level: Literal["zero", "feet"] = Field(
+        "zero",
+        description="where flat ground lies; `feet` as in the original: at the mean height of the soles in "
+        "contact, for each cycle",
+    )
+    held_up: PositiveFloat | None = Field(
+        2.0,
+        description="a heel that keeps still so far above its standing toe is not on flat ground, cm; null "
+        "as in the original: not looked at",
     )
     seed: int = 1
 

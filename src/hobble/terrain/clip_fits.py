@@ -76,7 +76,7 @@ def clip_fits(
     fitted, pictures = [], []
     shown = picture_cycles(len(cycles))
     for c, (start, end) in enumerate(cycles):
-        around = slice(start - window, end + window)
+        around = _around(start, end, window)
         fit = _ground(feet, around, samples, patches, ground, options)
         heights.append(heights_under(fit, samples, start, end, offsets))
         fitted.append((fit, feet.soles[around], feet.contacts[around]))
@@ -100,22 +100,29 @@ def _feet(
 ) -> Feet:
     """Soles, and contacts that are on the ground.
 
-    On flat ground a heel that is held up, still, over its standing toe is not. Where no foot stands all
+    On flat ground a heel that is held up, still, over its standing toe may not be. Where no foot stands all
     through a cycle, its lowest points count as contacts.
     """
     counted = np.zeros(len(clip), bool)
     for start, end in cycles:
-        counted[start - window : end + window] = True
+        counted[_around(start, end, window)] = True
     names = ("heel_height", "toe_height", "sole", "deepest")
     feet = feet_of(clip, contacts, np.flatnonzero(counted), flat, **{n: options[n] for n in names})
-    contacts = feet.contacts & ~held_up(feet) if flat else feet.contacts.copy()
+    contacts = feet.contacts.copy()
+    if flat and options["held_up"] is not None:
+        contacts &= ~held_up(feet, options["held_up"])
     for start, end in cycles:
-        around = slice(start - window, end + window)
+        around = _around(start, end, window)
         if not contacts[around].any():
             log.warning("%s: no foot stands in frames %d to %d; the lowest count", clip.name, start, end)
             height = feet.soles[around][..., 1]
             contacts[around] = height <= np.quantile(height, 0.05)
     return replace(feet, contacts=contacts)
+
+
+def _around(start: int, end: int, window: int) -> slice:
+    """The frames that a cycle is fitted over: its own, both ends included, and as many before as after."""
+    return slice(start - window, end + window + 1)
 
 
 def _ground(
@@ -125,7 +132,7 @@ def _ground(
     soles, contacts = feet.soles[around], feet.contacts[around]
     corrected = {n: options[n] for n in ("smoothing", "deepest")}
     if kind == "flat":
-        return flat_ground(soles, contacts, **corrected, bent=options["bend_flat"])
+        return flat_ground(soles, contacts, options["flat_level"], **corrected, bent=options["bend_flat"])
     path = samples[1, around]
     sides = samples[0, around] - path
     sides = sides / np.linalg.norm(sides, axis=-1, keepdims=True)

@@ -14,7 +14,6 @@ from hobble.core.skeleton import Skeleton
 Mask = NDArray[np.bool_]
 
 ROLES = ("left_heel", "left_toe", "right_heel", "right_toe")
-HELD_UP = 2.0  # cm
 HEEL = np.array([True, False, True, False])
 
 
@@ -64,11 +63,11 @@ def feet_of(
     return Feet(joints, contacts, *found)
 
 
-def held_up(feet: Feet) -> Mask:
-    """(F, 4) whether a joint is HELD_UP cm or more above the other of its foot, which is in contact."""
+def held_up(feet: Feet, least: float) -> Mask:
+    """(F, 4) whether a joint is more than `least` cm above the other of its foot, which is in contact."""
     other = [1, 0, 3, 2]
     height = feet.soles[..., 1]
-    return (height - height[:, other] > HELD_UP) & feet.contacts[:, other]
+    return (height - height[:, other] > least) & feet.contacts[:, other]
 
 
 def _flat_height(heights: Array, down: Array, deepest: float | None) -> float:

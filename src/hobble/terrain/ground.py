@@ -86,18 +86,24 @@ def fit_cycle(
 
 
 def flat_ground(
-    soles: Array, contacts: Mask, *, smoothing: float, deepest: float | None, bent: bool
+    soles: Array, contacts: Mask, level: str, *, smoothing: float, deepest: float | None, bent: bool
 ) -> Ground:
-    """Flat ground lies at zero: one fit.
+    """Flat ground: one fit. It lies at zero or, if `level` is "feet", at the mean height of soles in contact.
+
+    That is as in the original, whose stretch of frames has no velocity in the last: the contacts of the frame
+    before count there once more.
 
     If `bent`: where a foot is further below it than `deepest` (cm) it is dug out, and where the feet in
     contact are further from it than that on average, since the floor or the capture was uneven, it is bent
     to meet them.
     """
-    plain = Ground(None, np.array([-1]), np.zeros(1), np.zeros(2), np.zeros(1))
+    heights = soles[..., 1]
+    held = np.concatenate([contacts[:-1], contacts[-2:-1]])
+    zero = heights[held if held.any() else contacts].mean() if level == "feet" else 0.0
+    plain = Ground(None, np.array([-1]), np.zeros(1), np.zeros(2), np.array([zero]))
     if deepest is None or not bent:
         return plain
-    if np.abs(soles[contacts][:, 1]).mean() > deepest:
+    if np.abs(heights[contacts] - zero).mean() > deepest:
         return meet_feet(plain, soles, contacts, smoothing, deepest)
     return replace(plain, dug=_dug(plain, soles, stances(soles, contacts, PIECE), deepest))
 
