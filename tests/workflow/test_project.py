@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -88,3 +89,50 @@ def test_networks_that_others_make_are_read_where_they_lie(root: Path) -> None:
     assert project.network("ava-m", "weights.npz") == "results/ava/network/weights.npz"
     assert project.start("holden-xt") == ["results/holden/network/checkpoint.npz"]
     assert project.start("holden") == []
+
+
+@pytest.fixture
+def complete(base: Path, root: Path) -> Path:
+    """The same, with the skeleton that the data set names."""
+    (base / "config/skeletons").mkdir()
+    shutil.copy(root / "config/skeletons/holden31.yaml", base / "config/skeletons/s.yaml")
+    return base
+
+
+def test_what_is_compared(complete: Path) -> None:
+    base = complete
+    project = Project(base, {"compare": ["one", "hurt"]})
+    project.check(["results/compare/compare.json"])
+    assert project.measured()["accuracy"] == [
+        f"results/{n}/evaluation/accuracy.json" for n in ("one", "hurt")
+    ]
+    assert Project(base, {"compare": "one,hurt"}).compared() == ["one", "hurt"]
+    (base / "config/read.yaml").write_text("extends: one\nnetwork_of: one\n")
+    read = Project(base, {"compare": ["read"]}).measured()
+    assert read["history"] == ["results/one/network/history.csv"]
+    # A list of configurations is no part of any of them.
+    assert project.resolved("one") == Project(base, {}).resolved("one")
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (["one", "two"], "two.yaml: no such file. There are: hurt, one"),
+        (["one", "one"], "each configuration once"),
+        ([], "one or more, not none"),
+        ([1], "a list of configurations"),
+        ({"a": "one"}, "a list of configurations"),
+    ],
+)
+def test_what_cannot_be_compared(complete: Path, names: object, message: str) -> None:
+    project = Project(complete, {"compare": names})
+    project.check(["results/one/report.html"])
+    with pytest.raises(HobbleError, match=message):
+        project.check(["results/compare/report.html"])
+
+
+@pytest.mark.parametrize("name", ["compare", "datasets"])
+def test_folders_of_results_are_no_configurations(base: Path, name: str) -> None:
+    (base / f"config/{name}.yaml").write_text("extends: one\n")
+    with pytest.raises(HobbleError, match=f"no configuration can be called {name}"):
+        Project(base, {})

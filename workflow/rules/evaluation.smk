@@ -72,3 +72,36 @@ rule injury_response:
         code=project.code("injury_response"),
     script:
         "../scripts/injury_response.py"
+
+
+rule compare:
+    """Configurations side by side, with the published figures: one JSON and its tables as CSV."""
+    input:
+        configuration=lambda w: project.measured()["configuration"],
+        accuracy=lambda w: project.measured()["accuracy"],
+        responsivity=lambda w: project.measured()["responsivity"],
+        injury=lambda w: project.measured()["injury"],
+        pipeline=lambda w: project.measured()["pipeline"],
+        history=lambda w: project.measured()["history"],
+        published=project.published(),
+    output:
+        json="results/compare/compare.json",
+        configurations="results/compare/configurations.csv",
+        accuracy="results/compare/accuracy.csv",
+        responsivity="results/compare/responsivity.csv",
+        training="results/compare/training.csv",
+        stages="results/compare/stages.csv",
+        difference="results/compare/difference.csv",
+        fit="results/compare/fit.csv",
+        published="results/compare/published.csv",
+    log:
+        "results/compare/logs/evaluation/compare.log",
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        configurations=lambda w: project.compared(),
+        files=lambda w: sorted(project.measured()),
+        code=project.code("compare"),
+    script:
+        "../scripts/compare.py"

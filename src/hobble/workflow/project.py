@@ -11,6 +11,7 @@ from typing import Any
 
 from hobble.config.load import Catalogue
 from hobble.config.models import ClipEntry, Configuration, Dataset
+from hobble.config.sections import COMPARED
 from hobble.core.errors import HobbleError, InputError
 from hobble.workflow.fingerprint import fingerprint
 
@@ -18,20 +19,34 @@ DATASETS = "results/datasets"
 MIRROR = "_mirror"
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 STAGES = ("synthetic", "motion", "labels", "injury", "terrain", "database")
+COMPARE = "compare"
+RESERVED = (COMPARE, "datasets")  # folders of results/ that belong to no configuration
+# What a comparison reads of each configuration, under results/<configuration>/.
+MEASURED = {
+    "configuration": "configuration.yaml",
+    "accuracy": "evaluation/accuracy.json",
+    "responsivity": "evaluation/responsivity.json",
+    "injury": "evaluation/injury.json",
+    "pipeline": "pipeline.json",
+}
 
 
 class Project:
     """The configuration folder of one checkout, with the overrides of one command line.
 
     base: the folder of the Snakefile. config: Snakemake's config; `mocap` is the folder with the
-    user's clips, every other key goes on top of each configuration.
+    user's clips, `compare` the configurations to set side by side, every other key goes on top of each
+    configuration. Raises HobbleError where a configuration has the name of a folder of results/.
     """
 
     def __init__(self, base: Path, config: Mapping[str, Any]) -> None:
         self.base = base
         self.mocap = Path(config.get("mocap", base / "data"))
-        overrides = {key: value for key, value in config.items() if key != "mocap"}
+        self._compare = config.get(COMPARE, list(COMPARED))
+        overrides = {key: value for key, value in config.items() if key not in ("mocap", COMPARE)}
         self.catalogue = Catalogue(base / "config", overrides)
+        for name in set(RESERVED) & set(self.catalogue.names()):
+            raise HobbleError(f"no configuration can be called {name}: results/{name} is another folder")
 
     # Configurations and what they name
 
@@ -69,13 +84,19 @@ class Project:
             _, name, folder, *_ = (*Path(target).parts, "", "")
             if name == "datasets":
                 self._check_dataset(folder)
+            elif name == COMPARE:
+                for one in self.compared():
+                    self._check_configuration(one)
             elif name:
-                model = self.configuration(name)
-                for other in filter(None, (model.network_of, model.training.continues)):
-                    if other == name:
-                        raise HobbleError(f"configuration {name} cannot go on from itself")
-                    self.configuration(other)
-                self._check_dataset(model.dataset)
+                self._check_configuration(name)
+
+    def _check_configuration(self, name: str) -> None:
+        model = self.configuration(name)
+        for other in filter(None, (model.network_of, model.training.continues)):
+            if other == name:
+                raise HobbleError(f"configuration {name} cannot go on from itself")
+            self.configuration(other)
+        self._check_dataset(model.dataset)
 
     def _check_dataset(self, name: str) -> None:
         self.catalogue.skeleton(self.dataset(name).skeleton)
@@ -223,6 +244,28 @@ class Project:
         """The checkpoint that training goes on from, if it continues another configuration's."""
         other = self.configuration(configuration).training.continues
         return [f"results/{other}/network/checkpoint.npz"] if other else []
+
+    # What is compared
+
+    def compared(self) -> list[str]:
+        """The configurations to set side by side, as `--config compare='[holden,injured]'` names them.
+
+        Raises HobbleError for anything but names, each once.
+        """
+        names = self._compare.split(",") if isinstance(self._compare, str) else self._compare
+        if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
+            raise HobbleError(f"compare: a list of configurations, as in '[holden,injured]', not {names!r}")
+        if not names or len(set(names)) < len(names):
+            raise HobbleError(
+                f"compare: each configuration once, one or more, not {', '.join(names) or 'none'}"
+            )
+        return list(names)
+
+    def measured(self) -> dict[str, list[str]]:
+        """Kind of file -> that of each configuration compared."""
+        names = self.compared()
+        out = {kind: [f"results/{name}/{file}" for name in names] for kind, file in MEASURED.items()}
+        return out | {"history": [self.network(name, "history.csv") for name in names]}
 
     def heightmap_files(self, dataset: str) -> list[str]:
         """Heightmaps that are files, in the order of the configuration."""

@@ -1,0 +1,184 @@
+"""Configurations side by side: eq. 3.2, lines through points, published counts, different data sets."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hobble.core.errors import InputError
+from hobble.evaluation.compare import compare, read_measured
+from hobble.evaluation.compare_tables import tables
+from hobble.evaluation.responsivity import parameter_counts
+from hobble.evaluation.series import difference, line
+from hobble.evaluation.tables import write_csv
+
+SIZES = {
+    "holden": (342, 512, 512, 311),
+    "holden-xl": (342, 512, 512, 512, 311),
+    "ava": (1302, 512, 512, 1751),
+}
+MODES = ("constant", "cubic")
+
+
+@pytest.fixture
+def published(root: Path) -> dict[str, Any]:
+    return yaml.safe_load((root / "src/hobble/evaluation/published.yaml").read_text(encoding="utf-8"))
+
+
+def spread(mean: float, sd: float, frames: int = 100) -> dict[str, Any]:
+    return {"frames": frames, "mean": mean, "sd": sd, "position_error_cm": 1.0, "mean_of_clips": mean}
+
+
+def timed(ms: float) -> dict[str, Any]:
+    steps = dict.fromkeys(("prepare", "input", "insert", "output", "update"), 0.0)
+    return {**steps, "predict": ms / 2, "total": ms, "spread": {"sd": 0.1}}
+
+
+def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[int, ...]) -> dict[str, Path]:
+    """Files of one configuration, whose frame time is exactly .1 ms and a nanosecond per computation."""
+    counts = parameter_counts(sizes)
+    modes = []
+    for k, mode in enumerate(MODES, 1):
+        ms = timed(k * (0.1 + 1e-6 * counts["true"]))
+        lap = {"lap": 1, "frames": 10, "milliseconds": ms}
+        modes.append({"mode": mode, "laps": [lap], "milliseconds": ms, "laps_finished": 1})
+    files: dict[str, Any] = {
+        "accuracy": {
+            "joints": 31,
+            "train": spread(np.mean(list(clips.values())), 0.02),
+            "held_out": {"frames": 0, "mean": None, "sd": None, "mean_of_clips": None},
+            "clips": [{"clip": c, "split": "train", **spread(m, 0.01)} for c, m in clips.items()],
+        },
+        "responsivity": {"parameters": counts, "modes": modes, **modes[-1]},
+        "injury": {"applies": False, "reason": "none"},
+        "pipeline": {"stages": [{"stage": "training", "seconds": 60.0, "bytes": 9, "rules": []}]},
+    }
+    folder = folder / name
+    folder.mkdir()
+    paths = {key: folder / f"{key}.json" for key in files}
+    for key, value in files.items():
+        paths[key].write_text(json.dumps(value))
+    paths["configuration"], paths["history"] = folder / "configuration.yaml", folder / "history.csv"
+    network = {"hidden_layers": len(sizes) - 2, "units": 512, "control_points": 4}
+    model = {"dataset": f"of-{name}", "injury": False, "network": network, "training": {"passes": 20}}
+    paths["configuration"].write_text(yaml.safe_dump({"configuration": model}))
+    blocks = "pass,train_mse,held_out_turn" if name == "ava" else "pass,train_mse,held_out_mse"
+    paths["history"].write_text(f"{blocks}\n1,0.5,0.25\n2,0.4,\n")
+    return paths
+
+
+@pytest.fixture
+def compared(tmp_path: Path, published: dict[str, Any]) -> dict[str, Any]:
+    clips = {"holden": {"a": 0.04, "b": 0.02}, "holden-xl": {"a": 0.03, "b": 0.02}, "ava": {"b": 0.05}}
+    found = [read_measured(n, left_behind(tmp_path, n, clips[n], s)) for n, s in SIZES.items()]
+    return compare(found, published)
+
+
+def test_the_counts_are_those_of_table_6_1(compared, published) -> None:
+    """The published numbers, from the layers alone."""
+    for row in published["computations"]:
+        counts = parameter_counts(row["sizes"])
+        assert (counts["true"], counts["table_6_1_as_printed"]) == (row["parameters"], row["table_6_1"])
+    beside = [r for r in compared["beside"] if r["measure"] == "computations of Table 6.1"]
+    assert {r["configuration"]: r["ours"] for r in beside if r["ours"]} == {
+        "holden": 335_501,
+        "holden-xl": 598_157,
+        "ava": 1_566_701,
+    }
+    assert all(r["ours"] in (None, r["published"]) for r in beside)
+    holden = compared["configurations"][0]
+    assert holden["weights_bytes"] == {"constant": 119_563_000, "linear": 23_912_600, "cubic": 9_565_040}
+
+
+def test_the_line_is_found_again(compared) -> None:
+    fits = {(f["whose"], f["mode"], f["step"], f["computations"]): f for f in compared["milliseconds"]["fit"]}
+    for k, mode in enumerate(MODES, 1):
+        fit = fits["hobble", mode, "total", "true"]
+        assert fit["slope"] == pytest.approx(k * 1e-6)
+        assert fit["intercept"] == pytest.approx(k * 0.1)
+        assert fit["r2"] == pytest.approx(1)
+        assert fits["hobble", mode, "predict", "true"]["slope"] == pytest.approx(k * 0.5e-6)
+    theirs = fits["published", None, "total", "table_6_1_as_printed"]
+    slope, intercept = np.polyfit([335501, 598157, 335501, 1566701], [0.376, 0.499, 0.382, 1.55], 1)
+    assert (theirs["slope"], theirs["intercept"]) == pytest.approx((slope, intercept))
+    assert theirs["points"] == 4
+
+
+def test_each_pair_on_what_both_were_measured_on(compared) -> None:
+    found = {(d["a"], d["b"], d["over"]): d["difference"] for d in compared["difference"]}
+    # No clip is held out, and `ava` has no clip `a`.
+    assert set(found) == {
+        *(("holden", "holden-xl", over) for over in ("train", "a", "b")),
+        *((a, "ava", over) for a in ("holden", "holden-xl") for over in ("train", "b")),
+    }
+    assert found["holden", "holden-xl", "a"] == pytest.approx(2 * 0.01 / 0.02)
+    assert found["holden", "holden-xl", "b"] == 0
+    assert found["holden", "ava", "train"] == pytest.approx(2 * 0.02 / 0.04)
+    times = {(d["a"], d["b"], d["over"]): d["difference"] for d in compared["milliseconds"]["difference"]}
+    assert len(times) == 3 * len(MODES)
+    apart = 1e-6 * (860_471 - 597_815)
+    assert times["holden", "holden-xl", "cubic"] == pytest.approx(2 * 2 * apart / 0.2)
+
+
+def test_tables_hold_the_same_whatever_columns_each_has(compared, tmp_path) -> None:
+    found = tables(compared)
+    rows = {}
+    for name, table in found.items():
+        write_csv(tmp_path / f"{name}.csv", table)
+        with open(tmp_path / f"{name}.csv", newline="") as file:
+            rows[name] = list(csv.DictReader(file))
+        assert len(rows[name]) == len(table) > 0, name
+    assert [r["configuration"] for r in rows["configurations"]] == list(SIZES)
+    assert [r["computations_true"] for r in rows["configurations"]] == ["597815", "860471", "1828055"]
+    assert [(r["configuration"], r["clip"]) for r in rows["accuracy"]][2:] == [
+        ("holden-xl", "a"),
+        ("holden-xl", "b"),
+        ("ava", "b"),
+    ]
+    assert [(r["mode"], r["lap"]) for r in rows["responsivity"]] == [(m, "1") for _ in SIZES for m in MODES]
+    last = rows["training"][-2:]
+    assert [r["held_out_turn"] for r in last] == ["0.25", ""]
+    assert [r["held_out_mse"] for r in last] == ["", ""]
+    json.dumps(compared, allow_nan=False)
+
+
+def test_one_configuration_alone(tmp_path, published) -> None:
+    found = compare(
+        [read_measured("holden", left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"]))], published
+    )
+    assert found["difference"] == []
+    assert found["milliseconds"]["fit"][0]["slope"] is None
+    assert tables(found)["difference"] == []
+
+
+def test_a_damaged_history_is_named(tmp_path) -> None:
+    files = left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"])
+    files["history"].write_text("pass,train_mse\n1,half\n")
+    with pytest.raises(InputError, match=r"history\.csv"):
+        read_measured("holden", files)
+
+
+NUMBER = st.floats(-1e3, 1e3)
+
+
+@given(NUMBER, st.floats(0.01, 10), NUMBER, st.floats(0.01, 10), st.floats(0.1, 10))
+def test_a_difference_has_no_unit_and_no_order(a: float, sa: float, b: float, sb: float, k: float) -> None:
+    found = difference(a, sa, b, sb)
+    assert found == difference(b, sb, a, sa)
+    assert found == pytest.approx(difference(k * a, k * sa, k * b, k * sb))
+    assert found == pytest.approx(abs(a - b) / ((sa + sb) / 2))
+    assert difference(a, 0, b, 0) is None
+
+
+def test_lines() -> None:
+    assert line([1, 1], [2, 3]) is None
+    assert line([1, 2, 3], [2, 2, 2])["r2"] is None
+    assert line([0, 1, 2], [1, 3, 5]) == pytest.approx({"slope": 2, "intercept": 1, "r2": 1, "points": 3})

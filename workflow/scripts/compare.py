@@ -1,0 +1,22 @@
+"""Creates compare.json and its CSV tables from what each of the compared configurations measured."""
+
+from pathlib import Path
+
+import yaml
+
+from hobble.core.files import write_json
+from hobble.evaluation.compare import compare, read_measured
+from hobble.evaluation.compare_tables import tables
+from hobble.evaluation.tables import write_csv
+from hobble.workflow.job import job
+
+with job(snakemake):
+    files = snakemake.input
+    measured = [
+        read_measured(name, {key: files[key][i] for key in snakemake.params.files})
+        for i, name in enumerate(snakemake.params.configurations)
+    ]
+    compared = compare(measured, yaml.safe_load(Path(files.published).read_text(encoding="utf-8")))
+    write_json(snakemake.output.json, compared)
+    for name, rows in tables(compared).items():
+        write_csv(snakemake.output[name], rows)
