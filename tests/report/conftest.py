@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import importlib.util
 import sys
 from pathlib import Path
@@ -10,7 +11,9 @@ from typing import Any
 
 import pytest
 
+from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
+from hobble.report.bundle import bundle, install
 from hobble.report.compare import comparisons
 from hobble.report.gather import Material, gather
 from hobble.report.page import render
@@ -84,8 +87,38 @@ def compared(
 
 
 @pytest.fixture(scope="session")
+def modules(tmp_path_factory: pytest.TempPathFactory) -> Path | None:
+    """The page's npm packages, fetched once for all workers; None where they cannot be had."""
+    shared = tmp_path_factory.getbasetemp().parent / "page-packages"
+    shared.mkdir(exist_ok=True)
+    with open(shared / "lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (shared / "done").exists():
+            try:
+                install(shared)
+            except HobbleError as error:
+                (shared / "failed").write_text(str(error))
+            (shared / "done").touch()
+    return None if (shared / "failed").exists() else shared / "node_modules"
+
+
+@pytest.fixture(scope="session")
+def script(modules: Path | None, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The page's scripts, bundled; "" where the packages cannot be had (no browser opens that page)."""
+    if modules is None:
+        return ""
+    target = tmp_path_factory.mktemp("bundle") / "bundle.js"
+    bundle(modules, target)
+    return target.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
 def page(
-    material: Material, play: dict[str, Any], character: dict[str, Any], compared: dict[str, Any]
+    material: Material,
+    play: dict[str, Any],
+    character: dict[str, Any],
+    compared: dict[str, Any],
+    script: str,
 ) -> str:
     """The report of the examples."""
-    return render(material, play, character, compared)
+    return render(material, play, character, compared, script)

@@ -1,3 +1,38 @@
+rule page_packages:
+    """What the page takes from the npm registry, as its lock file says; fetched once."""
+    input:
+        project.web(".json"),
+    output:
+        "results/page/node_modules/.package-lock.json",
+    log:
+        "results/page/logs/report/page_packages.log",
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        code=project.code("page_packages"),
+    script:
+        "../scripts/page_packages.py"
+
+
+rule page_bundle:
+    """The page's scripts in one, shared by every report."""
+    input:
+        packages=rules.page_packages.output,
+        scripts=project.web(".js"),
+    output:
+        js="results/page/bundle.js",
+    log:
+        "results/page/logs/report/page_bundle.log",
+    resources:
+        mem_mb=1000,
+        runtime=5,
+    params:
+        code=project.code("page_bundle"),
+    script:
+        "../scripts/page_bundle.py"
+
+
 rule configuration:
     """The resolved configuration and data set, as they determine the results."""
     output:
@@ -58,6 +93,7 @@ rule report:
             w.configuration, "terrain/clips/{clip}.npz"
         ),
         template=project.templates(),
+        bundle=rules.page_bundle.output.js,
     output:
         html="results/{configuration}/report.html",
     log:

@@ -1,5 +1,7 @@
 """Creates results/<configuration>/report.html from evaluation, clip reports and generated motion."""
 
+from pathlib import Path
+
 from hobble.core.files import write_text
 from hobble.report.compare import comparisons
 from hobble.report.gather import gather
@@ -33,4 +35,5 @@ with job(snakemake):
     trained = load_network(given.weights)
     character = playable(trained, material.resolved["configuration"]["runtime"])
     compared = comparisons(trained, given.get("rows", []), asked.splits)
-    write_text(snakemake.output.html, render(material, play, character, compared))
+    bundle = Path(given.bundle).read_text(encoding="utf-8")
+    write_text(snakemake.output.html, render(material, play, character, compared, bundle))

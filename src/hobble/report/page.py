@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -27,19 +26,6 @@ from hobble.report.ground_pictures import ground_pictures
 from hobble.report.provenance import commit, machine, versions
 
 TEMPLATES = Path(__file__).parent
-SCRIPTS = (
-    "charts.js",
-    "tables.js",
-    "view.js",
-    "figure.js",
-    "network.js",
-    "character.js",
-    "play.js",
-    "compare.js",
-    "ground.js",
-    "strips.js",
-    "page.js",
-)
 
 
 def render(
@@ -47,11 +33,12 @@ def render(
     scenes: Mapping[str, Any] | None = None,
     playable: Mapping[str, Any] | None = None,
     compared: Mapping[str, Any] | None = None,
+    bundle: str = "",
 ) -> str:
     """The report as one HTML document.
 
     scenes: of `scenes.scenes`; playable: of `playable.playable`; compared: of `compare.comparisons`; without
-    them those parts are left out.
+    them those parts are left out. bundle: the page's scripts as `bundle.bundle` makes them.
 
     Every value is escaped where it stands; data for the scripts is JSON in which no "<" is left.
     """
@@ -87,10 +74,9 @@ def render(
         compared=[clip["name"] for clip in (compared or {}).get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],
-        style=_text("page.css"),
-        scripts=[_text(name) for name in SCRIPTS],
+        style=_trusted("page.css", (TEMPLATES / "page.css").read_text(encoding="utf-8")),
+        bundle=_trusted("the bundle", bundle),
         configuration=yaml.safe_dump(plain(dict(material.resolved)), sort_keys=False, allow_unicode=True),
-        plotly=plotly_js(),
         provenance={"commit": commit(TEMPLATES), "machine": machine(), "versions": versions()},
         **sections,
     )
@@ -143,15 +129,8 @@ def _specs(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _text(name: str) -> Markup:
+def _trusted(name: str, text: str) -> Markup:
     """Our own CSS or script, which is trusted; it must not end its own element."""
-    text = (TEMPLATES / name).read_text(encoding="utf-8")
     if "</script" in text.lower() or "</style" in text.lower():
         raise ValueError(f"{name} holds the end of the element it is put into")
     return Markup(text)
-
-
-def plotly_js() -> Markup:
-    """The plotly.js that plotly's Python package carries."""
-    text = files("plotly").joinpath("package_data", "plotly.min.js").read_text(encoding="utf-8")
-    return Markup(text.replace("</script", "<\\/script"))

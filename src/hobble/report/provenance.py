@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import subprocess
@@ -9,18 +10,19 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-PACKAGES = ("hobble", "torch", "numpy", "scipy", "numba", "snakemake", "pydantic", "plotly", "jinja2")
+WEB = Path(__file__).parent / "web"
+PACKAGES = ("hobble", "torch", "numpy", "scipy", "numba", "snakemake", "pydantic", "jinja2")
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that do the work, without importing any of them."""
+    """Versions of Python, of the packages that do the work, and of what the page takes from npm."""
     found = {"python": platform.python_version()}
     for name in PACKAGES:
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             found[name] = "not installed"
-    return found
+    return found | json.loads((WEB / "package.json").read_text(encoding="utf-8"))["dependencies"]
 
 
 def machine() -> dict[str, Any]:

@@ -20,6 +20,7 @@ MIRROR = "_mirror"
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 STAGES = ("synthetic", "motion", "labels", "injury", "terrain", "database")
 COMPARE = "compare"
+PAGE = "page"  # under results/: what all reports share
 RESERVED = (COMPARE, "datasets")  # folders of results/ that belong to no configuration
 # What a comparison reads of each configuration, under results/<configuration>/.
 MEASURED = {
@@ -66,6 +67,11 @@ class Project:
         """Plain values of one section of a configuration."""
         return getattr(self.configuration(configuration), name).model_dump(mode="json")
 
+    def evaluation(self, configuration: str, *keys: str) -> dict[str, Any]:
+        """Those keys of the section `evaluation` on which one measurement depends."""
+        section = self.section(configuration, "evaluation")
+        return {key: section[key] for key in keys}
+
     def resolved(self, configuration: str) -> dict[str, Any]:
         """Everything that determines a configuration's results, as plain data."""
         model = self.configuration(configuration)
@@ -87,7 +93,7 @@ class Project:
             elif name == COMPARE:
                 for one in self.compared():
                     self._check_configuration(one)
-            elif name:
+            elif name and name != PAGE:
                 self._check_configuration(name)
 
     def _check_configuration(self, name: str) -> None:
@@ -275,8 +281,13 @@ class Project:
     def templates(self) -> list[str]:
         """The page's templates; a change in one re-makes only the reports."""
         folder = self.base / "src" / "hobble" / "report"
-        files = [str(p) for p in folder.iterdir() if p.suffix in {".j2", ".css", ".js", ".yaml"}]
+        files = [str(p) for p in folder.iterdir() if p.suffix in {".j2", ".css", ".yaml"}]
         return sorted([*files, self.published()])
+
+    def web(self, suffix: str) -> list[str]:
+        """The page's scripts (".js"), or what says which packages they need (".json")."""
+        folder = self.base / "src" / "hobble" / "report" / "web"
+        return sorted(str(p) for p in folder.iterdir() if p.suffix == suffix)
 
     def published(self) -> str:
         """The file of published figures that stand beside ours."""

@@ -1,23 +1,14 @@
 // A small 3D view on a canvas: a camera that orbits, and bodies of shaded capsules. Centimetres, Y up.
-"use strict";
-Hobble.vector = {
-  dot: (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2],
-  cross: (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]],
-  minus: (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]],
-  unit: (a) => { const n = Math.hypot(...a) || 1; return a.map((v) => v / n); },
-  mix: (a, b, t) => a.map((v, i) => v + (b[i] - v) * t),
-};
-Hobble.css = (c, alpha = 1) => `rgba(${c.map((v) => Math.round(Math.min(255, Math.max(0, v)))).join(",")},${alpha})`;
+import { onTheme, rgb } from "./base.js";
+import { cross, dot, minus, mix, unit } from "./numbers.js";
 
-// Numbers that lie in the page as base64.
-Hobble.bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
+export const css = (c, alpha = 1) => `rgba(${c.map((v) => Math.round(Math.min(255, Math.max(0, v)))).join(",")},${alpha})`;
 
 // Draws every view, also those that were never scrolled to: for printing.
-Hobble.views = [];
+export const views = [];
 
 // draw(now, view) is called when something asked for it and the canvas can be seen.
-Hobble.view = (canvas, home, draw) => {
-  const { dot, cross, minus, unit, mix } = Hobble.vector, { css } = Hobble;
+export const createView = (canvas, home, draw) => {
   const context = canvas.getContext("2d"), shade = document.createElement("canvas"), shadow = shade.getContext("2d");
   const camera = { ...home };
   let scale = 1, eye, right, up, ahead, seen = false, waiting = false;
@@ -168,16 +159,16 @@ Hobble.view = (canvas, home, draw) => {
   }, { passive: false });
 
   const recolour = () => {
-    const { rgb } = Hobble, dark = rgb("paper")[0] < 128;
+    const dark = rgb("paper")[0] < 128;
     view.paint = {
       dark, body: dark ? [166, 174, 182] : [190, 196, 201], low: rgb("hurt-low"), high: rgb("hurt-high"),
       line: rgb("faint"), ink: rgb("ink"), accent: rgb("accent"), ground: rgb("ground"),
     };
     view.ask();
   };
-  Hobble.onTheme.push(recolour);
+  onTheme.push(recolour);
   recolour();
-  Hobble.views.push(() => paint(performance.now()));
+  views.push(() => paint(performance.now()));
   new ResizeObserver(() => {
     view.W = canvas.clientWidth;
     view.H = canvas.clientHeight;
@@ -191,17 +182,17 @@ Hobble.view = (canvas, home, draw) => {
 };
 
 // Body: grey where healthy, over amber to red where hurt.
-Hobble.severityColour = (paint, severity) => {
-  const { mix } = Hobble.vector, t = severity / 10;
+export const severityColour = (paint, severity) => {
+  const t = severity / 10;
   if (!severity) return paint.body;
   return t < .5 ? mix(paint.body, paint.low, .35 + 1.3 * t) : mix(paint.low, paint.high, 2 * t - 1);
 };
 
 // The parts of a body whose joints are at `points`; severity(links) tells how much a part is hurt.
-Hobble.bodyParts = (capsules, points, floor, colour) => capsules.map((c) => {
+export const bodyParts = (capsules, points, floor, colour) => capsules.map((c) => {
   let a = points[c.a], b = points[c.b];
   if (c.beyond) {
-    const way = Hobble.vector.unit(Hobble.vector.minus(points[c.b], points[c.from]));
+    const way = unit(minus(points[c.b], points[c.from]));
     b = b.map((v, i) => v + way[i] * c.beyond);
     if (c.flat) b[1] = Math.max(b[1], floor(b[0], b[2]) + c.rb);
     if (c.centre) a = b;

@@ -1,29 +1,13 @@
 // Charts: drawn when they come near the window, in the colours of the page's tokens, again when the theme changes.
-"use strict";
-const Hobble = { material: JSON.parse(document.getElementById("material").textContent), onTheme: [] };
+import Plotly from "plotly.js-cartesian-dist-min";
+import { colour, material, onTheme } from "./base.js";
 
-Hobble.colour = (() => {
-  // A custom property may hold light-dark(...), which only a real property resolves; so a hidden element wears it.
-  const probe = document.createElement("span");
-  probe.hidden = true;
-  document.body.append(probe);
-  let known = new Map();
-  Hobble.onTheme.push(() => { known = new Map(); });
-  return (token) => {
-    if (!known.has(token)) {
-      probe.style.color = `var(--${token})`;
-      known.set(token, getComputedStyle(probe).color);
-    }
-    return known.get(token);
-  };
-})();
-
-// The numbers [r, g, b] of a token, for blending.
-Hobble.rgb = (token) => (Hobble.colour(token).match(/[\d.]+/g) || [0, 0, 0]).slice(0, 3).map(Number);
+// Draws every chart, also those that were never scrolled to: for printing.
+export let drawAll;
 
 (() => {
   const resolve = (value) => {
-    if (typeof value === "string") return value[0] === "@" ? Hobble.colour(value.slice(1)) : value;
+    if (typeof value === "string") return value[0] === "@" ? colour(value.slice(1)) : value;
     if (Array.isArray(value)) return value.map(resolve);
     if (value && typeof value === "object") {
       return Object.fromEntries(Object.entries(value).map(([key, item]) => [key, resolve(item)]));
@@ -55,7 +39,7 @@ Hobble.rgb = (token) => (Hobble.colour(token).match(/[\d.]+/g) || [0, 0, 0]).sli
   const drawn = new Map();
 
   const draw = (element) => {
-    const spec = Hobble.material.charts[element.dataset.chart];
+    const spec = material.charts[element.dataset.chart];
     if (!spec) return;
     const narrow = element.clientWidth < 520;
     const chosen = spec.options.length ? spec.options[drawn.get(element) || 0] : null;
@@ -69,7 +53,7 @@ Hobble.rgb = (token) => (Hobble.colour(token).match(/[\d.]+/g) || [0, 0, 0]).sli
     if (!drawn.has(element)) drawn.set(element, 0);
     Plotly.react(element, traces, shape, config);
   };
-  Hobble.drawAll = () => document.querySelectorAll("[data-chart]").forEach(draw);
+  drawAll = () => document.querySelectorAll("[data-chart]").forEach(draw);
 
   document.querySelectorAll("[data-chooses]").forEach((select) => {
     select.addEventListener("change", () => {
@@ -86,5 +70,5 @@ Hobble.rgb = (token) => (Hobble.colour(token).match(/[\d.]+/g) || [0, 0, 0]).sli
     }
   }, { rootMargin: "600px" });
   document.querySelectorAll("[data-chart]").forEach((element) => near.observe(element));
-  Hobble.onTheme.push(() => { for (const element of drawn.keys()) draw(element); });
+  onTheme.push(() => { for (const element of drawn.keys()) draw(element); });
 })();

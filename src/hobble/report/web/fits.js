@@ -1,9 +1,12 @@
 // Terrain fits: the ground under one cycle, the soles that it was fitted to, and the figure at three moments.
-"use strict";
+import { material } from "./base.js";
+import { bytes, cross, dot, minus, mix, unit } from "./numbers.js";
+import { bodyParts, createView, css } from "./view.js";
+
 (() => {
-  const grounds = Hobble.material.grounds, canvas = document.getElementById("ground");
+  const grounds = material.grounds, canvas = document.getElementById("ground");
   if (!canvas || !grounds || !grounds.pictures.length) return;
-  const choice = document.getElementById("ground-choice"), { bytes, css } = Hobble, { mix, unit, cross, dot, minus } = Hobble.vector;
+  const choice = document.getElementById("ground-choice");
   const unpacked = new Map();
   const unpack = (index) => {
     if (!unpacked.has(index)) {
@@ -20,7 +23,7 @@
   };
   const LIGHT = unit([.4, .8, -.35]);
 
-  const view = Hobble.view(canvas, { yaw: .9, pitch: .5, distance: 560 }, () => {
+  const view = createView(canvas, { yaw: .9, pitch: .5, distance: 560 }, () => {
     const g = unpack(choice.selectedIndex), { n, heights, x, z } = g, { context, paint, project } = view;
     const at = (i, k) => [x[0] + (x[1] - x[0]) * i / (n - 1), heights[i * n + k], z[0] + (z[1] - z[0]) * k / (n - 1)];
     const middle = g.poses[1][0];
@@ -57,7 +60,7 @@
     const depth = (pose) => project(pose[0])[2];
     const pale = mix(paint.body, paint.dark ? [40, 46, 52] : [244, 243, 239], .6);
     g.poses.map((pose, k) => [pose, k === 1 ? paint.body : pale]).sort((a, b) => depth(b[0]) - depth(a[0]))
-      .forEach(([pose, colour]) => view.body(Hobble.bodyParts(grounds.capsules, pose, () => -Infinity, () => colour)));
+      .forEach(([pose, colour]) => view.body(bodyParts(grounds.capsules, pose, () => -Infinity, () => colour)));
   });
   choice.addEventListener("change", view.ask);
   view.listen(document.getElementById("ground-stage"));

@@ -1,7 +1,8 @@
 // Label strips: footfalls, phase, gait, speed and what hurts, along the time of one clip.
-"use strict";
+import { colour, material, onTheme } from "./base.js";
+
 (() => {
-  const strips = Hobble.material.strips, host = document.getElementById("strip");
+  const strips = material.strips, host = document.getElementById("strip");
   if (!host || !strips || !strips.length) return;
   const select = document.getElementById("strip-clip"), keys = document.getElementById("strip-keys");
   const NS = "http://www.w3.org/2000/svg";
@@ -16,7 +17,7 @@
   const GAITS = { stand: "g0", walk: "g1", jog: "g2", crouch: "g3", jump: "g4", bump: "g5" };
 
   const draw = () => {
-    const strip = strips[select.selectedIndex], width = Math.max(320, host.clientWidth), colour = Hobble.colour;
+    const strip = strips[select.selectedIndex], width = Math.max(320, host.clientWidth);
     const left = width < 520 ? 70 : 92, right = 14, times = strip.seconds, end = Math.max(.1, strip.length);
     const x = (t) => left + (t / end) * (width - left - right);
     host.replaceChildren();
@@ -113,6 +114,6 @@
   };
   select.addEventListener("change", draw);
   addEventListener("resize", () => requestAnimationFrame(draw));
-  Hobble.onTheme.push(draw);
+  onTheme.push(draw);
   draw();
 })();

@@ -1,11 +1,14 @@
 // The page itself: theme, printing, and the mark in the contents of where the reader is.
-"use strict";
+import { onTheme } from "./base.js";
+import { drawAll } from "./charts.js";
+import { views } from "./view.js";
+
 (() => {
   const root = document.documentElement, button = document.getElementById("theme");
   const themes = ["auto", "light", "dark"];
   const remembered = () => { try { return localStorage.getItem("hobble-theme"); } catch { return null; } };
   const remember = (name) => { try { localStorage.setItem("hobble-theme", name); } catch { /* not from disk */ } };
-  const recolour = () => Hobble.onTheme.forEach((react) => react());
+  const recolour = () => onTheme.forEach((react) => react());
   const show = (name) => {
     if (name === "auto") delete root.dataset.theme; else root.dataset.theme = name;
     button.textContent = `Theme: ${name}`;
@@ -29,8 +32,8 @@
     opened = [...document.querySelectorAll("details:not([open])")].filter((d) => d.querySelectorAll("tr").length < 120);
     opened.forEach((details) => { details.open = true; });
     recolour();
-    Hobble.drawAll();
-    Hobble.views.forEach((drawn) => drawn());
+    drawAll();
+    views.forEach((drawn) => drawn());
   });
   addEventListener("afterprint", () => {
     opened.forEach((details) => { details.open = false; });

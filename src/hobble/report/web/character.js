@@ -1,12 +1,14 @@
 // The character: the controller of `hobble.runtime` once more, for one figure. The same steps in the same order, so
 // that one set of vectors tests both. Centimetres, 60 Hz, yaw 0 faces +Z and grows toward +X.
-"use strict";
-Hobble.character = (spec, place = [0, 0], heading = 0) => {
+import { createNetwork } from "./network.js";
+import { bytes, dot, minus } from "./numbers.js";
+
+export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const { joints: J, step, x: X, y: Y, gaits, constants: k } = spec, T = 2 * spec.window, M = spec.window;
-  const S = T / step, F = M / step, G = gaits.length, L = spec.links.length, predict = Hobble.network(spec);
+  const S = T / step, F = M / step, G = gaits.length, L = spec.links.length, predict = createNetwork(spec);
   const { atan2, sin, cos, hypot, floor, min, max, abs, sqrt, PI } = Math;
   const wrap = (angle) => angle - 2 * PI * floor((angle + PI) / (2 * PI));
-  const mean = new Float32Array(Hobble.bytes(spec.yMean)), x = new Float32Array(X.size);
+  const mean = new Float32Array(bytes(spec.yMean)), x = new Float32Array(X.size);
   const filled = (n, value) => new Float64Array(n).fill(value);
 
   const c = {
@@ -180,7 +182,7 @@ Hobble.character = (spec, place = [0, 0], heading = 0) => {
     for (const j of spec.carried[f]) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
   };
   const reach = (hip, knee, heel, shift) => {
-    const { minus, dot } = Hobble.vector, thigh = minus(knee, hip), shank = minus(heel, knee);
+    const thigh = minus(knee, hip), shank = minus(heel, knee);
     const upper = hypot(...thigh), lower = hypot(...shank);
     const leg = thigh.map((v, i) => v + shank[i]), before = hypot(...leg);
     const aim = leg.map((v, i) => v + shift[i]), distance = hypot(...aim);

@@ -1,9 +1,11 @@
 // Captured (a grey body) and predicted (lines in the accent colour), with the distance between them along the time.
-"use strict";
+import { find, material } from "./base.js";
+import { bytes, mix } from "./numbers.js";
+import { bodyParts, createView } from "./view.js";
+
 (() => {
-  const shown = Hobble.material.compare, canvas = document.getElementById("compare-view");
+  const shown = material.compare, canvas = document.getElementById("compare-view");
   if (!canvas || !shown || !shown.clips) return;
-  const find = (id) => document.getElementById(id), { mix } = Hobble.vector, { bytes } = Hobble;
   const J = shown.joints, slider = find("compare-time"), choice = find("compare-choice"), unpacked = new Map();
 
   const unpack = (index) => {
@@ -36,7 +38,7 @@
       }
     }
   };
-  const view = Hobble.view(canvas, { yaw: .75, pitch: .16, distance: 400 }, (now) => {
+  const view = createView(canvas, { yaw: .75, pitch: .16, distance: 400 }, (now) => {
     if (playing && last !== null) time = (time + Math.min(.1, (now - last) / 1000) * shown.fps) % Math.max(1, clip.frames - 1);
     last = playing ? now : null;
     slider.value = time;
@@ -44,12 +46,12 @@
     const [x, , z] = body[0];
     view.aim([x, 82, z]);
     drawGrid(view, x, z);
-    const parts = Hobble.bodyParts(shown.capsules, body, () => -Infinity, () => paint.body);
+    const parts = bodyParts(shown.capsules, body, () => -Infinity, () => paint.body);
     view.shadow(parts, () => 0);
     view.body(parts);
     const aside = [apart * Math.cos(view.camera.yaw), -apart * Math.sin(view.camera.yaw)]; // to the right as seen
     const moved = guess.map((p) => [p[0] + aside[0], p[1], p[2] + aside[1]]);
-    const bones = Hobble.bodyParts(shown.capsules, moved, () => -Infinity, () => paint.accent);
+    const bones = bodyParts(shown.capsules, moved, () => -Infinity, () => paint.accent);
     context.lineCap = "round";
     context.lineWidth = Math.max(2, view.zoom * 2.2 / view.camera.distance);
     bones.forEach(({ a, b }) => view.segment(a, b, paint.accent, .95));

@@ -1,9 +1,13 @@
 // Play: the network runs here. Keys, a gamepad or a finger say where to go; parts of the body can be hurt.
-"use strict";
+import { find, material } from "./base.js";
+import { createCharacter } from "./character.js";
+import { bodyParts, createView, severityColour } from "./view.js";
+
+export let player = null;
+
 (() => {
-  const spec = Hobble.material.playable, stage = document.getElementById("play-stage");
+  const spec = material.playable, stage = document.getElementById("play-stage");
   if (!stage || !spec || !spec.layers) return;
-  const find = (id) => document.getElementById(id), { dot, minus, unit } = Hobble.vector;
   const readings = find("play-reading"), ground = find("play-ground"), L = spec.links.length;
   const GROUNDS = {
     flat: () => 0,
@@ -32,7 +36,7 @@
     }
   };
   const start = () => {
-    character = Hobble.character(spec);
+    character = createCharacter(spec);
     trail = [];
     hurt();
   };
@@ -110,9 +114,9 @@
     for (let j = 0; j < spec.joints; j++) points.push(Array.from(character.pose.subarray(3 * j, 3 * j + 3)));
     return points;
   };
-  const parts = (paint) => Hobble.bodyParts(spec.capsules, posed(), floor, (links) => {
+  const parts = (paint) => bodyParts(spec.capsules, posed(), floor, (links) => {
     const most = Math.max(0, ...links.map((l) => character.severity[l])) * spec.severityScale;
-    return Hobble.severityColour(paint, most);
+    return severityColour(paint, most);
   });
   const stood = [false, false];
   let eye = null, last = null, owed = 0, told = 0;
@@ -133,7 +137,7 @@
       if (!character.pose.every(Number.isFinite)) { fall++; start(); } // a network that has learnt nothing runs away
     }
   };
-  const view = Hobble.view(find("play-view"), { yaw: 3.9, pitch: .24, distance: 470 }, (now) => {
+  const view = createView(find("play-view"), { yaw: 3.9, pitch: .24, distance: 470 }, (now) => {
     move(now);
     const at = character.pose;
     eye = eye ? eye.map((v, i) => v + .12 * (at[i] - v)) : Array.from(at.subarray(0, 3));
@@ -260,7 +264,7 @@
   pad.addEventListener("pointermove", (event) => { if (pad.hasPointerCapture(event.pointerId)) steer(event); });
   for (const name of ["pointerup", "pointercancel"]) pad.addEventListener(name, release);
 
-  Hobble.player = { get character() { return character; }, severities, start, view };
+  player = { get character() { return character; }, severities, start, view };
   restore();
   start();
   if (location.hash.startsWith("#play=")) find("play").scrollIntoView();

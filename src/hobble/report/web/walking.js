@@ -1,9 +1,11 @@
 // The figure walking: motion that lies in the page, played with footprints, readings and a scrubber.
-"use strict";
+import { find, material } from "./base.js";
+import { bytes, mix } from "./numbers.js";
+import { bodyParts, createView, css, severityColour } from "./view.js";
+
 (() => {
-  const scenes = Hobble.material.scenes, stage = document.getElementById("stage");
+  const scenes = material.scenes, stage = document.getElementById("stage");
   if (!stage || !scenes.scenarios || !scenes.scenarios.length) return;
-  const find = (id) => document.getElementById(id), { mix } = Hobble.vector, { bytes } = Hobble;
   const slider = find("time"), clock = find("clock"), reading = find("reading"), choice = find("scenario");
   const J = scenes.joints, fps = scenes.fps, L = scenes.links.length, unpacked = new Map();
 
@@ -88,7 +90,7 @@
       if (print.first > frame || near <= 0) continue;
       const points = print.path.slice(0, Math.floor(frame) - print.first + 1).map(view.project);
       if (points.some((p) => p[2] < 20)) continue;
-      context.strokeStyle = Hobble.css(view.paint.ink, .34 * near);
+      context.strokeStyle = css(view.paint.ink, .34 * near);
       context.lineWidth = Math.max(1.5, view.zoom * 6 / points[0][2]);
       context.beginPath();
       context.moveTo(points[0][0], points[0][1]);
@@ -105,8 +107,8 @@
     if (trails) { drawPath(view, s, focus, at); drawPrints(view, s, focus, at); }
     const points = [];
     for (let j = 0; j < J; j++) points.push(mix(joint(s, frame, j), joint(s, next, j), t));
-    const colour = (links) => Hobble.severityColour(view.paint, severity(s, frame, links));
-    const parts = Hobble.bodyParts(scenes.capsules, points, floor, colour);
+    const colour = (links) => severityColour(view.paint, severity(s, frame, links));
+    const parts = bodyParts(scenes.capsules, points, floor, colour);
     view.shadow(parts, floor);
     view.body(parts);
     tell(s, frame);
@@ -133,7 +135,7 @@
   // Playing
 
   let scene, time = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, rate = 1, trails = true, last = null;
-  const view = Hobble.view(find("view"), { yaw: .75, pitch: .2, distance: 430 }, (now) => {
+  const view = createView(find("view"), { yaw: .75, pitch: .2, distance: 430 }, (now) => {
     const passed = playing && last !== null ? Math.min(.1, (now - last) / 1000) * fps * rate : 0;
     time = passed ? (time + passed) % Math.max(1, scene.frames - 1) : time;
     last = playing ? now : null;

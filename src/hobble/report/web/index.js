@@ -1,0 +1,13 @@
+// The report's page. What a person may want in the browser's console, and the tests use, is `Hobble`.
+import { colour, material } from "./base.js";
+import { createCharacter } from "./character.js";
+import { drawAll } from "./charts.js";
+import { csv } from "./tables.js";
+import "./walking.js";
+import { player } from "./play.js";
+import "./captured.js";
+import "./fits.js";
+import "./strips.js";
+import "./page.js";
+
+globalThis.Hobble = { character: createCharacter, colour, csv, drawAll, material, player };

@@ -1,0 +1,9 @@
+"""Creates results/page/bundle.js from the page's scripts and the packages that they import."""
+
+from pathlib import Path
+
+from hobble.report.bundle import bundle
+from hobble.workflow.job import job
+
+with job(snakemake):
+    bundle(Path(snakemake.input.packages[0]).parent, snakemake.output.js)
