@@ -39,7 +39,7 @@ def spread(mean: float, sd: float, frames: int = 100) -> dict[str, Any]:
 
 def timed(ms: float) -> dict[str, Any]:
     steps = dict.fromkeys(("prepare", "input", "insert", "output", "update"), 0.0)
-    return {**steps, "predict": ms / 2, "total": ms, "spread": {"sd": 0.1}}
+    return {**steps, "predict": ms / 2, "total": ms, "spread": {"sd": 0.1}, "sd": {"predict": 0.1}}
 
 
 def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[int, ...]) -> dict[str, Path]:

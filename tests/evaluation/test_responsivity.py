@@ -68,19 +68,59 @@ def test_everything_but_the_times_is_reproducible(network) -> None:
     assert without_times(first) == without_times(second)
     assert "milliseconds" not in json.dumps(without_times(first))
     times = first["laps"][0]["milliseconds"]
-    assert set(times) == {*STEPS, "total", "spread"}
+    assert set(times) == {*STEPS, "total", "sd", "spread"}
+    assert set(times["sd"]) == set(STEPS)
     assert times["total"] == pytest.approx(sum(times[step] for step in STEPS), abs=1e-4)
     assert times["spread"]["whole_call"] > times["total"] > 0
     json.dumps(first, allow_nan=False)
+
+
+def test_each_mode_runs_its_own_laps(network) -> None:
+    result = run(network, AHEAD, laps=1, seconds=3.0)
+    modes = {entry["mode"]: entry for entry in result["modes"]}
+    assert list(modes) == ["constant", "linear", "cubic"]
+    assert result["mode"] == RUNTIME["mode"] == "cubic"
+    assert all(result[key] == value for key, value in modes["cubic"].items())
+    # Weights looked up otherwise move the figure a little otherwise.
+    ways = {mode: entry["laps"][0]["path_distance_cm"] for mode, entry in modes.items()}
+    assert len(set(ways.values())) == 3
+    some = responsivity(
+        network,
+        configuration="x",
+        runtime={**RUNTIME, "mode": "linear"},
+        laps=1,
+        lap_seconds=3.0,
+        modes=(),
+        track=AHEAD,
+    )
+    assert [entry["mode"] for entry in some["modes"]] == ["linear"]
+    assert without_times(some["laps"]) == without_times(modes["linear"]["laps"])
+
+
+def test_a_lap_is_timed_step_by_step(steady) -> None:
+    """Means and deviations over laps are those of all their frames."""
+    result = run(steady, NEAR)
+    laps, whole = result["laps"], result["milliseconds"]
+    frames = np.array([lap["frames"] for lap in laps])
+    for step in STEPS:
+        means = np.array([lap["milliseconds"][step] for lap in laps])
+        assert whole[step] == pytest.approx((frames @ means) / frames.sum(), abs=1e-5)
+        squares = np.array([lap["milliseconds"]["sd"][step] ** 2 for lap in laps]) + means**2
+        expected = (frames @ squares) / frames.sum() - whole[step] ** 2
+        assert whole["sd"][step] == pytest.approx(max(expected, 0) ** 0.5, abs=1e-4)
 
 
 def test_rows_for_a_table(steady, tmp_path) -> None:
     rows = lap_rows(run(steady, NEAR))
     write_csv(tmp_path / "laps.csv", rows)
     lines = (tmp_path / "laps.csv").read_text().splitlines()
-    assert len(lines) == 3
-    assert lines[0].startswith("lap,finished,frames,")
-    assert "milliseconds_predict" in lines[0]
+    assert len(lines) == 1 + 3 * 2
+    assert lines[0].startswith("mode,lap,finished,frames,")
+    assert "milliseconds_predict," in lines[0]
+    assert "milliseconds_predict_sd" in lines[0]
+    assert [line.split(",")[:2] for line in lines[1:]] == [
+        [m, n] for m in ("constant", "linear", "cubic") for n in ("1", "2")
+    ]
     write_csv(tmp_path / "none.csv", [])
     assert (tmp_path / "none.csv").read_text() == ""
 

@@ -27,7 +27,7 @@ rule accuracy:
 
 
 rule responsivity:
-    """Laps of the waypoint track: milliseconds a frame of each step, and how well it is followed."""
+    """Laps of the waypoint track in each phase mode: milliseconds a frame, and how well it is followed."""
     input:
         weights=lambda w: project.network(w.configuration, "weights.npz"),
     output:
@@ -44,7 +44,9 @@ rule responsivity:
     params:
         configuration=lambda w: w.configuration,
         runtime=lambda w: project.section(w.configuration, "runtime"),
-        evaluation=lambda w: project.section(w.configuration, "evaluation"),
+        evaluation=lambda w: project.evaluation(
+            w.configuration, "laps", "lap_seconds", "modes"
+        ),
         code=project.code("responsivity"),
     script:
         "../scripts/responsivity.py"
@@ -68,7 +70,7 @@ rule injury_response:
     params:
         configuration=lambda w: w.configuration,
         runtime=lambda w: project.section(w.configuration, "runtime"),
-        evaluation=lambda w: project.section(w.configuration, "evaluation"),
+        evaluation=lambda w: project.evaluation(w.configuration, "seconds"),
         code=project.code("injury_response"),
     script:
         "../scripts/injury_response.py"

@@ -13,7 +13,9 @@ with job(snakemake) as log:
         runtime=snakemake.params.runtime,
         laps=snakemake.params.evaluation["laps"],
         lap_seconds=snakemake.params.evaluation["lap_seconds"],
+        modes=snakemake.params.evaluation["modes"],
     )
     write_json(snakemake.output.json, result)
     write_csv(snakemake.output.csv, lap_rows(result))
-    log.info("%d of %d waypoints reached", result["waypoints_reached"], result["waypoints"])
+    for mode in result["modes"]:
+        log.info("%s: %d of %d waypoints reached", mode["mode"], mode["waypoints_reached"], mode["waypoints"])

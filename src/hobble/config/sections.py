@@ -197,6 +197,9 @@ class Evaluation(Section):
     )
     laps: Positive = 19
     lap_seconds: PositiveFloat = Field(400.0, description="a lap that takes longer is ended there")
+    modes: tuple[Literal["constant", "linear", "cubic"], ...] = Field(
+        ("constant", "linear", "cubic"), description="phase modes that laps are run in, beside the runtime's own"
+    )
     seconds: PositiveFloat = Field(8.0, description="length of each injury response walk")
 
 

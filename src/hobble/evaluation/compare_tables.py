@@ -54,6 +54,7 @@ def _laps(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
         times = lap["milliseconds"]
         row = {key: value for key, value in lap.items() if key != "milliseconds"}
         row |= {f"milliseconds_{step}": times[step] for step in STEPS}
+        row |= {f"milliseconds_{step}_sd": sd for step, sd in times["sd"].items()}
         rows.append({**head, **row, **{f"milliseconds_{k}": v for k, v in _flat(times["spread"]).items()}})
     return rows
 

@@ -14,6 +14,7 @@ from hobble.evaluation.motion_measures import foot_slide, largest_turn
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.controller import STEPS
 from hobble.runtime.network import Network
+from hobble.runtime.predictor import MODES
 from hobble.runtime.waypoints import TRACK, Waypoint
 
 FPS = 60
@@ -27,15 +28,40 @@ def responsivity(
     runtime: Mapping[str, Any],
     laps: int,
     lap_seconds: float,
+    modes: Sequence[str] = tuple(MODES),
     track: Sequence[Waypoint] = TRACK,
 ) -> dict[str, Any]:
-    """Run `laps` laps of the track of Segerstedt 2021; runtime: options of ProceduralAnimation.
+    """Run `laps` laps of the track of Segerstedt 2021 in each of `modes` and in the runtime's own.
 
-    A lap that takes longer than `lap_seconds` of simulated time is ended there, its remaining waypoints not
-    reached, and the next one starts from the beginning of the track. Measured times stand under
-    "milliseconds" only, each with the steps' means, their `total`, and `spread`: sd, median and 99th
-    percentile of the total, and the mean of a whole call.
+    runtime: options of ProceduralAnimation. A lap that takes longer than `lap_seconds` of simulated time is
+    ended there, its remaining waypoints not reached, and the next one starts from the beginning of the track.
+    `modes` holds the laps of each mode and what they come to; those of the runtime's own mode stand at the
+    top too. Measured times stand under "milliseconds" only, each with the steps' means, their `total`, and
+    `spread`: sd, median and 99th percentile of the total, and the mean of a whole call.
     """
+    own = str(runtime.get("mode", "cubic"))
+    found = {
+        mode: _laps(network, {**runtime, "mode": mode}, track, laps, lap_seconds)
+        for mode in dict.fromkeys((*modes, own))
+    }
+    return {
+        "configuration": configuration,
+        "track": {
+            "waypoints": len(track),
+            "metres": round(
+                sum(np.hypot(*(np.subtract(a.position, b.position))) for a, b in _closed(track)) / 100, 3
+            ),
+        },
+        "parameters": parameter_counts(network.sizes),
+        **found[own],
+        "modes": list(found.values()),
+    }
+
+
+def _laps(
+    network: Network, runtime: Mapping[str, Any], track: Sequence[Waypoint], laps: int, lap_seconds: float
+) -> dict[str, Any]:
+    """All laps of one mode."""
     animation = ProceduralAnimation(network, waypoints=track, **runtime)
     for _ in range(WARM_UP):
         animation.next_pose()
@@ -47,21 +73,13 @@ def responsivity(
         times.append(seconds)
         if not lap["finished"]:
             animation.reset()
-    reached = [lap["waypoints_reached"] for lap in results]
     return {
-        "configuration": configuration,
-        "mode": runtime.get("mode"),
-        "track": {
-            "waypoints": len(track),
-            "metres": round(
-                sum(np.hypot(*(np.subtract(a.position, b.position))) for a, b in _closed(track)) / 100, 3
-            ),
-        },
-        "parameters": parameter_counts(network.sizes),
+        "mode": runtime["mode"],
         "laps": results,
         "laps_finished": sum(lap["finished"] for lap in results),
-        "waypoints_reached": sum(reached),
+        "waypoints_reached": sum(lap["waypoints_reached"] for lap in results),
         "waypoints": laps * len(track),
+        "mean_lap_seconds": _mean([lap["seconds"] for lap in results if lap["finished"]]),
         "path_overshoot_cm": max(lap["path_overshoot_cm"] for lap in results),
         "foot_slide_cm": _mean([lap["foot_slide_cm"] for lap in results]),
         "largest_turn_degrees": max(lap["largest_turn_degrees"] for lap in results),
@@ -87,13 +105,15 @@ def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
 
 
 def lap_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The laps as flat rows for a CSV file; the times at the end."""
+    """The laps of every mode as flat rows for a CSV file; the times at the end, a step's `_sd` beside it."""
     rows = []
-    for lap in result["laps"]:
-        row = {key: value for key, value in lap.items() if key != "milliseconds"}
-        times = lap["milliseconds"]
-        row |= {f"milliseconds_{key}": value for key, value in times.items() if key != "spread"}
-        rows.append(row | {f"milliseconds_{key}": value for key, value in times["spread"].items()})
+    for entry in result["modes"]:
+        for lap in entry["laps"]:
+            row = {"mode": entry["mode"]} | {k: v for k, v in lap.items() if k != "milliseconds"}
+            times = lap["milliseconds"]
+            row |= {f"milliseconds_{key}": v for key, v in times.items() if not isinstance(v, dict)}
+            row |= {f"milliseconds_{key}_sd": v for key, v in times["sd"].items()}
+            rows.append(row | {f"milliseconds_{key}": v for key, v in times["spread"].items()})
     return rows
 
 
@@ -140,6 +160,7 @@ def _milliseconds(seconds: Array) -> dict[str, Any]:
     return {
         **steps,
         "total": round(float(total.mean()), 6),
+        "sd": {step: round(float(ms[:, i].std()), 6) for i, step in enumerate(STEPS)},
         "spread": {
             "sd": round(float(total.std()), 6),
             "median": round(float(np.median(total)), 6),
