@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import glob
 import json
 import os
+import struct
 import zipfile
+import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +17,26 @@ from typing import Any
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.untrusted import read_text
+
+MOST_INFLATED = 1 << 30  # bytes that a file's compressed arrays may become; our own are not compressed
+MOST_JSON = 1 << 30
+AGAIN = "Delete it; the next run makes it again."
+HEADERS = {
+    (1, 0): np.lib.format.read_array_header_1_0,
+    (2, 0): np.lib.format.read_array_header_2_0,
+}
+DAMAGE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    EOFError,
+    KeyError,
+    NotImplementedError,  # a flipped bit in the number of the compression
+    OverflowError,
+    RuntimeError,  # or in the flag for a password
+    ValueError,
+)
 
 
 @contextlib.contextmanager
@@ -24,9 +47,11 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     Raises HobbleError where the disk is full or the folder cannot be written.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for left in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
+            left.unlink(missing_ok=True)  # by a job that was killed; nobody else writes this file now
         yield temporary
         with open(temporary, "rb") as file:
             os.fsync(file.fileno())
@@ -34,7 +59,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         raise explained(error, path) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def explained(error: OSError, path: Path) -> HobbleError:
@@ -63,9 +89,11 @@ def write_json(path: str | Path, value: Any) -> None:
 def read_json(path: str | Path) -> Any:
     """Read a JSON file; raises InputError with the line where it is not JSON."""
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
+        return json.loads(read_text(path, MOST_JSON))
     except json.JSONDecodeError as error:
         raise InputError(path, f"not valid JSON: {error.msg}", line=error.lineno) from error
+    except (RecursionError, ValueError) as error:
+        raise InputError(path, f"not valid JSON: {error}") from error
 
 
 def save_npz(path: str | Path, **arrays: Any) -> None:
@@ -74,17 +102,59 @@ def save_npz(path: str | Path, **arrays: Any) -> None:
         np.savez(file, allow_pickle=False, **arrays)
 
 
-def load_npz(path: str | Path, names: Iterable[str] | None = None) -> dict[str, np.ndarray]:
-    """Read every array of an npz, or those of `names`; checksums are verified.
+class Arrays(dict[str, np.ndarray]):
+    """Arrays of a file by name; asking for one that is not there raises InputError."""
 
-    Raises InputError where the file or one of the arrays is missing or damaged.
+    def __init__(self, path: str | Path, arrays: Iterable[tuple[str, np.ndarray]]) -> None:
+        super().__init__(arrays)
+        self.path = path
+
+    def __missing__(self, name: str) -> np.ndarray:
+        raise InputError(self.path, f"holds no array {name!r}", fix=AGAIN)
+
+
+def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
+    """Read every array of an npz, or those of `names`; checksums are verified, nothing is unpickled.
+
+    Raises InputError where the file or one of the arrays is missing, damaged, or asks for more memory than
+    the file can fill.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in (file.files if names is None else names)}
+        with zipfile.ZipFile(path) as archive:
+            if _entries(path, archive) != len(archive.infolist()):
+                raise zipfile.BadZipFile("its directory has lost an entry")
+            there = [name.removesuffix(".npy") for name in archive.namelist()]
+            wanted = there if names is None else list(names)
+            if sum(i.file_size for i in archive.infolist() if i.compress_type) > MOST_INFLATED:
+                raise ValueError(f"would unpack to more than {MOST_INFLATED >> 20} MB")
+            return Arrays(path, [(name, _array(archive, f"{name}.npy")) for name in wanted])
     except FileNotFoundError as error:
         raise InputError(path, "no such file") from error
-    except (zipfile.BadZipFile, KeyError, ValueError, EOFError, OSError) as error:
-        raise InputError(
-            path, f"damaged or not an npz file ({error})", fix="Delete it; the next run makes it again."
-        ) from error
+    except OSError as error:
+        raise InputError(path, f"cannot be read: {error.strerror or error}") from error
+    except DAMAGE as error:
+        raise InputError(path, f"damaged or not an npz file ({error})", fix=AGAIN) from error
+
+
+def _entries(path: str | Path, archive: zipfile.ZipFile) -> int:
+    """How many files the archive's last record counts; zipfile itself goes by the directory's length."""
+    with open(path, "rb") as file:
+        file.seek(-22 - len(archive.comment), os.SEEK_END)
+        (count,) = struct.unpack("<10xH10x", file.read(22))
+    return count
+
+
+def _array(archive: zipfile.ZipFile, member: str) -> np.ndarray:
+    """One array. What its header says is compared with the bytes there are before any memory is taken."""
+    info = archive.getinfo(member)
+    if not info.compress_type and info.header_offset + info.file_size > archive.start_dir:
+        raise EOFError(f"{member} does not fit into the file")
+    with archive.open(info) as file:
+        shape, _, dtype = HEADERS[np.lib.format.read_magic(file)](file)
+        count = 1
+        for length in shape:
+            count *= length
+        if dtype.hasobject or count * dtype.itemsize != info.file_size - file.tell():
+            raise ValueError(f"{member} does not hold what its header says")
+    with archive.open(info) as file:
+        return np.lib.format.read_array(file, allow_pickle=False)

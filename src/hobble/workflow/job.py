@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from hobble.core.errors import HobbleError
+from hobble.workflow import checksums
 
 BUG = "This is a fault of Hobble, not of your data; please report it with the log."
 
@@ -19,6 +20,7 @@ BUG = "This is a fault of Hobble, not of your data; please report it with the lo
 def job(snakemake: Any) -> Iterator[logging.Logger]:
     """Log to the rule's log file and, from warnings on, to the terminal; end a HobbleError in one message.
 
+    Inputs that are not what their jobs wrote, or that change while the job runs, are such an error.
     A HobbleError ends the process with status 1 and its text. Anything unforeseen ends it with its last line
     on the terminal and the whole traceback in the log.
     """
@@ -35,8 +37,14 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
     to_terminal.setFormatter(logging.Formatter(f"{snakemake.rule}: %(message)s"))
     logger.handlers = [to_file, to_terminal]
     logging.captureWarnings(True)
+    inputs, outputs = getattr(snakemake, "input", ()), getattr(snakemake, "output", ())
     try:
+        checksums.forget(outputs)
+        before = checksums.stamps(inputs)
+        checksums.verify(inputs)
         yield logger
+        checksums.check_unchanged(before)
+        checksums.record(outputs)
     except HobbleError as error:
         logger.error("%s", error)
         sys.exit(1)
@@ -53,7 +61,7 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
 
 
 class _LogFile(logging.FileHandler):
-    """A log that goes without what it cannot write: on a full disk the message still reaches the terminal, alone."""
+    """A log that goes without what it cannot write: on a full disk the message still reaches the terminal."""
 
     def emit(self, record: logging.LogRecord) -> None:
         with contextlib.suppress(OSError):

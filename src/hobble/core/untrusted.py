@@ -1,0 +1,87 @@
+"""Reading what a stranger wrote: bytes, text and YAML, refused before they take more than they may."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from hobble.core.errors import InputError
+
+MB = 1 << 20
+MOST_TEXT = 64 * MB  # labels and status: 1 kB a frame of a clip of ten minutes at 100 Hz
+MOST_YAML = 4 * MB  # a data set that lists 20,000 clips with five keys each
+MOST_NODES = 1_000_000  # of a YAML file with its aliases written out: some 100 MB as Python objects
+
+
+def read_bytes(path: str | Path, most: int) -> bytes:
+    """The content of a regular file of at most `most` bytes.
+
+    Raises InputError for anything else: what is not there or may not be read, a folder, a device, a pipe.
+    """
+    try:
+        kind = os.stat(path)
+        if not stat.S_ISREG(kind.st_mode):
+            raise InputError(
+                path, "not a file" if stat.S_ISDIR(kind.st_mode) else "a device or a pipe, not a file"
+            )
+        with open(path, "rb") as file:
+            data = file.read(most + 1) if kind.st_size <= most else b""
+    except FileNotFoundError:
+        raise InputError(path, "no such file") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(path, f"cannot be read: {reason}") from None
+    if kind.st_size > most or len(data) > most:
+        raise InputError(path, f"larger than {most / MB:g} MB, which is the most that is read of such a file")
+    return data
+
+
+def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
+    """A text file as UTF-8, without a byte order mark; raises InputError where it is none or too large."""
+    try:
+        return read_bytes(path, most).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(path, "is not a text file") from None
+
+
+def read_yaml(path: str | Path) -> Any:
+    """What a YAML file says, as plain data: no tag of it makes an object, no alias in it a mountain.
+
+    Raises InputError, with the line where there is one.
+    """
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)(read_text(path, MOST_YAML))
+    try:
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        if _written_out(node, {}, set()) > MOST_NODES:
+            raise InputError(path, f"its aliases stand for more than {MOST_NODES} values")
+        return loader.construct_document(node)
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else None
+        raise InputError(path, f"not valid YAML: {error.problem}", line=line) from None
+    except RecursionError:
+        raise InputError(path, "nested too deeply, or an alias that holds itself") from None
+    except (yaml.YAMLError, ValueError) as error:
+        raise InputError(path, f"not valid YAML: {' '.join(str(error).split())}") from None
+    finally:
+        loader.dispose()
+
+
+def _written_out(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
+    """Values that a node stands for when every alias is replaced by what it names."""
+    if isinstance(node, yaml.ScalarNode):
+        return 1
+    if id(node) in above:
+        raise RecursionError
+    if id(node) not in known:
+        above.add(id(node))
+        pairs = isinstance(node, yaml.MappingNode)
+        children = [part for pair in node.value for part in pair] if pairs else node.value
+        known[id(node)] = 1 + sum(_written_out(child, known, above) for child in children)
+        above.remove(id(node))
+    return known[id(node)]

@@ -1,0 +1,105 @@
+"""What a job left behind, so that the next one notices when a file is no longer that.
+
+An npz and a database's chunks carry checksums of their own. A digit flipped in a JSON, CSV, YAML or text file
+is another digit, which nobody could tell; so every job leaves the checksums of such files in
+results/<configuration>/checksums/ or results/datasets/<dataset>/checksums/, and every job that reads one
+looks there.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+import zlib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from hobble.core.errors import InputError
+from hobble.core.files import write_text
+
+CARRY_THEIR_OWN = {".npz"}
+BLOCK = 1 << 20
+TICK = 0.02  # seconds: coarser than the clock that stamps files
+
+Stamp = tuple[int, int, int]
+
+
+def record_of(path: Path) -> Path | None:
+    """Where the checksums of an artefact are kept; None for what is none, such as a user's clip."""
+    parts = path.parts
+    if "results" not in parts:
+        return None
+    results = len(parts) - parts[::-1].index("results")
+    root = results + (2 if parts[results : results + 1] == ("datasets",) else 1)
+    if len(parts) <= root or path.suffix in CARRY_THEIR_OWN:
+        return None
+    return Path(*parts[:root], "checksums", *parts[root:-1], f"{path.name}.crc32")
+
+
+def forget(paths: Iterable[str]) -> None:
+    """Take away the checksums of files that are about to be made again."""
+    for record in filter(None, map(record_of, map(Path, paths))):
+        record.unlink(missing_ok=True)
+
+
+def record(paths: Iterable[str]) -> None:
+    """Note the checksums of finished files; of a folder, those of the files right in it."""
+    for path in map(Path, paths):
+        if (where := record_of(path)) is not None and path.exists():
+            lines = [f"{_checksum(file):08x} {file.name}" for file in _files(path)]
+            write_text(where, "\n".join(lines) + "\n")
+
+
+def verify(paths: Iterable[str]) -> None:
+    """Raise InputError for a file that is not what its job wrote; a file without checksums is let pass."""
+    for path in map(Path, paths):
+        where = record_of(path)
+        if where is None or not where.is_file() or not path.exists():
+            continue
+        lines = where.read_text(encoding="utf-8", errors="replace").splitlines()
+        known = {name: checksum for checksum, _, name in (line.partition(" ") for line in lines)}
+        for file in _files(path):
+            if known.get(file.name) != f"{_checksum(file):08x}":
+                raise InputError(
+                    file,
+                    "damaged or changed: it is not what its job wrote",
+                    fix=f"Delete it; the next run makes it again. If the change is meant, delete {where}.",
+                )
+
+
+def stamps(paths: Iterable[str]) -> Mapping[str, Stamp]:
+    """When each file was last written, its length and its place on disk."""
+    out = {}
+    for path in map(str, paths):
+        if os.path.isfile(path):
+            if 0 <= time.time() - os.stat(path).st_mtime < TICK:
+                time.sleep(TICK)  # else a write that follows at once could bear the same time
+            found = os.stat(path)
+            out[path] = (found.st_mtime_ns, found.st_size, found.st_ino)
+    return out
+
+
+def check_unchanged(before: Mapping[str, Stamp]) -> None:
+    """Raise InputError for a file that was written, replaced or taken away since `before`."""
+    now = stamps(before)
+    for path, stamp in before.items():
+        if now.get(path) != stamp:
+            raise InputError(path, "changed while it was being read", fix="Run the same command again.")
+
+
+def _files(path: Path) -> list[Path]:
+    """The file itself, or those in the folder that are not hidden (Snakemake leaves its own there)."""
+    if not path.is_dir():
+        return [path]
+    return sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
+
+
+def _checksum(path: Path) -> int:
+    crc = 0
+    try:
+        with open(path, "rb") as file:
+            while block := file.read(BLOCK):
+                crc = zlib.crc32(block, crc)
+    except OSError as error:
+        raise InputError(path, f"cannot be read: {error.strerror}") from error
+    return crc
