@@ -66,7 +66,7 @@ def options(section: str, **changed: object) -> dict[str, Any]:
     return model(**ORIGINAL[section] | changed).model_dump(mode="json")
 
 
-def rows_as_configured(shared: Path, root: Path, **terrain: object) -> ClipRows:
+def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrain: object) -> ClipRows:
     """The rows of the reference clip, stage by stage, by nothing but the configuration."""
     skeletons = root / "config" / "skeletons"
     folder = shared / "mocap" / "pfnn"
@@ -74,7 +74,7 @@ def rows_as_configured(shared: Path, root: Path, **terrain: object) -> ClipRows:
         folder / f"{NAME}.bvh", skeletons / "holden31.yaml", skeletons, NAME, "holden31", options("motion")
     )
     files = [folder / f"{NAME}{end}" for end in (".phase", ".gait", "_footsteps.txt", "_gait.txt")]
-    labels = vars(label_clip(clip, files, report, "walk", "flat", options("labels"))[0])
+    labels = vars(label_clip(clip, files, report, "walk", "flat", options("labels", margins=margins))[0])
     ground, database = options("terrain", **terrain), options("database")
     any_map = Heightmap("any", np.zeros((200, 200)), ground["cell"])
     drawn = {name: ground[name] for name in ("cell", "size", "highest", "seed")}
@@ -256,11 +256,33 @@ def test_files_that_do_not_belong_together_are_refused(walk, labels, terrain, ch
         clip_rows("walk", walk, {**labels, **change}, np.zeros((300, 2)), terrain, **OPTIONS)
 
 
-def test_severities_and_windows_that_do_not_fit_are_refused(walk, labels, terrain):
+def test_severities_and_cycles_that_do_not_fit_are_refused(walk, labels, terrain):
     with pytest.raises(InputError, match="severities of 3 links for a skeleton of 2"):
         clip_rows("walk", walk, labels, np.zeros((300, 3)), terrain, **OPTIONS)
-    near = {**labels, "cycles": np.array([[59, 90]])}
-    with pytest.raises(InputError, match="walk, frame 59: a cycle lies within 60 frames"):
-        clip_rows(
-            "walk", walk, near, np.zeros((300, 2)), flat_terrain(near["cycles"], np.zeros(1)), **OPTIONS
-        )
+    for cycle, frame in (([0, 40], 0), ([260, 299], 299)):
+        near = {**labels, "cycles": np.array([cycle])}
+        ground = flat_terrain(near["cycles"], np.zeros(1))
+        with pytest.raises(InputError, match=f"walk, frame {frame}: a cycle has no frame before it or none"):
+            clip_rows("walk", walk, near, np.zeros((300, 2)), ground, **OPTIONS)
+
+
+def test_past_the_ends_of_the_clip_the_root_goes_straight_on_and_the_gait_is_held(walk, labels):
+    """Rows next to an end are those of a longer clip that does so."""
+    ends = {**labels, "cycles": np.array([[1, 40], [260, 298]])}
+    still = replace(walk, rotations=np.tile(walk.rotations[:1], (300, 1, 1)))
+    once = clip_rows(
+        "a", still, ends, np.zeros((300, 2)), flat_terrain(ends["cycles"], np.zeros(2)), **OPTIONS
+    )
+    n = np.arange(-70, 370)
+    longer = replace(
+        still,
+        rotations=np.tile(walk.rotations[:1], (440, 1, 1)),
+        root=np.stack([2.0 * n, np.full(440, 90.0), np.zeros(440)], axis=1),
+    )
+    held = {name: values[np.clip(n, 0, 299)] for name, values in labels.items() if len(values) == 300}
+    held["cycles"] = ends["cycles"] + 70
+    twice = clip_rows(
+        "a", longer, held, np.zeros((440, 2)), flat_terrain(held["cycles"], np.zeros(2)), **OPTIONS
+    )
+    np.testing.assert_allclose(once.x, twice.x, atol=1e-4)
+    np.testing.assert_allclose(once.y, twice.y, atol=1e-4)

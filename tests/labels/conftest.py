@@ -19,6 +19,7 @@ OPTIONS = {
     "heel_speed": 0.375,
     "toe_speed": 0.0875,
     "valley_factor": 2.875,
+    "margins": "drop",
     "shortest_step": 5,
 }
 

@@ -63,7 +63,7 @@ def test_only_a_long_pause_parts_two_bouts(walker, pause, bouts):
     _, events = found(paused)
     assert [foot for _, foot in events].count(-1) == bouts - 1
     assert len(events) - (bouts - 1) == len(found(clip)[1])
-    cycles, _ = find_cycles(rows_of_landings(events), len(paused), "right")
+    cycles, _ = find_cycles(rows_of_landings(events), len(paused), "right", "drop")
     assert any(a < both_down < b for a, b in cycles) == (bouts == 1)
 
 
@@ -80,4 +80,4 @@ def test_feet_up_marks_the_frames_of_swings(walker):
 def test_the_shortest_clips_are_no_trouble(walker, frames):
     clip = walker(frames=frames, start=5)
     assert len(found(clip)[1]) <= 1
-    assert find_cycles(rows_of_landings(found(clip)[1]), frames, "right")[0].shape == (0, 2)
+    assert find_cycles(rows_of_landings(found(clip)[1]), frames, "right", "drop")[0].shape == (0, 2)

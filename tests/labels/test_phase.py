@@ -54,10 +54,10 @@ def test_over_a_pause_phase_goes_on_forward_and_meets_the_next_landing():
 
 
 def test_cycles_run_from_line_to_line_and_share_their_boundary_frames():
-    cycles, dropped = find_cycles(STEPS, 300, "right")
+    cycles, dropped = find_cycles(STEPS, 300, "right", "drop")
     assert cycles.tolist() == [[70, 120], [120, 175], [175, 230]]
     assert dropped == 0
-    cycles, _ = find_cycles(STEPS, 300, "left")
+    cycles, _ = find_cycles(STEPS, 300, "left", "drop")
     assert cycles.tolist() == [[95, 150], [150, 200]]
 
 
@@ -65,28 +65,35 @@ def test_cycles_run_from_line_to_line_and_share_their_boundary_frames():
 def test_a_cycle_that_starts_before_frame_60_is_left_out(first, kept):
     steps = STEPS.copy()
     steps[0, 0] = first
-    assert len(find_cycles(steps, 300, "right")[0]) == kept
+    assert len(find_cycles(steps, 300, "right", "drop")[0]) == kept
 
 
 @pytest.mark.parametrize(("frames", "kept"), [(291, 2), (292, 3), (293, 3)])
 def test_a_cycle_that_ends_within_61_frames_of_the_end_is_left_out(frames, kept):
-    cycles, dropped = find_cycles(STEPS, frames, "right")
+    cycles, dropped = find_cycles(STEPS, frames, "right", "drop")
     assert (len(cycles), dropped) == (kept, 3 - kept)
+
+
+@pytest.mark.parametrize(("first", "frames", "kept"), [(1, 164, 3), (0.5, 164, 3), (0, 164, 2), (1, 163, 2)])
+def test_with_extended_margins_a_cycle_needs_a_frame_before_it_and_two_after(first, frames, kept):
+    steps = STEPS - [69, 69, 0]
+    steps[0, 0] = first
+    assert len(find_cycles(steps, frames, "right", "extend")[0]) == kept
 
 
 @pytest.mark.parametrize(("line", "kept"), [(0, [1, 2]), (1, [2]), (2, [0]), (3, [0, 1])])
 def test_a_marked_line_drops_the_cycles_on_both_sides_of_it(line, kept):
     steps = STEPS.copy()
     steps[line, 2] = 1
-    whole = find_cycles(STEPS, 300, "right")[0]
-    assert find_cycles(steps, 300, "right")[0].tolist() == whole[kept].tolist()
+    whole = find_cycles(STEPS, 300, "right", "drop")[0]
+    assert find_cycles(steps, 300, "right", "drop")[0].tolist() == whole[kept].tolist()
     assert dropped_frames(steps, 300).sum() == (0 if line == 3 else whole[line, 1] - whole[line, 0])
 
 
 def test_no_cycle_runs_over_a_pause():
     steps = np.array([[70.0, 95, 0], [np.nan, np.nan, 1], [270.0, 300, 0], [330.0, 360, 0]])
-    assert find_cycles(steps, 500, "right")[0].tolist() == [[270, 330]]
-    assert find_cycles(steps, 500, "left")[0].tolist() == [[300, 360]]
+    assert find_cycles(steps, 500, "right", "drop")[0].tolist() == [[270, 330]]
+    assert find_cycles(steps, 500, "left", "drop")[0].tolist() == [[300, 360]]
 
 
 def test_landings_become_rows_and_the_same_foot_twice_parts_them():
@@ -126,7 +133,7 @@ def test_phase_goes_forward_and_gives_its_footsteps_back(case):
     found = np.sort(back[:, :2][np.isfinite(back[:, :2])])
     for when in landed:
         assert np.abs(found - when).min() < 1.0
-    assert len(find_cycles(steps, frames, "right")[0]) <= len(steps)
+    assert len(find_cycles(steps, frames, "right", "drop")[0]) <= len(steps)
     assert not (moving & ~known)[:-1].sum() > len(landed)
 
 
@@ -140,8 +147,8 @@ def test_mirroring_footsteps_shifts_phase_by_half_a_cycle(case):
     assert apart(other[known], phase[known] + 0.5) == pytest.approx(0, abs=1e-9)
     twice = mirrored_footsteps(mirrored_footsteps(steps))
     np.testing.assert_equal(twice, steps)
-    left = find_cycles(steps, frames, "left")[0]
-    assert find_cycles(mirrored_footsteps(steps), frames, "right")[0].tolist() == left.tolist()
+    left = find_cycles(steps, frames, "left", "drop")[0]
+    assert find_cycles(mirrored_footsteps(steps), frames, "right", "drop")[0].tolist() == left.tolist()
 
 
 def test_a_dropped_line_stays_dropped_in_the_mirror():

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from hobble.core import quat
 from hobble.motion.root import (
+    RootFrames,
+    continued,
     facing,
     local_pose,
     points_to_root,
@@ -112,3 +114,29 @@ def test_rows_of_the_original_come_out(shared, make):
     np.testing.assert_allclose(root.turn[frames], y[:, 2], atol=1e-7)
     previous = positions[94 : 94 + n][..., [0, 2]]
     np.testing.assert_allclose(previous, x[:, 120:213].reshape(n, 31, 3)[..., [0, 2]], atol=1e-5)
+
+
+def test_the_root_goes_straight_on_past_both_ends():
+    n = np.arange(40.0)
+    position = np.stack([2 * n, np.where(n < 20, 0, n - 20)], axis=1)
+    position[36] += [30, 30]  # one bad frame near an end is no velocity
+    yaw = 0.02 * n
+    direction = np.stack([np.sin(yaw), 0 * n, np.cos(yaw)], axis=1)
+    root = RootFrames(position, direction, quat.yaw(-yaw), np.full(39, 0.02))
+    longer = continued(root, 7)
+    assert len(longer) == 54
+    assert len(longer.turn) == 53
+    for name in ("position", "direction", "rotation"):
+        np.testing.assert_array_equal(getattr(longer, name)[7:47], getattr(root, name))
+    k = np.arange(1.0, 8)
+    np.testing.assert_allclose(longer.position[47:], np.stack([78 + 2 * k, 19 + k], axis=1))
+    np.testing.assert_allclose(longer.position[:7], np.stack([-2 * k[::-1], 0 * k], axis=1), atol=1e-12)
+    for name in ("direction", "rotation"):
+        np.testing.assert_array_equal(getattr(longer, name)[:7], np.tile(getattr(root, name)[0], (7, 1)))
+        np.testing.assert_array_equal(getattr(longer, name)[47:], np.tile(getattr(root, name)[-1], (7, 1)))
+    np.testing.assert_array_equal(longer.turn, np.pad(root.turn, 7))
+
+
+def test_a_clip_of_one_frame_stands_before_and_after_it():
+    root = RootFrames(np.ones((1, 2)), np.array([[0, 0, 1.0]]), quat.yaw(np.zeros(1)), np.zeros(0))
+    np.testing.assert_array_equal(continued(root, 3).position, np.ones((7, 2)))

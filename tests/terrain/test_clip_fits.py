@@ -218,8 +218,10 @@ def test_labels_of_another_clip_are_refused(made: SimpleNamespace, patches: Patc
     few = {**walk.labels, "contacts": walk.labels["contacts"][1:]}
     with pytest.raises(InputError, match=r"figure: labels have contacts of shape \(419, 4\) for 420 frames"):
         clip_fits(walk.clip, few, patches, "rocky", made.options(), made.database())
-    late = {**walk.labels, "cycles": np.array([[64, 128], [300, 400]])}
-    with pytest.raises(InputError, match="frame 300: the cycle of frames 300 to 400 has no 60 frames"):
+    late = {**walk.labels, "cycles": np.array([[64, 128], [300, 420]])}
+    with pytest.raises(
+        InputError, match="frame 300: the cycle of frames 300 to 420 does not lie in the clip's 420"
+    ):
         clip_fits(walk.clip, late, patches, "rocky", made.options(), made.database())
     with pytest.raises(InputError, match="300 patches are fewer than the 400 fits"):
         clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(fits=400), made.database())

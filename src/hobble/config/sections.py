@@ -6,13 +6,23 @@ description here re-runs nothing.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+
+def _inside(path: str) -> str:
+    """A path that stays in the folder that it is relative to."""
+    if Path(path).is_absolute() or ".." in Path(path).parts or not path.isprintable():
+        raise ValueError("must be relative to the mocap folder and stay in it")
+    return path
+
 
 Positive = Annotated[int, Field(gt=0)]
 PositiveFloat = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0, lt=1)]
+Inside = Annotated[str, AfterValidator(_inside)]
 Ground = Literal["flat", "rocky", "jumpy", "beam"]
 Gait = Literal["stand", "walk", "jog", "crouch", "jump", "bump"]
 # What results/compare/ sets side by side where --config compare names nothing else: the published sizes and
@@ -70,6 +80,11 @@ class Labels(Section):
     heel_speed: PositiveFloat = 0.375
     toe_speed: PositiveFloat = 0.0875
     valley_factor: PositiveFloat = 2.875
+    margins: Literal["extend", "drop"] = Field(
+        "extend",
+        description="what becomes of a cycle with less than a second of clip before or after it: the path "
+        "goes on straight past the clip's end, or, as in the original, the cycle is dropped",
+    )
     shortest_step: Positive = Field(5, description="steps of this many 120 Hz frames or fewer are dropped")
 
 
@@ -117,7 +132,7 @@ class Heightmap(Section):
     """One source of ground: generated, matplotlib's real elevation model, or a file."""
 
     kind: Literal["fractal", "hills", "stairs", "slope", "boxes", "beams", "elevation", "file"]
-    path: str | None = Field(None, description="for kind: file; relative to the mocap folder")
+    path: Inside | None = Field(None, description="for kind: file; relative to the mocap folder")
     seed: int = 0
     cell: PositiveFloat | None = Field(None, description="centimetres a cell, where not terrain.cell")
     height_scale: PositiveFloat | None = Field(
@@ -164,10 +179,20 @@ class Training(Section):
     sections: Positive = 10
     batch: Positive = 32
     learning_rate: PositiveFloat = 1e-4
+    schedule: Literal["constant", "cosine"] = Field(
+        "constant", description="of the learning rate; cosine falls to 0 at the end of the last pass"
+    )
+    warm_up: Annotated[float, Field(ge=0)] = Field(0.0, description="passes in which the rate rises from 0")
     beta1: Share = 0.9
     beta2: Share = 0.999
     dropout: Share = Field(0.3, description="share of units dropped before each layer, the input included")
     l1: Annotated[float, Field(ge=0)] = Field(0.01, description="weight of the mean absolute weights")
+    weight_decay: Annotated[float, Field(ge=0)] = Field(
+        0.0, description="share of its weights that the network would lose in a step at a learning rate of 1"
+    )
+    noise: Annotated[float, Field(ge=0)] = Field(
+        0.0, description="on the previous pose in the input, in standard deviations of a pose over the clips"
+    )
     seed: int = 1
     memory_mb: Positive = Field(512, description="largest part of the database held in memory")
     continues: str | None = Field(None, description="a configuration whose last checkpoint is the start")
@@ -175,6 +200,14 @@ class Training(Section):
     precision: Literal["auto", "float32", "bfloat16"] = Field(
         "auto", description="factors of the products; auto: bfloat16 from batch 256 on where the CPU has it"
     )
+
+    @model_validator(mode="after")
+    def _can_go_on(self) -> Training:
+        if self.continues and self.schedule != "constant":
+            raise ValueError(
+                "`continues` needs `schedule: constant`; after another there is nothing to go on with"
+            )
+        return self
 
 
 class Runtime(Section):
@@ -198,7 +231,8 @@ class Evaluation(Section):
     laps: Positive = 19
     lap_seconds: PositiveFloat = Field(400.0, description="a lap that takes longer is ended there")
     modes: tuple[Literal["constant", "linear", "cubic"], ...] = Field(
-        ("constant", "linear", "cubic"), description="phase modes that laps are run in, beside the runtime's own"
+        ("constant", "linear", "cubic"),
+        description="phase modes that laps are run in, beside the runtime's own",
     )
     seconds: PositiveFloat = Field(8.0, description="length of each injury response walk")
 

@@ -132,8 +132,8 @@ def _plan(
         rows, pairs = rows + len(one.fits), pairs + fits
     if first is None or not any(e["rows"] for e in entries if e["split"] == "train"):
         raise HobbleError(
-            "There is nothing to train on: no clip of the training part has a locomotion cycle "
-            "60 frames from its ends. Add clips, or hold fewer out."
+            "There is nothing to train on: no clip of the training part has a whole locomotion "
+            "cycle. Add clips, or hold fewer out."
         )
     layout = first.layout if injury else replace(first.layout, links=0)
     values = x_columns(layout) + layout.y_size + fit_columns(layout) * pairs / rows

@@ -14,7 +14,7 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.database.clip_rows import ClipRows
 from hobble.database.layout import RowLayout
-from hobble.motion.root import RootFrames, local_pose, points_to_root, root_frames, vectors_to_root
+from hobble.motion.root import RootFrames, continued, local_pose, points_to_root, root_frames, vectors_to_root
 
 Arrays = Mapping[str, np.ndarray]
 
@@ -33,17 +33,18 @@ def clip_rows(
     """The rows of a clip's locomotion cycles, one after another, factorised.
 
     labels, terrain: the arrays that docs/artefacts.md lists for these stages. severity: (F, L). window, step,
-    facing_sigma: frames. Raises InputError where the files do not belong together or a cycle lies too near
-    an end of the clip for its window.
+    facing_sigma: frames. Past the clip's ends the root goes on as `continued` has it and the gait is held.
+    Raises InputError where the files do not belong together or a cycle lacks a frame before or after it.
     """
     skeleton = clip.skeleton
     layout = RowLayout(len(skeleton.joints), window, step, len(skeleton.links))
     frame, cycle = cycle_frames(labels["cycles"])
-    _check(name, clip, labels, severity, terrain, frame, window)
+    _check(name, clip, labels, severity, terrain, frame)
     root = root_frames(clip, facing_sigma)
+    path, here = continued(root, window), frame + window
     position, velocity, rotation = local_pose(clip, root)
     x = [
-        *trajectory(root, frame, frame, layout.offsets),
+        *trajectory(path, here, here, layout.offsets),
         gait_columns(labels["gait"], frame, layout.offsets),
         position[frame - 1],
         velocity[frame - 1],
@@ -54,7 +55,7 @@ def clip_rows(
         root.turn[frame],
         phase_change(labels["phase"])[frame],
         labels["contacts"][frame],
-        *trajectory(root, frame + 1, frame + 1, layout.offsets[layout.future :]),
+        *trajectory(path, here + 1, here + 1, layout.offsets[layout.future :]),
         position[frame],
         velocity[frame],
         rotation[frame],
@@ -119,8 +120,10 @@ def trajectory(root: RootFrames, frame: np.ndarray, seen_from: np.ndarray, offse
 
 
 def gait_columns(gait: Array, frame: np.ndarray, offsets: range) -> Array:
-    """(R, gaits * samples): for each gait (column of `gait`, (F, gaits)) its share at every sample."""
-    return np.swapaxes(gait[frame[:, None] + np.array(offsets)], 1, 2)
+    """(R, gaits * samples): for each gait (column of `gait`, (F, gaits)) its share at every sample, held
+    past the ends."""
+    at = np.clip(frame[:, None] + np.array(offsets), 0, len(gait) - 1)
+    return np.swapaxes(gait[at], 1, 2)
 
 
 def _table(columns: list[Array], rows: int) -> Array:
@@ -137,7 +140,6 @@ def _check(
     severity: Array,
     terrain: Arrays,
     frame: np.ndarray,
-    window: int,
 ) -> None:
     where = name
     lengths = {"labels": len(labels["phase"]), "severities": len(severity)}
@@ -153,6 +155,6 @@ def _check(
             "terrain was fitted to other cycles than the labels have",
             fix="Make both again from the same clip.",
         )
-    if len(frame) and (frame.min() < window or frame.max() + 1 + window > len(clip)):
-        outside = int(frame.min() if frame.min() < window else frame.max())
-        raise InputError(where, f"a cycle lies within {window} frames of an end of the clip", frame=outside)
+    if len(frame) and (frame.min() < 1 or frame.max() + 2 > len(clip)):
+        outside = int(frame.min() if frame.min() < 1 else frame.max())
+        raise InputError(where, "a cycle has no frame before it or none after it", frame=outside)

@@ -19,6 +19,7 @@ from hobble.labels.footfall import Swing, find_swings, landings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
 from hobble.labels.model import GAITS, LabelReport, Labels
 from hobble.labels.phase import (
+    MARGINS,
     dropped_frames,
     find_cycles,
     footsteps_of_phase,
@@ -55,11 +56,9 @@ def label_clip(
         shares = overwrite_crouch(shares, clip)
     known &= ~dropped_frames(footsteps, len(clip))
     zero = options["phase_zero"]
-    cycles, dropped = find_cycles(footsteps, len(clip), zero)
+    cycles, dropped = find_cycles(footsteps, len(clip), zero, options["margins"])
     if not len(cycles):
-        warnings.append(
-            "no locomotion cycle that starts 60 frames after the beginning and ends 62 before the end"
-        )
+        warnings.append(_no_cycle(options["margins"]))
     labels = Labels(
         contacts=foot_contacts(clip, options["contact_threshold"]),
         phase=phase if zero == "right" else (phase + 0.5) % 1.0,
@@ -73,16 +72,22 @@ def label_clip(
         phase_source="file" if {"phase", "footsteps"} & given.keys() else "automatic",
         gait_source="file" if {"gait", "gait_keys"} & given.keys() else "automatic",
         phase_zero=zero,
+        margins=options["margins"],
         cycles_dropped=dropped,
         warnings=tuple(warnings),
     )
     return labels, report
 
 
+def _no_cycle(margins: str) -> str:
+    where = f" with {MARGINS[margins]} frames of the clip before and {MARGINS[margins] + 1} after it"
+    return f"no locomotion cycle{where if margins == 'drop' else ''}"
+
+
 def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labels, LabelReport]:
     """Labels of the mirrored clip: contacts swapped, phase half a cycle on, cycles of the other foot."""
     footsteps = mirrored_footsteps(labels.footsteps)
-    cycles, dropped = find_cycles(footsteps, len(labels), report.phase_zero)
+    cycles, dropped = find_cycles(footsteps, len(labels), report.phase_zero, report.margins)
     mirrored = Labels(
         contacts=labels.contacts[:, [2, 3, 0, 1]],
         phase=(labels.phase + 0.5) % 1.0,

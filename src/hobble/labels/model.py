@@ -46,6 +46,7 @@ class LabelReport:
     phase_source: str
     gait_source: str
     phase_zero: str
+    margins: str
     cycles_dropped: int
     warnings: tuple[str, ...] = ()
 

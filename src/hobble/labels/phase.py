@@ -16,7 +16,7 @@ from hobble.labels.files import whole_frame
 BREAK = (np.nan, np.nan, 1.0)
 IDLE_RATE = 0.0017
 FASTEST = 0.25
-WINDOW = 60
+MARGINS = {"extend": 1, "drop": 60}  # frames that a clip has before a cycle; one more after it
 
 
 def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray]:
@@ -91,13 +91,15 @@ def rows_of_landings(events: list[tuple[float, int]]) -> Array:
     return np.array(rows, float).reshape(-1, 3)
 
 
-def find_cycles(footsteps: Array, frames: int, zero: str, window: int = WINDOW) -> tuple[np.ndarray, int]:
+def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple[np.ndarray, int]:
     """Cycles (C, 2) from one landing of the foot `zero` to its next, both frames included, and how many are
     left out.
 
-    Left out are those with a line marked as dropped, those that start before frame `window` and those that
-    end within `window` + 1 frames of the clip's end (`pfnn-facts`, Labels).
+    Left out are those with a line marked as dropped and those too near an end of the clip: with `margins`
+    "drop" as in the original (`pfnn-facts`, Labels) those that start before frame 60 or end within 61 frames
+    of the clip's end; with "extend" only what has no frame before it or not two after it.
     """
+    margin = MARGINS[margins]
     own = 0 if zero == "right" else 1
     kept, dropped = [], 0
     for line, following in itertools.pairwise(footsteps):
@@ -105,7 +107,7 @@ def find_cycles(footsteps: Array, frames: int, zero: str, window: int = WINDOW) 
         if not line[own] < between < following[own]:
             continue
         first, last = whole_frame(line[own]), whole_frame(following[own])
-        if line[2] or following[2] or first < window or frames - last <= window + 1:
+        if line[2] or following[2] or first < margin or frames - last <= margin + 1:
             dropped += 1
         else:
             kept.append((first, last))

@@ -14,7 +14,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
-from hobble.motion.root import RootFrames, root_frames
+from hobble.motion.root import RootFrames, continued, root_frames
 from hobble.terrain.feet import Feet, Mask, feet_of, held_up
 from hobble.terrain.ground import Ground, fit_cycle, flat_ground
 from hobble.terrain.patches import Patches
@@ -62,13 +62,13 @@ def clip_fits(
     """
     cycles, contacts = np.asarray(labels["cycles"], int), np.asarray(labels["contacts"], bool)
     window, step = database["window"], database["step"]
-    _check(clip, cycles, contacts, window)
+    _check(clip, cycles, contacts)
     if len(patches) < options["fits"]:
         raise InputError(
             "terrain.patches",
             f"{len(patches)} patches are fewer than the {options['fits']} fits of a cycle",
         )
-    root = root_frames(clip, database["facing_sigma"])
+    root = continued(root_frames(clip, database["facing_sigma"]), window)
     samples = sample_points(root, database["terrain_side"])
     feet = _feet(clip, contacts, cycles, window, ground == "flat", options)
     offsets = np.arange(-window, window, step)
@@ -76,9 +76,9 @@ def clip_fits(
     fitted, pictures = [], []
     shown = picture_cycles(len(cycles))
     for c, (start, end) in enumerate(cycles):
-        around = _around(start, end, window)
-        fit = _ground(feet, around, samples, patches, ground, options)
-        heights.append(heights_under(fit, samples, start, end, offsets))
+        around = _around(start, end, window, len(clip))
+        fit = _ground(feet, around, samples[:, window:-window], patches, ground, options)
+        heights.append(heights_under(fit, samples, start + window, end + window, offsets))
         fitted.append((fit, feet.soles[around], feet.contacts[around]))
         if c in shown and np.any(heights[-1]):
             pictures.append(picture_of(clip, c, fit, feet, around))
@@ -105,14 +105,14 @@ def _feet(
     """
     counted = np.zeros(len(clip), bool)
     for start, end in cycles:
-        counted[_around(start, end, window)] = True
+        counted[_around(start, end, window, len(clip))] = True
     names = ("heel_height", "toe_height", "sole", "deepest")
     feet = feet_of(clip, contacts, np.flatnonzero(counted), flat, **{n: options[n] for n in names})
     contacts = feet.contacts.copy()
     if flat and options["held_up"] is not None:
         contacts &= ~held_up(feet, options["held_up"])
     for start, end in cycles:
-        around = _around(start, end, window)
+        around = _around(start, end, window, len(clip))
         if not contacts[around].any():
             log.warning("%s: no foot stands in frames %d to %d; the lowest count", clip.name, start, end)
             height = feet.soles[around][..., 1]
@@ -120,9 +120,10 @@ def _feet(
     return replace(feet, contacts=contacts)
 
 
-def _around(start: int, end: int, window: int) -> slice:
-    """The frames that a cycle is fitted over: its own, both ends included, and as many before as after."""
-    return slice(start - window, end + window + 1)
+def _around(start: int, end: int, window: int, frames: int) -> slice:
+    """The frames that a cycle is fitted over: its own, both ends included, and a window to each side, of
+    those that the clip has."""
+    return slice(max(start - window, 0), min(end + window + 1, frames))
 
 
 def _ground(
@@ -177,7 +178,7 @@ def _rows(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def _check(clip: Clip, cycles: np.ndarray, contacts: Mask, window: int) -> None:
+def _check(clip: Clip, cycles: np.ndarray, contacts: Mask) -> None:
     if contacts.shape != (len(clip), 4):
         raise InputError(
             clip.name,
@@ -185,11 +186,12 @@ def _check(clip: Clip, cycles: np.ndarray, contacts: Mask, window: int) -> None:
             fix="Make both again from the same clip.",
         )
     for start, end in cycles:
-        if not window <= start < end < len(clip) - window:
+        if not 0 <= start < end < len(clip):
             raise InputError(
                 clip.name,
-                f"the cycle of frames {start} to {end} has no {window} frames to each side",
+                f"the cycle of frames {start} to {end} does not lie in the clip's {len(clip)}",
                 frame=int(start),
+                fix="Make both again from the same clip.",
             )
 
 
