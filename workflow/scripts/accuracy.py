@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-import yaml
-
 from hobble.core.files import write_json, write_text
+from hobble.core.untrusted import read_yaml
 from hobble.evaluation.accuracy import equivalent_joints, measure, to_csv
 from hobble.workflow.job import job
 
@@ -12,7 +11,7 @@ with job(snakemake):
     equivalents = None
     if snakemake.params.joints == "equivalent":
         skeleton = snakemake.input.skeleton
-        equivalents = equivalent_joints(yaml.safe_load(Path(skeleton).read_text(encoding="utf-8")))
+        equivalents = equivalent_joints(read_yaml(skeleton))
     result = measure(
         snakemake.input.weights,
         {Path(file).stem: file for file in snakemake.input.clips},

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-import yaml
-
+from hobble.core.untrusted import read_yaml
 from hobble.synthetic.clip import write_clip
 from hobble.workflow.job import job
 
@@ -11,7 +10,7 @@ with job(snakemake):
     source = Path(snakemake.input.skeleton)
     write_clip(
         snakemake.params.clip,
-        {"name": source.stem, **yaml.safe_load(source.read_text(encoding="utf-8"))},
+        {"name": source.stem, **read_yaml(source)},
         snakemake.params.frames,
         snakemake.params.recipe,
         snakemake.params.injured,

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import copy
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
 from pydantic import BaseModel, ValidationError
 
 from hobble.config.models import Configuration, Dataset, SkeletonFile
+from hobble.core import untrusted
 from hobble.core.errors import HobbleError, InputError
 
 Model = TypeVar("Model", bound=BaseModel)
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")  # so that no name leads out of its folder
+NAMES = "Names are made of letters, digits, dots, dashes and underscores."
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
@@ -27,14 +30,10 @@ def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 def read_yaml(path: Path) -> dict[str, Any]:
     """Read a YAML mapping; raises InputError with the line where it does not parse."""
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not path.is_file():
         there = ", ".join(sorted(p.stem for p in path.parent.glob("*.yaml"))) or "none"
-        raise InputError(path, "no such file", fix=f"There are: {there}.") from None
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else None
-        raise InputError(path, f"not valid YAML: {error.problem}", line=line) from None
+        raise InputError(path, "no such file", fix=f"There are: {there}.")
+    data = untrusted.read_yaml(path)
     if data is None:
         return {}
     if not isinstance(data, dict):
@@ -48,6 +47,8 @@ def layers(folder: Path, name: str) -> tuple[dict[str, Any], list[Path]]:
     chain: list[dict[str, Any]] = []
     next_name: str | None = name
     while next_name is not None:
+        if not isinstance(next_name, str) or not NAME.fullmatch(next_name):
+            raise InputError(files[-1] if files else folder, f"{next_name!r:.80} is not a name", fix=NAMES)
         path = folder / f"{next_name}.yaml"
         if path in files:
             raise InputError(path, f"extends itself by way of {' -> '.join(p.stem for p in files)}")

@@ -44,7 +44,7 @@ class Dataset(s.Section):
     extends: Name | None = None
     skeleton: Name
     source: Name | None = Field(None, description="a data set whose source files this one reads")
-    folder: str | None = Field(None, description="where the BVH files lie, inside the mocap folder")
+    folder: s.Inside | None = Field(None, description="where the BVH files lie, inside the mocap folder")
     clips: dict[Name, ClipEntry | None] = Field(
         default_factory=dict, description="clips by name; none: every .bvh in the folder"
     )

@@ -7,9 +7,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import yaml
-
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.untrusted import read_yaml
 from hobble.injury.table import write_statuses
 
 
@@ -31,10 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _links(skeleton: Path) -> list[str]:
     try:
-        links = yaml.safe_load(skeleton.read_text(encoding="utf-8"))["links"]
-    except OSError as error:
-        raise InputError(skeleton, f"cannot be read: {error.strerror}") from None
-    except (yaml.YAMLError, KeyError, TypeError):
+        links = read_yaml(skeleton)["links"]
+    except (KeyError, TypeError):
         raise InputError(skeleton, "does not list `links`") from None
     return [f"{a}-{b}" for a, b in links]
 

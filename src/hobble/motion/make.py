@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from hobble.motion.axes import Axes, straighten, turned
 from hobble.motion.decode import Decoded, decode, frame_rate
 from hobble.motion.defects import flips, repair
 from hobble.motion.loop import loop_clip
-from hobble.motion.read import Bvh, read_bvh
+from hobble.motion.read import MOST_POSES, Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import Match, Target, clean_names, leg_length, load_skeleton, match_rig, unit_of
@@ -65,6 +64,7 @@ def make_clip(
     target = load_skeleton(skeleton, skeleton_name)
     file = read_bvh(bvh)
     source = load_source(file, target, maps, options)
+    _check_length(file, source.clip, target.skeleton, options)
     resampled = resample(source.clip, options["fps"])
     fitted = fit_skeleton(resampled, source.match, target.skeleton, options["proportions"])
     made, said, loops = fitted.clip, source.repairs + fitted.repairs, options["loops"]
@@ -76,6 +76,18 @@ def make_clip(
     made = replace(made, name=clip)
     extra = {"loops": loops, "cycle_frames": len(made) // loops, "scale": fitted.scale}
     return made, _report(file, source, made) | extra | {"repairs": said, "notes": source.notes}
+
+
+def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: Mapping[str, Any]) -> None:
+    """Refuse a clip that at the frame rate asked for would take more memory than any real one."""
+    frames = len(clip) / clip.fps * options["fps"] * options["loops"]
+    if frames * max(len(clip.skeleton.joints), len(target.joints)) > MOST_POSES:
+        raise InputError(
+            file.path,
+            f"{len(clip)} frames at {clip.fps:g} a second become {frames:.0f} at {options['fps']:g}: more "
+            f"than {MOST_POSES} poses of a joint",
+            fix="Cut it into shorter clips, or give its source_fps.",
+        )
 
 
 def first_facing(clip: Clip) -> float:
@@ -190,12 +202,11 @@ def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
 
 
 def _report(file: Bvh, source: Source, made: Clip) -> dict[str, Any]:
-    data = file.path.read_bytes()
     return {
         "clip": made.name,
         "source": file.path.name,
-        "sha256": hashlib.sha256(data).hexdigest(),
-        "bytes": len(data),
+        "sha256": file.sha256,
+        "bytes": file.bytes,
         "source_frames": len(file),
         "source_start": source.first_frame,
         "source_fps": source.clip.fps,

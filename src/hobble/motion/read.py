@@ -6,6 +6,7 @@ names with spaces or prefixes, braces anywhere. What the numbers mean is the wor
 
 from __future__ import annotations
 
+import hashlib
 import io
 import re
 from dataclasses import dataclass, field, replace
@@ -16,8 +17,13 @@ import numpy as np
 
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
+from hobble.core.untrusted import read_bytes
 
+# What a file may ask for. The largest figure known has 191 joints; an hour of it at 60 Hz is 41 million poses
+# of a joint, which as rotations take 1.3 GB.
 MOST_JOINTS = 4096
+MOST_BYTES = 1 << 30
+MOST_POSES = 50_000_000
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 _EXPORT = "Export the clip again."
 
@@ -33,6 +39,7 @@ class Bvh:
     frame_time: seconds, with its digits as written in frame_time_text.
     end_sites: joint -> offsets of its end sites.
     declared: the number of frames that the file declares; F itself may be one off (see `read_bvh`).
+    sha256, bytes: of the file as it was read.
     """
 
     path: Path
@@ -45,6 +52,8 @@ class Bvh:
     frame_time_text: str
     end_sites: dict[str, list[tuple[float, float, float]]] = field(repr=False)
     declared: int
+    sha256: str = ""
+    bytes: int = 0
 
     def __len__(self) -> int:
         return len(self.values)
@@ -68,19 +77,15 @@ def read_bvh(path: str | Path) -> Bvh:
     more than it can hold.
     """
     path = Path(path)
-    data = _bytes(path)
+    raw = read_bytes(path, MOST_BYTES)
+    data = _text(path, raw)
     split = _motion_at(path, data)
     header = _hierarchy(path, data[:split])
-    return _motion(path, data, split, header)
+    bvh = _motion(path, data, split, header)
+    return replace(bvh, sha256=hashlib.sha256(raw).hexdigest(), bytes=len(raw))
 
 
-def _bytes(path: Path) -> bytes:
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(path, "no such file") from None
-    except OSError as error:
-        raise InputError(path, f"cannot be read: {error.strerror}") from None
+def _text(path: Path, data: bytes) -> bytes:
     if not data.strip():
         raise InputError(path, "the file is empty", fix=_EXPORT)
     if data.startswith(b"Kaydara FBX"):
@@ -238,7 +243,7 @@ def _motion(path: Path, data: bytes, at: int, header: _Header) -> Bvh:
     body = at + 6 + max(at_frames, at_time)
     width = sum(len(c) for c in header.channels)
     try:
-        declared = int(frames_text)
+        declared = int(frames_text.replace("_", "x"))
     except ValueError:
         raise InputError(path, f"Frames: {frames_text[:40]!r} is not a number", line=line_frames) from None
     try:
@@ -257,6 +262,14 @@ def _motion(path: Path, data: bytes, at: int, header: _Header) -> Bvh:
             f"truncated: declares {declared} frames of {width} values, more than the file can hold",
             line=line_frames,
             fix=_EXPORT,
+        )
+    if declared * len(header.names) > MOST_POSES:
+        raise InputError(
+            path,
+            f"declares {declared} frames of {len(header.names)} joints: more than {MOST_POSES} poses of a "
+            "joint",
+            line=line_frames,
+            fix="Cut it into shorter clips.",
         )
     first = max(line_frames, line_time) + 1
     values = _values(path, data, body, width, declared, first)

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
+from hobble.core.untrusted import read_yaml
 
 # Centimetres per unit of the file; the CMU files count in inches / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
@@ -47,14 +47,13 @@ class Match:
 
 def load_skeleton(path: str | Path, name: str | None = None) -> Target:
     """Read a skeleton file (`config/skeletons/<name>.yaml`, validated when the workflow starts)."""
-    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    if not Path(path).is_file():
+        raise InputError(path, "no such skeleton file")
+    data: Any = read_yaml(path)
     try:
-        data: dict[str, Any] = yaml.load(Path(path).read_text(encoding="utf-8"), loader)
         maps = data.pop("maps", None) or {}
         return Target(Skeleton.from_dict({**data, "name": name or Path(path).stem}), maps)
-    except FileNotFoundError:
-        raise InputError(path, "no such skeleton file") from None
-    except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(path, f"not a skeleton file: {error}") from None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -10,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from hobble.core.errors import InputError
-from hobble.core.files import read_json
+from hobble.core.files import load_npz, read_json
+from hobble.core.untrusted import read_text, read_yaml
 
 PUBLISHED = Path(__file__).parents[1] / "evaluation" / "published.yaml"
 COUNTED = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
@@ -79,7 +80,7 @@ def gather(
         dataset=dataset,
         title=title,
         splits=dict(splits),
-        resolved=yaml.safe_load(Path(configuration).read_text(encoding="utf-8")) or {},
+        resolved=read_yaml(configuration) or {},
         accuracy=read_json(accuracy),
         responsivity=read_json(responsivity),
         injury=read_json(injury),
@@ -90,17 +91,16 @@ def gather(
         labels=[read_json(path) for path in labels],
         injuries=[read_json(path) for path in injuries],
         terrain=list(terrain),
-        published=yaml.safe_load(PUBLISHED.read_text(encoding="utf-8")),
+        published=read_yaml(PUBLISHED),
     )
 
 
 def read_history(path: str | Path) -> dict[str, list[float | None]]:
     """Columns of a CSV of numbers; an empty cell is None. Raises InputError for anything else."""
     columns: dict[str, list[float | None]] = {}
-    with open(path, encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            for key, text in row.items():
-                columns.setdefault(key, []).append(_cell(path, key, text))
+    for row in csv.DictReader(io.StringIO(read_text(path), newline="")):
+        for key, text in row.items():
+            columns.setdefault(key, []).append(_cell(path, key, text))
     return columns
 
 
@@ -116,12 +116,11 @@ def _cell(path: str | Path, key: str, text: str | None) -> float | None:
 
 def describe_network(path: str | Path) -> dict[str, Any]:
     """Layer sizes, control points and parameters of a weights file; its skeleton and links."""
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            shapes = {key: file[key].shape for key in file.files if key[:1] in "Wb" and key[1:].isdigit()}
-            meta = json.loads(str(file["meta"])) if "meta" in file.files else {}
-    except (OSError, ValueError) as error:
-        raise InputError(path, f"not a network's weights ({error})", fix="Train again.") from error
+    arrays = load_npz(path)
+    shapes = {key: array.shape for key, array in arrays.items() if key[:1] in "Wb" and key[1:].isdigit()}
+    if "W0" not in shapes:
+        raise InputError(path, "not a network's weights", fix="Train again.")
+    meta = json.loads(str(arrays["meta"])) if "meta" in arrays else {}
     layers = sorted(int(key[1:]) for key in shapes if key[0] == "W")
     sizes = [shapes[f"W{layers[0]}"][2]] + [shapes[f"W{i}"][1] for i in layers]
     return {

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.report.body import capsules
 from hobble.report.scenes import packed
 
 STEPS_PER_CM = 10  # everything is kept in 16-bit steps of a millimetre
 MOST = 24
+PARTS = ("cycle", "x", "z", "ground", "soles", "contacts", "pose")
 
 
 def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) -> dict[str, Any]:
@@ -26,17 +28,13 @@ def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) ->
     names = list(joints)
     parents = [names.index(j["parent"]) if j["parent"] is not None else -1 for j in joints.values()]
     for path in paths:
-        with np.load(path, allow_pickle=False) as data:
-            count = int(data["pictures"]) if "pictures" in data.files else 0
-            for k in range(min(count, MOST - len(pictures))):
-                part = {
-                    key: data[f"picture{k}_{key}"]
-                    for key in ("cycle", "x", "z", "ground", "soles", "contacts", "pose")
-                }
-                if part["pose"].shape[1] == len(names):
-                    pictures.append(
-                        {"name": f"{Path(path).stem}, cycle {int(part['cycle']) + 1}", **_packed(part)}
-                    )
+        data = load_npz(path)
+        count = int(data.get("pictures", 0))
+        for k in range(min(count, MOST - len(pictures))):
+            part = {key: data[f"picture{k}_{key}"] for key in PARTS}
+            if part["pose"].shape[1] == len(names):
+                name = f"{Path(path).stem}, cycle {int(part['cycle']) + 1}"
+                pictures.append({"name": name, **_packed(part)})
     shapes = capsules(names, parents, skeleton.get("roles") or {}) if names else []
     return {"joints": len(names), "capsules": shapes, "pictures": pictures}
 

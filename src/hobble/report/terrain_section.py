@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.errors import InputError
+from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.tables import Column, Table
@@ -43,16 +44,15 @@ class Fits:
 def read_fits(path: str | Path) -> Fits:
     """Read `terrain/clips/<clip>.npz`. Raises InputError where an array is missing or counts disagree."""
     try:
-        with np.load(path, allow_pickle=False) as data:
-            fits, frame = data["fits"], data["frame"]
-            heights = data["heights"]
-            present = heights.shape[1] // 3 + heights.shape[1] // 6
-            least = int(fits.min()) if len(fits) else 1
-            first = np.concatenate([[0], np.cumsum(fits)[:-1]]).astype(int) if len(fits) else np.zeros(0, int)
-            rows = first[:, None] + np.arange(least)
-            profile = heights[:, present][rows[:LONGEST:STRIDE]] if len(fits) else np.zeros((0, 1))
-            return Fits(Path(path).stem, data["foot_error"], data["error"], frame[:LONGEST:STRIDE], profile)
-    except (OSError, ValueError, KeyError, IndexError) as error:
+        data = load_npz(path, ("fits", "frame", "heights", "foot_error", "error"))
+        fits, frame, heights = data["fits"], data["frame"], data["heights"]
+        present = heights.shape[1] // 3 + heights.shape[1] // 6
+        least = int(fits.min()) if len(fits) else 1
+        first = np.concatenate([[0], np.cumsum(fits)[:-1]]).astype(int) if len(fits) else np.zeros(0, int)
+        rows = first[:, None] + np.arange(least)
+        profile = heights[:, present][rows[:LONGEST:STRIDE]] if len(fits) else np.zeros((0, 1))
+        return Fits(Path(path).stem, data["foot_error"], data["error"], frame[:LONGEST:STRIDE], profile)
+    except (ValueError, IndexError) as error:
         raise InputError(
             path, f"not the terrain of a clip ({error})", fix="Delete it; it is made again."
         ) from error

@@ -5,6 +5,8 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import os
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,10 +15,12 @@ from hobble.config.load import Catalogue
 from hobble.config.models import ClipEntry, Configuration, Dataset
 from hobble.config.sections import COMPARED
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.untrusted import MOST_TEXT, read_bytes
 from hobble.workflow.fingerprint import fingerprint
 
 DATASETS = "results/datasets"
 MIRROR = "_mirror"
+SPEAKABLE = re.compile(r"(?![.\s])[^{}<>\\]*(?<!\s)")  # Snakemake fills in {x} and <x>
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 STAGES = ("synthetic", "motion", "labels", "injury", "terrain", "database")
 COMPARE = "compare"
@@ -124,10 +128,13 @@ class Project:
         if model.clips:
             found = {name: entry or ClipEntry() for name, entry in model.clips.items()}
         else:
-            names = sorted(path.stem for path in self.folder(dataset).glob("*.bvh"))
+            folder = self.folder(dataset)
+            names = sorted(path.stem for path in folder.glob("*.bvh"))
+            for name in names:
+                _check_name(folder, name)
             found = {name: ClipEntry() for name in names if not name.endswith(MIRROR)}
             if not found:
-                raise InputError(self.folder(dataset), "no .bvh files here", fix="Put clips there.")
+                raise InputError(folder, "no .bvh files here", fix="Put clips there.")
         made = [name for name in found if name.endswith(MIRROR)]
         if made:
             raise HobbleError(
@@ -147,6 +154,8 @@ class Project:
                 f"no such folder, but data set {dataset} reads its clips there",
                 fix="Put the clips there, or name the folder that holds it with --config mocap=FOLDER.",
             )
+        if not os.access(path, os.R_OK | os.X_OK):
+            raise InputError(path, "no permission to read this folder", fix="Check who owns it.")
         return path
 
     def entry(self, dataset: str, clip: str) -> ClipEntry:
@@ -186,7 +195,7 @@ class Project:
             return True
         if self.dataset(dataset).synthetic is not None:
             return False
-        return any("[" in Path(f).read_text(errors="replace") for f in self.status_files(dataset, clip))
+        return any(b"[" in read_bytes(file, MOST_TEXT) for file in self.status_files(dataset, clip))
 
     def selected(self, dataset: str, selection: str) -> dict[str, str]:
         """Clip -> "train" or "held_out", of the `healthy` or of `all` clips; mirrors go with originals."""
@@ -320,3 +329,14 @@ class Project:
     def code(self, script: str) -> str:
         """Fingerprint of a rule's script and of all it imports from the package."""
         return fingerprint(self.base / "workflow" / "scripts" / f"{script}.py", self.base / "src")
+
+
+def _check_name(folder: Path, clip: str) -> None:
+    """Clips may be called anything that can stand in a path, a line of a log and a wildcard of Snakemake."""
+    if not clip.isprintable() or not SPEAKABLE.fullmatch(clip):
+        raise InputError(
+            folder,
+            f"a clip is called {clip!a:.80}",
+            fix="Rename it: no control characters, braces, angle brackets or backslashes, no dot or space "
+            "first and no space last.",
+        )
