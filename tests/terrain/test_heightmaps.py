@@ -83,7 +83,7 @@ BAD = {
     "word.txt": (b"1 2 3\n4 five 6\n", "line 2: not a number: 'five'"),
     "ragged.txt": (b"1 2 3\n4 5 6\n7 8\n", "line 3: 2 heights where the rows above have 3"),
     "row.txt": (b"1 2 3\n", "has rows and columns"),
-    "binary.txt": (bytes(range(256)), "not text"),
+    "binary.txt": (bytes(range(256)), "not a text"),
     "nan.txt": (b"nan nan\nnan nan\n", "no finite height"),
     "not.png": (b"\x89PNG\r\n\x1a\n" + b"rubbish" * 9, "not an image"),
     "not.npy": (b"rubbish", "not an array file"),

@@ -30,6 +30,7 @@ def severity_matrix(status: Status, links: Sequence[str]) -> Array:
 def odd_ranges(status: Status, path: str | Path) -> list[str]:
     """A sentence for each range that starts at 0, leaves the clip, or changes what an earlier line says."""
     said = []
+    overlaps = _overlaps(status.spells)
     for i, spell in enumerate(status.spells):
         place = f"{Path(path).name}, line {spell.line}: the range {spell.first}-{spell.last}"
         if spell.first > status.frames:
@@ -38,16 +39,26 @@ def odd_ranges(status: Status, path: str | Path) -> list[str]:
             said.append(f"{place} goes past the last of {status.frames} frames; it was cut there.")
         if spell.first == 0:
             said.append(f"{place} starts at 0; frames count from 1, so it was taken to start there.")
-        for earlier in status.spells[:i]:
+        for earlier in overlaps.get(i, ()):
             if both := _contested(earlier, spell):
                 said.append(f"{place} overlaps that of line {earlier.line}; the later one counts for {both}.")
     return said
 
 
+def _overlaps(spells: Sequence[Spell]) -> dict[int, list[Spell]]:
+    """For each spell the earlier ones that share frames with it, in their order."""
+    found: dict[int, list[int]] = {}
+    going: list[int] = []
+    for i in sorted(range(len(spells)), key=lambda i: spells[i].first):
+        going = [j for j in going if spells[j].last >= spells[i].first]
+        for j in going:
+            found.setdefault(max(i, j), []).append(min(i, j))
+        going.append(i)
+    return {i: [spells[j] for j in sorted(others)] for i, others in found.items()}
+
+
 def _contested(earlier: Spell, later: Spell) -> str:
-    """The links for which two spells say different things of the same frames, with commas between."""
-    if later.first > earlier.last or earlier.first > later.last:
-        return ""
+    """The links of which two spells that share frames say different things, with commas between."""
     said = dict(earlier.links)
     return ", ".join(link for link, severity in later.links if said.get(link, severity) != severity)
 

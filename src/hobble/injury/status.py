@@ -20,9 +20,11 @@ from pathlib import Path
 
 from hobble.core.errors import InputError
 from hobble.core.files import write_text
+from hobble.core.untrusted import read_text
 
 HIGHEST = 10.0
-RANGE = re.compile(r"(\d+)\s*-\s*(\d+)\s+(.*)")
+MOST_SPELLS = 20_000  # a line for every frame of three minutes at 120 Hz
+RANGE = re.compile(r"(\d{1,12})\s*-\s*(\d{1,12})\s+(.*)")
 LINK = re.compile(r"\s*(.+?)\s*\[\s*([^\]]*?)\s*\]\s*")
 
 
@@ -62,8 +64,10 @@ def read_status(path: str | Path, links: Sequence[str]) -> Status:
             continue
         if frames is None:
             frames = _frame_count(path, number, line)
-        else:
+        elif len(spells) < MOST_SPELLS:
             spells.append(_spell(path, number, line, links))
+        else:
+            raise InputError(path, f"more than {MOST_SPELLS} ranges", line=number)
     if frames is None:
         raise InputError(path, "is empty", fix="Its first line is `frames:` and the number of frames.")
     return Status(frames, tuple(spells))
@@ -105,18 +109,8 @@ def write_status(path: str | Path, status: Status) -> None:
     write_text(path, format_status(status))
 
 
-def read_text(path: Path) -> str:
-    """The whole of a text file, without a byte order mark; raises InputError where it is none."""
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(path, "is not a text file") from None
-    except OSError as error:
-        raise InputError(path, f"cannot be read: {error.strerror}") from None
-
-
 def _frame_count(path: Path, number: int, line: str) -> int:
-    match = re.fullmatch(r"frames\s*:\s*(\d+)", line, re.IGNORECASE)
+    match = re.fullmatch(r"frames\s*:\s*(\d{1,12})", line, re.IGNORECASE)
     if match is None or int(match[1]) < 1:
         raise InputError(
             path, f"{line[:60]!r} is not a frame count", line=number, fix="The first line reads `frames:225`."

@@ -12,13 +12,16 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from hobble.core.errors import InputError
-from hobble.injury.status import Spell, Status, check_link, check_severity, read_text, write_status
+from hobble.core.untrusted import read_text
+from hobble.injury.status import Spell, Status, check_link, check_severity, write_status
 
+COUNT = re.compile(r"\d{1,12}")
 COLUMNS = ("clip", "link", "severity", "from", "to")
 
 
@@ -77,7 +80,7 @@ def bvh_frames(path: Path) -> int:
         with open(path, encoding="utf-8", errors="replace") as file:
             for line in file:
                 key, _, value = line.partition(":")
-                if key.strip().lower() == "frames" and value.strip().isdigit():
+                if key.strip().lower() == "frames" and COUNT.fullmatch(value.strip()):
                     return int(value)
     except OSError as error:
         raise InputError(path, f"cannot be read: {error.strerror}") from None
@@ -92,7 +95,7 @@ def write_statuses(table: str | Path, folder: str | Path, links: Sequence[str]) 
     rows = read_table(table, links)
     folder = Path(folder)
     clips = dict.fromkeys(row.clip for row in rows)
-    files = {clip: folder / f"{clip}.bvh" for clip in clips}
+    files = {clip: folder / f"{clip}.bvh" for clip in clips if Path(clip).name == clip}
     frames = {clip: bvh_frames(file) for clip, file in files.items() if file.is_file()}
     written = []
     for clip, status in statuses(rows, frames, table).items():
@@ -119,6 +122,6 @@ def _row(path: Path, line: int, values: Mapping[str, str | None], links: Sequenc
 def _frame(path: Path, line: int, text: str) -> int | None:
     if not text:
         return None
-    if not text.isdigit() or int(text) < 1:
+    if not COUNT.fullmatch(text) or int(text) < 1:
         raise InputError(path, f"{text!r} is not a frame number; they count from 1", line=line)
     return int(text)

@@ -15,6 +15,7 @@ import numpy as np
 
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
+from hobble.core.untrusted import read_text
 from hobble.labels.model import GAITS
 
 FILE_GAITS = ("stand", "walk", "jog", "run", "crouch", "jump", "crawl", "unknown")
@@ -135,13 +136,7 @@ def read_gait_keys(path: Path, time: SourceTime, frames: int) -> Array:
 
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Number (from 1) and words of each line that is not empty."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(path, "is not a text file") from None
-    except OSError as error:
-        raise InputError(path, f"cannot be read: {error.strerror}") from None
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(read_text(path).splitlines(), 1):
         if words := line.split():
             yield number, words
 

@@ -205,7 +205,7 @@ class _Hierarchy:
         if not self.open or self.open[-1] < 0:
             self.fail("CHANNELS outside of any joint")
         count, *words = rest.split()[:100] or [""]
-        if not count.isdigit() or int(count) != len(words):
+        if not count.isdecimal() or int(count[:9]) != len(words):
             self.fail(f"CHANNELS declares {count[:12] or 'nothing'} and names {len(words)}")
         known = {name.lower(): name for name in CHANNELS}
         for word in words:

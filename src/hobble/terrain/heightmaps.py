@@ -12,7 +12,11 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
+from hobble.core.untrusted import read_text
 from hobble.terrain.generate import generate
+
+MOST_CELLS = 1 << 26  # of a map: 8192 squared, half a gigabyte; 322 m a side at 3.9 cm a cell
+MOST_TEXT = 1 << 28  # of a map as text, which takes some eight times that while it is read
 
 
 @dataclass(frozen=True)
@@ -94,13 +98,7 @@ def read_heights(path: str | Path) -> Array:
 
 def _text(path: Path) -> Array:
     rows: list[list[float]] = []
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except UnicodeDecodeError as error:
-        raise InputError(
-            path, "not text", fix="Heightmaps are text, .png, .tif, .npy or .npz files."
-        ) from error
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(read_text(path, MOST_TEXT).splitlines(), 1):
         words = line.split("#")[0].replace(",", " ").replace(";", " ").split()
         if not words:
             continue
@@ -120,8 +118,12 @@ def _text(path: Path) -> Array:
 
 def _npy(path: Path) -> Array:
     try:
-        return np.load(path, allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
+        # Mapped, so that a header that promises more than the file holds takes no memory.
+        heights = np.load(path, mmap_mode="r", allow_pickle=False)
+        if heights.size > MOST_CELLS:
+            raise InputError(path, f"{heights.size} heights, more than {MOST_CELLS}")
+        return np.array(heights)
+    except (ValueError, OSError, EOFError, AttributeError, TypeError) as error:
         raise InputError(path, f"not an array file ({error})") from error
 
 
@@ -142,7 +144,9 @@ def _image(path: Path) -> Array:
 
     try:
         with Image.open(path) as image:
+            if image.width * image.height > MOST_CELLS:
+                raise InputError(path, f"{image.width} x {image.height} cells, more than {MOST_CELLS}")
             grey = image if image.mode in ("L", "I", "F", "I;16", "I;16B", "1") else image.convert("L")
             return np.asarray(grey, float)
-    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+    except (UnidentifiedImageError, Image.DecompressionBombError, OSError, SyntaxError, ValueError) as error:
         raise InputError(path, f"not an image that can be read ({error})") from error
