@@ -14,6 +14,7 @@ from hobble.core.quat import Array
 from hobble.terrain.feet import Mask
 
 STEEPNESS = 2.0  # cm of height per cm: the walls of what is dug out
+MOST_TURNS = 50  # in which what a surface leaves is taken up
 
 
 @dataclass(frozen=True)
@@ -75,18 +76,38 @@ class Bend:
         return distance_sum(*_columns(points), *_columns(self.places), self.weights / self.spread)
 
 
-def bends(points: Stances, residual: Array, smoothing: float) -> list[Bend]:
+def bends(points: Stances, residual: Array, smoothing: float, most: float | None = None) -> list[Bend]:
     """The surfaces through each row of `residual` (K, N) at N points, regularised by `smoothing`.
 
     A point that counts m times has a diagonal of smoothing / m, and weighs m in the mean distance: that is
-    exactly what m points at one place come to.
+    exactly what m points at one place come to. most: if more than this is left at the points on average (cm),
+    what is left gets a surface too, and so on, as under feet that stand half a metre beside a beam.
     """
     apart = distances(points.place, points.place)
     spread = float(points.count @ apart @ points.count / points.count.sum() ** 2)
     if spread < 1e-6:
         return [Bend(points.place[:1], np.zeros(1), 1.0)] * len(residual)
     matrix = apart / spread - np.diag(smoothing / points.count)
-    return [Bend(points.place, w, spread) for w in np.linalg.solve(matrix, residual.T).T]
+    weights = np.linalg.solve(matrix, residual.T).T
+    if most is not None:
+        weights += _repeated(matrix, weights, smoothing / points.count, points.count, most)
+    return [Bend(points.place, w, spread) for w in weights]
+
+
+def _repeated(matrix: Array, weights: Array, diagonal: Array, count: Array, most: float) -> Array:
+    """What to add to the weights (K, N) of surfaces that leave more than `most` at their points.
+
+    What a surface leaves is its weights times what smoothing took off the matrix's diagonal; each turn leaves
+    less.
+    """
+    more, left = np.zeros_like(weights), -diagonal * weights
+    for _ in range(MOST_TURNS):
+        left[np.abs(left) @ count / count.sum() <= most] = 0
+        if not left.any():
+            break
+        again = np.linalg.solve(matrix, left.T).T
+        more, left = more + again, -diagonal * again
+    return more
 
 
 @dataclass(frozen=True)

@@ -109,18 +109,22 @@ def flat_ground(
 
 
 def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None) -> Ground:
-    """Add the surface of what is left between the ground and the feet in contact.
+    """Add the surface of what is left between the ground and the feet in contact, in as many turns as it
+    takes to leave no more than half of `deepest` on average.
 
     Feet that are then below the ground (by more than half of `deepest`) join those points, and the surface is
     made again; where it still covers a foot by more than `deepest` it is dug out.
     """
     standing = stances(soles, contacts, PIECE)
     residual = standing.height - plain.at(standing.place)
-    ground = replace(plain, surfaces=bends(standing, residual, smoothing))
+    most = None if deepest is None else deepest / 2
+    ground = replace(plain, surfaces=bends(standing, residual, smoothing, most))
     if deepest is None:
         return ground
     surfaces = [
-        _joined(plain, k, standing, stances(soles, c & ~contacts, FINE_PIECE), smoothing) if c.any() else same
+        _joined(plain, k, standing, stances(soles, c & ~contacts, FINE_PIECE), smoothing, most)
+        if c.any()
+        else same
         for k, (c, same) in enumerate(zip(ground.above(soles) > deepest / 2, ground.surfaces, strict=True))
     ]
     ground = replace(plain, surfaces=surfaces)
@@ -132,11 +136,13 @@ def _dug(ground: Ground, soles: Array, standing: Stances, deepest: float) -> lis
     return [pits(soles[covered], standing, deepest / 2) for covered in ground.above(soles) > deepest]
 
 
-def _joined(plain: Ground, k: int, standing: Stances, covered: Stances, smoothing: float) -> Bend:
+def _joined(
+    plain: Ground, k: int, standing: Stances, covered: Stances, smoothing: float, most: float | None
+) -> Bend:
     """The surface of fit k through the feet in contact and through those that it covered."""
     points = together(standing, covered)
     residual = points.height - plain.at(points.place)[k]
-    return bends(points, residual[None], smoothing)[0]
+    return bends(points, residual[None], smoothing, most)[0]
 
 
 def beside_path(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:

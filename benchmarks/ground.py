@@ -1,0 +1,155 @@
+"""Whether the ground is honest: feet in contact on it, no foot in it, for every clip of whole data sets.
+
+    python benchmarks/ground.py [DATASET ...] [--mocap FOLDER] [--kinds flat rocky jumpy beam] [--workers 2]
+
+Each clip and its mirror is made, labelled and fitted as the workflow does it, on the kind of ground that its
+data set names or, with --kinds, on those, whatever it walked on. Printed for each data set and kind: the
+worst mean distance of feet in contact from their ground over a clip (goal: 1 cm) and over a single fit of a
+cycle, and how far the deepest foot is below it (goal: 1 cm); then each clip that misses a goal.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+import yaml
+
+from hobble.core.clip import Clip
+from hobble.core.errors import HobbleError
+from hobble.labels.label import label_clip, mirror_labels
+from hobble.motion.make import make_clip
+from hobble.motion.mirror import mirror_clip
+from hobble.synthetic.clip import write_clip
+from hobble.terrain.clip_fits import clip_fits
+from hobble.terrain.heightmaps import heightmaps
+from hobble.terrain.patches import Patches, draw_patches
+from hobble.workflow.project import Project
+
+BASE = Path(__file__).resolve().parents[1]
+GOAL = 1.0  # cm
+
+
+class Job(NamedTuple):
+    """One clip of a data set on some kinds of ground; no kinds: the one that it names."""
+
+    dataset: str
+    clip: str
+    kinds: tuple[str, ...]
+    mocap: Path
+
+
+class Found(NamedTuple):
+    """What the fits of a clip on one kind of ground came to, cm."""
+
+    dataset: str
+    clip: str
+    kind: str
+    cycles: int
+    mean: float
+    worst_fit: float
+    below: float
+
+
+@cache
+def patches_of(dataset: str, mocap: Path) -> Patches:
+    """The patches of a data set, drawn once a process."""
+    project = Project(BASE, {"mocap": str(mocap)})
+    options = project.options(dataset, "terrain")
+    scales = {name: options[name] for name in ("cell", "height_scale")}
+    maps = heightmaps(options["heightmaps"], project.heightmap_files(dataset), **scales)
+    names = ("cell", "size", "highest", "seed")
+    return draw_patches(maps, count=options["patches"], **{name: options[name] for name in names})
+
+
+def source(project: Project, job: Job, folder: Path) -> tuple[Path, list[Path]]:
+    """The BVH file of a clip and the label files beside it; written to `folder` where it is synthetic."""
+    if project.dataset(job.dataset).synthetic is None:
+        files = [Path(file) for file in project.label_files(job.dataset, job.clip)]
+        return Path(project.source(job.dataset, job.clip)), files
+    entry = project.entry(job.dataset, job.clip)
+    skeleton = yaml.safe_load(Path(project.skeleton_file(job.dataset)).read_text())
+    name = project.dataset(job.dataset).skeleton
+    files = {part: folder / f"{job.clip}_{part}.txt" for part in ("footsteps", "gait", "status")}
+    bvh, frames = folder / f"{job.clip}.bvh", project.frames(job.dataset, job.clip)
+    options = project.options(job.dataset, "synthetic")
+    write_clip(
+        job.clip, {"name": name, **skeleton}, frames, entry.recipe, entry.injured, options, bvh=bvh, **files
+    )
+    return bvh, [files["footsteps"], files["gait"]]
+
+
+def made(project: Project, job: Job, folder: Path) -> Iterator[tuple[Clip, dict]]:
+    """The clip and, where the data set has them, its mirror, with their labels."""
+    bvh, files = source(project, job, folder)
+    entry, dataset = project.entry(job.dataset, job.clip), project.dataset(job.dataset)
+    clip, report = make_clip(
+        bvh,
+        project.skeleton_file(job.dataset),
+        str(BASE / "config/skeletons"),
+        clip=job.clip,
+        skeleton_name=dataset.skeleton,
+        options=project.motion_options(job.dataset, job.clip),
+    )
+    options = project.options(job.dataset, "labels")
+    labels, told = label_clip(clip, files, report, entry.gait, entry.ground, options)
+    yield clip, vars(labels)
+    if dataset.mirror:
+        mirror = mirror_clip(clip, f"{job.clip}_mirror")
+        yield mirror, vars(mirror_labels(labels, told, mirror)[0])
+
+
+def found(job: Job) -> list[Found]:
+    """The fits of one clip and its mirror."""
+    project = Project(BASE, {"mocap": str(job.mocap)})
+    options, database = (project.options(job.dataset, name) for name in ("terrain", "database"))
+    out = []
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            pairs = list(made(project, job, Path(folder)))
+        except HobbleError as error:
+            print(f"{job.dataset} {job.clip} left out: {error}", flush=True)
+            return []
+    for clip, labels in pairs:
+        for kind in job.kinds or (project.entry(job.dataset, job.clip).ground,):
+            fits = clip_fits(clip, labels, patches_of(job.dataset, job.mocap), kind, options, database)
+            if not len(fits.patch):
+                continue
+            means = fits.foot_error[..., 0]
+            numbers = float(means.mean()), float(means.max()), float(fits.foot_below.max())
+            out.append(Found(job.dataset, clip.name, kind, len(means), *numbers))
+    return out
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("datasets", nargs="*", default=["synthetic"], metavar="DATASET")
+    parser.add_argument("--mocap", type=Path, default=BASE / "data")
+    parser.add_argument("--kinds", nargs="*", default=[], choices=["flat", "rocky", "jumpy", "beam"])
+    parser.add_argument("--workers", type=int, default=2)
+    asked = parser.parse_args()
+    project = Project(BASE, {"mocap": str(asked.mocap)})
+    jobs = [
+        Job(d, clip, tuple(asked.kinds), asked.mocap) for d in asked.datasets for clip in project.clips(d)
+    ]
+    with ProcessPoolExecutor(asked.workers) as pool:
+        results = [one for some in pool.map(found, jobs) for one in some]
+    print("data set      ground  clips  cycles   worst mean of a clip   of a fit   deepest below")
+    for dataset, kind in sorted({(r.dataset, r.kind) for r in results}):
+        some = [r for r in results if (r.dataset, r.kind) == (dataset, kind)]
+        cycles = sum(r.cycles for r in some)
+        worst = [max(getattr(r, name) for r in some) for name in ("mean", "worst_fit", "below")]
+        print(f"{dataset:<13} {kind:<7} {len(some):5} {cycles:7}", end=" ")
+        print(f"{worst[0]:18.2f} cm {worst[1]:7.2f} cm {worst[2]:12.2f} cm")
+    for r in results:
+        if r.mean > GOAL or r.worst_fit > GOAL or r.below > GOAL + 1e-3:
+            print(f"missed: {r.dataset} {r.clip} {r.kind}: {r.mean:.3f}, {r.worst_fit:.3f}, {r.below:.3f}")
+
+
+if __name__ == "__main__":
+    main()
