@@ -34,9 +34,17 @@ def spans(rows: int, visits: int, section: int, sections: int) -> Iterator[tuple
 def groups(
     chunk_rows: Sequence[int], window: int, seed: int, pass_index: int, layer: int
 ) -> list[np.ndarray]:
-    """The chunks that are read and mixed together, `window` of them at a time, in a fresh order."""
+    """The chunks that are read and mixed together, in a fresh order: one, two, four, ..., `window` at a time.
+
+    So the first rows of a layer are there after one chunk is read; since the rows were permuted when they
+    were written, few chunks are mixed as well as many.
+    """
     order = generator(seed, CHUNKS, pass_index, layer).permutation(len(chunk_rows))
-    return [order[i : i + window] for i in range(0, len(order), window)]
+    out, start, size = [], 0, 1
+    while start < len(order):
+        out.append(order[start : start + size])
+        start, size = start + size, min(2 * size, window)
+    return out
 
 
 def row_order(rows: int, seed: int, pass_index: int, layer: int, group: int) -> np.ndarray:
