@@ -12,7 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
-from hobble.evaluation.injury import GAITS, SEVERITIES, Sweep, injury_response, spearman
+from hobble.evaluation.captured import Captured
+from hobble.evaluation.crowd import SPEEDS, Stretch, run, severities
+from hobble.evaluation.injury import GAITS, injury_response, largest_accelerations
+from hobble.evaluation.injury_cases import divided_severities, into_a_jog, second_injuries
+from hobble.evaluation.pose_distance import mean_cycle, settling
+from hobble.evaluation.spearman import spearman
+from hobble.evaluation.sweep import SEVERITIES, Sweep
 
 RUNTIME = {
     "mode": "cubic",
@@ -67,50 +73,178 @@ def test_a_response_that_is_known(hurtable) -> None:
     """
     each = (30 * 0.05 + np.hypot(0.4, 0.05)) / 31
     result = response(slowing(hurtable))
-    walk = [row for row in result["rows"] if row["gait"] == "walk"]
-    assert [row["severity"] for row in walk] == SEVERITIES.tolist()
-    np.testing.assert_allclose([r["speed"] for r in walk], 60 * (1.5 - 0.05 * SEVERITIES), rtol=0.01)
-    np.testing.assert_allclose([r["from_healthy"] for r in walk], each * SEVERITIES, atol=0.005)
-    np.testing.assert_allclose([r["from_worst"] for r in walk], each * (10 - SEVERITIES), atol=0.005)
+    for rows, way in ((result["rows"], SEVERITIES), (result["back"], SEVERITIES[-2::-1])):
+        walk = [row for row in rows if row["gait"] == "walk"]
+        assert [row["severity"] for row in walk] == way.tolist()
+        np.testing.assert_allclose([r["speed"] for r in walk], 60 * (1.5 - 0.05 * way), rtol=0.01)
+        np.testing.assert_allclose([r["from_healthy"] for r in walk], each * way, atol=0.005)
+        np.testing.assert_allclose([r["from_worst"] for r in walk], each * (10 - way), atol=0.005)
+        np.testing.assert_allclose([r["from_way_up"] for r in walk], 0, atol=0.005)
     for gait, found in zip(GAITS, result["responses"], strict=True):
         assert found["gait"] == gait
         assert found["link"] == KNEE
-        assert found["spearman"]["speed"] == pytest.approx(-1)
-        assert found["spearman"]["from_healthy"] == pytest.approx(1)
+        assert found["spearman"]["speed"] == found["spearman_back"]["speed"] == pytest.approx(-1)
+        assert found["spearman"]["from_healthy"] == found["spearman_back"]["from_healthy"] == pytest.approx(1)
         assert found["speed_share"] == pytest.approx(2 / 3, rel=0.02)
         assert found["after_healing_cm"] == pytest.approx(0, abs=1e-3)
+        assert found["way_back_cm"] == pytest.approx(0, abs=0.005)
         assert found["from_healthy_cm"] == pytest.approx(10 * each, rel=0.02)
-        # The severity climbs for a second, and a mean over a second follows it for another.
+        # The severity moves for a second, and a mean over a second follows it for another.
         assert 0.9 < found["settle_seconds"] < 2.1
+        assert 0.9 < found["heal_seconds"] < 2.1
     assert result["summary"]["walk"]["spearman_speed"] == pytest.approx(-1)
+    json.dumps(result, allow_nan=False)
 
 
 def test_a_link_that_is_not_felt_changes_nothing(hurtable) -> None:
-    result = response(slowing(hurtable), links=["Neck1-Head"])
+    result = response(slowing(hurtable), links=["Neck1-Head"], seconds=2.0)
     found = result["responses"][0]
     assert found["from_healthy_cm"] == pytest.approx(0, abs=1e-6)
     assert found["spearman"]["speed"] is None
     assert found["speed_share"] == pytest.approx(1)
+    assert found["settle_seconds"] is None
     json.dumps(result, allow_nan=False)
 
 
-def test_links_default_to_those_hurt_in_training(hurtable) -> None:
+def test_every_link_is_swept_and_those_never_hurt_are_marked(hurtable) -> None:
     seen = np.zeros_like(hurtable.x_mean)
-    seen[hurtable.layout.x_injury.start + 7] = 0.1
-    result = response(replace(hurtable, x_mean=seen), links=None, seconds=0.5)
-    assert result["links"] == [hurtable.links[7]] == ["RightUpLeg-RightLeg"]
-    assert len(result["rows"]) == 2 * 11
+    start = hurtable.layout.x_injury.start
+    seen[start + 7] = seen[start + 2] = 0.1
+    result = response(replace(hurtable, x_mean=seen), links=None, seconds=0.2)
+    hurt = ["LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg"]
+    assert result["links"] == list(hurtable.links)
+    assert len(result["links"]) == 30
+    assert result["trained"] == hurt
+    assert len(result["rows"]) == 2 * 30 * 11
+    assert len(result["back"]) == 2 * 30 * 10
+    assert [r["link"] for r in result["responses"] if r["trained"]] == 2 * hurt
+    assert {(r["first"], r["second"]) for r in result["second"]} == {tuple(hurt), tuple(hurt[::-1])}
+    assert {r["link"] for r in result["into_a_jog"]} == {None, *hurtable.links}
+    assert set(result["summary"]) == set(result["summary_untrained"]) == set(GAITS)
 
 
 def test_the_same_numbers_each_time(hurtable) -> None:
-    assert response(hurtable, seconds=1.0) == response(hurtable, seconds=1.0)
+    assert response(hurtable, seconds=0.5) == response(hurtable, seconds=0.5)
+
+
+def test_a_second_injury_adds_to_the_first(hurtable) -> None:
+    """Both lower the head: by the same again, whatever the first is."""
+    other = "RightUpLeg-RightLeg"
+    found = second_injuries(slowing(hurtable, (KNEE, other)), [KNEE, other], 2.0, RUNTIME)
+    assert [(r["first"], r["second"]) for r in found] == [(KNEE, other), (other, KNEE)]
+    for row in found:
+        assert row["share"] == pytest.approx(1, rel=0.03)
+        assert row["spearman"] == pytest.approx(1)
+        # The first, at 7, is still seen beside the second at 10.
+        assert row["from_second_cm"] == pytest.approx(0.7 * row["from_first_cm"], rel=0.05)
+    # One that the network does not feel adds nothing.
+    deaf = second_injuries(slowing(hurtable), [KNEE, other], 2.0, RUNTIME)
+    assert deaf[0]["share"] is None
+    assert deaf[0]["from_first_cm"] == pytest.approx(0, abs=0.01)
+    assert deaf[1]["share"] == pytest.approx(1, rel=0.03)
+
+
+def test_an_injury_is_kept_from_walking_into_jogging(hurtable) -> None:
+    found = into_a_jog(slowing(hurtable), [KNEE, "Neck1-Head"], 2.0, RUNTIME)
+    rows = {(r["link"], r["severity"]): r for r in found}
+    assert list(rows) == [(None, 0.0), (KNEE, 5.0), (KNEE, 10.0), ("Neck1-Head", 5.0), ("Neck1-Head", 10.0)]
+    assert rows[KNEE, 10.0]["kept"] == pytest.approx(1, rel=0.05)
+    assert rows[KNEE, 5.0]["walk_speed"] == pytest.approx(60 * 1.25, rel=0.02)
+    assert rows["Neck1-Head", 10.0]["kept"] is None
+    assert rows[None, 0.0]["jog_from_healthy_cm"] == 0
+
+
+def test_divided_severities_are_smaller_ones(hurtable) -> None:
+    found = divided_severities(slowing(hurtable), [KNEE], 2.0, RUNTIME)
+    away = {(r["scale"], r["severity"]): r["from_healthy_cm"] for r in found}
+    assert {scale for scale, _ in away} == {1, 2, 5}
+    assert away[2, 10] == pytest.approx(away[1, 5], rel=0.03)
+    assert away[2, 5] == pytest.approx(away[1, 2.5], rel=0.03)
+    assert away[5, 10] == pytest.approx(0.2 * away[1, 10], rel=0.03)
+
+
+def test_figures_of_a_crowd_do_not_mind_each_other(hurtable) -> None:
+    """Each walks as it would alone."""
+    hurt = severities(hurtable, [{}, {KNEE: 4.0}, {KNEE: 10.0}])
+    together = run(hurtable, [Stretch(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
+    for figure, gait in enumerate(("walk", "jog", "walk")):
+        alone = run(hurtable, [Stretch(30, [gait], hurt[figure : figure + 1])], RUNTIME)
+        np.testing.assert_allclose(together.local[:, figure], alone.local[:, 0], atol=2e-3)
+        np.testing.assert_allclose(together.root[:, figure], alone.root[:, 0], atol=2e-3)
+    assert SPEEDS["jog"] > SPEEDS["walk"]
+
+
+def test_whole_cycles_are_measured(hurtable) -> None:
+    walks = run(hurtable, [Stretch(n, ["walk"], np.zeros((1, 30))) for n in (20, 400, 10)], RUNTIME)
+    phase = np.zeros((430, 1))
+    phase[:, 0] = np.mod(0.013 * np.arange(430), 1)
+    known = replace(walks, phase=phase)
+    span = known.measured(1, 0)
+    assert span.stop == 420
+    assert span.start >= 120
+    turned = 0.013 * (span.stop - 1 - span.start)
+    assert turned == pytest.approx(np.round(turned), abs=0.014)
+    assert np.round(turned) == 3  # of the three quarters that are measured, 3.9 cycles
+    assert known.measured(2, 0) == slice(422, 430)  # less than a cycle: all but its beginning
+
+
+def test_largest_accelerations_are_of_the_gait_and_the_hurt_link(hurtable) -> None:
+    gait = np.zeros((6, 6))
+    gait[:4, hurtable.gaits.index("walk")] = gait[4:, hurtable.gaits.index("jog")] = 1
+    severity = np.zeros((6, 30))
+    severity[2:, hurtable.links.index(KNEE)] = 3
+    rough = np.array([9.0, 8, 2, 1, 5, 6])
+    clip = Captured(
+        "a",
+        *(np.zeros((6, 1, 3)), np.zeros((6, 4)), np.zeros(6)),
+        severity,
+        gait,
+        np.zeros((6, 3)),
+        rough,
+        None,
+    )
+    assert largest_accelerations([clip, clip], hurtable) == {
+        ("walk", None): 9.0,
+        ("walk", KNEE): 2.0,
+        ("jog", None): 6.0,
+        ("jog", KNEE): 6.0,
+    }
+    found = injury_response(
+        hurtable, [clip], configuration="x", runtime=RUNTIME, seconds=0.2, links=[KNEE, "Neck1-Head"]
+    )
+    of = {
+        (r["gait"], r["link"]): (r["clip_acceleration"], r["clip_acceleration_of"])
+        for r in found["responses"]
+    }
+    assert of["walk", KNEE] == (2.0, "link")
+    assert of["jog", "Neck1-Head"] == (6.0, "gait")
+
+
+def test_settling_of_an_exponential() -> None:
+    distance = 5 * (1 - np.exp(-np.arange(600) / 60))
+    # A mean over w frames lags by half of them; within a tenth after ln 10 seconds.
+    assert settling(distance, 0.0, 1) == pytest.approx(np.log(10), abs=0.05)
+    assert settling(distance, 0.0, 60) == pytest.approx(np.log(10) + 0.5, abs=0.1)
+    assert settling(0 * distance, 0.05, 30) is None
+
+
+def test_a_cycle_bridges_what_was_not_seen() -> None:
+    phase = np.array([0.0, 0.5, 0.98])
+    local = np.arange(3.0)[:, None, None] * np.ones((3, 2, 3))
+    cycle = mean_cycle(local, phase)[:, 0, 0]
+    assert cycle[0] == 0
+    assert cycle[12] == cycle[10] == 1
+    assert cycle[23] == cycle[20] == 2
+    assert cycle[1] == 0
 
 
 def test_all_walk_healthy_before_the_onset(hurtable) -> None:
-    sweep = Sweep(hurtable, KNEE, "walk", 2.0, RUNTIME)
-    same = sweep.world[: sweep.onset]
-    np.testing.assert_allclose(same, same[:, :1].repeat(11, axis=1), atol=1e-3)
-    worst = sweep.world[sweep.healing - 1]
+    links = [KNEE, "Neck1-Head", "LowerBack-Spine"]
+    sweep = Sweep(hurtable, links, "walk", 0.5, RUNTIME)
+    for walks in (sweep.walks, sweep.at_once):
+        same = walks.local[: walks.starts[2]]
+        np.testing.assert_allclose(same, same[:, :1].repeat(3, axis=1), atol=1e-3)
+    worst = sweep.at_once.local[sweep.at_once.starts[3] - 1]
     assert np.abs(worst - worst[:1]).max() > 1e-3
 
 

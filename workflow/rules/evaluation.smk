@@ -53,19 +53,23 @@ rule responsivity:
 
 
 rule injury_response:
-    """How the gait changes as the severity of each link is swept from 0 to 10."""
+    """How the gait changes as the severity of each link is swept from 0 to 10 and back."""
     input:
         weights=lambda w: project.network(w.configuration, "weights.npz"),
+        clips=lambda w: project.of_dataset(w.configuration, "database/clips/{clip}.npz"),
     output:
         json="results/{configuration}/evaluation/injury.json",
         csv="results/{configuration}/evaluation/injury.csv",
+        second="results/{configuration}/evaluation/injury_second.csv",
+        into_a_jog="results/{configuration}/evaluation/injury_into_a_jog.csv",
+        divided="results/{configuration}/evaluation/injury_divided.csv",
     log:
         "results/{configuration}/logs/evaluation/injury_response.log",
     benchmark:
         "results/{configuration}/benchmarks/evaluation/injury_response.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
+        mem_mb=2000,
         runtime=60,
     params:
         configuration=lambda w: w.configuration,

@@ -234,7 +234,7 @@ class Evaluation(Section):
         ("constant", "linear", "cubic"),
         description="phase modes that laps are run in, beside the runtime's own",
     )
-    seconds: PositiveFloat = Field(8.0, description="length of each injury response walk")
+    seconds: PositiveFloat = Field(4.0, description="at each severity of the injury sweeps")
 
 
 class Report(Section):

@@ -243,7 +243,9 @@ def _track(material: Material) -> Iterator[Hint]:
 
 
 def _injury(material: Material) -> Iterator[Hint]:
-    walks = [r for r in material.injury.get("responses") or () if r["gait"] == "walk"]
+    walks = [
+        r for r in material.injury.get("responses") or () if r["gait"] == "walk" and r.get("trained", True)
+    ]
     if not walks:
         return
     deaf = [r["link"] for r in walks if (r.get("from_healthy_cm") or 0) < 0.5]

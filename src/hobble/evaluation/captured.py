@@ -1,0 +1,104 @@
+"""Captured motion as the measures take it, from the rows of a clip: unbroken stretches in the root frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.database.clip_rows import ClipRows, load_clip_rows
+from hobble.database.layout import GAITS
+
+
+@dataclass(frozen=True)
+class Captured:
+    """F consecutive frames of a clip.
+
+    local: (F, J, 3) positions in the root frame, cm above the ground; contacts: (F, 4); phase: (F,);
+    severity: (F, L); gait: (F, 6); root: (F, 3) where the root is, level, from the origin on;
+    acceleration: (F,) the largest of any joint, cm per frame squared, 0 in the first frame.
+    rows: (F,) which row of the clip each frame is.
+    """
+
+    clip: str
+    local: Array = field(repr=False)
+    contacts: Array = field(repr=False)
+    phase: Array = field(repr=False)
+    severity: Array = field(repr=False)
+    gait: Array = field(repr=False)
+    root: Array = field(repr=False)
+    acceleration: Array = field(repr=False)
+    rows: np.ndarray = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.phase)
+
+
+def unbroken(frame: np.ndarray) -> list[np.ndarray]:
+    """Rows of each stretch without a gap; of the two rows of a frame that two cycles share, the first.
+
+    >>> [run.tolist() for run in unbroken(np.array([3, 4, 7, 8, 8, 9]))]
+    [[0, 1], [2, 3, 5]]
+    """
+    if not len(frame):
+        return []
+    _, first = np.unique(frame, return_index=True)
+    return np.split(first, np.flatnonzero(np.diff(frame[first]) != 1) + 1)
+
+
+def captured(rows: ClipRows) -> Iterator[Captured]:
+    """The unbroken stretches of a clip's rows, on the first terrain fit of each."""
+    layout = rows.layout
+    for chosen in unbroken(rows.frame):
+        y = rows.y[chosen].astype(float)
+        local = y[:, layout.y_joint_position].reshape(len(chosen), -1, 3)
+        local[..., 1] -= rows.mean[rows.first_fit[chosen]][:, None]
+        turn, velocity = y[:, layout.y_turn][:, 0], y[:, layout.y_root_velocity]
+        gait = rows.x[chosen][:, layout.x_gait].reshape(len(chosen), len(GAITS), layout.samples)
+        yield Captured(
+            rows.clip,
+            local,
+            y[:, layout.y_contacts],
+            rows.p[chosen].astype(float),
+            rows.severity[chosen].astype(float),
+            gait[:, :, layout.samples // 2].astype(float),
+            root_path(velocity, turn),
+            _accelerations(y[:, layout.y_joint_velocity].reshape(local.shape), turn),
+            chosen,
+        )
+
+
+def captured_clips(paths: Iterable[str | Path]) -> Iterator[Captured]:
+    """The unbroken stretches of all clips, one clip in memory at a time, in the order of their names."""
+    for path in sorted(paths, key=lambda path: Path(path).stem):
+        yield from captured(load_clip_rows(path))
+
+
+def root_path(velocity: Array, turn: Array) -> Array:
+    """(F, 3) where a root is that moves by velocity (F, 2), seen from itself, then turns.
+
+    turn: (F,) of the world seen from the root, so that the root turns by its negative.
+    """
+    yaw = np.concatenate([[0.0], -np.cumsum(turn)[:-1]])
+    steps = turned(velocity, yaw)
+    out = np.zeros((len(turn), 3))
+    out[1:, ::2] = np.cumsum(steps, axis=0)[:-1]
+    return out
+
+
+def turned(vectors: Array, yaw: Array) -> Array:
+    """Level vectors x, z (..., 2) seen from a root of yaw (...), as the world sees them."""
+    sin, cos = np.sin(yaw), np.cos(yaw)
+    x, z = vectors[..., 0], vectors[..., 1]
+    return np.stack([x * cos + z * sin, z * cos - x * sin], axis=-1)
+
+
+def _accelerations(velocity: Array, turn: Array) -> Array:
+    """(F,) the largest change of velocity (F, J, 3), each seen from its own root."""
+    carried = velocity[:-1].copy()
+    carried[..., ::2] = turned(velocity[:-1, :, ::2], turn[:-1, None])
+    change = np.linalg.norm(velocity[1:] - carried, axis=-1)
+    return np.concatenate([[0.0], change.max(axis=1)]) if len(velocity) else np.zeros(0)

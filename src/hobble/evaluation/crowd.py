@@ -1,0 +1,98 @@
+"""Many figures at once, each walking by a script of its own: speed, gait and severities, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.evaluation.motion_measures import in_root_frame
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.network import Network
+
+FPS = 60
+SPEEDS = {"walk": 2.5, "jog": 7.0}  # cm a frame asked for
+SETTLING = 0.25  # share of a stretch that is not measured: severity and gait are still on their way
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """`frames` in which C figures are asked for the same: gait (C,) names, severity (C, L)."""
+
+    frames: int
+    gait: Sequence[str]
+    severity: Array = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Walks:
+    """What C figures did over F frames, and `starts` (S + 1,) of each stretch.
+
+    local: (F, C, J, 3) positions in the root frame, float32; contacts (F, C, 4); phase (F, C); root
+    (F, C, 3); acceleration (F, C): the largest of any joint around a frame, cm per frame squared, 0 at both
+    ends.
+    """
+
+    local: Array = field(repr=False)
+    contacts: Array = field(repr=False)
+    phase: Array = field(repr=False)
+    root: Array = field(repr=False)
+    acceleration: Array = field(repr=False)
+    starts: np.ndarray
+
+    def measured(self, stretch: int, figure: int) -> slice:
+        """The frames of a stretch that are measured: the last ones that make up whole cycles of the figure.
+
+        All but the beginning where it does not get through a cycle.
+        """
+        start, stop = int(self.starts[stretch]), int(self.starts[stretch + 1])
+        start += round(SETTLING * (stop - start))
+        turned = np.concatenate([[0.0], np.cumsum(np.mod(np.diff(self.phase[start:stop, figure]), 1.0))])
+        whole = np.floor(turned[-1])
+        if whole < 1:
+            return slice(start, stop)
+        return slice(start + int(np.searchsorted(turned, turned[-1] - whole)), stop)
+
+
+def run(network: Network, script: Sequence[Stretch], runtime: Mapping[str, Any]) -> Walks:
+    """Let figures that stand at first walk by `script`, straight ahead on flat ground.
+
+    runtime: options of ProceduralAnimation.
+    """
+    assert network.skeleton is not None
+    count, frames = len(script[0].gait), sum(s.frames for s in script)
+    animation = ProceduralAnimation(network, characters=count, **runtime)
+    local = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
+    contacts, root = np.zeros((frames, count, 4)), np.zeros((frames, count, 3))
+    phase, rough = np.zeros((frames, count)), np.zeros((frames, count))
+    before: list[Array] = []
+    f = 0
+    for stretch in script:
+        velocity = np.zeros((count, 2))
+        velocity[:, 1] = [SPEEDS[name] for name in stretch.gait]
+        shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
+        for _ in range(stretch.frames):
+            pose = animation.next_pose(velocity, gait=shares, injury=stretch.severity)
+            # One figure alone has no axis of its own.
+            positions = pose.positions.reshape(count, -1, 3)
+            root[f], phase[f], contacts[f] = pose.root, pose.phase, pose.contacts
+            local[f] = in_root_frame(positions, root[f], np.atleast_1d(pose.yaw))
+            before = [*before[-2:], positions]
+            if len(before) == 3:
+                bend = before[2] - 2 * before[1] + before[0]
+                rough[f - 1] = np.sqrt(np.max(np.einsum("cjk,cjk->cj", bend, bend), axis=1))
+            f += 1
+    starts = np.cumsum([0, *(s.frames for s in script)])
+    return Walks(local, contacts, phase, root, rough, starts)
+
+
+def severities(network: Network, each: Sequence[Mapping[str, float]]) -> Array:
+    """(C, L) severities of figures given as link -> severity."""
+    out = np.zeros((len(each), len(network.links)))
+    for row, hurt in zip(out, each, strict=True):
+        for link, severity in hurt.items():
+            row[network.links.index(link)] = severity
+    return out

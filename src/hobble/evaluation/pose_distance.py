@@ -1,0 +1,55 @@
+"""How far apart two ways of walking are: the distance of poses at the same phase."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.core.quat import Array
+
+PHASES = 24  # bins of the cycle in which poses are compared
+FPS = 60
+SETTLED = 0.1  # share of the final change within which a response counts as settled
+FELT = 0.1  # cm; a smaller change is none that could settle
+
+
+def bins(phase: Array) -> np.ndarray:
+    """(...) which of PHASES bins each phase falls into."""
+    return np.minimum((np.asarray(phase) * PHASES).astype(int), PHASES - 1)
+
+
+def mean_cycle(local: Array, phase: Array) -> Array:
+    """(PHASES, J, 3) mean pose in each phase bin of local (F, J, 3), phase (F,); a gap takes its nearest."""
+    at = bins(phase)
+    mean = np.zeros((PHASES, *local.shape[1:]))
+    seen = np.unique(at)
+    for b in seen:
+        mean[b] = local[at == b].mean(axis=0)
+    for b in set(range(PHASES)) - set(seen.tolist()):
+        gap = np.abs(seen - b)
+        mean[b] = mean[seen[np.argmin(np.minimum(gap, PHASES - gap))]]
+    return mean
+
+
+def apart(local: Array, phase: Array, cycle: Array) -> Array:
+    """(F,) mean distance in cm of the joints of local (F, J, 3) from a mean cycle at the same phase."""
+    return np.linalg.norm(local - cycle[bins(phase)], axis=-1).mean(axis=-1)
+
+
+def period(phase: Array) -> int:
+    """Frames of a cycle of phase (F,), at most a second and a half."""
+    rate = np.mod(np.diff(phase), 1.0).mean()
+    return int(np.clip(round(1 / max(rate, 1e-3)), 10, 3 * FPS // 2))
+
+
+def settling(distance: Array, normal: float, window: int) -> float | None:
+    """Seconds until distance (F,) from a motion, over a window of a cycle, stays near its last.
+
+    normal: the distance before the change. Near is within a tenth of the whole change; None without one.
+    """
+    window = min(window, len(distance))
+    smooth = np.convolve(distance, np.ones(window) / window, mode="valid")
+    change = abs(float(smooth[-1]) - normal)
+    if change < FELT:
+        return None
+    out = np.abs(smooth - smooth[-1]) > SETTLED * change
+    return round((int(np.flatnonzero(out)[-1]) + window if np.any(out) else 0) / FPS, 5)

@@ -1,0 +1,27 @@
+"""Spearman's rank correlation where some values are not known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hobble.core.quat import Array
+
+
+def spearman(x: Sequence[float] | Array, y: Sequence[float | None]) -> float | None:
+    """Spearman's rank correlation of the pairs in which y is known.
+
+    None for fewer than 3 or without any change.
+    """
+    pairs = [(a, b) for a, b in zip(x, y, strict=True) if b is not None]
+    if len(pairs) < 3 or len({b for _, b in pairs}) < 2:
+        return None
+    ranks = np.array([_ranks(np.array(v)) for v in zip(*pairs, strict=True)])
+    return round(float(np.corrcoef(ranks)[0, 1]), 5)
+
+
+def _ranks(values: Array) -> Array:
+    """Ranks from 1 on, equal values sharing the mean of theirs."""
+    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
+    return (np.cumsum(count) - (count - 1) / 2)[place]
