@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import subprocess
 
 import numpy as np
 import pytest
@@ -116,3 +117,42 @@ def test_clips_come_back(tmp_path, holden31):
 def test_errors_name_file_line_and_frame():
     error = InputError("a.bvh", "it is broken", line=3, frame=7, fix="Mend it.")
     assert str(error) == "a.bvh, line 3, frame 7: it is broken. Mend it."
+
+
+def test_what_a_killed_process_left_is_swept_and_a_living_ones_kept(tmp_path):
+    path = tmp_path / "a[1].json"
+    child = subprocess.Popen(["true"])
+    child.wait()
+    dead, alive = (tmp_path / f".{path.name}.{pid}.part" for pid in (child.pid, 1))
+    dead.write_text("half")
+    alive.write_text("half")
+    write_json(path, {"whole": 1})
+    assert leftovers(tmp_path) == [alive.name]
+
+
+def test_every_flipped_bit_of_an_npz_is_noticed_or_changes_nothing(tmp_path):
+    path = tmp_path / "a.npz"
+    arrays = {
+        "x": np.arange(6, dtype=np.float32).reshape(2, 3),
+        "name": np.array("walk"),
+        "none": np.zeros((0, 3)),
+    }
+    save_npz(path, **arrays)
+    whole = path.read_bytes()
+    noticed = 0
+    for at in range(len(whole)):
+        for bit in (0, 3, 7):
+            flipped = bytearray(whole)
+            flipped[at] ^= 1 << bit
+            path.write_bytes(flipped)
+            try:
+                found = load_npz(path)
+            except InputError as error:
+                noticed += 1
+                assert str(path) in str(error)
+            else:
+                assert found.keys() == arrays.keys()
+                assert all(
+                    np.array_equal(found[k], arrays[k]) and found[k].dtype == arrays[k].dtype for k in found
+                )
+    assert noticed > 2 * len(whole)
