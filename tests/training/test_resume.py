@@ -190,3 +190,11 @@ def test_the_name_of_a_training_says_what_determines_it(
         recipe_hash(network, training | {"sections": 4}, data, "code"),
     ]
     assert len({name, *others}) == 5
+
+
+def test_passes_are_in_the_name_where_the_learning_rate_goes_by_them(
+    data: Database, network: Settings, training: Settings
+) -> None:
+    cosine = training | {"schedule": "cosine"}
+    names = [recipe_hash(network, cosine | {"passes": passes}, data, "code") for passes in (3, 4)]
+    assert names[0] != names[1]

@@ -11,7 +11,6 @@ from hobble.core.errors import HobbleError
 from hobble.database.reader import Block, Database
 
 TRAIN = "train"
-BLOCK_ROWS = 4096
 LOOK_EVERY = 2048  # samples between looks at the losses: an accelerator is not waited for at each batch
 DIVERGED = 100.0  # predicting nothing but the mean has an error of 1
 NAMED = 8  # clips that a message names
@@ -26,8 +25,7 @@ def batches(
     section sees each of its samples once and leaves nothing over for the next: a checkpoint between the two
     is complete.
     """
-    rows = size * max(1, BLOCK_ROWS // size)
-    for block in database.blocks(TRAIN, pass_index, section, sections, seed, rows):
+    for block in database.blocks(TRAIN, pass_index, section, sections, seed, database.block_rows(size)):
         for start in range(0, len(block.p), size):
             yield Block(*(array[start : start + size] for array in block))
 
@@ -40,13 +38,14 @@ class Watch:
 
     def __init__(self, where: str, clips: tuple[str, ...]) -> None:
         self.where, self.clips = where, clips
-        self.samples, self._batches, self._total, self._new = 0, 0, 0.0, 0
+        self.seen, self.samples, self._batches, self._total, self._new = 0, 0, 0, 0.0, 0
         self._waiting: list[tuple[torch.Tensor, Block]] = []
         self._worst: tuple[float, int, Block] | None = None
 
     def add(self, loss: torch.Tensor, batch: Block) -> None:
         """Note a batch and its loss, a scalar on any device."""
         self._waiting.append((loss, batch))
+        self.seen += len(batch.p)
         self._new += len(batch.p)
         if self._new >= LOOK_EVERY:
             self._look()

@@ -21,11 +21,13 @@ from hobble.training.fused import FusedStep
 from hobble.training.network import Network, initialise
 from hobble.training.optimiser import Adam
 from hobble.training.products import bfloat16_is_fast
+from hobble.training.schedule import depends_on_passes
 from hobble.training.step import Step
 
 log = logging.getLogger("hobble.training")
 
-NOT_IN_THE_NAME = ("passes", "continues", "device")
+NOT_IN_THE_NAME = ("continues", "device")
+OF_ADAM = ("learning_rate", "beta1", "beta2", "l1", "weight_decay")
 HALF_FROM = 256  # batch from which the products take most of the time
 
 
@@ -40,11 +42,14 @@ def use_threads(threads: int) -> None:
 def recipe_hash(
     network: Mapping[str, Any], training: Mapping[str, Any], database: Database, code: str | None
 ) -> str:
-    """Names all that determines a training section by section; how many passes there are is no part of it.
+    """Names all that determines a training section by section.
 
+    How many passes there are is no part of it, unless the learning rate goes by that.
     code: a fingerprint of the training's source, where there is one.
     """
     kept = {key: value for key, value in training.items() if key not in NOT_IN_THE_NAME}
+    if not depends_on_passes(training):
+        del kept["passes"]
     data = hashlib.sha256((database.path / FILE).read_bytes()).hexdigest()
     text = json.dumps([dict(network), kept, data, code], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -85,7 +90,7 @@ def fresh(database: Database, network: Mapping[str, Any], training: Mapping[str,
     layout = database.layout
     sizes = (layout.x_size, *[network["units"]] * network["hidden_layers"], layout.y_size)
     new = initialise(sizes, network["control_points"], training["seed"]).to(device(training["device"]))
-    return State(new, Adam(new, **{k: training[k] for k in ("learning_rate", "beta1", "beta2", "l1")}))
+    return State(new, Adam(new, **{key: training[key] for key in OF_ADAM}))
 
 
 def device(wanted: str) -> torch.device:

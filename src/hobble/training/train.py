@@ -17,9 +17,13 @@ from hobble.training.batches import TRAIN, Watch, batches
 from hobble.training.checkpoint import Saver, State, pack
 from hobble.training.held_out import HeldOut
 from hobble.training.history import duration
+from hobble.training.noise import Noise
+from hobble.training.schedule import share
 from hobble.training.start import begin, recipe_hash, step_for, use_threads
 
 log = logging.getLogger("hobble.training")
+
+DROPOUT, NOISE = 1, 2  # what is drawn in a section, so that no two draw the same numbers
 
 
 def train(
@@ -54,16 +58,21 @@ def _run(state: State, database: Database, training: Mapping[str, Any], saver: S
     device = state.network.flat.device
     step = step_for(state.network, training)
     held_out = HeldOut(database, device, database.pairs(TRAIN) // sections)
-    progress = Progress(state, passes * database.pairs(TRAIN))
+    noise = Noise(database, training["noise"], device)
+    pairs = database.pairs(TRAIN)
+    progress = Progress(state, passes * pairs)
     for turn in range(state.sections, passes * sections):
         pass_index, section = divmod(turn, sections)
         where = f"pass {pass_index + 1} of {passes}, section {section + 1} of {sections}"
         watch = Watch(where, database.clips)
         step.seed(section_seed(seed, turn))
+        noise.seed(section_seed(seed, turn, NOISE))
         for batch in batches(database, pass_index, section, sections, seed, training["batch"]):
             x, y, p = (torch.from_numpy(array).to(device) for array in batch[:3])
+            noise.add(x)
+            rate = share(training, (state.samples + watch.seen) / pairs)
             watch.add(step(x, y, p, step.masks(len(x))), batch)
-            state.adam.step(step.gradients)
+            state.adam.step(step.gradients, rate)
             progress.bar.update(len(p))
         train_mse = watch.mean()
         state.sections, state.samples = turn + 1, state.samples + watch.samples
@@ -77,9 +86,9 @@ def _run(state: State, database: Database, training: Mapping[str, Any], saver: S
     saver.wait()
 
 
-def section_seed(seed: int, turn: int) -> int:
-    """Seed of what is drawn at random in section `turn`, counted from the start: dropout."""
-    return int(np.random.SeedSequence([seed, 1, turn]).generate_state(1, np.uint64)[0] >> 1)
+def section_seed(seed: int, turn: int, what: int = DROPOUT) -> int:
+    """Seed of what is drawn at random in section `turn`, counted from the start."""
+    return int(np.random.SeedSequence([seed, what, turn]).generate_state(1, np.uint64)[0] >> 1)
 
 
 class Progress:
