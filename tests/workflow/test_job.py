@@ -1,5 +1,6 @@
 """The frame around a job's script: what a person sees when it ends badly."""
 
+import re
 import subprocess
 import sys
 
@@ -41,3 +42,12 @@ def test_a_fault_of_ours_leaves_its_traceback_in_the_log_only(tmp_path) -> None:
     text = path.read_text()
     assert "words for the log" in text
     assert "Traceback" in text
+
+
+def test_the_log_ends_with_the_memory_that_the_job_took(tmp_path) -> None:
+    """All of it, though it was freed again and no sample was taken while it was there."""
+    path = tmp_path / "job.log"
+    assert ended(str(path), "b = b'x' * 300_000_000; del b").returncode == 0
+    took = re.search(r"took (\d+) MB of memory at most$", path.read_text().strip())
+    assert took is not None
+    assert 300 <= int(took[1]) < 600

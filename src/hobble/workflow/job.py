@@ -12,6 +12,7 @@ from typing import Any
 
 from hobble.core.errors import HobbleError
 from hobble.workflow import checksums
+from hobble.workflow.usage import peak_memory_mb
 
 BUG = "This is a fault of Hobble, not of your data; please report it with the log."
 
@@ -45,6 +46,7 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
         yield logger
         checksums.check_unchanged(before)
         checksums.record(outputs)
+        logger.info("took %.0f MB of memory at most", peak_memory_mb())
     except HobbleError as error:
         logger.error("%s", error)
         sys.exit(1)
