@@ -106,11 +106,12 @@ def test_shares_of_the_wish(strafe: float, position_bias: float, direction_bias:
 
 
 def test_wishes_are_taken_up_at_their_rates() -> None:
-    position, _, gait = path(0.0, stand=1.0)
+    position, heading, gait = path(0.0, stand=1.0)
     velocity, direction, strafe = np.zeros((1, 2)), np.array([[0.0, 1.0]]), np.zeros(1)
     shares = np.eye(6)[[1]]
     wish = np.array([[2.0, 0.0]]), np.array([[1.0, 0.0]]), np.ones(1), shares
-    trajectory.follow_wish(*wish, 0.0, velocity, direction, strafe, gait, position)
+    owed = np.zeros((1, 2))
+    trajectory.follow_wish(*wish, 0.0, velocity, direction, strafe, gait, position, heading, owed)
     np.testing.assert_allclose(velocity, [[1.8, 0]])
     np.testing.assert_allclose(np.arctan2(*direction[0]), 0.9 * np.pi / 2)
     np.testing.assert_allclose(strafe, 0.9)
@@ -133,13 +134,63 @@ def test_wishes_are_taken_up_at_their_rates() -> None:
 )
 def test_steering_asks_for_what_is_missing(steering: float, wish: tuple, asked: tuple) -> None:
     """The figure glides ahead at 1.5 cm a frame."""
-    position, _, gait = path(1.5)
+    velocity, _, _ = follow(wish, (0.0, 1.0), steering)
+    np.testing.assert_allclose(velocity, 0.9 * np.array(asked), atol=1e-9)
+
+
+def follow(wish, facing, steering: float, frames: int = 1, speed: float = 1.5, owed=None):
+    """Targets (2,) velocity and (2,) direction, and what is owed (2,), of a figure that glides ahead whatever
+    it is told."""
+    position, heading, gait = path(speed)
     velocity, direction = np.zeros((1, 2)), np.array([[0.0, 1.0]])
-    trajectory.follow_wish(
-        np.array([wish]), direction, np.zeros(1), np.eye(6)[[1]], steering, velocity, direction, np.zeros(1),
-        gait, position,
-    )  # fmt: skip
-    np.testing.assert_allclose(velocity, 0.9 * np.array([asked]), atol=1e-9)
+    owed = np.zeros((1, 2)) if owed is None else np.array([owed], float)
+    for _ in range(frames):
+        trajectory.follow_wish(
+            np.array([wish]), np.array([facing]), np.zeros(1), np.eye(6)[[1]], steering, velocity, direction,
+            np.zeros(1), gait, position, heading, owed,
+        )  # fmt: skip
+    return velocity[0], direction[0], owed[0]
+
+
+def test_what_is_missing_for_long_is_owed_along_and_across_the_wish() -> None:
+    for frames in (1, 40, 1000):
+        asked, _, owed = follow((0.5, 1.5), (0.0, 1.0), 2.0, frames)
+        speed = np.hypot(0.5, 1.5)
+        ahead = np.array([0.5, 1.5]) / speed
+        lack = np.array([0.5, 0.0])
+        rate = 2.0 * trajectory.OWED_RATE / speed * frames
+        along, left = lack @ ahead, lack @ [ahead[1], -ahead[0]]
+        expected = np.minimum(rate * np.array([along, left]), trajectory.MOST_OWED)
+        np.testing.assert_allclose(owed, expected, atol=1e-9)
+    # Asked for from the next frame on: here all of it, and the shortfall of the moment, within the limit.
+    more = speed * (owed[0] * ahead + owed[1] * np.array([ahead[1], -ahead[0]])) + 2.0 * lack
+    more *= min(1.0, trajectory.STEERING_LIMIT * speed / np.linalg.norm(more))
+    np.testing.assert_allclose(asked, np.array([0.5, 1.5]) + more, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("wish", "steering", "expected"),
+    [
+        ((0.0, -1.5), 2.0, (0.3, -0.2)),  # on its way round: kept as it was
+        ((0.0, 0.0), 2.0, (0.0, 0.0)),  # it is to stand: forgotten
+        ((0.0, 1.5), 2.0, (0.3, -0.2)),  # nothing is missing
+        ((0.5, 1.5), 0.0, (0.3, -0.2)),  # the original runtime
+    ],
+)
+def test_when_nothing_more_is_owed(wish, steering: float, expected) -> None:
+    _, _, owed = follow(wish, (0.0, 1.0), steering, 30, owed=(0.3, -0.2))
+    np.testing.assert_allclose(owed, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("degrees", "beyond"), [(0, 0), (20, 20), (60, 60), (100, 37), (140, 0), (179, 0)])
+def test_a_turn_is_asked_for_further_than_it_is_to_go(degrees: float, beyond: float, sign: int) -> None:
+    facing = np.radians(sign * degrees)
+    wish = 1.5 * np.array([np.sin(facing), np.cos(facing)])
+    for speed, extra in ((1.5, beyond), (0.0, 0)):
+        _, direction, _ = follow(wish * speed / 1.5, (np.sin(facing), np.cos(facing)), 2.0)
+        yaw = np.degrees(np.arctan2(*direction))
+        assert yaw == pytest.approx(0.9 * sign * (degrees + extra), abs=1e-6)
 
 
 def test_the_ground_is_looked_up_on_both_sides() -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.runtime.network import Network
 
@@ -17,8 +18,8 @@ class Character:
     position, direction: (C, T, 2) trajectory; gait: (C, T, 6). ground: (C, samples, 3) heights at left, path,
     right; root_height: (C,) mean of those on the path. joint_position, joint_velocity: (C, J, 3);
     joint_rotation: (C, J, 4) world: the network's own copy. phase: (C,). severity, severity_target: (C, L).
-    target_velocity, target_direction: (C, 2); strafe: (C,). foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift
-    (C, 2): of `feet`.
+    target_velocity, target_direction: (C, 2); strafe: (C,); owed: (C, 2) of `trajectory.follow_wish`.
+    foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2): of `feet`.
     """
 
     position: Array
@@ -35,6 +36,7 @@ class Character:
     target_velocity: Array
     target_direction: Array
     strafe: Array
+    owed: Array
     foot_lock: Array
     foot_hold: Array
     foot_lift: Array
@@ -47,6 +49,7 @@ def standing(network: Network, characters: int, position: Array, yaw: Array) -> 
     mean = network.y_mean.astype(float)
     sin, cos = np.sin(yaw)[:, None], np.cos(yaw)[:, None]
     x, y, z = mean[layout.y_joint_position].reshape(joints, 3).T
+    turns = mean[layout.y_joint_rotation].reshape(joints, 3)
     placed = np.stack(
         [
             x * cos + z * sin + position[:, :1],
@@ -66,13 +69,14 @@ def standing(network: Network, characters: int, position: Array, yaw: Array) -> 
         root_height=np.zeros(count),
         joint_position=np.ascontiguousarray(placed),
         joint_velocity=np.zeros((count, joints, 3)),
-        joint_rotation=np.tile([1.0, 0, 0, 0], (count, joints, 1)),
+        joint_rotation=quat.mul(quat.yaw(yaw)[:, None], quat.exp(turns)),
         phase=np.zeros(count),
         severity=np.zeros((count, layout.links)),
         severity_target=np.zeros((count, layout.links)),
         target_velocity=np.zeros((count, 2)),
         target_direction=facing.copy(),
         strafe=np.zeros(count),
+        owed=np.zeros((count, 2)),
         foot_lock=np.zeros((count, 2)),
         foot_hold=np.zeros((count, 2, 2)),
         foot_lift=np.zeros((count, 2)),

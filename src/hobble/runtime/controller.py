@@ -25,6 +25,10 @@ from hobble.runtime.predictor import Predictor
 
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
+# Radians a frame (1500 degrees a second). No joint of a person who walks or runs turns as fast, but a
+# prediction between rotations half a turn apart, such as hands have, may point anywhere, and a new wish
+# changes the next pose at once.
+FASTEST_TURN = np.radians(25)
 
 Ground = Callable[[Array, Array], Array]
 
@@ -101,7 +105,7 @@ class Controller:
         c = self.character
         trajectory.prepare(
             velocity, direction, strafe, gait, self.steering, c.target_velocity, c.target_direction, c.strafe,
-            c.gait, c.position, c.direction, c.severity, c.severity_target, self.severity_step,
+            c.gait, c.position, c.direction, c.owed, c.severity, c.severity_target, self.severity_step,
             self.layout.step, self.side, self._points,
         )  # fmt: skip
         if ground is None:
@@ -194,7 +198,8 @@ def _take_output(
     root: Any, yaw: Any, pose_position: Any, pose_rotation: Any,
 ) -> None:  # fmt: skip
     """Bring predicted joints into the world; positions meet halfway with where their velocity carries
-    them."""
+    them, and no rotation goes further from that of the frame before than FASTEST_TURN."""
+    slowest = np.cos(FASTEST_TURN / 2)
     middle, count = position.shape[1] // 2, joints.shape[1]
     for c in range(y.shape[0]):
         sin, cos = direction[c, middle, 0], direction[c, middle, 1]
@@ -216,10 +221,22 @@ def _take_output(
             half = np.sqrt(rx * rx + ry * ry + rz * rz)
             scale = np.sin(half) / half if half > 1e-8 else 1.0
             w, rx, ry, rz = np.cos(half), rx * scale, ry * scale, rz * scale
-            rotations[c, j, 0] = half_cos * w - half_sin * ry
-            rotations[c, j, 1] = half_cos * rx + half_sin * rz
-            rotations[c, j, 2] = half_cos * ry + half_sin * w
-            rotations[c, j, 3] = half_cos * rz - half_sin * rx
+            w, rx, ry, rz = (
+                half_cos * w - half_sin * ry,
+                half_cos * rx + half_sin * rz,
+                half_cos * ry + half_sin * w,
+                half_cos * rz - half_sin * rx,
+            )
+            old = rotations[c, j]
+            dot = old[0] * w + old[1] * rx + old[2] * ry + old[3] * rz
+            keep, take = 0.0, 1.0
+            if abs(dot) < slowest:
+                # Along the shorter way (slerp), so far as it may turn.
+                whole = np.arccos(abs(dot))
+                keep = np.sin(whole - FASTEST_TURN / 2) / np.sin(whole)
+                take = np.sin(FASTEST_TURN / 2) / np.sin(whole) * (1.0 if dot >= 0 else -1.0)
+            old[0], old[1] = keep * old[0] + take * w, keep * old[1] + take * rx
+            old[2], old[3] = keep * old[2] + take * ry, keep * old[3] + take * rz
             for k in range(3):
                 pose_position[c, j, k] = joints[c, j, k]
             for k in range(4):

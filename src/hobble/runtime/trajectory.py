@@ -17,6 +17,10 @@ from hobble.database.layout import RowLayout
 STEERING_LIMIT = 2.0  # with 1, a network that saw few starts stands for seconds before it sets off
 TARGET_MIX = 0.9
 GAIT_MIX = 0.1
+OWED_RATE = 0.01  # a frame, of what is missing: a second or two until it is made good
+OWED_WITHIN = 0.8  # share of the wish; who lacks more is still on the way to it
+MOST_OWED = 1.0  # share of the wish
+FURTHEST_TURN = np.radians(137)
 STILL = 0.1  # cm a frame: a slower wish is a wish to stand
 
 
@@ -29,31 +33,70 @@ def wrap(angle: float) -> float:
 @njit(cache=True)
 def follow_wish(
     wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
-    velocity: Any, direction: Any, strafe: Any, gait: Any, position: Any,
+    velocity: Any, direction: Any, strafe: Any, gait: Any, position: Any, heading: Any, owed: Any,
 ) -> None:  # fmt: skip
     """Move the smoothed targets toward what the caller asks for; the present frame's gait blends slowly.
 
-    wish_velocity, wish_direction, velocity, direction: (C, 2); wish_strafe, strafe: (C,); wish_gait: (C, 6).
-    A network goes on as it has been going: it answers to its past as much as to the bent future. So what the
-    last half of the past window lacks of the wished velocity is asked for on top, `steering` times over, up
-    to STEERING_LIMIT times the wish; 0 is the original runtime.
+    wish_velocity, wish_direction, velocity, direction, owed: (C, 2); wish_strafe, strafe: (C,); wish_gait:
+    (C, 6); position, heading: (C, T, 2) of the trajectory. What is asked for beyond the wish is that of
+    `_ask` and `_ask_turn`; with `steering` 0 nothing is, as in the original runtime.
     """
     middle = gait.shape[1] // 2
-    span = middle // 2
     for c in range(velocity.shape[0]):
         x, z = wish_velocity[c, 0], wish_velocity[c, 1]
-        more_x = steering * (x - (position[c, middle, 0] - position[c, middle - span, 0]) / span)
-        more_z = steering * (z - (position[c, middle, 1] - position[c, middle - span, 1]) / span)
-        limit = STEERING_LIMIT * np.sqrt((x * x + z * z) / max(more_x * more_x + more_z * more_z, 1e-12))
-        x, z = x + more_x * min(1.0, limit), z + more_z * min(1.0, limit)
+        goal = np.arctan2(wish_direction[c, 0], wish_direction[c, 1])
+        if steering > 0.0:
+            if x * x + z * z >= STILL * STILL:
+                facing = np.arctan2(heading[c, middle, 0], heading[c, middle, 1])
+                goal += _ask_turn(0.5 * steering, wrap(goal - facing))
+            x, z = _ask(steering, x, z, position[c], owed[c])
         velocity[c, 0] += TARGET_MIX * (x - velocity[c, 0])
         velocity[c, 1] += TARGET_MIX * (z - velocity[c, 1])
         now = np.arctan2(direction[c, 0], direction[c, 1])
-        now += TARGET_MIX * wrap(np.arctan2(wish_direction[c, 0], wish_direction[c, 1]) - now)
+        now += TARGET_MIX * wrap(goal - now)
         direction[c, 0], direction[c, 1] = np.sin(now), np.cos(now)
         strafe[c] += TARGET_MIX * (wish_strafe[c] - strafe[c])
         for k in range(gait.shape[2]):
             gait[c, middle, k] += GAIT_MIX * (wish_gait[c, k] - gait[c, middle, k])
+
+
+@njit(cache=True)
+def _ask(steering: float, x: float, z: float, position: Any, owed: Any) -> tuple[float, float]:
+    """The velocity to ask for so that (x, z) comes of it.
+
+    A network goes on as it has been going: it answers to its past as much as to the bent future. So what the
+    last half of the past window lacks of the wish is asked for on top, `steering` times over, up to
+    STEERING_LIMIT times the wish. What is still missing then, as where a network strafes less to one side, is
+    owed: it adds up in `owed` (2,), along the wish and across it to the left, in shares of the wish.
+    """
+    middle = position.shape[0] // 2
+    span = middle // 2
+    speed = np.sqrt(x * x + z * z)
+    lack_x = x - (position[middle, 0] - position[middle - span, 0]) / span
+    lack_z = z - (position[middle, 1] - position[middle - span, 1]) / span
+    more_x, more_z = steering * lack_x, steering * lack_z
+    if speed < STILL:
+        owed[:] = 0.0
+    else:
+        more_x += owed[0] * x + owed[1] * z
+        more_z += owed[0] * z - owed[1] * x
+        # Not while it turns round or sets off: that is late, not out of true.
+        if lack_x * lack_x + lack_z * lack_z < (OWED_WITHIN * speed) ** 2:
+            rate = steering * OWED_RATE / (speed * speed)
+            owed[0] += rate * (lack_x * x + lack_z * z)
+            owed[1] += rate * (lack_x * z - lack_z * x)
+            for k in range(2):
+                owed[k] = min(max(owed[k], -MOST_OWED), MOST_OWED)
+    limit = STEERING_LIMIT * speed / max(np.sqrt(more_x * more_x + more_z * more_z), 1e-6)
+    return x + more_x * min(1.0, limit), z + more_z * min(1.0, limit)
+
+
+@njit(cache=True)
+def _ask_turn(gain: float, turn: float) -> float:
+    """Radians to ask for beyond a `turn` that is still to be made: `gain` times it, and never as far round
+    as to be nearer the other way."""
+    room = max(FURTHEST_TURN - abs(turn), 0.0)
+    return min(max(gain * turn, -room), room)
 
 
 @njit(cache=True)
@@ -101,24 +144,16 @@ def sample_points(position: Any, direction: Any, step: int, side: float, points:
 def prepare(
     wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
     velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
-    severity: Any, severity_target: Any, severity_step: float, step: int, side: float, points: Any,
+    owed: Any, severity: Any, severity_target: Any, severity_step: float, step: int, side: float, points: Any,
 ) -> None:  # fmt: skip
     """All of the above in one call, and severities (C, L) move toward their targets, at most by a step.
 
     In this file because compiled code kept on disk is renewed when its own file changes, not its callees'.
     """
     follow_wish(
-        wish_velocity,
-        wish_direction,
-        wish_strafe,
-        wish_gait,
-        steering,
-        velocity,
-        target,
-        strafe,
-        gait,
-        position,
-    )
+        wish_velocity, wish_direction, wish_strafe, wish_gait, steering, velocity, target, strafe, gait,
+        position, direction, owed,
+    )  # fmt: skip
     blend_future(velocity, target, strafe, position, direction, gait)
     sample_points(position, direction, step, side, points)
     for c in range(severity.shape[0]):

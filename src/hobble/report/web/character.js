@@ -15,8 +15,8 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     px: filled(T, place[0]), pz: filled(T, place[1]), dx: filled(T, sin(heading)), dz: filled(T, cos(heading)),
     gait: filled(T * G, 0), ground: filled(S * 3, 0), height: 0, phase: 0, joints: filled(3 * J, 0),
     velocities: filled(3 * J, 0), pose: filled(3 * J, 0), severity: filled(L, 0), wished: filled(L, 0),
-    velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, lock: [0, 0], hold: [[0, 0], [0, 0]],
-    lift: [0, 0], contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
+    velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, owed: [0, 0], lock: [0, 0],
+    hold: [[0, 0], [0, 0]], lift: [0, 0], contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
   };
   for (let t = 0; t < T; t++) c.gait[t * G + gaits.indexOf("stand")] = 1;
   for (let j = 0; j < J; j++) {
@@ -51,14 +51,35 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
 
   // The steps of a frame
 
+  const ask = ([x, z], speed, [goingX, goingZ]) => {
+    const a = x - goingX, b = z - goingZ, more = [spec.steering * a, spec.steering * b];
+    if (speed < k.still) c.owed = [0, 0];
+    else {
+      more[0] += c.owed[0] * x + c.owed[1] * z;
+      more[1] += c.owed[0] * z - c.owed[1] * x;
+      if (a * a + b * b < (k.owedWithin * speed) ** 2) {
+        const rate = spec.steering * k.owedRate / (speed * speed);
+        c.owed = [c.owed[0] + rate * (a * x + b * z), c.owed[1] + rate * (a * z - b * x)];
+        c.owed = c.owed.map((v) => min(max(v, -k.mostOwed), k.mostOwed));
+      }
+    }
+    const limit = min(1, k.steeringLimit * speed / max(hypot(...more), 1e-6));
+    return [x + more[0] * limit, z + more[1] * limit];
+  };
   const prepare = (velocity, direction, strafe, gait, ground) => {
-    // What the last half of the past lacks of the wished velocity is asked for on top, up to twice the wish.
-    const span = floor(M / 2), past = [c.px[M] - c.px[M - span], c.pz[M] - c.pz[M - span]];
-    const more = velocity.map((v, i) => spec.steering * (v - past[i] / span));
-    const limit = min(1, 2 * sqrt((velocity[0] ** 2 + velocity[1] ** 2) / max(more[0] ** 2 + more[1] ** 2, 1e-12)));
-    for (let i = 0; i < 2; i++) c.velocity[i] += k.targetMix * (velocity[i] + more[i] * limit - c.velocity[i]);
+    // What the last half of the past lacks of the wished velocity is asked for on top, what is missing then is owed.
+    const speed = hypot(...velocity), span = floor(M / 2);
+    let asked = velocity, wished = atan2(...direction);
+    if (spec.steering > 0) {
+      if (speed >= k.still) {
+        const off = wrap(wished - atan2(c.dx[M], c.dz[M])), room = max(k.furthestTurn - abs(off), 0);
+        wished += min(max(.5 * spec.steering * off, -room), room);
+      }
+      asked = ask(velocity, speed, [(c.px[M] - c.px[M - span]) / span, (c.pz[M] - c.pz[M - span]) / span]);
+    }
+    for (let i = 0; i < 2; i++) c.velocity[i] += k.targetMix * (asked[i] - c.velocity[i]);
     let now = atan2(...c.direction);
-    now += k.targetMix * wrap(atan2(...direction) - now);
+    now += k.targetMix * wrap(wished - now);
     c.direction = [sin(now), cos(now)];
     c.strafe += k.targetMix * (strafe - c.strafe);
     for (let g = 0; g < G; g++) c.gait[M * G + g] += k.gaitMix * (gait[g] - c.gait[M * G + g]);
