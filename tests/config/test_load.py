@@ -48,6 +48,27 @@ def test_overrides_go_on_top_of_every_configuration(folder: Path) -> None:
     assert [catalogue.configuration(n).training.passes for n in ("base", "child")] == [7, 7]
 
 
+def test_a_training_can_be_named(folder: Path) -> None:
+    """It stands for the whole section, from a file or the command line, and can be said more of."""
+    (folder / "quick.yaml").write_text("extends: base\ntraining: {batch: 256}\n")
+    (folder / "like.yaml").write_text("injury: true\ntraining: quick\n")
+    (folder / "more.yaml").write_text("extends: like\ntraining: {seed: 5}\n")
+    quick = Catalogue(folder).configuration("quick").training
+    assert Catalogue(folder).configuration("like").training == quick
+    assert Catalogue(folder).configuration("more").training == quick.model_copy(update={"seed": 5})
+    named = Catalogue(folder, {"training": "quick"})
+    assert [named.configuration(name).training for name in ("base", "child", "quick")] == [quick] * 3
+    assert named.configuration("like").injury
+
+
+def test_a_training_that_is_not_there_is_told(folder: Path) -> None:
+    with pytest.raises(HobbleError, match=r"slow\.yaml: no such file\. There are: base, child"):
+        Catalogue(folder, {"training": "slow"}).configuration("base")
+    (folder / "like.yaml").write_text("training: like\n")
+    with pytest.raises(HobbleError, match="`training: like` leads back to itself"):
+        Catalogue(folder).configuration("like")
+
+
 def test_a_circle_of_extends_is_told(folder: Path) -> None:
     (folder / "base.yaml").write_text("extends: child\n")
     with pytest.raises(HobbleError, match=r"child\.yaml: extends itself by way of child -> base"):

@@ -41,8 +41,11 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return data
 
 
-def layers(folder: Path, name: str) -> tuple[dict[str, Any], list[Path]]:
-    """The values of `<folder>/<name>.yaml` over those of what it `extends`, and the files read."""
+def layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[dict[str, Any], list[Path]]:
+    """The values of `<folder>/<name>.yaml` over those of what it `extends`, and the files read.
+
+    within: names whose files this one is read for.
+    """
     files: list[Path] = []
     chain: list[dict[str, Any]] = []
     next_name: str | None = name
@@ -57,8 +60,18 @@ def layers(folder: Path, name: str) -> tuple[dict[str, Any], list[Path]]:
         next_name = chain[-1].get("extends")
     merged: dict[str, Any] = {}
     for values in reversed(chain):
-        merged = merge(merged, values)
+        merged = with_training(folder, merge(merged, values), (*within, name))
     return merged, files
+
+
+def with_training(folder: Path, values: dict[str, Any], within: tuple[str, ...] = ()) -> dict[str, Any]:
+    """`values`, where `training: NAME` stands for the whole training section of configuration NAME."""
+    name = values.get("training")
+    if not isinstance(name, str):
+        return values
+    if name in within:
+        raise InputError(folder / f"{name}.yaml", f"`training: {name}` leads back to itself")
+    return {**values, "training": layers(folder, name, within)[0].get("training", {})}
 
 
 def validate(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
@@ -122,6 +135,6 @@ class Catalogue:
             values, files = layers(folder, name)
             where = " < ".join(str(path) for path in files)
             if over:
-                values, where = merge(values, over), f"{where} < --config"
+                values, where = with_training(folder, merge(values, over)), f"{where} < --config"
             self._cache[kind, name] = validate(model, values, where)
         return self._cache[kind, name]
