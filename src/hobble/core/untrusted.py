@@ -29,7 +29,8 @@ def read_bytes(path: str | Path, most: int) -> bytes:
                 path, "not a file" if stat.S_ISDIR(kind.st_mode) else "a device or a pipe, not a file"
             )
         with open(path, "rb") as file:
-            data = file.read(most + 1) if kind.st_size <= most else b""
+            # no more room than the file takes: a buffer of `most` bytes is 1 GB for some
+            data = file.read(kind.st_size + 1) if kind.st_size <= most else b""
     except FileNotFoundError:
         raise InputError(path, "no such file") from None
     except (OSError, ValueError) as error:
