@@ -31,7 +31,7 @@ from hobble.database.reader import Database
 
 CLIP_ROWS = 3000
 BATCH = 512
-TURNS, STEPS = 40, 10  # of training: many short turns, since other work on the machine comes and goes
+WINDOWS = 3  # of the reader, that a turn of training reads
 STACK = 8 << 20
 PROGRAM_MB = 100  # Python, numpy and some room for the page cache
 SECONDS = 6.0  # of reading, per measurement
@@ -142,8 +142,12 @@ def child(task: str, folder: Path, argument: str = "", limit_mb: int | None = No
     limit_mb: most memory, the page cache counted in, beyond which the kernel reclaims pages or kills.
     """
     command = [sys.executable, __file__, "--task", task, "--folder", str(folder), "--argument", argument]
+    one_arena = {**os.environ, "MALLOC_ARENA_MAX": "1"}  # else each thread reserves 64 MB of address space
     with cgroup(limit_mb) as join:
-        out = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, preexec_fn=join).stdout
+        done = subprocess.run(
+            command, check=True, stdout=subprocess.PIPE, text=True, preexec_fn=join, env=one_arena
+        )
+    out = done.stdout
     return [float(word) for word in out.split()]
 
 
@@ -179,11 +183,11 @@ def task_build(folder: Path, clips: str) -> None:
 
 
 def task_section(folder: Path, memory_mb: str) -> None:
-    """One section from disk, with no more new data than stated: an allocation beyond it fails."""
+    """One section from disk, with no more new address space than stated: an allocation beyond it fails."""
     list(Database.open(folder / "small").blocks("train", 0, 0, 10, 1))  # the program itself, once through
     before = status("VmRSS")
-    limit = (int(memory_mb) << 20) + 2 * STACK  # the threads' stacks, which the kernel counts as data
-    resource.setrlimit(resource.RLIMIT_DATA, (status("VmData") + limit, resource.RLIM_INFINITY))
+    limit = (int(memory_mb) << 20) + 2 * STACK  # the threads' stacks, of which the kernel counts every byte
+    resource.setrlimit(resource.RLIMIT_AS, (status("VmSize") + limit, resource.RLIM_INFINITY))
     db = Database.open(folder / "db", int(memory_mb))
     rows = sum(len(block.p) for block in db.blocks("train", 0, 0, 10, 1, db.block_rows(BATCH)))
     assert rows == db.section_pairs("train", 0, 10)
@@ -224,7 +228,8 @@ def reading(db: Database, folder: Path, args: argparse.Namespace) -> None:
     )
     columns = db.layout.x_size + db.layout.y_size + 1
     expanded = folder / "expanded.bin"
-    write_expanded(db, expanded, min(db.pairs("train"), (args.size_mb << 20) // (4 * columns)))
+    size = min(args.size_mb, 4 * args.memory_mb) << 20
+    write_expanded(db, expanded, min(db.pairs("train"), size // (4 * columns)))
     limit = args.memory_mb + PROGRAM_MB
     piece = (args.memory_mb << 20) // (2 * 16 * 4 * columns)
     (memory,) = child("database", folder, str(1 << 20))
@@ -240,45 +245,62 @@ def reading(db: Database, folder: Path, args: argparse.Namespace) -> None:
     expanded.unlink()
     cold(folder)
     rows, peak, before = child("section", folder, str(args.memory_mb), limit)
-    print(
-        f"a section of {rows:,.0f} rows with at most {args.memory_mb} MB of new data: peak {peak:.0f} MB, ",
-        end="",
-    )
-    print(f"{peak - before:.0f} MB above the program's own {before:.0f} MB")
+    print(f"a section of {rows:,.0f} rows within {args.memory_mb} MB of new address space: ", end="")
+    print(f"peak {peak:.0f} MB, {peak - before:.0f} MB above the program's own {before:.0f} MB")
 
 
-def training(folder: Path, memory_mb: int) -> None:
-    """Steps of the real training, from memory and from disk in turns, so that both meet the same machine."""
+def training(folder: Path, memory_mb: int, rounds: int) -> None:
+    """The real training, from memory and from disk in turns, each turn a stretch of several windows.
+
+    A turn begins as a section does, with nothing read ahead, and from disk with the page cache dropped; which
+    comes first changes from round to round. So both meet the same machine, and neither profits from what was
+    read in the other's time.
+    """
+    from hobble.config.sections import Network, Training
+    from hobble.training.batches import batches
+    from hobble.training.start import fresh, step_for, use_threads
+
+    use_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
+    options = Training(memory_mb=memory_mb).model_dump(mode="json")
+    disk, memory = (Database.open(folder / "db", mb) for mb in (memory_mb, 1 << 20))
+    state = fresh(disk, Network().model_dump(mode="json"), options)
+    step, device = step_for(state.network, options), state.network.flat.device
+    rows = disk.block_rows(options["batch"])
+    stretch = WINDOWS * disk.window("train", rows) * disk.manifest.chunks["train"][0].rows
+    stretch = min(stretch, disk.section_pairs("train", 0, 10))
+
+    def turn(db: Database, section: int) -> tuple[float, float]:
+        """Samples a second over one stretch, by the clock and by processor time, that of all threads."""
+        start, used, done = time.perf_counter(), time.process_time(), 0
+        for batch in batches(db, 0, section % 10, 10, 1, options["batch"]):
+            x, y, p = (torch.from_numpy(array).to(device) for array in batch[:3])
+            loss = step(x, y, p, step.masks(len(x)))
+            state.adam.step(step.gradients)
+            done += len(p)
+            if done >= stretch:
+                break
+        float(loss)
+        return done / (time.perf_counter() - start), done / (time.process_time() - used)
+
     import torch
 
-    from hobble.training.batches import batches
-    from hobble.training.network import initialise
-    from hobble.training.optimiser import Adam
-    from hobble.training.step import Step
-
-    torch.set_num_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    databases = [Database.open(folder / "db", mb) for mb in (1 << 20, memory_mb)]
-    layout = databases[0].layout
-    network = initialise((layout.x_size, 512, 512, layout.y_size), 4, 1).to(device)
-    step, adam = Step(network, 0.3), Adam(network, 1e-4, 0.9, 0.999, 0.01)
-    times: list[list[float]] = [[], []]
-    cold(folder / "db")
-    streams = [(b for s in range(100) for b in batches(db, 0, s % 10, 10, 1, 32)) for db in databases]
-    for turn in range(TURNS):
-        for which, stream in enumerate(streams):
-            start = time.perf_counter()
-            for _ in range(STEPS):
-                batch = next(stream)
-                x, y, p = (torch.from_numpy(a).to(device) for a in batch[:3])
-                loss = step(x, y, p, step.masks(len(x)))
-                adam.step(step.gradients)
-            loss.item()
-            if turn:
-                times[which].append(time.perf_counter() - start)
-    memory, disk = (STEPS * 32 / np.quantile(t, 0.25) for t in times)
-    print(f"training on {device}: {memory:,.0f} samples/s from memory, {disk:,.0f} from disk: ", end="")
-    print(f"{disk / memory:.3f} (goal: 0.95)")
+    pairs = []
+    turn(memory, 0)
+    for number in range(rounds):
+        found = {}
+        for name, db in [("disk", disk), ("memory", memory)][:: 1 - 2 * (number % 2)]:
+            cold(folder / "db")
+            found[name] = turn(db, number)
+        pairs.append((found["memory"], found["disk"]))
+    print(
+        f"training on {device}, {rounds} rounds of {stretch:,} samples ({WINDOWS} windows) each way, medians:"
+    )
+    for k, clock in enumerate(("by the clock", "by processor time")):
+        speeds = np.array(pairs)[..., k]
+        from_memory, from_disk = np.median(speeds, axis=0)
+        ratios = speeds[:, 1] / speeds[:, 0]
+        print(f"    {clock}: {from_memory:,.0f} samples/s from memory, {from_disk:,.0f} from disk; ", end="")
+        print(f"disk / memory {np.median(ratios):.3f}, {ratios.min():.3f} to {ratios.max():.3f} (goal: 0.95)")
 
 
 def main() -> None:
@@ -286,6 +308,8 @@ def main() -> None:
     parser.add_argument("--size-mb", type=int, default=1280)
     parser.add_argument("--memory-mb", type=int, default=128)
     parser.add_argument("--joints", type=int, default=31)
+    parser.add_argument("--rounds", type=int, default=7, help="of training from memory and from disk")
+    parser.add_argument("--only", choices=["reading", "training"], help="leave the other out")
     parser.add_argument("--folder", type=Path)
     parser.add_argument("--task", help=argparse.SUPPRESS)
     parser.add_argument("--argument", help=argparse.SUPPRESS)
@@ -299,8 +323,10 @@ def main() -> None:
         splits = dict.fromkeys(small, "train")
         write_database(folder / "small", small, splits, injury=True, joint_weight=0.1)
         db = build(args, folder)
-        reading(db, folder, args)
-        training(folder, args.memory_mb)
+        if args.only != "training":
+            reading(db, folder, args)
+        if args.only != "reading":
+            training(folder, args.memory_mb, args.rounds)
     finally:
         shutil.rmtree(folder)
 
