@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import os
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
@@ -33,3 +37,61 @@ def holden31() -> Skeleton:
     """The 31-joint skeleton."""
     data = yaml.safe_load((ROOT / "config/skeletons/holden31.yaml").read_text())
     return Skeleton.from_dict({"name": "holden31", **{k: v for k, v in data.items() if k != "maps"}})
+
+
+@dataclass
+class Server:
+    """A server on the loopback address that serves `content`.
+
+    Each answer takes the next of `faults`: an error's status, or the bytes after which it breaks off.
+    asked: the Range of each request.
+    """
+
+    url: str = ""
+    content: bytes = b""
+    faults: list[int | str] = field(default_factory=list)
+    ranges: bool = True
+    announces: bool = True
+    asked: list[str | None] = field(default_factory=list)
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    """Such a server, on a port of its own."""
+    told = Server()
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            wanted = self.headers.get("Range")
+            told.asked.append(wanted)
+            fault = told.faults.pop(0) if told.faults else 0
+            if isinstance(fault, int) and 400 <= fault < 600:
+                return self.send_error(fault)
+            start = int(wanted[6:-1]) if wanted and told.ranges else 0
+            if start >= len(told.content):
+                return self.send_error(416)
+            body = told.content[start:]
+            self.send_response(206 if start else 200)
+            if start:
+                first = 0 if fault == "other part" else start
+                self.send_header(
+                    "Content-Range", f"bytes {first}-{len(told.content) - 1}/{len(told.content)}"
+                )
+            if told.announces:
+                self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body[: fault or None] if isinstance(fault, int) else body)
+            self.close_connection = True
+            return None
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    http = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    thread = threading.Thread(target=http.serve_forever, kwargs={"poll_interval": 0.01})
+    thread.start()
+    told.url = f"http://127.0.0.1:{http.server_port}/walk.bvh"
+    yield told
+    http.shutdown()
+    http.server_close()
+    thread.join()

@@ -136,3 +136,98 @@ def test_folders_of_results_are_no_configurations(base: Path, name: str) -> None
     (base / f"config/{name}.yaml").write_text("extends: one\n")
     with pytest.raises(HobbleError, match=f"no configuration can be called {name}"):
         Project(base, {})
+
+
+def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(base: Path) -> None:
+    below = base / "data/mine/takes/day 1"
+    below.mkdir(parents=True)
+    (below / "d.BVH").write_text("")
+    (below / "d_gait.txt").write_text("1 walk\n")
+    (below / "d_injuries.txt").write_text("frames:9\n")
+    (base / "data/mine/.trash").mkdir()
+    (base / "data/mine/.trash/e.bvh").write_text("")
+    project = Project(base, {})
+    assert list(project.clips("mine")) == ["a", "b", "c", "d"]
+    assert project.source("mine", "d") == str(below / "d.BVH")
+    assert project.label_files("mine", "d") == [str(below / "d_gait.txt")]
+    assert project.status_files("mine", "d") == [str(below / "d_injuries.txt")]
+
+
+def test_two_files_of_one_clip_are_refused_with_both(base: Path) -> None:
+    (base / "data/mine/old").mkdir()
+    (base / "data/mine/old/a.BVH").write_text("")
+    with pytest.raises(HobbleError, match=r"old/a\.BVH: a second file of clip a, beside .*mine/a\.bvh"):
+        Project(base, {}).clips("mine")
+    (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , c: }\n")
+    with pytest.raises(HobbleError, match="a second file of clip a"):
+        Project(base, {}).source("mine", "a")
+    assert Project(base, {}).source("mine", "b").endswith("mine/b.bvh")
+
+
+FAR = """
+skeleton: s
+folder: far
+download: {url: 'https://host/{subject:0>3}/{clip}.bvh', checksums: far.sha256}
+"""
+
+
+def test_what_the_folder_lacks_is_downloaded(base: Path) -> None:
+    (base / "config/datasets/far.yaml").write_text(FAR + "clips: {'2_1': , '2_2': , '2_3': }\n")
+    (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'B' * 64} *2_2.bvh\n\n")
+    project = Project(base, {})
+    assert project.source("far", "2_1") == str(base / "data/downloaded/far/2_1.bvh")
+    assert project.label_files("far", "2_1") == project.status_files("far", "2_1") == []
+    assert project.download("far", "2_2") == {
+        "url": "https://host/002/2_2.bvh",
+        "sha256": "b" * 64,
+        "folder": str(base / "data/far"),
+    }
+    with pytest.raises(HobbleError, match=r"far/2_3\.bvh: no such file, .* far\.sha256 has none to download"):
+        project.source("far", "2_3")
+    (base / "data/far").mkdir()
+    (base / "data/far/2_1.bvh").write_text("")
+    assert Project(base, {}).source("far", "2_1") == str(base / "data/far/2_1.bvh")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("https://host/", "ftp://host/", r"download: url: must be an address like"),
+        ("{clip}", "{name}", r"download: url: 'name'"),
+        ("{clip}", "a", r"download: url: \{clip\} must stand in it"),
+        ("{clip}", "{clip.x}", "download: url: "),
+        ("{clip}", "{clip", "download: url: "),
+        ("far.sha256", "../far.sha256", "checksums: must be relative"),
+        ("clips: {'2_1': }\n", "", "lists them and names a `folder`"),
+    ],
+)
+def test_an_address_that_cannot_work_is_told(base: Path, old: str, new: str, message: str) -> None:
+    (base / "config/datasets/far.yaml").write_text((FAR + "clips: {'2_1': }\n").replace(old, new))
+    with pytest.raises(HobbleError, match=message):
+        Project(base, {}).dataset("far")
+
+
+def test_a_manifest_that_does_not_read_is_told_with_its_line(base: Path) -> None:
+    (base / "config/datasets/far.yaml").write_text(FAR + "clips: {'2_1': }\n")
+    (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'a' * 63}  2_2.bvh\n")
+    with pytest.raises(HobbleError, match=r"far\.sha256, line 2: a line holds a SHA-256"):
+        Project(base, {}).source("far", "2_1")
+
+
+def test_every_clip_of_the_cmu_set_has_a_checksum_and_an_address(root: Path) -> None:
+    project = Project(root, {"mocap": "nowhere"})
+    project.check(["results/datasets/cmu/motion/02_01.npz"])
+    assert len(project.clips("cmu")) == 69
+    assert project.download("cmu", "02_01")["url"].endswith("/cmu-mocap/master/data/002/02_01.bvh")
+    assert project.download("cmu", "105_16")["url"].endswith("/105/105_16.bvh")
+    assert all(len(project.download("cmu", clip)["sha256"]) == 64 for clip in project.clips("cmu"))
+
+
+@pytest.mark.shared
+def test_the_checksums_are_those_of_the_files(root: Path, shared: Path) -> None:
+    import hashlib
+
+    project = Project(root, {})
+    for clip in project.clips("cmu"):
+        data = (shared / f"mocap/cmu/{clip}.bvh").read_bytes()
+        assert project.download("cmu", clip)["sha256"] == hashlib.sha256(data).hexdigest()

@@ -1,3 +1,22 @@
+# No `code` here: a file that has its checksum is the right one, whatever fetched it.
+rule download_clip:
+    """A clip that the user's folder lacks, from the address that the data set names."""
+    output:
+        bvh=project.downloaded("{dataset}", "{clip}"),
+    log:
+        "results/datasets/{dataset}/logs/motion/download_clip/{clip}.log",
+    localrule: True
+    resources:
+        mem_mb=500,
+        runtime=10,
+    params:
+        url=lambda w: project.download(w.dataset, w.clip)["url"],
+        sha256=lambda w: project.download(w.dataset, w.clip)["sha256"],
+        folder=lambda w: project.download(w.dataset, w.clip)["folder"],
+    script:
+        "../scripts/download_clip.py"
+
+
 rule motion_clip:
     """A BVH file, read, checked and put on the data set's skeleton at 60 Hz."""
     input:

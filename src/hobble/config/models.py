@@ -45,8 +45,9 @@ class Dataset(s.Section):
     skeleton: Name
     source: Name | None = Field(None, description="a data set whose source files this one reads")
     folder: s.Inside | None = Field(None, description="where the BVH files lie, inside the mocap folder")
+    download: s.Download | None = Field(None, description="where clips come from that the folder lacks")
     clips: dict[Name, ClipEntry | None] = Field(
-        default_factory=dict, description="clips by name; none: every .bvh in the folder"
+        default_factory=dict, description="clips by name; none: every .bvh in the folder and those below it"
     )
     held_out: tuple[Name, ...] = Field((), description="clips kept from training, with their mirrors")
     mirror: bool = False
@@ -62,6 +63,8 @@ class Dataset(s.Section):
             raise ValueError("a data set needs `folder` (BVH files) or `synthetic` (the embedded walker)")
         if self.synthetic is not None and not self.clips:
             raise ValueError("a synthetic data set lists its clips")
+        if self.download is not None and not (self.folder and self.clips):
+            raise ValueError("a data set that downloads its clips lists them and names a `folder`")
         unknown = [c for c in self.held_out if self.clips and c not in self.clips]
         if unknown:
             raise ValueError(f"held_out names clips that are not in `clips`: {', '.join(unknown)}")

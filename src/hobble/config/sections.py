@@ -6,7 +6,9 @@ description here re-runs nothing.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from string import Formatter
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
@@ -44,6 +46,30 @@ class Synthetic(Section):
     )
     fps: Literal[60, 120] = Field(120, description="frames a second in the files written")
     seed: int = 1
+
+
+class Download(Section):
+    """Where clips come from that the user's folder lacks."""
+
+    url: str = Field(
+        description="of a clip's file: {clip} its name, {subject} what stands before its first _"
+    )
+    checksums: Inside = Field(
+        description="SHA-256 of each file, as sha256sum writes them; beside the data set's own file"
+    )
+
+    @model_validator(mode="after")
+    def _url_of_a_clip(self) -> Download:
+        try:
+            fields = {name for _, name, _, _ in Formatter().parse(self.url) if name is not None}
+            made = self.url.format(clip="02_01", subject="02")
+        except (ValueError, LookupError, AttributeError) as error:
+            raise ValueError(f"url: {error}") from None
+        if not fields <= {"clip", "subject"} or "clip" not in fields:
+            raise ValueError("url: {clip} must stand in it, {subject} may, and nothing else in braces")
+        if not re.fullmatch(r"https?://[^/\s]+/\S+", made):
+            raise ValueError("url: must be an address like https://host/{subject}/{clip}.bvh")
+        return self
 
 
 class Motion(Section):
@@ -154,7 +180,9 @@ class Database(Section):
     facing_sigma: PositiveFloat = Field(20.0, description="smoothing of the facing direction, frames")
     joint_weight: PositiveFloat = 0.1
     terrain_side: PositiveFloat = Field(25.0, description="centimetres from the path to the side heights")
-    dtype: Literal["float32", "float16"] = "float32"
+    dtype: Literal["float32", "float16", "bfloat16"] = Field(
+        "float32", description="of the rows on disk; the others take half the bytes, float16 more exactly"
+    )
     seed: int = 1
 
     @model_validator(mode="after")

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from hobble.config.load import Catalogue
 from hobble.config.models import ClipEntry, Configuration, Dataset
@@ -17,6 +18,7 @@ from hobble.config.sections import COMPARED
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import MOST_TEXT, read_bytes
 from hobble.workflow.fingerprint import fingerprint
+from hobble.workflow.sources import find_clips, read_checksums, the_file
 
 DATASETS = "results/datasets"
 MIRROR = "_mirror"
@@ -128,11 +130,11 @@ class Project:
         if model.clips:
             found = {name: entry or ClipEntry() for name, entry in model.clips.items()}
         else:
-            folder = self.folder(dataset)
-            names = sorted(path.stem for path in folder.glob("*.bvh"))
-            for name in names:
+            folder, files = self.folder(dataset), self._files(dataset)
+            for name in sorted(files):
                 _check_name(folder, name)
-            found = {name: ClipEntry() for name in names if not name.endswith(MIRROR)}
+                the_file(name, files[name])
+            found = {name: ClipEntry() for name in sorted(files) if not name.endswith(MIRROR)}
             if not found:
                 raise InputError(folder, "no .bvh files here", fix="Put clips there.")
         made = [name for name in found if name.endswith(MIRROR)]
@@ -143,11 +145,16 @@ class Project:
         return found
 
     def folder(self, dataset: str) -> Path:
-        """Where the data set's own source files lie. Raises InputError where a user's folder is missing."""
+        """Where the data set's own source files lie.
+
+        Raises InputError where a user's folder is missing, unless its clips can be downloaded.
+        """
         model = self.dataset(dataset)
         if model.synthetic is not None:
             return Path(DATASETS, model.source or dataset, "synthetic")
         path = self.mocap / (model.folder or "")
+        if model.download is not None and not path.exists():
+            return path
         if not path.is_dir():
             raise InputError(
                 path,
@@ -169,14 +176,54 @@ class Project:
     def source(self, dataset: str, clip: str) -> str:
         """Path of the clip's BVH file."""
         self.entry(dataset, clip)
+        if self.dataset(dataset).synthetic is not None:
+            return str(self.folder(dataset) / f"{clip}.bvh")
+        if clip in (files := self._files(dataset)):
+            return str(the_file(clip, files[clip]))
+        if clip in (known := self._checksums(dataset)):
+            return self.downloaded(self.dataset(dataset).source or dataset, clip)
         path = self.folder(dataset) / f"{clip}.bvh"
-        if self.dataset(dataset).synthetic is None and not path.is_file():
-            raise InputError(path, f"no such file, but data set {dataset} lists this clip")
-        return str(path)
+        nor = f", and {self._manifest(dataset)} has none to download" if known else ""
+        raise InputError(path, f"no such file, but data set {dataset} lists this clip{nor}")
+
+    def downloaded(self, dataset: str, clip: str) -> str:
+        """Where a clip of a data set is kept that is downloaded."""
+        return str(self.base / "data" / "downloaded" / dataset / f"{clip}.bvh")
+
+    def download(self, dataset: str, clip: str) -> dict[str, str]:
+        """What fetches a clip: its `url`, the `sha256` that it must have, the `folder` that lacks it."""
+        options = self.dataset(dataset).download
+        if options is None or clip not in self._checksums(dataset):
+            raise HobbleError(f"data set {dataset}: clip {clip} cannot be downloaded")
+        return {
+            "url": options.url.format(clip=quote(clip), subject=quote(clip.partition("_")[0])),
+            "sha256": self._checksums(dataset)[clip],
+            "folder": str(self.mocap / (self.dataset(dataset).folder or "")),
+        }
+
+    def _manifest(self, dataset: str) -> Path:
+        options = self.dataset(dataset).download
+        return self.base / "config" / "datasets" / (options.checksums if options else "")
+
+    @functools.cache  # noqa: B019 - one project lives as long as the process
+    def _checksums(self, dataset: str) -> dict[str, str]:
+        return read_checksums(self._manifest(dataset)) if self.dataset(dataset).download else {}
+
+    @functools.cache  # noqa: B019 - one project lives as long as the process
+    def _files(self, dataset: str) -> dict[str, list[Path]]:
+        """The BVH files in the user's folder by clip."""
+        folder = self.folder(dataset)
+        return find_clips(folder) if folder.is_dir() else {}
+
+    def _stem(self, dataset: str, clip: str) -> Path:
+        """What the names of the files beside a clip begin with."""
+        if self.dataset(dataset).synthetic is None and clip in (files := self._files(dataset)):
+            return files[clip][0].with_suffix("")
+        return self.folder(dataset) / clip
 
     def label_files(self, dataset: str, clip: str) -> list[str]:
         """Hand-made label files beside the clip."""
-        stem = self.folder(dataset) / clip
+        stem = self._stem(dataset, clip)
         if self.dataset(dataset).synthetic is not None:
             return [f"{stem}_footsteps.txt", f"{stem}_gait.txt"]
         files = [f"{stem}{suffix}" for suffix in LABEL_FILES]
@@ -184,7 +231,7 @@ class Project:
 
     def status_files(self, dataset: str, clip: str) -> list[str]:
         """The status file beside the clip, if there is one and the data set gives no status of its own."""
-        path = f"{self.folder(dataset) / clip}_injuries.txt"
+        path = f"{self._stem(dataset, clip)}_injuries.txt"
         if self.dataset(dataset).synthetic is not None:
             return [path]
         return [path] if Path(path).is_file() and not self.entry(dataset, clip).status else []

@@ -1,0 +1,154 @@
+"""Downloading one clip: resumed where it broke off, tried again where a server fails, then checked."""
+
+from __future__ import annotations
+
+import hashlib
+import http.client
+import logging
+import os
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import explained
+from hobble.motion.read import MOST_BYTES
+
+log = logging.getLogger("hobble.download")
+
+ATTEMPTS = 5
+PAUSE = 1.0  # seconds before the second attempt, twice as long before each further one
+TIMEOUT = 30.0  # seconds without a byte
+BLOCK = 1 << 16
+AGAIN = {408, 425, 429, *range(500, 600)}  # answers after which another attempt may do
+
+
+class _Failed(Exception):
+    """An attempt that came to nothing; another may do better where `again`."""
+
+    def __init__(self, reason: str, again: bool = True) -> None:
+        super().__init__(reason)
+        self.again = again
+
+
+class _OtherFile(_Failed):
+    """What arrived has not the checksum; where the same arrives again, that is what the server has."""
+
+
+def download_clip(
+    url: str,
+    path: str | Path,
+    sha256: str,
+    folder: str,
+    *,
+    attempts: int = ATTEMPTS,
+    pause: float = PAUSE,
+    timeout: float = TIMEOUT,
+    sleep: Callable[[float], object] = time.sleep,
+) -> int:
+    """Fetch `url` to `path`, which is there afterwards only if it has the checksum; returns its bytes.
+
+    sha256: of the file, or of the file with its line ends as a bare newline, since version control may change
+    those. folder: where the user can put the file instead, for the message. What has arrived is kept in a
+    hidden file beside `path`, from which this or a later call goes on. pause, timeout: seconds.
+    Raises InputError, naming what to do, where no attempt succeeds.
+    """
+    path = Path(path)
+    part = path.with_name(f".{path.name}.part")
+    others: set[str] = set()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for attempt in range(attempts):
+            try:
+                _fetch(url, part, timeout)
+                _check(part, sha256)
+                size = part.stat().st_size
+                os.replace(part, path)
+                return size
+            except _Failed as failure:
+                last = failure
+            if attempt + 1 == attempts or not last.again or str(last) in others:
+                break
+            if isinstance(last, _OtherFile):
+                others.add(str(last))
+            log.info("%s: %s; trying again", url, last)
+            sleep(pause * 2**attempt)
+    except OSError as error:
+        raise explained(error, path) from error
+    raise _refusal(url, path, folder, str(last), attempt + 1)
+
+
+def _refusal(url: str, path: Path, folder: str, reason: str, attempts: int) -> HobbleError:
+    times = f", {attempts} times" if attempts > 1 else ""
+    return InputError(
+        url,
+        f"cannot be downloaded: {reason}{times}",
+        fix=f"Run the same command again when it can be reached, or put {path.name} into {folder} yourself.",
+    )
+
+
+def _fetch(url: str, part: Path, timeout: float) -> None:
+    """Complete `part`, going on from what is there of it if the server can."""
+    have = part.stat().st_size if part.is_file() else 0
+    headers = {"User-Agent": "hobble", "Accept-Encoding": "identity"}
+    if have:
+        headers["Range"] = f"bytes={have}-"
+    try:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=timeout) as answer:
+            goes_on = answer.status == 206 and _starts_at(answer.headers.get("Content-Range"), have)
+            if answer.status == 206 and not goes_on:
+                part.unlink()
+                raise _Failed("the server sent another part than was asked for")
+            with open(part, "ab" if goes_on else "wb") as file:
+                _copy(answer, file, have if goes_on else 0, timeout)
+    except urllib.error.HTTPError as error:
+        error.close()
+        if error.code == 416 and have:  # there is nothing after what is there: it is whole, or not this file
+            return
+        raise _Failed(f"the server says {error.code} {error.reason}", error.code in AGAIN) from None
+    except TimeoutError:
+        raise _Failed(f"no answer for {timeout:g} seconds") from None
+    except urllib.error.URLError as error:
+        reason = getattr(error.reason, "strerror", None) or error.reason
+        raise _Failed(f"the server cannot be reached ({reason})") from None
+    except http.client.HTTPException as error:
+        raise _Failed(f"the answer makes no sense ({type(error).__name__})") from None
+
+
+def _starts_at(content_range: str | None, byte: int) -> bool:
+    return (content_range or "").replace("=", " ").startswith(f"bytes {byte}-")
+
+
+def _copy(answer: http.client.HTTPResponse, file: BinaryIO, have: int, timeout: float) -> None:
+    """Write the answer's body; raises _Failed where it ends before the length that it announced."""
+    announced = answer.headers.get("Content-Length")
+    came = 0
+    while block := _block(answer, timeout):
+        file.write(block)
+        came += len(block)
+        if have + came > MOST_BYTES:
+            raise _Failed("it is far larger than any clip", again=False)
+    if announced and announced.isdigit() and came < int(announced):
+        raise _Failed(f"the file was cut short after {have + came} of {have + int(announced)} bytes")
+
+
+def _block(answer: http.client.HTTPResponse, timeout: float) -> bytes:
+    try:
+        return answer.read(BLOCK)
+    except TimeoutError:
+        raise _Failed(f"no answer for {timeout:g} seconds") from None
+    except (OSError, http.client.HTTPException) as error:
+        raise _Failed(f"the connection broke off ({type(error).__name__})") from None
+
+
+def _check(part: Path, sha256: str) -> None:
+    """Raise _OtherFile, and throw the file away, where it is not the one that the manifest means."""
+    data = part.read_bytes()
+    found = hashlib.sha256(data).hexdigest()
+    if sha256.lower() in (found, hashlib.sha256(data.replace(b"\r\n", b"\n")).hexdigest()):
+        return
+    part.unlink()
+    raise _OtherFile(f"what arrives is another file: its SHA-256 is {found}, in the manifest it is {sha256}")

@@ -1,0 +1,148 @@
+"""Downloads from a server on the loopback address that does what servers in the wild do."""
+
+from __future__ import annotations
+
+import hashlib
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.motion.download import download_clip
+
+CONTENT = b"HIERARCHY\n" + bytes(range(48, 58)) * 20_000 + b"\n"
+SHA256 = hashlib.sha256(CONTENT).hexdigest()
+
+
+@pytest.fixture
+def fetch(server, tmp_path: Path) -> Callable[..., Path]:
+    def run(**changed: object) -> Path:
+        path = tmp_path / "kept/walk.bvh"
+        server.content = server.content or CONTENT
+        options = {"sha256": SHA256, "folder": "data/mine", "sleep": waits.append, **changed}
+        download_clip(server.url, path, **options)
+        return path
+
+    waits: list[float] = []
+    run.waits = waits
+    run.part = tmp_path / "kept/.walk.bvh.part"
+    return run
+
+
+def test_a_file_arrives_whole_and_leaves_nothing_else(server, fetch):
+    path = fetch()
+    assert path.read_bytes() == CONTENT
+    assert [p.name for p in path.parent.iterdir()] == ["walk.bvh"]  # no part is left
+    assert (server.asked, fetch.waits) == ([None], [])
+
+
+def test_a_server_that_fails_twice_is_asked_a_third_time_after_longer_waits(server, fetch):
+    server.faults = [503, 500]
+    assert fetch().read_bytes() == CONTENT
+    assert fetch.waits == [1, 2]
+
+
+def test_a_file_cut_short_is_gone_on_with_where_it_broke_off(server, fetch):
+    server.faults = [70_000, 50_000]
+    assert fetch().read_bytes() == CONTENT
+    assert server.asked == [None, "bytes=70000-", "bytes=120000-"]
+
+
+def test_a_later_run_goes_on_too(server, fetch):
+    server.faults = [90_000]
+    with pytest.raises(InputError, match=f"cut short after 90000 of {len(CONTENT)} bytes"):
+        fetch(attempts=1)
+    assert fetch.part.stat().st_size == 90_000
+    assert fetch().read_bytes() == CONTENT
+    assert server.asked[1:] == ["bytes=90000-"]
+
+
+def test_a_server_without_ranges_starts_anew(server, fetch):
+    server.faults, server.ranges = [70_000], False
+    assert fetch().read_bytes() == CONTENT
+    assert server.asked == [None, "bytes=70000-"]
+
+
+def test_a_server_that_sends_another_part_is_not_believed(server, fetch):
+    server.faults = [70_000, "other part"]
+    assert fetch().read_bytes() == CONTENT
+    assert server.asked == [None, "bytes=70000-", None]
+
+
+def test_what_is_cut_short_without_a_length_is_told_by_its_checksum(server, fetch):
+    server.faults, server.announces = [70_000], False
+    assert fetch().read_bytes() == CONTENT
+    assert server.asked == [None, None]
+
+
+@pytest.mark.parametrize("left", [b"not how it begins", CONTENT, CONTENT + b"more"])
+def test_a_leftover_of_another_file_or_a_whole_one_does_no_harm(server, fetch, left):
+    fetch.part.parent.mkdir()
+    fetch.part.write_bytes(left)
+    assert fetch().read_bytes() == CONTENT
+    assert len(server.asked) == (1 if left == CONTENT else 2)
+
+
+def test_lines_may_end_either_way(server, fetch):
+    server.content = CONTENT.replace(b"\n", b"\r\n")
+    assert fetch().read_bytes() == server.content
+
+
+def test_a_wrong_checksum_is_refused_with_both_and_nothing_is_kept(server, fetch):
+    server.content = CONTENT + b"."
+    found = hashlib.sha256(server.content).hexdigest()
+    with pytest.raises(InputError) as refused:
+        fetch()
+    assert str(refused.value) == (
+        f"{server.url}: cannot be downloaded: what arrives is another file: its SHA-256 is {found}, in the "
+        f"manifest it is {SHA256}, 2 times. Run the same command again when it can be reached, or "
+        "put walk.bvh into data/mine yourself."
+    )
+    assert list(fetch.part.parent.iterdir()) == []
+    assert server.asked == [None, None]
+
+
+def test_what_is_not_there_is_asked_for_once(server, fetch):
+    server.faults = [404] * 9
+    with pytest.raises(InputError, match=r"cannot be downloaded: the server says 404 Not Found\. Run"):
+        fetch()
+    assert (len(server.asked), fetch.waits) == (1, [])
+
+
+def test_a_server_that_never_answers_is_given_up(server, fetch):
+    server.faults = [500] * 9
+    with pytest.raises(InputError, match="500 Internal Server Error, 5 times"):
+        fetch()
+    assert fetch.waits == [1, 2, 4, 8]
+
+
+def test_without_a_network_the_message_says_so(tmp_path):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    with pytest.raises(
+        InputError, match=r"cannot be reached \(.*\), 2 times\. .*put walk\.bvh into data/mine"
+    ):
+        download_clip(
+            f"http://127.0.0.1:{port}/walk.bvh",
+            tmp_path / "walk.bvh",
+            SHA256,
+            "data/mine",
+            attempts=2,
+            pause=0,
+        )
+
+
+def test_a_silent_server_is_not_waited_for_for_ever(tmp_path):
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        url = f"http://127.0.0.1:{silent.getsockname()[1]}/walk.bvh"
+        with pytest.raises(InputError, match=r"no answer for 0\.05 seconds"):
+            download_clip(url, tmp_path / "walk.bvh", SHA256, "data/mine", attempts=1, timeout=0.05)
+
+
+def test_a_folder_that_cannot_be_written_is_named(server, tmp_path):
+    (tmp_path / "kept").write_text("a file where the folder should be")
+    with pytest.raises(InputError, match=r"kept/walk\.bvh"):
+        download_clip(server.url, tmp_path / "kept/walk.bvh", SHA256, "data/mine", attempts=1)

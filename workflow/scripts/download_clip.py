@@ -1,0 +1,13 @@
+"""Fetches a clip that the user's folder lacks, and keeps it once its checksum is right."""
+
+from hobble.motion.download import download_clip
+from hobble.workflow.job import job
+
+with job(snakemake) as log:
+    size = download_clip(
+        snakemake.params.url,
+        snakemake.output.bvh,
+        snakemake.params.sha256,
+        snakemake.params.folder,
+    )
+    log.info("%s: %d bytes", snakemake.params.url, size)
