@@ -19,7 +19,7 @@ import numpy as np
 from hobble.core.errors import InputError
 
 MOST_PARTS = 16  # of one vectored read: what POSIX has every system take
-TYPES = {"<f2": "F16", "<f4": "F32", "<i4": "I32"}
+TYPES = {"<f2": "F16", "<u2": "BF16", "<f4": "F32", "<i4": "I32"}
 HINT = "Delete the database's folder; the next run makes it again."
 
 
@@ -39,7 +39,7 @@ class Chunk:
 
 
 def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Chunk:
-    """Write arrays of float16, float32 or int32 to folder/file; `x` and `fits` are among them."""
+    """Write arrays of the types above, `x` and `fits` among them, to folder/file."""
     header: dict[str, Any] = {}
     place = 0
     for name, array in arrays.items():

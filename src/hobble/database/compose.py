@@ -6,6 +6,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.database.layout import RowLayout
+from hobble.database.precision import widen
 from hobble.database.statistics import Statistics
 
 
@@ -60,14 +61,14 @@ def compose(
     rows: (n,) of x and y; fit: (n,) of fits. Plain gathers: 2 million rows a second and core with 31 joints.
     """
     terrain = layout.x_terrain
-    of_frame, ground = tables[0][rows], tables[2][fit]
+    of_frame, ground = widen(tables[0][rows]), widen(tables[2][fit])
     x[:, : terrain.start] = of_frame[:, : terrain.start]
     x[:, terrain.stop :] = of_frame[:, terrain.start :]
     x[:, terrain] = ground[:, :-1]
     if tables[1].dtype == y.dtype:
         np.take(tables[1], rows, axis=0, out=y, mode="clip")  # any other mode copies once more
     else:
-        y[...] = tables[1][rows]
+        y[...] = widen(tables[1][rows])
     lift = ground[:, -1:].astype(np.float32)
     if lift.any():
         heights = joint_heights(layout.x_joint_position)

@@ -27,6 +27,7 @@ from hobble.database.clip_rows import ClipRows, Outline, load_clip_rows, outline
 from hobble.database.compose import fit_columns, split_rows, x_columns
 from hobble.database.layout import RowLayout
 from hobble.database.manifest import FILE, SPLITS, STATISTICS, Manifest
+from hobble.database.precision import STORED, narrow
 from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
 
 CHUNK_BYTES = 4 << 20  # what a reader takes in one go: long enough for any disk, short enough for any memory
@@ -65,8 +66,8 @@ def write_database(
 ) -> Manifest:
     """Build the database folder `path` from rows by clip name, or from the files that hold them.
 
-    splits: clip name -> "train" or "held_out". injury: whether severities are inputs. dtype: float32 or
-    float16. The statistics are those of the clips in training. The same rows and options give the same
+    splits: clip name -> "train" or "held_out". injury: whether severities are inputs. dtype: float32, float16
+    or bfloat16. The statistics are those of the clips in training. The same rows and options give the same
     bytes. Raises HobbleError where no clip has rows to train on, InputError where a clip does not fit the
     others.
     """
@@ -76,7 +77,7 @@ def write_database(
     work = path / f"part-{os.getpid()}"
     try:
         work.mkdir()
-        plan = _plan(clips, splits, injury, np.dtype(dtype).itemsize, chunk_bytes)
+        plan = _plan(clips, splits, injury, STORED[dtype].itemsize, chunk_bytes)
         buckets, moments = _scatter(work, clips, plan, seed)
         unseen = unseen_joints(plan.skeleton)
         statistics = finish(plan.layout, *moments, joint_weight, unseen)
@@ -200,9 +201,9 @@ def _chunks(
             raw = frames[part, :columns], frames[part, columns:], fits[fit_part]
             x, y, ground = split_rows(plan.layout, statistics, *raw, count)
             arrays = {
-                "x": x.astype(dtype),
-                "y": y.astype(dtype),
-                "fits": ground.astype(dtype),
+                "x": narrow(x, dtype),
+                "y": narrow(y, dtype),
+                "fits": narrow(ground, dtype),
                 "count": count,
                 "clip": index["clip"][part],
                 "frame": index["frame"][part],

@@ -19,6 +19,7 @@ from hobble.database.chunks import read_chunk
 from hobble.database.compose import compose, fit_columns, x_columns
 from hobble.database.layout import RowLayout
 from hobble.database.manifest import STATISTICS, Manifest
+from hobble.database.precision import STORED
 from hobble.database.statistics import Statistics
 
 Item = TypeVar("Item")
@@ -231,7 +232,7 @@ class Database:
         chunks = self.manifest.chunks[split]
         rows = sum(sorted(chunk.rows for chunk in chunks)[-window:])
         fits = sum(sorted(chunk.fits for chunk in chunks)[-window:])
-        floats = np.dtype(self.manifest.dtype)
+        floats = STORED[self.manifest.dtype]
         return {
             "x": np.empty((rows, x_columns(self.layout)), floats),
             "y": np.empty((rows, self.layout.y_size), floats),

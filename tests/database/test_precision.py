@@ -1,0 +1,38 @@
+"""Half precision against what defines it: the nearest of the numbers that there are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hobble.core.errors import HobbleError
+from hobble.database.precision import narrow, widen
+
+
+@given(st.lists(st.floats(-(2.0**99), 2.0**99, width=32), min_size=1, max_size=40))
+def test_bfloat16_is_that_of_torch(values):
+    array = np.array(values, np.float32)
+    expected = torch.from_numpy(array).to(torch.bfloat16)
+    stored = narrow(array, "bfloat16")
+    np.testing.assert_array_equal(stored.view(np.int16), expected.view(torch.int16).numpy())
+    np.testing.assert_array_equal(widen(stored), expected.float().numpy())
+
+
+def test_of_two_equally_near_the_even_one_is_taken():
+    halfway = np.array([1 + 2**-8, 1 + 3 * 2**-8], np.float32)
+    np.testing.assert_array_equal(widen(narrow(halfway, "bfloat16")), [1.0, 1 + 2**-6])
+
+
+@pytest.mark.parametrize("precision", ["float32", "float16"])
+def test_other_types_are_numpys_own(precision):
+    values = np.random.default_rng(0).normal(size=99)
+    np.testing.assert_array_equal(widen(narrow(values, precision)), values.astype(precision))
+
+
+def test_what_float16_cannot_hold_is_said_and_bfloat16_holds_it():
+    with pytest.raises(HobbleError, match=r"7e\+04 does not fit float16.*bfloat16"):
+        narrow(np.array([1.0, -7e4]), "float16")
+    assert widen(narrow(np.array([-7e4]), "bfloat16"))[0] == pytest.approx(-7e4, rel=2**-8)
