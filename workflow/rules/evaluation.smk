@@ -80,6 +80,32 @@ rule injury_response:
         "../scripts/injury_response.py"
 
 
+rule recognition:
+    """Whether it can be told what hurts: a classifier of the captured clips names generated walks."""
+    input:
+        weights=lambda w: project.network(w.configuration, "weights.npz"),
+        clips=lambda w: project.of_dataset(w.configuration, "database/clips/{clip}.npz"),
+        published=project.published(),
+    output:
+        json="results/{configuration}/evaluation/recognition.json",
+        csv="results/{configuration}/evaluation/recognition.csv",
+    log:
+        "results/{configuration}/logs/evaluation/recognition.log",
+    benchmark:
+        "results/{configuration}/benchmarks/evaluation/recognition.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=30,
+    params:
+        configuration=lambda w: w.configuration,
+        splits=lambda w: project.splits(w.configuration),
+        runtime=lambda w: project.section(w.configuration, "runtime"),
+        code=project.code("recognition"),
+    script:
+        "../scripts/recognition.py"
+
+
 rule compare:
     """Configurations side by side, with the published figures: one JSON and its tables as CSV."""
     input:

@@ -58,6 +58,7 @@ rule pipeline_summary:
         rules.accuracy.output.json,
         rules.responsivity.output.json,
         rules.injury_response.output.json,
+        rules.recognition.output.json,
         rules.generate.output.scenarios,
     output:
         json="results/{configuration}/pipeline.json",

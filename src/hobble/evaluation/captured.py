@@ -18,9 +18,9 @@ class Captured:
     """F consecutive frames of a clip.
 
     local: (F, J, 3) positions in the root frame, cm above the ground; contacts: (F, 4); phase: (F,);
-    severity: (F, L); gait: (F, 6); root: (F, 3) where the root is, level, from the origin on;
-    acceleration: (F,) the largest of any joint, cm per frame squared, 0 in the first frame.
-    rows: (F,) which row of the clip each frame is.
+    severity: (F, L); gait: (F, 6); velocity: (F, 2) of the root, seen from itself, cm a frame; root: (F, 3)
+    where it is, level, from the origin on; acceleration: (F,) the largest of any joint, cm per frame squared,
+    0 in the first frame; rows: (F,) which row of the clip each frame is.
     """
 
     clip: str
@@ -29,6 +29,7 @@ class Captured:
     phase: Array = field(repr=False)
     severity: Array = field(repr=False)
     gait: Array = field(repr=False)
+    velocity: Array = field(repr=False)
     root: Array = field(repr=False)
     acceleration: Array = field(repr=False)
     rows: np.ndarray = field(repr=False)
@@ -65,6 +66,7 @@ def captured(rows: ClipRows) -> Iterator[Captured]:
             rows.p[chosen].astype(float),
             rows.severity[chosen].astype(float),
             gait[:, :, layout.samples // 2].astype(float),
+            velocity,
             root_path(velocity, turn),
             _accelerations(y[:, layout.y_joint_velocity].reshape(local.shape), turn),
             chosen,

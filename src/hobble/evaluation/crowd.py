@@ -20,11 +20,15 @@ SETTLING = 0.25  # share of a stretch that is not measured: severity and gait ar
 
 @dataclass(frozen=True)
 class Stretch:
-    """`frames` in which C figures are asked for the same: gait (C,) names, severity (C, L)."""
+    """`frames` in which C figures are asked for the same: gait (C,) names, severity (C, L).
+
+    speed: (C,) cm a frame; by default the gait's.
+    """
 
     frames: int
     gait: Sequence[str]
     severity: Array = field(repr=False)
+    speed: Sequence[float] | None = None
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ def run(network: Network, script: Sequence[Stretch], runtime: Mapping[str, Any])
     f = 0
     for stretch in script:
         velocity = np.zeros((count, 2))
-        velocity[:, 1] = [SPEEDS[name] for name in stretch.gait]
+        velocity[:, 1] = [SPEEDS[name] for name in stretch.gait] if stretch.speed is None else stretch.speed
         shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
         for _ in range(stretch.frames):
             pose = animation.next_pose(velocity, gait=shares, injury=stretch.severity)

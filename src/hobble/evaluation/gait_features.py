@@ -1,0 +1,58 @@
+"""What a stretch of walking looks like in some forty numbers, from which it can be told what hurts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.evaluation.motion_measures import bend, gait_measures
+
+SIDES = ("left", "right")
+
+
+def features(skeleton: Skeleton, local: Array, contacts: Array, root: Array) -> dict[str, float]:
+    """The gait's measures, and for each limb how far and about which middle it moves.
+
+    local: (F, J, 3) positions in the root frame; contacts: (F, 4); root: (F, 3). Degrees, cm and shares;
+    lengths of steps and asymmetries are 0 where there is no step.
+    """
+    measured = gait_measures(skeleton, local, contacts, root)
+    out = {name: value if value is not None else 0.0 for name, value in measured.items()}
+    at = {
+        f"{side}_{part}": local[:, skeleton.role(f"{side}_{part}")].astype(float)
+        for side in SIDES
+        for part in ("hip", "knee", "heel", "toe", "shoulder", "elbow", "wrist")
+    }
+    hips, neck = (local[:, skeleton.role(part)].astype(float) for part in ("hips", "neck"))
+    for side in SIDES:
+        hip, knee, heel, toe = (at[f"{side}_{part}"] for part in ("hip", "knee", "heel", "toe"))
+        shoulder, elbow, wrist = (at[f"{side}_{part}"] for part in ("shoulder", "elbow", "wrist"))
+        angles = {
+            "thigh": _swing(knee - hip),
+            "knee_bend": bend(hip, knee, heel),
+            "ankle": bend(knee, heel, toe),
+            "upper_arm": _swing(elbow - shoulder),
+            "elbow": bend(shoulder, elbow, wrist),
+        }
+        for name, angle in angles.items():
+            out |= _moves(f"{name}_{side}", angle)
+        out[f"elbow_out_{side}"] = float(np.mean((elbow - shoulder)[:, 0]))
+        out[f"wrist_height_{side}"] = float(np.mean((wrist - shoulder)[:, 1]))
+        out[f"toe_lift_{side}"] = float(np.ptp(toe[:, 1]))
+    out |= _moves("pelvis_height", hips[:, 1])
+    out |= _moves("pelvis_sway", hips[:, 0])
+    out |= _moves("trunk_forward", _swing(hips - neck))
+    out |= _moves("trunk_side", np.degrees(np.arctan2((neck - hips)[:, 0], (neck - hips)[:, 1])))
+    twist = at["left_shoulder"] - at["right_shoulder"]
+    out |= _moves("shoulder_twist", np.degrees(np.arctan2(twist[:, 2], twist[:, 0])))
+    return out
+
+
+def _swing(down: Array) -> Array:
+    """Degrees that a limb (F, 3) that hangs down points forward."""
+    return np.degrees(np.arctan2(down[:, 2], -down[:, 1]))
+
+
+def _moves(name: str, values: Array) -> dict[str, float]:
+    return {f"{name}_mean": float(np.mean(values)), f"{name}_sd": float(np.std(values))}
