@@ -199,6 +199,7 @@ def test_largest_accelerations_are_of_the_gait_and_the_hurt_link(hurtable) -> No
         *(np.zeros((6, 1, 3)), np.zeros((6, 4)), np.zeros(6)),
         severity,
         gait,
+        np.zeros((6, 2)),
         np.zeros((6, 3)),
         rough,
         None,
