@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton
+from hobble.report.body import body
 from hobble.report.compare import in_world, travelled
 from hobble.report.scenes import UNIT
 from hobble.runtime.network import Network
@@ -44,10 +45,7 @@ def test_captured_motion_comes_back(
 
 
 def _drawn(made: np.ndarray, compared: dict[str, Any], skeleton: Skeleton) -> np.ndarray:
-    from hobble.report.body import capsules
-    from hobble.report.scenes import drawn_joints
-
-    keep, _ = drawn_joints(capsules(skeleton.joints, skeleton.parents, skeleton.roles))
+    keep = body(skeleton.joints, skeleton.parents, skeleton.roles)["keep"]
     assert len(keep) == compared["joints"]
     return made[:, keep]
 

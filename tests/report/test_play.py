@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -13,8 +14,11 @@ import numpy as np
 import pytest
 import yaml
 
-from hobble.core.skeleton import Skeleton
+from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.motion.decode import decode, frame_rate
+from hobble.motion.read import read_bvh
 from hobble.report.formats import embedded
+from hobble.report.loft import vertices
 from hobble.report.playable import PARTS, body_parts, playable
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.network import Network, load_network
@@ -73,7 +77,7 @@ def test_the_page_moves_as_python_does(tab: Any, network: Network, examples: Mod
         expected.append((pose.positions, pose.phase, pose.severity))
     links = network.links
     script = f"""(() => {{
-      const spec = Hobble.material.playable, c = Hobble.character(spec);
+      const spec = Hobble.material.playable.example, c = Hobble.character(spec);
       const hills = (x, z) => 14 * Math.sin(x / 170) * Math.cos(z / 140) + 8 * Math.sin((x + z) / 260);
       return {json.dumps([wish(f) for f in range(FRAMES)])}.map(({{ velocity, facing, gait, hurt }}) => {{
         if (hurt) {{
@@ -93,31 +97,39 @@ def test_the_page_moves_as_python_does(tab: Any, network: Network, examples: Mod
     assert travelled > 50, "the example should go somewhere"
 
 
+def show(tab: Any) -> None:
+    tab.run("document.getElementById('play-view').scrollIntoView({ behavior: 'instant', block: 'center' })")
+    tab.run("document.getElementById('play-stage').focus({ preventScroll: true })")
+
+
 def test_keys_move_the_figure(tab: Any) -> None:
-    tab.run("document.getElementById('play-stage').scrollIntoView({ behavior: 'instant', block: 'center' })")
-    tab.run("document.getElementById('play-stage').focus()")
-    where = "[Hobble.player.character.px[60], Hobble.player.character.pz[60]]"
+    show(tab)
+    character = "Hobble.player.actors[0].character"
+    where = f"[{character}.px[60], {character}.pz[60]]"
     tab.run("Hobble.player.start()")
     before = tab.run(where)
     tab.send("Input.dispatchKeyEvent", type="keyDown", key="w", code="KeyW", text="w")
-    assert tab.until("Math.hypot(...Hobble.player.character.velocity) > 2")
+    assert tab.until(f"Math.hypot(...{character}.velocity) > 2")
     assert tab.until(f"Math.hypot({where}[0] - {before[0]}, {where}[1] - {before[1]}) > 5")
     tab.send("Input.dispatchKeyEvent", type="keyUp", key="w", code="KeyW")
-    assert tab.until("Math.hypot(...Hobble.player.character.velocity) < .01")
+    assert tab.until(f"Math.hypot(...{character}.velocity) < .01")
+    panel = "document.getElementById('play-panel').textContent"
+    assert tab.until(f"/Speed\\d\\.\\d\\d m\\/sPhase.*A frame\\d+\\.\\d ms/.test({panel})"), tab.run(panel)
 
 
-def test_a_click_on_the_left_shin_hurts_it(tab: Any, network: Network) -> None:
-    tab.run("document.getElementById('play-stage').scrollIntoView({ behavior: 'instant', block: 'center' })")
+def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> None:
+    show(tab)
+    tab.run("Hobble.player.view.orbit.yaw = 0")  # from the front no leg hides the other
     tab.run("Hobble.player.start()")
-    tab.until("document.getElementById('play-reading').textContent.length > 0")
-    shin = network.links.index("LeftLeg-LeftFoot")
+    tab.run("new Promise(requestAnimationFrame)")
     place = """(() => {
-      const { view, character } = Hobble.player, [, knee, heel] = Hobble.material.playable.legs[0];
+      const { view, actors: [{ character, spec }] } = Hobble.player, [, knee, heel] = spec.legs[0];
       const box = document.getElementById("play-view").getBoundingClientRect();
       const at = (j) => view.project(Array.from(character.pose.subarray(3 * j, 3 * j + 3)));
       const [p, q] = [at(knee), at(heel)];
       return [box.x + (p[0] + q[0]) / 2, box.y + (p[1] + q[1]) / 2];
     })()"""
+    shin = "Hobble.player.injuries.severity.get('LeftLeg-LeftFoot')"
     for modifiers, severity in ((0, 2), (0, 4), (8, 2)):
         tab.run("new Promise(requestAnimationFrame)")
         x, y = tab.run(place)
@@ -126,27 +138,67 @@ def test_a_click_on_the_left_shin_hurts_it(tab: Any, network: Network) -> None:
                 "Input.dispatchMouseEvent",
                 type=kind, x=x, y=y, button="left", clickCount=1, modifiers=modifiers,
             )  # fmt: skip
-        assert tab.until(f"Hobble.player.severities[{shin}] === {severity}"), severity
-    assert tab.until(f"Hobble.player.character.severity[{shin}] > .1")
+        assert tab.until(f"{shin} === {severity}"), severity
+    index = "Hobble.player.actors[0].spec.links.indexOf('LeftLeg-LeftFoot')"
+    assert tab.until(f"Hobble.player.actors[0].character.severity[{index}] > .1")
+    apart = f"""(() => {{
+      const [{{ spec }}] = Hobble.player.actors, [hurt, healthy] = [Hobble.character(spec), Hobble.character(spec)];
+      hurt.wished[{index}] = 2;
+      for (let f = 0; f < 60; f++) for (const c of [hurt, healthy]) c.frame([0, 2.5], null, "walk", () => 0);
+      return Math.max(...hurt.pose.map((v, i) => Math.abs(v - healthy.pose[i])));
+    }})()"""
+    assert tab.run(apart) > 0.01
 
 
-def test_presets_sliders_and_the_link_to_them(tab: Any, network: Network) -> None:
+def test_presets_sliders_and_the_link_to_them(tab: Any) -> None:
     buttons = "[...document.querySelectorAll('#play-presets button')]"
     assert tab.run(f"{buttons}.map((b) => b.textContent)") == [
         "Hurt knee", "Sprained ankle", "Bad back", "Knee and back", "Healthy",
     ]  # fmt: skip
     tab.run(f"{buttons}[2].click()")
-    back = network.links.index("Hips-LowerBack")
-    assert tab.run(f"Hobble.player.severities[{back}]") == 8
+    back = "Hobble.player.injuries.severity.get('Hips-LowerBack')"
+    assert tab.run(back) == 8
     assert "8" in tab.run("[...document.querySelectorAll('#play-sliders output')].map((o) => o.value)")
+    tab.run("Hobble.player.steering.toggle('crouch', true)")
+    tab.run("document.getElementById('play-ground').value = 'steps'")
+    tab.run("Object.assign(Hobble.player.view.orbit, { yaw: 1.25, distance: 333 })")
     tab.run("document.getElementById('play-share').click()")
-    assert tab.run("location.hash") == f"#play=flat;{back}:8"
     tab.run(f"{buttons}[4].click()")
-    assert tab.run("Math.max(...Hobble.player.severities)") == 0
+    assert tab.run("Math.max(...Hobble.player.injuries.severity.values())") == 0
     tab.send("Page.reload")
     assert tab.until(
-        f"typeof Hobble !== 'undefined' && Hobble.player && Hobble.player.severities[{back}] === 8"
+        f"typeof Hobble !== 'undefined' && Hobble.player && {back} === 8 && Hobble.player.steering.on.crouch"
     )
+    assert tab.run("document.getElementById('play-ground').value") == "steps"
+    assert tab.run("[Hobble.player.view.orbit.yaw, Hobble.player.view.orbit.distance]") == [1.25, 333]
+    tab.run("Hobble.player.steering.toggle('crouch', false)")
+
+
+def test_the_page_draws_the_body_that_python_draws(tab: Any, character: dict[str, Any]) -> None:
+    dressed, rng = character["body"], np.random.default_rng(3)
+    points = rng.normal(0, 40, (len(dressed["keep"]), 3))
+    found = tab.run(f"Hobble.surface({json.dumps(dressed)}, (j) => {json.dumps(points.tolist())}[j])")
+    assert np.abs(np.reshape(found, (-1, 3)) - vertices(dressed, points)).max() < 1e-9
+
+
+def test_what_is_saved_as_bvh_is_what_was_played(
+    tab: Any, character: dict[str, Any], examples: ModuleType, holden31: Skeleton, tmp_path: Path
+) -> None:
+    made = examples.walker(holden31, 90, 2.2)["positions"]
+    spec = {key: character[key] for key in ("names", "parents", "offsets")}
+    frames = np.round(made, 4).reshape(len(made), -1).tolist()
+    (tmp_path / "played.bvh").write_text(tab.run(f"Hobble.bvh({json.dumps(spec)}, {json.dumps(frames)})"))
+    file = read_bvh(tmp_path / "played.bvh")
+    assert frame_rate(file.frame_time, file.frame_time_text) == 60
+    read = decode(file, still=0.0)
+    order = [file.names.index(name) for name in holden31.joints]
+    skeleton = replace(holden31, offsets=read.offsets[order])
+    _, positions = forward_kinematics(skeleton, read.rotations[:, order], read.root)
+    assert np.abs(positions - made).max() < 0.05
+    show(tab)
+    assert tab.until("Hobble.player.actors[0].frames.length > 20")
+    (tmp_path / "own.bvh").write_text(tab.run("Hobble.player.motion()"))
+    assert len(read_bvh(tmp_path / "own.bvh")) > 20
 
 
 def test_playing_says_nothing_and_asks_for_nothing(tab: Any) -> None:
@@ -163,7 +215,7 @@ def test_the_largest_network_leaves_room_in_the_page(
     examples.weights(tmp_path / "weights.npz", skeleton, units=512)
     spec = playable(load_network(tmp_path / "weights.npz"), examples.RUNTIME)
     assert len(embedded(spec)) < 17e6
-    assert len(page) < 7e6
+    assert len(page) < 5e6
 
 
 def test_a_network_without_links_can_still_be_played(

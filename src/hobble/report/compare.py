@@ -11,8 +11,8 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.database.clip_rows import ClipRows, expanded, load_clip_rows
 from hobble.evaluation.predict import predict
-from hobble.report.body import capsules
-from hobble.report.scenes import FPS, UNIT, drawn_joints, pack_positions, packed
+from hobble.report.body import body
+from hobble.report.scenes import FPS, UNIT, pack_positions, packed
 from hobble.runtime.network import Network
 
 CLIPS = 6
@@ -27,8 +27,8 @@ def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[s
     """
     if network.skeleton is None:
         return {}
-    shapes = capsules(network.skeleton.joints, network.skeleton.parents, network.skeleton.roles)
-    keep, shapes = drawn_joints(shapes)
+    dressed = body(network.skeleton.joints, network.skeleton.parents, network.skeleton.roles)
+    keep = dressed["keep"]
     order = sorted(paths, key=lambda path: (splits.get(Path(path).stem) != "held_out", Path(path).stem))
     clips = []
     for path in order:
@@ -37,9 +37,8 @@ def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[s
             clips.append(_compared(network, rows, splits.get(rows.clip, "train"), keep))
         if len(clips) == CLIPS:
             break
-    return (
-        {"fps": FPS, "unit": UNIT, "joints": len(keep), "capsules": shapes, "clips": clips} if clips else {}
-    )
+    found = {"fps": FPS, "unit": UNIT, "joints": len(keep), "body": dressed, "clips": clips}
+    return found if clips else {}
 
 
 def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
-from hobble.report.body import capsules
+from hobble.report.body import body
 from hobble.report.scenes import packed
 
 STEPS_PER_CM = 10  # everything is kept in 16-bit steps of a millimetre
@@ -35,8 +35,8 @@ def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) ->
             if part["pose"].shape[1] == len(names):
                 name = f"{Path(path).stem}, cycle {int(part['cycle']) + 1}"
                 pictures.append({"name": name, **_packed(part)})
-    shapes = capsules(names, parents, skeleton.get("roles") or {}) if names else []
-    return {"joints": len(names), "capsules": shapes, "pictures": pictures}
+    dressed = body(names, parents, skeleton.get("roles") or {})
+    return {"joints": len(names), "body": dressed, "pictures": pictures}
 
 
 def _packed(part: Mapping[str, Array]) -> dict[str, Any]:

@@ -59,7 +59,8 @@ def render(
         "scenes": scenes,
         "strips": strips,
         "grounds": grounds,
-        "playable": playable or {},
+        "name": material.name,
+        "playable": {material.name: playable} if playable else {},
         "compare": compared or {},
     }
     return environment.get_template("page.html.j2").render(
@@ -70,7 +71,8 @@ def render(
         lead=findings.lead(material),
         embedded=embedded(data),
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
-        playable=playable or {},
+        playable={material.name: playable} if playable else {},
+        hurts=bool((playable or {}).get("links")),
         compared=[clip["name"] for clip in (compared or {}).get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],

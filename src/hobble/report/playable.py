@@ -9,7 +9,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.report.body import capsules
+from hobble.report.body import body
 from hobble.report.scenes import packed
 from hobble.runtime import animation, feet, trajectory
 from hobble.runtime.network import Network
@@ -49,6 +49,7 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
     weights[-1], biases[-1] = weights[-1][:, :outputs], biases[-1][:, :outputs]
     legs = feet.leg_joints(skeleton)
     parts = body_parts(skeleton, network.links)
+    sole = feet.sole_heights(network, legs).tolist()
     return {
         "layers": [_layer(w, b) for w, b in zip(weights, biases, strict=True)],
         "xMean": packed(network.x_mean.astype(np.float32)),
@@ -58,6 +59,9 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
         "yMean": packed(network.y_mean[:outputs].astype(np.float32)),
         "yStd": packed(network.y_std[:outputs].astype(np.float32)),
         "joints": layout.joints,
+        "names": list(skeleton.joints),
+        "parents": list(skeleton.parents),
+        "offsets": np.round(skeleton.offsets, 4).tolist(),
         "window": layout.window,
         "step": layout.step,
         "x": {name: block.start for name, block in layout.blocks("x").items()} | {"size": layout.x_size},
@@ -66,8 +70,8 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
         "links": list(network.links),
         "legs": legs.tolist(),
         "carried": [np.flatnonzero(row).tolist() for row in feet.carried(skeleton, legs)],
-        "sole": feet.sole_heights(network, legs).tolist(),
-        "capsules": capsules(skeleton.joints, skeleton.parents, skeleton.roles, network.links),
+        "sole": sole,
+        "body": {**body(skeleton.joints, skeleton.parents, skeleton.roles, network.links), "sole": sole},
         "severityStep": runtime["severity_rate"] / 60,
         "severityScale": runtime["severity_scale"],
         "footLocking": runtime["foot_locking"],

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
-from hobble.report.body import capsules
+from hobble.report.body import body
 
 FPS = 30
 UNIT = 0.01  # centimetres of one step of the 16-bit joint positions
@@ -43,28 +43,17 @@ def scenes(path: str | Path, skeleton: Mapping[str, Any], links: Sequence[str] =
     stride = max(1, round(float(data["fps"]) / FPS))
     names = [str(name) for name in data["names"]]
     feet = [joints.index(roles[r]) for r in FEET] if all(r in roles for r in FEET) else []
-    keep, shapes = drawn_joints(capsules(joints, parents, roles, links), feet)
+    dressed = body(joints, parents, roles, links, feet)
+    keep = dressed["keep"]
     return {
         "fps": float(data["fps"]) / stride,
         "joints": len(keep),
         "unit": UNIT,
         "links": list(links),
         "feet": [keep.index(j) for j in feet],
-        "capsules": shapes,
+        "body": dressed,
         "scenarios": [_scenario(data, name, stride, links, keep) for name in names],
     }
-
-
-def drawn_joints(
-    shapes: Sequence[Mapping[str, Any]], others: Sequence[int] = ()
-) -> tuple[list[int], list[dict[str, Any]]]:
-    """The joints that are drawn, the root first, and the capsules with indices into these alone.
-
-    A figure of 191 joints is drawn by some twenty of them; the rest need not lie in the page.
-    """
-    ends = ("a", "b", "from")
-    keep = sorted({0, *others, *(shape[end] for shape in shapes for end in ends if end in shape)})
-    return keep, [{k: keep.index(v) if k in ends else v for k, v in shape.items()} for shape in shapes]
 
 
 def _scenario(

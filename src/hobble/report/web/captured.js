@@ -1,7 +1,8 @@
-// Captured (a grey body) and predicted (lines in the accent colour), with the distance between them along the time.
+// Captured (grey) and predicted (blue, seen through), with the distance between them along the time.
 import { find, material } from "./base.js";
+import { createFigure } from "./figure.js";
 import { bytes, mix } from "./numbers.js";
-import { bodyParts, createView } from "./view.js";
+import { createView } from "./view.js";
 
 (() => {
   const shown = material.compare, canvas = document.getElementById("compare-view");
@@ -27,35 +28,18 @@ import { bodyParts, createView } from "./view.js";
   };
 
   let clip, time = 0, playing = false, apart = 0, last = null;
-  const drawGrid = (view, x, z) => {
-    view.context.lineWidth = 1;
-    for (let n = -800; n <= 800; n += 100) {
-      const [a, b] = [100 * Math.round(x / 100) + n, 100 * Math.round(z / 100) + n];
-      for (let m = -800; m < 800; m += 100) {
-        const fade = .45 * Math.max(0, 1 - Math.hypot(n, m) / 850);
-        view.segment([a, 0, z + m], [a, 0, z + m + 100], view.paint.line, fade);
-        view.segment([x + m, 0, b], [x + m + 100, 0, b], view.paint.line, fade);
-      }
-    }
-  };
   const view = createView(canvas, { yaw: .75, pitch: .16, distance: 400 }, (now) => {
     if (playing && last !== null) time = (time + Math.min(.1, (now - last) / 1000) * shown.fps) % Math.max(1, clip.frames - 1);
     last = playing ? now : null;
     slider.value = time;
-    const { context, paint } = view, body = between(clip, clip.pose, time), guess = between(clip, clip.guess, time);
-    const [x, , z] = body[0];
+    const { paint } = view, body = between(clip, clip.pose, time), guess = between(clip, clip.guess, time);
+    const [x, , z] = body[0], yaw = view.orbit.yaw;
     view.aim([x, 82, z]);
-    drawGrid(view, x, z);
-    const parts = bodyParts(shown.capsules, body, () => -Infinity, () => paint.body);
-    view.shadow(parts, () => 0);
-    view.body(parts);
-    const aside = [apart * Math.cos(view.camera.yaw), -apart * Math.sin(view.camera.yaw)]; // to the right as seen
-    const moved = guess.map((p) => [p[0] + aside[0], p[1], p[2] + aside[1]]);
-    const bones = bodyParts(shown.capsules, moved, () => -Infinity, () => paint.accent);
-    context.lineCap = "round";
-    context.lineWidth = Math.max(2, view.zoom * 2.2 / view.camera.distance);
-    bones.forEach(({ a, b }) => view.segment(a, b, paint.accent, .95));
-    context.lineCap = "butt";
+    view.land.around([x, 0, z], () => 0);
+    const aside = [apart * Math.cos(yaw), -apart * Math.sin(yaw)]; // to the right as seen
+    captured.pose((j) => body[j], () => paint.body);
+    predicted.pose((j) => [guess[j][0] + aside[0], guess[j][1], guess[j][2] + aside[1]], () => paint.predicted);
+    predicted.mesh.castShadow = apart > 0;
     const f = Math.min(clip.frames - 1, Math.round(time));
     const split = clip.split === "held_out" ? "held out: never seen in training" : "a training clip";
     find("compare-reading").replaceChildren(split, document.createElement("br"), `${clip.error[f].toFixed(1)} cm a joint apart`);
@@ -64,6 +48,7 @@ import { bodyParts, createView } from "./view.js";
     find("compare-mark").setAttribute("x2", time);
     if (playing) view.ask();
   });
+  const captured = createFigure(view, shown.body), predicted = createFigure(view, shown.body, { opacity: .62, casts: false });
   view.onHidden = () => { last = null; };
 
   const play = (on) => {
@@ -91,9 +76,9 @@ import { bodyParts, createView } from "./view.js";
     event.currentTarget.setAttribute("aria-pressed", String(apart > 0));
     view.ask();
   });
-  Object.assign(view.keys, {
+  Object.assign(view.orbit.keys, {
     " ": () => play(!playing), ",": () => seek(Math.ceil(time) - 1), ".": () => seek(Math.floor(time) + 1),
   });
-  view.listen(find("compare-stage"));
+  view.orbit.listen(find("compare-stage"));
   choose();
 })();

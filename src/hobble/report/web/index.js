@@ -1,5 +1,7 @@
 // The report's page. What a person may want in the browser's console, and the tests use, is `Hobble`.
 import { colour, material } from "./base.js";
+import { corners, posed } from "./body.js";
+import { bvh } from "./bvh.js";
 import { createCharacter } from "./character.js";
 import { drawAll } from "./charts.js";
 import { csv } from "./tables.js";
@@ -10,4 +12,5 @@ import "./fits.js";
 import "./strips.js";
 import "./page.js";
 
-globalThis.Hobble = { character: createCharacter, colour, csv, drawAll, material, player };
+const surface = (body, at) => Array.from(corners(posed(body, at), []));
+globalThis.Hobble = { bvh, character: createCharacter, colour, csv, drawAll, material, player, surface };

@@ -1,0 +1,59 @@
+// Strips and dots that lie on the ground or in the air, given anew for every picture.
+import { BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Mesh, MeshBasicMaterial } from "three";
+import { minus } from "./numbers.js";
+import { linear } from "./paint.js";
+
+const MOST = 4000; // four-cornered pieces
+
+export const createMarks = (scene) => {
+  const geometry = new BufferGeometry(), colour = new Color(), index = [];
+  const place = new BufferAttribute(new Float32Array(12 * MOST), 3), shade = new BufferAttribute(new Float32Array(16 * MOST), 4);
+  for (const attribute of [place, shade]) attribute.setUsage(DynamicDrawUsage);
+  for (let q = 0; q < MOST; q++) index.push(4 * q, 4 * q + 1, 4 * q + 2, 4 * q, 4 * q + 2, 4 * q + 3);
+  geometry.setAttribute("position", place);
+  geometry.setAttribute("color", shade);
+  geometry.setIndex(index);
+  const material = new MeshBasicMaterial({
+    vertexColors: true, transparent: true, depthWrite: false, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -2, polygonOffsetUnits: -4,
+  });
+  const mesh = new Mesh(geometry, material);
+  mesh.frustumCulled = false;
+  scene.add(mesh);
+  let used = 0;
+
+  const marks = {
+    clear() { used = 0; },
+    // Four corners of one colour [r, g, b] and opacity.
+    piece(points, rgb, alpha) {
+      if (used === MOST || alpha < .02) return;
+      linear(rgb, colour);
+      points.forEach((p, i) => {
+        place.array.set(p, 12 * used + 3 * i);
+        shade.array.set([colour.r, colour.g, colour.b, alpha], 16 * used + 4 * i);
+      });
+      used++;
+    },
+    // A strip on the ground from a to b, `width` cm wide, a little above it.
+    strip(a, b, width, rgb, alpha) {
+      const [x, z] = [b[0] - a[0], b[2] - a[2]], n = Math.hypot(x, z) || 1, [sx, sz] = [width / 2 * z / n, -width / 2 * x / n], up = .35;
+      marks.piece([
+        [a[0] - sx, a[1] + up, a[2] - sz], [a[0] + sx, a[1] + up, a[2] + sz],
+        [b[0] + sx, b[1] + up, b[2] + sz], [b[0] - sx, b[1] + up, b[2] - sz],
+      ], rgb, alpha);
+    },
+    // The print of a foot whose heel and toe stood at two places on the ground.
+    print(heel, toe, rgb, alpha) {
+      const way = minus(toe, heel), size = Math.hypot(...way) || 1, at = (cm) => heel.map((v, i) => v + way[i] * cm / size);
+      const [sx, sz] = [way[2] / size, -way[0] / size];
+      const across = ([cm, half]) => { const [x, y, z] = at(cm); return [[x - half * sx, y + .3, z - half * sz], [x + half * sx, y + .3, z + half * sz]]; };
+      const outline = [[-5, 1.6], [-3.5, 3.1], [2, 3], [size, 4.6], [size + 5, 3.9], [size + 8, 1.6]].map(across);
+      for (let i = 1; i < outline.length; i++) marks.piece([...outline[i - 1], outline[i][1], outline[i][0]], rgb, alpha);
+    },
+    done() {
+      geometry.setDrawRange(0, 6 * used);
+      place.needsUpdate = shade.needsUpdate = true;
+      mesh.visible = used > 0;
+    },
+  };
+  return marks;
+};

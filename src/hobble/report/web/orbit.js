@@ -1,0 +1,50 @@
+// A camera that goes around what it looks at: by dragging, pinching, keys and the wheel.
+
+export const createOrbit = (canvas, home, changed) => {
+  const orbit = { ...home };
+  const { nearest = 140, furthest = 1500 } = home;
+
+  orbit.turn = (yaw, pitch) => {
+    orbit.yaw += yaw;
+    orbit.pitch = Math.min(1.45, Math.max(.02, orbit.pitch + pitch));
+    changed();
+  };
+  orbit.nearer = (factor) => {
+    orbit.distance = Math.min(furthest, Math.max(nearest, orbit.distance * factor));
+    changed();
+  };
+  orbit.reset = () => { Object.assign(orbit, home); changed(); };
+  orbit.keys = {
+    ArrowLeft: () => orbit.turn(-.1, 0), ArrowRight: () => orbit.turn(.1, 0), ArrowUp: () => orbit.turn(0, .07),
+    ArrowDown: () => orbit.turn(0, -.07), "+": () => orbit.nearer(.9), "=": () => orbit.nearer(.9),
+    "-": () => orbit.nearer(1.1),
+  };
+  orbit.listen = (element) => element.addEventListener("keydown", (event) => {
+    const act = orbit.keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!act || event.target !== element || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    act();
+  });
+
+  const touches = new Map();
+  const spread = () => { const [p, q] = [...touches.values()]; return Math.max(1, Math.hypot(p[0] - q[0], p[1] - q[1])); };
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    touches.set(event.pointerId, [event.clientX, event.clientY]);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const before = touches.get(event.pointerId);
+    if (!before) return;
+    const was = touches.size === 2 ? spread() : 0;
+    touches.set(event.pointerId, [event.clientX, event.clientY]);
+    if (touches.size === 2) orbit.nearer(was / spread());
+    else orbit.turn(-(event.clientX - before[0]) / 160, (event.clientY - before[1]) / 220);
+  });
+  for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => touches.delete(event.pointerId));
+  canvas.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey) return; // plain scrolling belongs to the page
+    event.preventDefault();
+    orbit.nearer(Math.exp(event.deltaY / 300));
+  }, { passive: false });
+  return orbit;
+};

@@ -1,0 +1,24 @@
+// Colours of the scenes, from the page's tokens.
+import { Color, SRGBColorSpace } from "three";
+import { rgb } from "./base.js";
+import { mix } from "./numbers.js";
+
+// Numbers 0 to 255, as the page shows them.
+export const palette = () => {
+  const dark = rgb("paper")[0] < 128;
+  return {
+    dark, body: dark ? [158, 167, 176] : [186, 193, 199], low: rgb("hurt-low"), high: rgb("hurt-high"),
+    line: rgb("faint"), ink: rgb("ink"), accent: rgb("accent"), predicted: rgb("predicted"), second: rgb("g2"), ground: rgb("ground"),
+    floor: rgb("sunken"),
+  };
+};
+
+// Body: grey where healthy, over amber to red where hurt.
+export const severityColour = (paint, severity, healthy = paint.body) => {
+  const t = severity / 10;
+  if (!severity) return healthy;
+  return t < .5 ? mix(healthy, paint.low, .35 + 1.3 * t) : mix(paint.low, paint.high, 2 * t - 1);
+};
+
+// A colour [r, g, b], 0 to 255, as light is reckoned with.
+export const linear = ([r, g, b], colour = new Color()) => colour.setRGB(r / 255, g / 255, b / 255, SRGBColorSpace);

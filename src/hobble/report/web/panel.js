@@ -1,0 +1,56 @@
+// What is read off a character while it is played: phase, contacts, gait, speed, milliseconds.
+const FEET = ["left heel", "left toe", "right heel", "right toe"];
+const COLOURS = { stand: "g0", walk: "g1", jog: "g2", crouch: "g3", jump: "g4", bump: "g5" };
+const NS = "http://www.w3.org/2000/svg";
+
+const make = (parent, tag, className = "", text = "") => {
+  const element = document.createElement(tag);
+  element.className = className;
+  element.textContent = text;
+  parent.append(element);
+  return element;
+};
+
+export const createPanel = (host, actor, title = "") => {
+  const { spec } = actor, box = make(host, "div", "readings");
+  if (title) make(box, "h4", "", title);
+  const list = make(box, "dl"), row = (label) => {
+    const part = make(list, "div");
+    make(part, "dt", "", label);
+    return make(part, "dd");
+  };
+  const speed = row("Speed"), phase = row("Phase"), down = row("On the ground"), gait = row("Gait"), cost = row("A frame");
+  const number = make(speed, "span", "value");
+  const dial = document.createElementNS(NS, "svg"), hand = document.createElementNS(NS, "circle");
+  dial.setAttribute("viewBox", "0 0 24 24");
+  for (const circle of [document.createElementNS(NS, "circle"), hand]) {
+    for (const [key, value] of Object.entries({ cx: 12, cy: 12, r: 9, pathLength: 1 })) circle.setAttribute(key, value);
+    dial.append(circle);
+  }
+  phase.append(dial);
+  const turn = make(phase, "span"), feet = make(down, "span", "feet");
+  const dots = FEET.map((name) => { const dot = make(feet, "i"); dot.title = name; return dot; });
+  const standing = make(down, "span", "words"), bar = make(gait, "span", "shares"), words = make(gait, "span", "words");
+  const shares = spec.gaits.map((name) => {
+    const piece = make(bar, "i");
+    piece.style.background = `var(--${COLOURS[name] || "g0"})`;
+    return piece;
+  });
+  const note = make(box, "p", "note");
+
+  return {
+    box,
+    tell(drawing) {
+      const c = actor.character, M = spec.window, G = spec.gaits.length;
+      number.textContent = `${(Math.hypot(c.px[M] - c.px[M - 10], c.pz[M] - c.pz[M - 10]) * 6 / 100).toFixed(2)} m/s`;
+      hand.setAttribute("stroke-dasharray", `${c.phase.toFixed(3)} 1`);
+      turn.textContent = c.phase.toFixed(2);
+      FEET.forEach((name, i) => dots[i].classList.toggle("on", c.contacts[i] > .5));
+      standing.textContent = FEET.filter((_, i) => c.contacts[i] > .5).join(", ") || "no foot";
+      spec.gaits.forEach((name, g) => { shares[g].style.flexGrow = Math.max(0, c.gait[M * G + g]); });
+      words.textContent = spec.gaits.filter((_, g) => c.gait[M * G + g] > .3).join(", ");
+      cost.textContent = `${actor.milliseconds.toFixed(1)} ms${drawing ? `, drawing ${drawing.toFixed(1)} ms` : ""}`;
+      note.textContent = actor.falls ? `fell over ${actor.falls === 1 ? "once" : `${actor.falls} times`} and stood up again` : "";
+    },
+  };
+};

@@ -1,0 +1,73 @@
+// Where the character is asked to go: keys, a gamepad, or a thumb on the disc.
+import { find } from "./base.js";
+
+// By place and not by letter, so that they lie alike on every keyboard.
+const CODES = {
+  KeyW: [0, 1], KeyS: [0, -1], KeyA: [-1, 0], KeyD: [1, 0],
+  ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0],
+};
+const SPEED = { crouch: 2, walk: 2.5, jog: 7 }; // cm a frame
+
+export const createSteering = (stage, orbit) => {
+  const held = new Set(), stick = { x: 0, y: 0 }, on = { crouch: false, strafe: false };
+  const steering = { on };
+
+  steering.toggle = (name, value = !on[name]) => {
+    on[name] = value;
+    find(`play-${name}`).setAttribute("aria-pressed", String(value));
+  };
+  for (const name of Object.keys(on)) find(`play-${name}`).addEventListener("click", () => steering.toggle(name));
+
+  // What is wished for now, seen from the camera: velocity [x, z], facing [x, z] or null, gait or null.
+  steering.wish = () => {
+    let [right, ahead] = [stick.x, -stick.y], fast = held.has("ShiftLeft") || held.has("ShiftRight"), look = on.strafe;
+    for (const code of held) if (CODES[code]) { right += CODES[code][0]; ahead += CODES[code][1]; }
+    const pad = [...(navigator.getGamepads ? navigator.getGamepads() : [])].find((p) => p && p.connected);
+    if (pad) {
+      const dead = (v) => (Math.abs(v) < .15 ? 0 : v);
+      right += dead(pad.axes[0]);
+      ahead -= dead(pad.axes[1]);
+      fast = fast || pad.buttons[0]?.pressed;
+      look = look || pad.buttons[4]?.pressed;
+      orbit.yaw -= .04 * dead(pad.axes[2] || 0);
+    }
+    const size = Math.hypot(right, ahead);
+    if (size > 1) { right /= size; ahead /= size; }
+    const gait = on.crouch ? "crouch" : fast ? "jog" : "walk", { yaw } = orbit;
+    const forward = [-Math.sin(yaw), -Math.cos(yaw)], side = [-forward[1], forward[0]];
+    const velocity = [0, 1].map((i) => SPEED[gait] * (ahead * forward[i] + right * side[i]));
+    return { velocity, ahead: look ? forward : null, gait: gait === "walk" && !size ? null : gait };
+  };
+  steering.release = () => held.clear();
+
+  // act(event): what other keys do; true where one did something.
+  steering.listen = (act) => {
+    stage.addEventListener("keydown", (event) => {
+      if (event.target !== stage || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.code === "KeyC") { if (!event.repeat) steering.toggle("crouch"); }
+      else if (event.code === "KeyF") { if (!event.repeat) steering.toggle("strafe"); }
+      else if (event.code === "KeyQ") orbit.turn(.08, 0);
+      else if (event.code === "KeyE") orbit.turn(-.08, 0);
+      else if (event.code === "Equal") orbit.nearer(.9);
+      else if (event.code === "Minus") orbit.nearer(1.1);
+      else if (CODES[event.code] || event.code.startsWith("Shift")) held.add(event.code);
+      else if (!act(event)) return;
+      event.preventDefault();
+    });
+    stage.addEventListener("keyup", (event) => held.delete(event.code));
+    stage.addEventListener("blur", () => held.clear());
+  };
+
+  const pad = find("play-pad");
+  const steer = (event) => {
+    const box = pad.getBoundingClientRect(), r = box.width / 2;
+    const [x, y] = [(event.clientX - box.x - r) / r, (event.clientY - box.y - r) / r], n = Math.max(1, Math.hypot(x, y));
+    Object.assign(stick, { x: x / n, y: y / n });
+    pad.firstElementChild.style.translate = `${stick.x * r * .6}px ${stick.y * r * .6}px`;
+  };
+  const release = () => { Object.assign(stick, { x: 0, y: 0 }); pad.firstElementChild.style.translate = ""; };
+  pad.addEventListener("pointerdown", (event) => { pad.setPointerCapture(event.pointerId); steer(event); });
+  pad.addEventListener("pointermove", (event) => { if (pad.hasPointerCapture(event.pointerId)) steer(event); });
+  for (const name of ["pointerup", "pointercancel"]) pad.addEventListener(name, release);
+  return steering;
+};
