@@ -86,7 +86,7 @@ def parse_links(
             continue
         match = LINK.fullmatch(part)
         if match is None:
-            raise InputError(path, f"{part.strip()!r} does not read as Joint-Joint[severity]", line=line)
+            raise InputError(path, f"{part.strip()[:80]!r} does not read as Joint-Joint[severity]", line=line)
         name, value = match[1], match[2]
         check_link(path, line, name, links)
         pairs.append((name, check_severity(path, line, name, value)))
@@ -135,7 +135,7 @@ def _spell(path: Path, number: int, line: str, links: Sequence[str]) -> Spell:
 def check_link(path: str | Path, line: int | None, name: str, links: Sequence[str]) -> None:
     """Raise InputError unless `name` is one of `links`."""
     if name not in links:
-        raise InputError(path, f"no such link: {name}", line=line, fix=_hint(name, links))
+        raise InputError(path, f"no such link: {name[:80]}", line=line, fix=_hint(name, links))
 
 
 def check_severity(path: str | Path, line: int | None, link: str, text: str) -> float:
@@ -145,7 +145,7 @@ def check_severity(path: str | Path, line: int | None, link: str, text: str) -> 
     except ValueError:
         value = -1.0
     if not 0 <= value <= HIGHEST:
-        raise InputError(path, f"severity {text or 'nothing'} of {link} is not in 0..10", line=line)
+        raise InputError(path, f"severity {text[:40] or 'nothing'} of {link} is not in 0..10", line=line)
     return value
 
 

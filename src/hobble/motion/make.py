@@ -74,6 +74,7 @@ def make_clip(
     if options["facing"] is not None:
         made = turned(made, np.radians(options["facing"]) - first_facing(made))
     made = replace(made, name=clip)
+    _check_finite(file, made)
     extra = {"loops": loops, "cycle_frames": len(made) // loops, "scale": fitted.scale}
     return made, _report(file, source, made) | extra | {"repairs": said, "notes": source.notes}
 
@@ -88,6 +89,24 @@ def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: Mapping[str,
             f"than {MOST_POSES} poses of a joint",
             fix="Cut it into shorter clips, or give its source_fps.",
         )
+
+
+def _check_finite(file: Bvh, clip: Clip) -> None:
+    """Refuse what no longer is a motion: values that no joint has, or a rig whose bones have no length."""
+    lengths = np.linalg.norm(file.offsets, axis=1)
+    for values in (clip.rotations, clip.root, clip.positions):
+        bad = ~np.isfinite(values).reshape(len(clip), -1).all(axis=1)
+        if bad.any():
+            short = ", ".join(
+                name for name, length in zip(file.names[1:], lengths[1:], strict=True) if not length
+            )
+            why = f" (joints without length: {short:.200})" if short else ""
+            raise InputError(
+                file.path,
+                f"no motion of {clip.skeleton.name} comes of it{why}",
+                frame=int(np.argmax(bad)) + 1,
+                fix="Check the OFFSETs and the values, and export the clip again.",
+            )
 
 
 def first_facing(clip: Clip) -> float:

@@ -22,6 +22,7 @@ from hobble.core.untrusted import read_bytes
 # What a file may ask for. The largest figure known has 191 joints; an hour of it at 60 Hz is 41 million poses
 # of a joint, which as rotations take 1.3 GB.
 MOST_JOINTS = 4096
+LONGEST_NAME = 200
 MOST_BYTES = 1 << 30
 MOST_POSES = 50_000_000
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
@@ -154,6 +155,8 @@ class _Hierarchy:
         names = self.header.names
         if not name:
             self.fail("a joint without a name")
+        if len(name) > LONGEST_NAME:
+            self.fail(f"a joint's name of {len(name)} letters")
         if name in self.seen:
             self.fail(f"joint {name!r} stands twice (first in line {self.seen[name]})")
         if names and not self.open:
@@ -189,7 +192,7 @@ class _Hierarchy:
         if not self.open:
             self.fail("OFFSET outside of any joint")
         try:
-            x, y, z = (float(v) for v in rest.split())
+            x, y, z = (float(v) for v in rest.replace("_", "?").split())
         except ValueError:
             self.fail(f"OFFSET needs three numbers, not {rest[:60]!r}")
         if not np.all(np.isfinite((x, y, z))):
@@ -243,11 +246,11 @@ def _motion(path: Path, data: bytes, at: int, header: _Header) -> Bvh:
     body = at + 6 + max(at_frames, at_time)
     width = sum(len(c) for c in header.channels)
     try:
-        declared = int(frames_text.replace("_", "x"))
+        declared = int(frames_text.replace("_", "?"))  # Python would read 1_000
     except ValueError:
         raise InputError(path, f"Frames: {frames_text[:40]!r} is not a number", line=line_frames) from None
     try:
-        frame_time = float(time_text)
+        frame_time = float(time_text.replace("_", "?"))
     except ValueError:
         raise InputError(path, f"Frame Time: {time_text[:40]!r} is not a number", line=line_time) from None
     if not 1e-4 <= frame_time <= 10:

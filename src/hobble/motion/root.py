@@ -15,6 +15,7 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.core.smooth import gaussian
 
 STEADY = 10  # frames at 60 Hz that tell how fast the root goes on past an end of its clip
 
@@ -54,11 +55,9 @@ def facing(skeleton: Skeleton, positions: Array, sigma: float) -> Array:
 
     across x up, smoothed over time by a Gaussian of `sigma` frames (edges: nearest), normalised again.
     """
-    from scipy.ndimage import gaussian_filter1d
-
     forward = np.cross(across_body(skeleton, positions), [0.0, 1.0, 0.0])
     if sigma > 0:
-        forward = gaussian_filter1d(forward, sigma, axis=0, mode="nearest")
+        forward = gaussian(forward, sigma)
     return forward / np.maximum(np.linalg.norm(forward, axis=-1, keepdims=True), 1e-9)
 
 
