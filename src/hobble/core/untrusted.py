@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import stat
 from pathlib import Path
-from typing import Any
-
-import yaml
+from typing import TYPE_CHECKING, Any
 
 from hobble.core.errors import InputError
+
+if TYPE_CHECKING:
+    import yaml
 
 MB = 1 << 20
 MOST_TEXT = 64 * MB  # labels and status: 1 kB a frame of a clip of ten minutes at 100 Hz
@@ -54,6 +55,8 @@ def read_yaml(path: str | Path) -> Any:
 
     Raises InputError, with the line where there is one.
     """
+    import yaml  # not needed by most jobs, which are many and short
+
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)(read_text(path, MOST_YAML))
     try:
         node = loader.get_single_node()
@@ -75,14 +78,14 @@ def read_yaml(path: str | Path) -> Any:
 
 def _written_out(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
     """Values that a node stands for when every alias is replaced by what it names."""
-    if isinstance(node, yaml.ScalarNode):
+    if not isinstance(node.value, list):
         return 1
     if id(node) in above:
         raise RecursionError
     if id(node) not in known:
         above.add(id(node))
-        pairs = isinstance(node, yaml.MappingNode)
-        children = [part for pair in node.value for part in pair] if pairs else node.value
+        pairs = (child if isinstance(child, tuple) else (child,) for child in node.value)
+        children = [part for pair in pairs for part in pair]
         known[id(node)] = 1 + sum(_written_out(child, known, above) for child in children)
         above.remove(id(node))
     return known[id(node)]

@@ -14,8 +14,8 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
+from hobble.core.smooth import median_of_three
 from hobble.labels.contacts import foot_positions
-from hobble.labels.smooth import median_of_three
 
 RIGHT, LEFT = 0, 1
 END_OF_BOUT = (np.nan, -1)

@@ -8,9 +8,9 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
+from hobble.core.smooth import gaussian, lowest, mean
 from hobble.labels.footfall import Swing, feet_up
 from hobble.labels.model import GAITS
-from hobble.labels.smooth import gaussian, lowest, mean
 
 STAND, WALK, JOG, CROUCH = range(4)
 GRAVITY = 981.0 / 3600.0

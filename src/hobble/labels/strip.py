@@ -8,8 +8,8 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
+from hobble.core.smooth import mean
 from hobble.labels.model import CONTACT_ROLES, GAITS, Labels
-from hobble.labels.smooth import mean
 
 POINTS = 400
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from hobble.labels.smooth import gaussian, lowest, mean, median_of_three
+from hobble.core.smooth import gaussian, lowest, mean, median_of_three
 
 
 @pytest.mark.parametrize("shape", [(40,), (40, 3), (3, 2), (1,)])
