@@ -1,0 +1,126 @@
+"""Throw faults at the workflow: `make faults N=200`, or python -m tests.faults --rounds 200 --seed 7.
+
+Every round draws from its own generator, made of the seed and its number, so that `--only` one number does it
+again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import secrets
+import sys
+import tempfile
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+
+from . import runs, texts, throws
+from .grammar import Case
+from .lab import ROOT, Lab
+from .throws import FAULT, REFUSED, REMADE, SKIPPED, UNHARMED, Throw
+
+TARGET = "results/test/report.html"
+KINDS: dict[Callable[[Lab, Random], Throw], int] = {
+    throws.kill: 22,
+    throws.harm: 36,
+    throws.gone: 5,
+    throws.full_disk: 10,
+    throws.no_permission: 8,
+    throws.changing_clip: 8,
+    throws.spoilt_checkpoint: 4,
+    runs.kill_run: 5,
+    runs.two_runs: 2,
+}
+TEXTS_PER_ROUND = 5
+COLUMNS = (REFUSED, REMADE, UNHARMED, SKIPPED, FAULT)
+PAGE = ROOT / "docs/faults.md"
+BEGIN, END = "<!-- what was thrown -->", "<!-- end of what was thrown -->"
+
+
+def main() -> int:
+    """Throw, tell, and write the table; status 1 where there was a fault."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], prog="python -m tests.faults")
+    parser.add_argument("--rounds", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=secrets.randbelow(10**6))
+    parser.add_argument("--only", type=int, help="this one round of the seed")
+    parser.add_argument("--table", action="store_true", help=f"write the table into {PAGE.relative_to(ROOT)}")
+    asked = parser.parse_args()
+    print(f"seed {asked.seed}", flush=True)
+    with tempfile.TemporaryDirectory(prefix="faults-") as scratch:
+        Path(scratch).chmod(0o755)
+        lab = Lab(Path(scratch) / "lab")
+        lab.undisturbed(TARGET)
+        print(f"{len(lab.jobs)} jobs of an undisturbed run are ready", flush=True)
+        thrown = _rounds(lab, asked.seed, range(asked.rounds) if asked.only is None else [asked.only])
+        if asked.only is None:
+            thrown += _texts(lab, Path(scratch), asked.seed, asked.rounds * TEXTS_PER_ROUND)
+    table = _table(thrown)
+    print(table)
+    if asked.table:
+        _write(f"make faults N={asked.rounds} SEED={asked.seed}", table)
+    faults = [throw for throw in thrown if throw.happened == FAULT]
+    print(f"{len(thrown)} thrown, {len(faults)} faults")
+    return 1 if faults else 0
+
+
+def _rounds(lab: Lab, seed: int, numbers: range | list[int]) -> list[Throw]:
+    done = []
+    for number in numbers:
+        rng = Random(f"{seed}-{number}")
+        (throw,) = rng.choices(list(KINDS), list(KINDS.values()))
+        began = time.monotonic()
+        try:
+            done.append(throw(lab, rng))
+        except Exception as error:  # of the harness itself, which must not end the others
+            done.append(Throw(throw.__name__, "-", FAULT, f"{type(error).__name__}: {error}"))
+        last = done[-1]
+        seconds = time.monotonic() - began
+        print(f"{number}: {seconds:.1f} s: {last.what}, {last.at}: {last.happened} {last.detail}", flush=True)
+    return done
+
+
+def _texts(lab: Lab, folder: Path, seed: int, examples: int) -> list[Throw]:
+    thrown: list[Throw] = []
+    clip = lab.run / next(path for job in lab.jobs for path in job.outputs if path.endswith(".bvh"))
+    bases = {"bvh": texts.base_bvh(clip), "status": texts.status_grammar.BASE}
+    names = {"bvh": "a BVH file", "status": "a status file"}
+    for which, base in bases.items():
+
+        def told(case: Case, became: str, which: str = which) -> None:
+            what = f"{names[which]} with {len(case.names)} mutation{'s' * (len(case.names) > 1)}"
+            thrown.append(Throw(what, "its reader", REFUSED if became == "refused" else UNHARMED))
+
+        try:
+            texts.throw(which, base, folder, examples, seed, told)
+        except AssertionError as error:
+            thrown.append(Throw(names[which], "its reader", FAULT, str(error)))
+            print(thrown[-1], flush=True)
+    return thrown
+
+
+def _table(thrown: list[Throw]) -> str:
+    counts: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+    for throw in thrown:
+        counts[throw.what, throw.at][throw.happened] += 1
+    rows = [
+        f"| {what} | {at} | {sum(found.values())} | "
+        + " | ".join(str(found[c] or "") for c in COLUMNS)
+        + " |"
+        for (what, at), found in sorted(counts.items())
+    ]
+    head = ["| thrown | at | times | " + " | ".join(COLUMNS) + " |", "|---" * (3 + len(COLUMNS)) + "|"]
+    total = Counter(throw.happened for throw in thrown)
+    last = f"| all | | {len(thrown)} | " + " | ".join(str(total[c] or "") for c in COLUMNS) + " |"
+    return "\n".join([*head, *rows, last])
+
+
+def _write(command: str, table: str) -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    before, after = text.split(BEGIN)[0], text.split(END)[1]
+    PAGE.write_text(f"{before}{BEGIN}\nMade by `{command}`:\n\n{table}\n{END}{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,109 @@
+"""What can be wrong with a text: named mutations, each with what must become of a file that has it.
+
+A mutation says "same" (the result must be bit for bit that of the file without it), "refused" (a message with
+the file, and where `placed` with the line), or "any" (another file that may be as good: a sound result or a
+refusal).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from random import Random
+
+from hypothesis import strategies as st
+
+Change = Callable[[Random, str], str]
+
+# What can stand where a number should, and whether it still is one.
+NUMBERS: dict[str, tuple[str, str]] = {
+    "a word": ("five", "refused"),
+    "nan": ("nan", "refused"),
+    "infinity": ("-inf", "refused"),
+    "past the largest float": ("1e999", "refused"),
+    "a decimal comma": ("1,5", "refused"),
+    "hexadecimal": ("0x10", "refused"),
+    "two points": ("1.2.3", "refused"),
+    "two signs": ("--1", "refused"),
+    "an underscore": ("1_0", "refused"),
+    "five thousand digits": ("9" * 5000, "refused"),
+    "a superscript": ("²", "refused"),
+    "a control character": ("\x01", "refused"),
+    "markup": ("<script>alert(1)</script>", "refused"),
+    "a shell's command": ("$(touch${IFS}/tmp/pwned)", "refused"),
+    "a format": ("%s{0}%n", "refused"),
+    "nothing": ("", "any"),
+    "zero": ("0", "any"),
+    "below zero": ("-3", "any"),
+    "two billion": ("2000000000", "any"),
+    "a fraction": ("0.5", "any"),
+    "digits of another script": ("٣", "any"),
+    "an exponent": ("1e3", "any"),
+}
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """One way in which a file goes wrong."""
+
+    name: str
+    change: Change
+    then: str = "any"
+    placed: bool = False
+
+
+@dataclass(frozen=True)
+class Case:
+    """A mutated file: what was done to it, and what must become of it."""
+
+    names: tuple[str, ...]
+    text: str
+    then: str
+    placed: bool
+
+
+def number_at(find: Callable[[Random, str], tuple[int, int]], word: str) -> Change:
+    """Put `word` where `find` says that a number stands."""
+
+    def change(rng: Random, text: str) -> str:
+        start, end = find(rng, text)
+        return text[:start] + word + text[end:]
+
+    return change
+
+
+def on_line(choose: Callable[[Random, list[str]], int], edit: Callable[[str], str]) -> Change:
+    """Edit one line; an empty result takes it out."""
+
+    def change(rng: Random, text: str) -> str:
+        lines = text.split("\n")
+        at = choose(rng, lines)
+        if at < 0:
+            return text
+        lines[at : at + 1] = edit(lines[at]).split("\n") if edit(lines[at]) else []
+        return "\n".join(lines)
+
+    return change
+
+
+def cases(base: str, table: Mapping[str, Mutation]) -> st.SearchStrategy[Case]:
+    """Files with one mutation, or with up to three at once."""
+
+    @st.composite
+    def draw_case(draw: st.DrawFn) -> Case:
+        some = st.lists(st.sampled_from(sorted(table)), min_size=1, max_size=3, unique=True)
+        names = draw(st.one_of(st.sampled_from(sorted(table)).map(lambda n: [n]), some))
+        return mutated(base, table, names, draw(st.integers(0, 2**32 - 1)))
+
+    return draw_case()
+
+
+def mutated(base: str, table: Mapping[str, Mutation], names: list[str], seed: int) -> Case:
+    """The file after mutations by name."""
+    rng, text = Random(seed), base
+    for name in names:
+        text = table[name].change(rng, text)
+    ends = {table[name].then for name in names}
+    alone = table[names[0]] if len(names) == 1 else None
+    then = "same" if ends == {"same"} or text == base else alone.then if alone else "any"
+    return Case(tuple(names), text, then, bool(alone and alone.placed))

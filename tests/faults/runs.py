@@ -1,0 +1,143 @@
+"""Faults thrown at whole runs of the workflow: kills, and two at once in the same folder."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from random import Random
+
+from .lab import End, Job, Lab
+from .same import same
+from .throws import FAULT, REFUSED, REMADE, TRACEBACK, UNHARMED, Throw
+
+LOCKED = "cannot be locked"  # Snakemake's own words
+
+
+@contextmanager
+def _started(lab: Lab, rng: Random) -> Iterator[tuple[Path, list[Job]]]:
+    """A copy of the undisturbed run that lacks some jobs' outputs: those, and what follows, are to do."""
+    folder = Path(tempfile.mkdtemp(prefix="run-", dir=lab.folder))
+    try:
+        shutil.copytree(lab.run, folder, symlinks=True, dirs_exist_ok=True)
+        lacking = rng.sample(lab.jobs, rng.randint(1, 3))
+        for path in (folder / path for job in lacking for path in job.outputs):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        for path in folder.glob("results/*/checkpoints"):
+            shutil.rmtree(path)
+        yield folder, lacking
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _start(lab: Lab, folder: Path, said: Path) -> subprocess.Popen[bytes]:
+    with open(said, "wb") as out:
+        return subprocess.Popen(
+            lab.command(folder, "-c2", *lab.targets),
+            env=lab.environment(),
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+
+
+def _tree(root: int) -> list[int]:
+    """Processes below one, from /proc."""
+    children: dict[int, list[int]] = {}
+    for entry in Path("/proc").iterdir():
+        with suppress(OSError, ValueError, IndexError):
+            parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+            children.setdefault(parent, []).append(int(entry.name))
+    found, waiting = [], [root]
+    while waiting:
+        below = children.get(waiting.pop(), [])
+        found += below
+        waiting += below
+    return found
+
+
+def kill_run(lab: Lab, rng: Random) -> Throw:
+    """SIGKILL of a process of a whole run at a random moment, then the same command again."""
+    victim = rng.choice(("a job", "snakemake", "snakemake and its jobs"))
+    what = f"SIGKILL of {victim} in a whole run"
+    with _started(lab, rng) as (folder, lacking):
+        at = lacking[0].rule
+        said = folder / "said"
+        process = _start(lab, folder, said)
+        time.sleep(rng.uniform(0.5, 4 + 3 * sum(lab.seconds[job.name] for job in lacking)))
+        jobs = _tree(process.pid)
+        while victim == "a job" and not jobs and process.poll() is None:
+            time.sleep(0.02)
+            jobs = _tree(process.pid)
+        ended = process.poll() is not None
+        victims = {"a job": [rng.choice(jobs)] if jobs else [], "snakemake": [process.pid]}
+        for pid in victims.get(victim, [process.pid, *jobs]):
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        process.wait()
+        if ended:
+            return _rerun(lab, folder, what, at, UNHARMED)
+        if victim == "a job" and (wrong := _unsaid(process.returncode, said.read_text(errors="replace"))):
+            return Throw(what, at, FAULT, wrong)
+        if victim != "a job":
+            again = lab.snakemake(folder, "-c2", *lab.targets)
+            if again.status == 0 and "Nothing to be done" not in again.said and LOCKED not in again.said:
+                pass  # it was killed before it had taken the lock
+            elif again.status and LOCKED not in again.said:
+                return Throw(what, at, FAULT, f"neither done nor locked: {again.said[-1500:]}")
+            lab.snakemake(folder, "--unlock", *lab.targets)
+        return _rerun(lab, folder, what, at, REMADE)
+
+
+def _unsaid(status: int, said: str) -> str:
+    """What is wrong with how Snakemake ends when one of its jobs is killed."""
+    if status == 0:
+        return "" if "Error in rule" not in said else "status 0 in spite of an error"
+    if "Error in rule" not in said or TRACEBACK in said:
+        return f"no message but {said[-1500:]}"
+    return ""
+
+
+def _rerun(lab: Lab, folder: Path, what: str, at: str, happened: str) -> Throw:
+    end = lab.snakemake(folder, "-c2", *lab.targets)
+    if end.status:
+        return Throw(what, at, FAULT, f"the run after it ended in {end.said[-2500:]}")
+    return _compared(lab, folder, what, at, happened, end)
+
+
+def _compared(lab: Lab, folder: Path, what: str, at: str, happened: str, end: End) -> Throw:
+    unlike = []
+    for path in (path for job in lab.jobs for path in job.outputs):
+        if path.endswith(".html"):  # it shows times; whole is what counts
+            whole = (folder / path).read_text().rstrip().endswith("</html>")
+            unlike += [] if whole else [path]
+        elif not same(folder / path, lab.run / path):
+            unlike.append(path)
+    left = [str(path) for path in folder.rglob("*.part")]
+    if unlike or left:
+        return Throw(what, at, FAULT, f"other than undisturbed: {unlike}; left: {left}; {end.said[-800:]}")
+    return Throw(what, at, happened)
+
+
+def two_runs(lab: Lab, rng: Random) -> Throw:
+    """Two snakemake processes on the same folder: one does the work, the other says that it may not."""
+    with _started(lab, rng) as (folder, lacking):
+        said = [folder / "said-1", folder / "said-2"]
+        first = _start(lab, folder, said[0])
+        time.sleep(rng.uniform(0, 3))
+        second = _start(lab, folder, said[1])
+        ends = [process.wait() for process in (first, second)]
+        words = [path.read_text(errors="replace") for path in said]
+        for status, text in zip(ends, words, strict=True):
+            if status and LOCKED not in text:
+                return Throw("two at once", lacking[0].rule, FAULT, f"status {status}: {text[-2500:]}")
+        if all(ends):
+            return Throw("two at once", lacking[0].rule, FAULT, f"neither did the work: {words[0][-1500:]}")
+        happened = REFUSED if any(ends) else UNHARMED
+        return _rerun(lab, folder, "two at once", lacking[0].rule, happened)

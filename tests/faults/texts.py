@@ -1,0 +1,120 @@
+"""BVH and status files from the grammars, through the real readers, and what became of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from hypothesis import HealthCheck, Phase, given, seed, settings
+
+from hobble.core.errors import InputError
+from hobble.injury.severity import odd_ranges, severity_matrix
+from hobble.injury.status import read_status
+from hobble.motion.make import make_clip
+from hobble.motion.rig import load_skeleton
+
+from . import bvh_grammar, status_grammar
+from .grammar import Case, cases
+from .lab import ROOT
+
+SKELETON = ROOT / "config/skeletons/holden31.yaml"
+OPTIONS = {
+    "fps": 60.0,
+    "source_fps": None,
+    "unit": "auto",
+    "up": "auto",
+    "handedness": "auto",
+    "facing": None,
+    "proportions": "skeleton",
+    "defects": "repair",
+    "loops": 1,
+    "heading": None,
+}
+
+Arrays = dict[str, np.ndarray]
+Reader = Callable[[Path], Arrays]
+
+
+def read_clip(path: Path) -> Arrays:
+    """The clip that is made of a BVH file."""
+    clip, report = make_clip(path, SKELETON, SKELETON.parent, "clip", "holden31", OPTIONS)
+    assert all(math.isfinite(v) for v in report.values() if isinstance(v, float)), report
+    turns = np.linalg.norm(clip.rotations, axis=-1)
+    assert np.allclose(turns, 1, atol=1e-6), "rotations that are none"
+    return {"rotations": clip.rotations, "root": clip.root, "positions": clip.positions}
+
+
+def read_severity(path: Path) -> Arrays:
+    """The severities that a status file says, for a clip of as many frames."""
+    links = load_skeleton(SKELETON).skeleton.link_names
+    status = read_status(path, links)
+    if status.frames > 100_000:  # the stage compares this with the clip before it makes room for it
+        return {"frames": np.array(status.frames)}
+    matrix = severity_matrix(status, links)
+    assert matrix.min() >= 0, "a severity below 0"
+    assert matrix.max() <= 10, "a severity above 10"
+    odd_ranges(status, path)
+    return {"severity": matrix}
+
+
+def judge(case: Case, path: Path, read: Reader, whole: Arrays) -> str:
+    """What became of a mutated file: "refused", "same" or "read". Raises AssertionError where it is wrong."""
+    path.write_text(case.text, encoding="utf-8", newline="")
+    try:
+        found = read(path)
+    except InputError as error:
+        refusal = error
+    except Exception as error:
+        raise AssertionError(f"{case.names}: {type(error).__name__}: {error}") from error
+    else:
+        return _judge_read(case, found, whole)
+    text = str(refusal)
+    assert text.startswith(str(path)), text
+    assert "\n" not in text, text
+    assert len(text) < 2000, text[:200]
+    assert case.then != "same", f"{case.names}: {text}"
+    assert refusal.line is not None or not case.placed, f"{case.names}: no line in {text!r}"
+    return "refused"
+
+
+def _judge_read(case: Case, found: Arrays, whole: Arrays) -> str:
+    assert case.then != "refused", f"{case.names}: read all the same"
+    for name, array in found.items():
+        assert np.isfinite(array).all(), f"{case.names}: {name} is not finite"
+    same = found.keys() == whole.keys() and all(np.array_equal(found[k], whole[k]) for k in whole)
+    assert same or case.then != "same", f"{case.names}: read as something else"
+    return "same" if same else "read"
+
+
+def base_bvh(path: Path) -> str:
+    """A BVH of a second and a half."""
+    head, _, rest = path.read_text().partition("Frames:")
+    _, time, *rows = rest.strip().split("\n")
+    return f"{head}Frames: 180\n{time}\n" + "\n".join(rows[:180]) + "\n"
+
+
+def throw(
+    which: str, base: str, folder: Path, examples: int, seed_: int, told: Callable[[Case, str], Any]
+) -> None:
+    """Files of a grammar ("bvh" or "status"), drawn by hypothesis from a seed, each read and judged."""
+    grammar = bvh_grammar if which == "bvh" else status_grammar
+    read = read_clip if which == "bvh" else read_severity
+    path = folder / ("clip.bvh" if which == "bvh" else "clip_injuries.txt")
+    path.write_text(base)
+    whole = read(path)
+
+    def one(case: Case) -> None:
+        told(case, judge(case, path, read, whole))
+
+    phases = (Phase.generate, Phase.shrink)
+    wanted = settings(
+        max_examples=examples,
+        deadline=None,
+        database=None,
+        phases=phases,
+        suppress_health_check=list(HealthCheck),
+    )
+    seed(seed_)(wanted(given(cases(base, grammar.MUTATIONS))(one)))()

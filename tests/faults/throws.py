@@ -1,0 +1,310 @@
+"""Faults thrown at single jobs, and whether what happened is what should happen."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import subprocess
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+from .damage import DAMAGES, damaged
+from .lab import NOBODY, Bench, End, Job, Lab
+
+OLD = b"what an earlier run made"
+TRACEBACK = "Traceback (most recent call last)"
+BUG = "This is a fault of Hobble"
+REFUSED, UNHARMED, REMADE, SKIPPED, FAULT = "refused", "unharmed", "made again", "skipped", "FAULT"
+
+
+@dataclass(frozen=True)
+class Throw:
+    """What was thrown at what, and what happened; `detail` tells more where that is a fault."""
+
+    what: str
+    at: str
+    happened: str
+    detail: str = ""
+
+
+def kind(path: str) -> str:
+    """The kind of an artefact, as the table names it."""
+    name = Path(path).name
+    for special in ("checkpoint", "manifest", "statistics"):
+        if name.startswith(special):
+            return f"{special}{Path(name).suffix}"
+    return Path(name).suffix or "folder"
+
+
+def refusal(end: End, job: Job, *pieces: str) -> str:
+    """What is wrong with a refusal; "" where it is one message that holds the pieces, and no traceback."""
+    if end.status != 1:
+        return f"status {end.status}"
+    messages = [line for line in end.said.splitlines() if line.startswith(f"{job.rule}: ")]
+    if TRACEBACK in end.said or BUG in end.said or not messages:
+        return f"no message but: {end.said[-1500:]}"
+    missing = [piece for piece in pieces if piece not in messages[-1]]
+    return f"{missing} not in {messages[-1]!r}" if missing else ""
+
+
+def kill(lab: Lab, rng: Random) -> Throw:
+    """SIGKILL at a random moment; older artefacts, there half the time, stay or are replaced whole."""
+    job = rng.choice(lab.jobs)
+    after = rng.uniform(0, 1.1 * lab.seconds[job.name])
+    with lab.bench(job) as bench:
+        files = [path for path in job.outputs if (lab.run / path).is_file()]
+        older = rng.random() < 0.5
+        for path in files if older else ():
+            (bench.folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (bench.folder / path).write_bytes(OLD)
+        end = bench.run(kill_after=after)
+        torn = [path for path in files if not _old_or_new(bench, path, older)]
+        what = f"killed after a random time, {'older' if older else 'no'} artefacts there"
+        if torn or _half_a_database(bench):
+            return Throw(what, job.rule, FAULT, f"{job.name} after {after:.3f} s left half of {torn}")
+        return _again(bench, what, job.rule, UNHARMED if end.status == 0 else REMADE)
+
+
+def _old_or_new(bench: Bench, path: str, older: bool) -> bool:
+    here = bench.folder / path
+    if not here.exists():
+        return not older
+    return (older and here.read_bytes() == OLD) or path not in bench.unlike()
+
+
+def _half_a_database(bench: Bench) -> bool:
+    folders = [path for path in bench.job.outputs if (bench.lab.run / path / "manifest.json").exists()]
+    return any((bench.folder / f / "manifest.json").exists() and f in bench.unlike() for f in folders)
+
+
+def _again(bench: Bench, what: str, at: str, happened: str) -> Throw:
+    """Run the job once more with whole inputs: it must end with the undisturbed run's artefacts."""
+    for path in bench.job.outputs:  # as Snakemake does before a job
+        if (bench.folder / path).is_dir():
+            shutil.rmtree(bench.folder / path)
+    end = bench.run()
+    if end.status != 0:
+        return Throw(what, at, FAULT, f"{bench.job.name}: the run after it ended in {end.said[-1500:]}")
+    if unlike := bench.unlike():
+        return Throw(what, at, FAULT, f"{bench.job.name}: the run after it made another {unlike}")
+    if left := [str(p) for p in (bench.folder / "results").rglob("*.part")]:
+        return Throw(what, at, FAULT, f"{bench.job.name}: left {left}")
+    return Throw(what, at, happened)
+
+
+def harm(lab: Lab, rng: Random, only: str | None = None) -> Throw:
+    """Bytes of one input that another job made are cut, flipped, zeroed, ...; its time stays as it was."""
+    jobs = [job for job in lab.jobs if any(p.startswith("results/") for p in job.inputs)]
+    job = rng.choice([job for job in jobs if only in (None, job.rule)])
+    name = rng.choice(sorted(DAMAGES))
+    with lab.bench(job) as bench:
+        target = _some_file(bench, rng)
+        whole, times = target.read_bytes(), target.stat()
+        if not whole:
+            return Throw(name, kind(str(target)), SKIPPED, "an empty file")
+        target.write_bytes(damaged(rng, name, whole))
+        os.utime(target, ns=(times.st_atime_ns, times.st_mtime_ns))
+        return _judged(bench, name, target, rng)
+
+
+def gone(lab: Lab, rng: Random) -> Throw:
+    """An input that is not there any more, or a folder where it was."""
+    job = rng.choice([job for job in lab.jobs if any(p.startswith("results/") for p in job.inputs)])
+    with lab.bench(job) as bench:
+        target = _some_file(bench, rng)
+        target.unlink()
+        folder = rng.random() < 0.3
+        if folder:
+            target.mkdir()
+        return _judged(bench, "a folder in its place" if folder else "gone", target, rng)
+
+
+def _some_file(bench: Bench, rng: Random) -> Path:
+    """A file among the inputs, a small one as likely as a large; of a folder, any in it."""
+    path = bench.folder / rng.choice(bench.artefacts)
+    if path.is_dir():
+        return rng.choice(sorted(p for p in path.rglob("*") if p.is_file() and not p.name.startswith(".")))
+    return path
+
+
+def _judged(bench: Bench, what: str, target: Path, rng: Random) -> Throw:
+    """A damaged input is refused by name, or the result is that of the whole one."""
+    at = kind(str(target))
+    end = bench.run()
+    if end.status == 0:
+        if unlike := bench.unlike():
+            return Throw(what, at, FAULT, f"{bench.job.name} took {target.name} and made another {unlike}")
+        return Throw(what, at, UNHARMED)
+    named = target.name if "database" not in target.parts or target.name != "manifest.json" else "database"
+    if wrong := refusal(end, bench.job, named):
+        return Throw(what, at, FAULT, f"{bench.job.name}, {target.name}: {wrong}")
+    if rng.random() < 0.2:  # with the whole input back, all is well
+        shutil.rmtree(bench.folder)
+        bench.fill()
+        return _again(bench, what, at, REFUSED)
+    return Throw(what, at, REFUSED)
+
+
+def full_disk(lab: Lab, rng: Random) -> Throw:
+    """The results lie on a disk that has room for a part of what the job makes."""
+    if os.getuid():
+        return Throw("a full disk", "-", SKIPPED, "not root, so that no small disk can be mounted")
+    job = rng.choice(lab.jobs)
+    with lab.bench(job) as bench, _disk(bench, rng) as disk:
+        if disk is None:
+            return Throw("a full disk", job.rule, SKIPPED, "nothing may be mounted here")
+        end = bench.run()
+        if end.status == 0:
+            return _again(bench, "a full disk", job.rule, UNHARMED)
+        if wrong := refusal(end, job, "the disk is full"):
+            return Throw("a full disk", job.rule, FAULT, f"{job.name}: {wrong}")
+        torn = [p for p in job.outputs if (bench.folder / p).is_file() and p in bench.unlike()]
+        if torn or _half_a_database(bench) or list(disk.rglob("*.part")):
+            return Throw("a full disk", job.rule, FAULT, f"{job.name} left half of {torn}")
+        subprocess.run(["mount", "-o", "remount,size=2g", str(disk)], check=True)
+        return _again(bench, "a full disk", job.rule, REFUSED)
+
+
+@contextlib.contextmanager
+def _disk(bench: Bench, rng: Random) -> Iterator[Path | None]:
+    disk = bench.folder / "results"
+    filled = bench.folder / "filled"
+    disk.rename(filled)
+    disk.mkdir()
+    sizes = [sum(f.stat().st_size for f in _files(root)) for root in (filled, *_made(bench))]
+    # Pages of a tmpfs hold 4 kB, and a folder or a record takes one too.
+    room = (
+        sizes[0] + 4096 * (2 + 2 * len(list(filled.rglob("*")))) + int(rng.uniform(0, 0.95) * sum(sizes[1:]))
+    )
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={room}", "tmpfs", str(disk)]
+    if subprocess.run(mount, capture_output=True).returncode:
+        yield None
+        return
+    try:
+        shutil.copytree(filled, disk, dirs_exist_ok=True)
+        yield disk
+    finally:
+        subprocess.run(["umount", "-l", str(disk)], check=True)
+
+
+def _made(bench: Bench) -> list[Path]:
+    return [bench.lab.run / path for path in bench.job.outputs]
+
+
+def _files(root: Path) -> list[Path]:
+    return [root] if root.is_file() else [path for path in root.rglob("*") if path.is_file()]
+
+
+def no_permission(lab: Lab, rng: Random) -> Throw:
+    """An input that may not be read, or a folder that may not be written in, for a user who is not root."""
+    what = rng.choice(("an input that may not be read", "a folder that may not be written in"))
+    if os.getuid():
+        return Throw(what, "-", SKIPPED, "not root, so that no job can be run as somebody else")
+    jobs = [job for job in lab.jobs if any(p.startswith("results/") for p in job.inputs)]
+    job = rng.choice(jobs)
+    with lab.bench(job) as bench:
+        if what.startswith("an"):
+            target = _some_file(bench, rng)
+        else:
+            target = (bench.folder / job.outputs[0]).parent
+            target.mkdir(parents=True, exist_ok=True)
+        for path in (bench.folder.parent, *bench.folder.parent.rglob("*")):
+            if not path.is_symlink():
+                os.chown(path, NOBODY, NOBODY)
+        target.chmod(0o000 if target.is_file() else 0o555)
+        end = bench.run(before=become_nobody)
+        target.chmod(0o644 if target.is_file() else 0o755)
+        if end.status == 0:
+            if unlike := bench.unlike():
+                return Throw(what, job.rule, FAULT, f"{job.name} made another {unlike}")
+            return Throw(what, job.rule, UNHARMED)
+        named = target.name if target.is_file() else Path(job.outputs[0]).parent.name
+        if wrong := refusal(end, job, named, "ermission"):
+            return Throw(what, job.rule, FAULT, f"{job.name}: {wrong}")
+        return _again(bench, what, job.rule, REFUSED)
+
+
+def become_nobody() -> None:
+    """Give up root, for whom no permission counts."""
+    os.setgroups([])
+    os.setgid(NOBODY)
+    os.setuid(NOBODY)
+    os.environ["HOME"] = "/nonexistent"
+
+
+def changing_clip(lab: Lab, rng: Random) -> Throw:
+    """A clip is written anew while its job reads it: the old one's result, the new one's, or a refusal.
+
+    The old one's result is right only where Snakemake will see that the clip is newer and make it again.
+    """
+    clips = [job for job in lab.jobs if job.rule == "motion_clip"]
+    job, other = rng.sample(clips, 2)
+    how = rng.choice(("written over", "emptied and written", "replaced"))
+    with lab.bench(job) as bench:
+        clip = bench.folder / next(p for p in job.inputs if p.endswith(".bvh"))
+        record = next((bench.folder / "results").rglob(f"{clip.name}.crc32"), None)
+        if record is not None:
+            record.unlink()  # it is a user's clip, which nobody vouches for
+        new = (lab.run / next(p for p in other.inputs if p.endswith(".bvh"))).read_bytes()
+        delay, pause = rng.uniform(0, lab.seconds[job.name]), rng.uniform(0, 0.05)
+
+        def change() -> None:
+            time.sleep(delay)
+            _write_anew(clip, new, how, pause)
+
+        end = bench.run(meanwhile=change)
+        at = f"{how} while it is read"
+        if end.status != 0:
+            wrong = refusal(end, job, clip.name)
+            return Throw("a clip that changes", at, FAULT if wrong else REFUSED, wrong)
+        written = min((bench.folder / path).stat().st_mtime_ns for path in job.outputs)
+        if clip.stat().st_mtime_ns >= written:
+            torn = bench.unlike()
+            return Throw(
+                "a clip that changes",
+                at,
+                FAULT if torn else UNHARMED,
+                f"neither old nor new: {torn}" * bool(torn),
+            )
+        made = {path: (bench.folder / path).read_bytes() for path in job.outputs}
+        end = bench.run()
+        again = {path: (bench.folder / path).read_bytes() for path in job.outputs}
+        if end.status or made != again:
+            return Throw(
+                "a clip that changes", at, FAULT, f"{job.name}: the result is not that of the new clip"
+            )
+        return Throw("a clip that changes", at, UNHARMED)
+
+
+def _write_anew(clip: Path, new: bytes, how: str, pause: float) -> None:
+    if how == "replaced":
+        beside = clip.with_suffix(".new")
+        beside.write_bytes(new)
+        os.replace(beside, clip)
+        return
+    with open(clip, "r+b") as file:
+        if how.startswith("emptied"):
+            file.truncate(0)
+        for at in range(0, len(new), len(new) // 5 + 1):
+            file.write(new[at : at + len(new) // 5 + 1])
+            file.flush()
+            time.sleep(pause)
+        file.truncate(len(new))
+
+
+def spoilt_checkpoint(lab: Lab, rng: Random) -> Throw:
+    """Training that was killed finds its own checkpoint damaged."""
+    job = next((job for job in lab.jobs if job.rule == "training"), None)
+    there = sorted(lab.run.glob("results/*/checkpoints/*/*.npz"))
+    if job is None or not there:
+        return Throw("a checkpoint that is damaged", "-", SKIPPED, "no training in this run")
+    with lab.bench(job) as bench:
+        name = rng.choice(sorted(DAMAGES))
+        target = bench.folder / there[-1].relative_to(lab.run)
+        target.parent.mkdir(parents=True)
+        target.write_bytes(damaged(rng, name, there[-1].read_bytes()))
+        return _judged(bench, name, target, rng)
