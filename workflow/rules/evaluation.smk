@@ -26,6 +26,35 @@ rule accuracy:
         "../scripts/accuracy.py"
 
 
+rule rollouts:
+    """How far the figure strays from every clip when it is fed its own pose."""
+    input:
+        weights=lambda w: project.network(w.configuration, "weights.npz"),
+        clips=lambda w: project.of_dataset(w.configuration, "database/clips/{clip}.npz"),
+        skeleton=lambda w: project.skeleton_file(
+            project.configuration(w.configuration).dataset
+        ),
+    output:
+        json="results/{configuration}/evaluation/rollouts.json",
+        csv="results/{configuration}/evaluation/rollouts.csv",
+    log:
+        "results/{configuration}/logs/evaluation/rollouts.log",
+    benchmark:
+        "results/{configuration}/benchmarks/evaluation/rollouts.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=240,
+    params:
+        configuration=lambda w: w.configuration,
+        splits=lambda w: project.splits(w.configuration),
+        evaluation=lambda w: project.evaluation(w.configuration, "joints", "rollouts"),
+        mode=lambda w: project.section(w.configuration, "runtime")["mode"],
+        code=project.code("rollouts"),
+    script:
+        "../scripts/rollouts.py"
+
+
 rule responsivity:
     """Laps of the waypoint track in each phase mode: milliseconds a frame, and how well it is followed."""
     input:

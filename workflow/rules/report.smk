@@ -56,6 +56,7 @@ rule pipeline_summary:
     input:
         # Everything that the account covers, so that it is drawn up last.
         rules.accuracy.output.json,
+        rules.rollouts.output.json,
         rules.responsivity.output.json,
         rules.injury_response.output.json,
         rules.recognition.output.json,

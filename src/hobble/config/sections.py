@@ -256,6 +256,9 @@ class Evaluation(Section):
     joints: Literal["all", "equivalent"] = Field(
         "all", description="`equivalent`: only the joints that the 31-joint skeleton has too"
     )
+    rollouts: tuple[Positive, ...] = Field(
+        (1, 10, 60, 300), description="frames for which the network is fed its own pose"
+    )
     laps: Positive = 19
     lap_seconds: PositiveFloat = Field(400.0, description="a lap that takes longer is ended there")
     modes: tuple[Literal["constant", "linear", "cubic"], ...] = Field(

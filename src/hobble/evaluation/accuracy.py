@@ -72,9 +72,13 @@ def joint_errors(layout: RowLayout, truth: Array, predicted: Array, joints: Sequ
     """(n, joints, 2): |t - p| / |t| and |t - p| in cm, of outputs Y (n, Y)."""
     block = layout.y_joint_position
     t = truth[:, block].reshape(len(truth), -1, 3)[:, joints].astype(np.float64)
-    p = predicted[:, block].reshape(len(truth), -1, 3)[:, joints]
-    distance = np.linalg.norm(t - p, axis=-1)
-    return np.stack([distance / np.maximum(np.linalg.norm(t, axis=-1), LEAST), distance], axis=-1)
+    return relative_and_distance(t, predicted[:, block].reshape(len(truth), -1, 3)[:, joints])
+
+
+def relative_and_distance(truth: Array, predicted: Array) -> Array:
+    """(..., 2): |t - p| / |t| and |t - p| in cm, of positions (..., 3) in the root frame."""
+    distance = np.linalg.norm(truth - predicted, axis=-1)
+    return np.stack([distance / np.maximum(np.linalg.norm(truth, axis=-1), LEAST), distance], axis=-1)
 
 
 def clip_errors(network: Network, rows: ClipRows, joints: Sequence[int]) -> Errors:
@@ -109,7 +113,7 @@ def measure(
     totals = dict.fromkeys(SPLITS, Errors())
     for name in sorted(clips):
         rows = load_clip_rows(clips[name])
-        _check(clips[name], rows, network)
+        check_layout(clips[name], rows, network)
         errors = clip_errors(network, rows, joints)
         totals[splits[name]] += errors
         entries.append({"clip": name, "split": splits[name], **errors.to_dict()})
@@ -143,7 +147,8 @@ def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[
     return chosen
 
 
-def _check(where: str | Path, rows: ClipRows, network: Network) -> None:
+def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
+    """Raise InputError, naming `where`, unless the network has learnt rows of this layout."""
     layout = network.layout
     same = (layout.joints, layout.window, layout.step) == (
         rows.layout.joints,
