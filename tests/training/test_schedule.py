@@ -12,7 +12,7 @@ import torch
 
 from hobble.config.sections import Training
 from hobble.database.reader import Database
-from hobble.training import train as training_module
+from hobble.training.batches import HostRows
 from hobble.training.network import initialise
 from hobble.training.noise import Noise
 from hobble.training.optimiser import Adam
@@ -77,7 +77,7 @@ def test_an_interrupted_training_with_a_schedule_ends_at_the_same_bits(
     arguments: Settings = {"network": network, "training": training | changes, "threads": 2}
     whole = train(data, **arguments, checkpoints=tmp_path / "whole")
     with monkeypatch.context() as patch:
-        patch.setattr(training_module, "batches", _stopping_at(4))
+        patch.setattr(HostRows, "batches", _stopping_at(4))
         with pytest.raises(KeyboardInterrupt):
             train(data, **arguments, checkpoints=tmp_path / "cut")
     resumed = train(data, **arguments, checkpoints=tmp_path / "cut")
@@ -90,10 +90,10 @@ def test_an_interrupted_training_with_a_schedule_ends_at_the_same_bits(
 
 
 def _stopping_at(turn: int) -> Any:
-    batches = training_module.batches
+    batches = HostRows.batches
 
-    def stopping(database: Database, pass_index: int, section: int, sections: int, *rest: int) -> Any:
-        for number, batch in enumerate(batches(database, pass_index, section, sections, *rest)):
+    def stopping(self: HostRows, pass_index: int, section: int, sections: int, *rest: int) -> Any:
+        for number, batch in enumerate(batches(self, pass_index, section, sections, *rest)):
             if pass_index * sections + section == turn and number == 1:
                 raise KeyboardInterrupt
             yield batch

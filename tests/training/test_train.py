@@ -14,13 +14,17 @@ import torch
 
 from hobble.core import files
 from hobble.core.errors import HobbleError, InputError
+from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database
 from hobble.training import checkpoint, start, train
-from hobble.training.batches import batches
+from hobble.training.batches import HostRows
 from hobble.training.checkpoint import State
+from hobble.training.device_rows import DeviceRows, rows_for
 from hobble.training.held_out import HeldOut
 from hobble.training.history import columns, write_history
 from hobble.training.network import initialise
+
+from .conftest import SPLITS, clip_rows
 
 Settings = dict[str, Any]
 Run = Callable[..., State]
@@ -51,14 +55,39 @@ def test_it_learns_and_generalises(run: Run) -> None:
     assert state.best_mse == min(row[5] for row in state.history)
 
 
-def test_batches_are_the_sections_samples_in_order(data: Database) -> None:
-    seen = list(batches(data, 1, 2, 3, seed=5, size=32))
+@pytest.mark.parametrize("kind", [HostRows, DeviceRows])
+@pytest.mark.parametrize("size", [32, 300])
+def test_batches_are_the_sections_samples_in_order(data: Database, kind: type[HostRows], size: int) -> None:
+    seen = list(kind(data, torch.device("cpu")).batches(1, 2, 3, seed=5, size=size))
     blocks = list(data.blocks("train", 1, 2, 3, 5))
-    assert [len(batch.p) for batch in seen[:-1]] == [32] * (len(seen) - 1)
-    assert 0 < len(seen[-1].p) <= 32
+    assert [len(batch.p) for batch in seen[:-1]] == [size] * (len(seen) - 1)
+    assert 0 < len(seen[-1].p) <= size
     for mine, theirs in zip(zip(*seen, strict=True), zip(*blocks, strict=True), strict=True):
         assert np.array_equal(np.concatenate(mine), np.concatenate(theirs))
     assert sum(len(batch.p) for batch in seen) == data.section_pairs("train", 2, 3)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float16", "bfloat16"])
+def test_rows_on_a_device_are_those_of_the_reader(tmp_path: Path, dtype: str) -> None:
+    """Of several chunks, in every type that a database has."""
+    clips = {"walk": clip_rows("walk", 150, 1, 1), "hop": clip_rows("hop", 80, 10, 2)}
+    write_database(
+        tmp_path, clips, SPLITS, injury=True, joint_weight=0.1, dtype=dtype, chunk_bytes=30_000, seed=1
+    )
+    data = Database.open(tmp_path, 64)
+    assert len(data.manifest.chunks["train"]) > 2
+    rows = DeviceRows(data, torch.device("cpu"))
+    for turn in range(4):
+        place = (*divmod(turn, 3), 3)
+        mine = rows.batches(*place, seed=2, size=2000)
+        theirs = data.blocks("train", *place, 2)
+        for batch, block in zip(mine, theirs, strict=True):
+            for ours, wanted in zip(batch, block, strict=True):
+                assert np.array_equal(ours, wanted)
+
+
+def test_rows_stay_with_the_host_where_there_is_no_accelerator(data: Database) -> None:
+    assert type(rows_for(data, torch.device("cpu"))) is HostRows
 
 
 def test_the_same_again_gives_the_same_bits(run: Run) -> None:

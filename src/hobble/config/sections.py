@@ -225,8 +225,10 @@ class Training(Section):
     memory_mb: Positive = Field(512, description="largest part of the database held in memory")
     continues: str | None = Field(None, description="a configuration whose last checkpoint is the start")
     device: Literal["auto", "cpu", "cuda"] = "auto"
-    precision: Literal["auto", "float32", "bfloat16"] = Field(
-        "auto", description="factors of the products; auto: bfloat16 from batch 256 on where the CPU has it"
+    precision: Literal["auto", "float32", "tf32", "bfloat16"] = Field(
+        "auto",
+        description="factors of the products; auto: bfloat16 from batch 256 on where it is fast, below "
+        "it tf32 on CUDA; a CPU has no tf32 and takes float32",
     )
 
     @model_validator(mode="after")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from hobble.core.errors import HobbleError
-from hobble.database.reader import Block, Database
+from hobble.database.reader import Database
 
 TRAIN = "train"
 LOOK_EVERY = 2048  # samples between looks at the losses: an accelerator is not waited for at each batch
@@ -16,18 +18,35 @@ DIVERGED = 100.0  # predicting nothing but the mean has an error of 1
 NAMED = 8  # clips that a message names
 
 
-def batches(
-    database: Database, pass_index: int, section: int, sections: int, seed: int, size: int
-) -> Iterator[Block]:
-    """The samples of one section in consecutive batches of `size`.
+class Batch(NamedTuple):
+    """n samples on the training's device: x (n, X), y (n, Y), p (n,); clip and frame (n,) as in a `Block`."""
 
-    Only the last may be shorter; it is trained like the others (a loss is a mean over its rows), so that a
-    section sees each of its samples once and leaves nothing over for the next: a checkpoint between the two
-    is complete.
-    """
-    for block in database.blocks(TRAIN, pass_index, section, sections, seed, database.block_rows(size)):
-        for start in range(0, len(block.p), size):
-            yield Block(*(array[start : start + size] for array in block))
+    x: Tensor
+    y: Tensor
+    p: Tensor
+    clip: np.ndarray
+    frame: np.ndarray
+
+
+class HostRows:
+    """The training rows of a database, read and composed by its own reader, then sent to `device`."""
+
+    def __init__(self, database: Database, device: torch.device) -> None:
+        self.database, self.device = database, device
+
+    def batches(self, pass_index: int, section: int, sections: int, seed: int, size: int) -> Iterator[Batch]:
+        """The samples of one section in consecutive batches of `size`.
+
+        Only the last may be shorter; it is trained like the others (a loss is a mean over its rows), so that
+        a section sees each of its samples once and leaves nothing over for the next: a checkpoint between
+        the two is complete.
+        """
+        rows = self.database.block_rows(size)
+        for block in self.database.blocks(TRAIN, pass_index, section, sections, seed, rows):
+            x, y, p = (torch.from_numpy(array).to(self.device) for array in block[:3])
+            for start in range(0, len(p), size):
+                part = slice(start, start + size)
+                yield Batch(x[part], y[part], p[part], block.clip[part], block.frame[part])
 
 
 class Watch:
@@ -39,10 +58,10 @@ class Watch:
     def __init__(self, where: str, clips: tuple[str, ...]) -> None:
         self.where, self.clips = where, clips
         self.seen, self.samples, self._batches, self._total, self._new = 0, 0, 0, 0.0, 0
-        self._waiting: list[tuple[torch.Tensor, Block]] = []
-        self._worst: tuple[float, int, Block] | None = None
+        self._waiting: list[tuple[Tensor, Batch]] = []
+        self._worst: tuple[float, int, Batch] | None = None
 
-    def add(self, loss: torch.Tensor, batch: Block) -> None:
+    def add(self, loss: Tensor, batch: Batch) -> None:
         """Note a batch and its loss, a scalar on any device."""
         self._waiting.append((loss, batch))
         self.seen += len(batch.p)
@@ -73,9 +92,10 @@ class Watch:
         self._waiting.clear()
         self._new = 0
 
-    def _message(self, what: str, number: int, batch: Block) -> str:
+    def _message(self, what: str, number: int, batch: Batch) -> str:
         text = f"training diverged in {self.where}, batch {number}: {what}"
-        bad = ~(np.isfinite(batch.x).all(1) & np.isfinite(batch.y).all(1) & np.isfinite(batch.p))
+        x, y, p = (part.isfinite().cpu().numpy() for part in batch[:3])
+        bad = ~(x.all(1) & y.all(1) & p)
         if bad.any():
             places = zip(batch.clip[bad], batch.frame[bad], strict=True)
             rows = _some([f"{self.clips[clip]} frame {frame}" for clip, frame in places])

@@ -56,41 +56,44 @@ class Adam:
         share: of the learning rate.
         """
         self.steps += 1
-        rate = share * self.learning_rate / (1 - self.beta1**self.steps)
-        keep = 1 - share * self.learning_rate * self.weight_decay
-        root = 1 / (1 - self.beta2**self.steps) ** 0.5
-        sweep = _sweep_on_cpu if self.first.device.type == "cpu" else _sweep
+        if self.network.flat.device.type == "cpu":
+            self._sweep(gradients, *self.numbers(share))
+        else:
+            self.move(gradients, torch.tensor(self.numbers(share), device=self.network.flat.device))
+
+    def numbers(self, share: float) -> tuple[float, float, float]:
+        """What changes from step to step: (rate, root, keep).
+
+        rate: the learning rate, made up for the first moment's start at 0; root: likewise for the root of the
+        second; keep: what weight decay leaves.
+        """
+        steps = max(self.steps, 1)
+        rate = share * self.learning_rate / (1 - self.beta1**steps)
+        root = 1 / (1 - self.beta2**steps) ** 0.5
+        return rate, root, 1 - share * self.learning_rate * self.weight_decay
+
+    def _sweep(self, gradients: list[Tensor], rate: float, root: float, keep: float) -> None:
+        """One pass over memory, whose bandwidth is all that bounds it on a CPU."""
         views = [self.network.layers, self.network.views(self.first), self.network.views(self.second)]
-        for w, m, v, g, slope in zip(*views, gradients, self.slopes, strict=True):
-            sweep(w, m, v, g.view(w.shape), self.beta1, self.beta2, rate, root, keep, slope)
+        for *layer, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
+            arrays = [bits(array.flatten(0, 1)) for array in layer]
+            arrays.append(bits(gradient.view(layer[0].shape).flatten(0, 1)))
+            team(layer[0].numel())
+            numbers = (self.beta1, self.beta2, rate, root, keep, slope, EPSILON)
+            _fused(*arrays, *(arrays[0].dtype.type(number) for number in numbers))
 
-
-def _sweep(
-    w: Tensor,
-    m: Tensor,
-    v: Tensor,
-    g: Tensor,
-    b1: float,
-    b2: float,
-    rate: float,
-    root: float,
-    keep: float,
-    slope: float,
-) -> None:
-    """One layer of weights, moments and gradient, each (out, K, in + 1), in PyTorch."""
-    g = g.to(w.dtype, copy=True)
-    g[:, :, :-1] += slope * torch.sign(w[:, :, :-1])
-    m.mul_(b1).add_(g, alpha=1 - b1)
-    v.mul_(b2).addcmul_(g, g, value=1 - b2)
-    w[:, :, :-1] *= keep
-    w.addcdiv_(m, v.sqrt().mul_(root).add_(EPSILON), value=-rate)
-
-
-def _sweep_on_cpu(w: Tensor, m: Tensor, v: Tensor, g: Tensor, *numbers: float) -> None:
-    """The same in one pass over memory, whose bandwidth is all that bounds it."""
-    arrays = [bits(array.flatten(0, 1)) for array in (w, m, v, g)]
-    team(w.numel())
-    _fused(*arrays, *(arrays[0].dtype.type(n) for n in (*numbers, EPSILON)))
+    def move(self, gradients: list[Tensor], numbers: Tensor) -> None:
+        """The same in PyTorch on any device; `numbers` (3,) are those of `numbers`, on it."""
+        rate, root, keep = numbers.to(self.network.flat.dtype).unbind()
+        views = [self.network.layers, self.network.views(self.first), self.network.views(self.second)]
+        for w, m, v, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
+            g = gradient.view(w.shape).to(w.dtype, copy=True)
+            g[:, :, :-1].add_(torch.sign(w[:, :, :-1]), alpha=slope)
+            m.lerp_(g, 1 - self.beta1)
+            v.mul_(self.beta2).addcmul_(g, g, value=1 - self.beta2)
+            if self.weight_decay:
+                w[:, :, :-1] *= keep
+            w.addcdiv_(m * -rate, v.sqrt().mul_(root).add_(EPSILON))
 
 
 @numba.njit(parallel=True, error_model="numpy", cache=True)

@@ -102,9 +102,14 @@ def device(wanted: str) -> torch.device:
 
 
 def step_for(network: Network, training: Mapping[str, Any]) -> Step:
-    """The way to find gradients that suits the device, the precision wanted and the size of a batch."""
+    """The way to find gradients that suits the device, the precision wanted and the size of a batch.
+
+    Sums are float32 whatever the factors. TF32, which rounds factors to 11 bits, is a setting of the process.
+    """
     on_cpu = network.flat.device.type == "cpu"
-    half = training["precision"] == "bfloat16"
-    if training["precision"] == "auto" and training["batch"] >= HALF_FROM:
+    precision = training["precision"]
+    half = precision == "bfloat16"
+    if precision == "auto" and training["batch"] >= HALF_FROM:
         half = bfloat16_is_fast() if on_cpu else torch.cuda.is_bf16_supported()
+    torch.backends.cuda.matmul.allow_tf32 = precision in ("auto", "tf32")
     return (FusedStep if on_cpu else Step)(network, training["dropout"], half)

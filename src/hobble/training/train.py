@@ -9,17 +9,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from tqdm import tqdm
 
 from hobble.database.reader import Database
-from hobble.training.batches import TRAIN, Watch, batches
+from hobble.training.batches import TRAIN, Watch
 from hobble.training.checkpoint import Saver, State, pack
+from hobble.training.device_rows import rows_for
 from hobble.training.held_out import HeldOut
 from hobble.training.history import duration
 from hobble.training.noise import Noise
 from hobble.training.schedule import share
 from hobble.training.start import begin, recipe_hash, step_for, use_threads
+from hobble.training.update import update_for
 
 log = logging.getLogger("hobble.training")
 
@@ -57,6 +58,8 @@ def _run(state: State, database: Database, training: Mapping[str, Any], saver: S
     passes, sections, seed = training["passes"], training["sections"], training["seed"]
     device = state.network.flat.device
     step = step_for(state.network, training)
+    update = update_for(step, state.adam, training["batch"])
+    rows = rows_for(database, device)
     held_out = HeldOut(database, device, database.pairs(TRAIN) // sections)
     noise = Noise(database, training["noise"], device)
     pairs = database.pairs(TRAIN)
@@ -67,13 +70,11 @@ def _run(state: State, database: Database, training: Mapping[str, Any], saver: S
         watch = Watch(where, database.clips)
         step.seed(section_seed(seed, turn))
         noise.seed(section_seed(seed, turn, NOISE))
-        for batch in batches(database, pass_index, section, sections, seed, training["batch"]):
-            x, y, p = (torch.from_numpy(array).to(device) for array in batch[:3])
-            noise.add(x)
+        for batch in rows.batches(pass_index, section, sections, seed, training["batch"]):
+            noise.add(batch.x)
             rate = share(training, (state.samples + watch.seen) / pairs)
-            watch.add(step(x, y, p, step.masks(len(x))), batch)
-            state.adam.step(step.gradients, rate)
-            progress.bar.update(len(p))
+            watch.add(update(*batch[:3], rate), batch)
+            progress.bar.update(len(batch.p))
         train_mse = watch.mean()
         state.sections, state.samples = turn + 1, state.samples + watch.samples
         state.seconds = progress.seconds()

@@ -1,0 +1,78 @@
+"""What one batch does to a training: gradient, optimiser; on CUDA as one captured graph."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from hobble.training.optimiser import Adam
+from hobble.training.step import Step
+
+CAPTURED_UP_TO = 1024  # rows of a batch: from there on the products outlast the launches
+WARM_UP = 3  # runs before a capture, in which libraries choose their algorithms and take their memory
+
+
+class Update:
+    """Draws a batch's dropout, finds its gradient and moves the network."""
+
+    def __init__(self, step: Step, adam: Adam) -> None:
+        self.step, self.adam = step, adam
+
+    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float) -> Tensor:
+        """Train on x (B, X), y (B, Y), p (B,) at `share` of the learning rate; the loss, a scalar tensor."""
+        loss = self.step(x, y, p, self.step.masks(len(x)))
+        self.adam.step(self.step.gradients, share)
+        return loss
+
+
+class CapturedUpdate(Update):
+    """The same on a CUDA device for batches of `rows` rows: a hundred small kernels started by one launch.
+
+    Batches of another size, such as the last of a section, go the plain way. What changes from step to step
+    lies in memory that the graph reads: the batch and the optimiser's numbers; the generator of the dropout
+    is known to it, and goes on, or begins anew, as it would without.
+    """
+
+    def __init__(self, step: Step, adam: Adam, rows: int) -> None:
+        super().__init__(step, adam)
+        flat, (wide, *_, out) = adam.network.flat, adam.network.sizes
+        self.x, self.y = (torch.zeros(rows, size, device=flat.device) for size in (wide, out))
+        self.p = torch.zeros(rows, device=flat.device)
+        self.numbers = torch.zeros(len(adam.numbers(0.0)), dtype=torch.float32, device=flat.device)
+        self.graph = torch.cuda.CUDAGraph()
+        self.graph.register_generator_state(step.generator)
+        before = [tensor.clone() for tensor in (flat, adam.first, adam.second)]
+        beside = torch.cuda.Stream()
+        beside.wait_stream(torch.cuda.current_stream())
+        with torch.cuda.stream(beside):
+            for _ in range(WARM_UP):
+                self._once()
+        torch.cuda.current_stream().wait_stream(beside)
+        with torch.cuda.graph(self.graph):
+            self.loss = self._once()
+        for tensor, value in zip((flat, adam.first, adam.second), before, strict=True):
+            tensor.copy_(value)
+
+    def _once(self) -> Tensor:
+        loss = self.step(self.x, self.y, self.p, self.step.masks(len(self.p)))
+        self.adam.move(self.step.gradients, self.numbers)
+        return loss
+
+    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float) -> Tensor:
+        """As in `Update`."""
+        if len(p) != len(self.p):
+            return super().__call__(x, y, p, share)
+        self.x.copy_(x)
+        self.y.copy_(y)
+        self.p.copy_(p)
+        self.adam.steps += 1
+        self.numbers.copy_(torch.tensor(self.adam.numbers(share)), non_blocking=True)
+        self.graph.replay()
+        return self.loss.clone()
+
+
+def update_for(step: Step, adam: Adam, rows: int) -> Update:
+    """Captured where that is possible and pays: on CUDA, for small batches."""
+    if adam.network.flat.device.type == "cuda" and rows <= CAPTURED_UP_TO:
+        return CapturedUpdate(step, adam, rows)
+    return Update(step, adam)
