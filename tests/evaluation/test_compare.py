@@ -26,6 +26,13 @@ SIZES = {
     "ava": (1302, 512, 512, 1751),
 }
 MODES = ("constant", "cubic")
+ROLLED = {split: {"frames": 5, "last_cm": 2.0} for split in ("train", "held_out")}
+JUDGED = {"windows": 4, "right": 0.75, "confusion": {"knee": {"knee": 3, "healthy": 1}}}
+RECOGNISED = {
+    "applies": True,
+    "captured": {"cross_validated": JUDGED, "held_out": JUDGED},
+    "generated": {**JUDGED, "right": 0.5},
+}
 
 
 @pytest.fixture
@@ -58,7 +65,9 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
             "clips": [{"clip": c, "split": "train", **spread(m, 0.01)} for c, m in clips.items()],
         },
         "responsivity": {"parameters": counts, "modes": modes, **modes[-1]},
+        "rollouts": {"lengths": [{"length": n, **ROLLED, "clips": []} for n in (1, 60)]},
         "injury": {"applies": False, "reason": "none"},
+        "recognition": RECOGNISED if name == "ava" else {"applies": False, "reason": "none"},
         "pipeline": {"stages": [{"stage": "training", "seconds": 60.0, "bytes": 9, "rules": []}]},
     }
     folder = folder / name
@@ -144,6 +153,17 @@ def test_tables_hold_the_same_whatever_columns_each_has(compared, tmp_path) -> N
         ("ava", "b"),
     ]
     assert [(r["mode"], r["lap"]) for r in rows["responsivity"]] == [(m, "1") for _ in SIZES for m in MODES]
+    lengths = [(r["length"], r["split"]) for r in rows["rollouts"]]
+    assert lengths == 3 * [("1", "train"), ("1", "held_out"), ("60", "train"), ("60", "held_out")]
+    assert [tuple(r.values()) for r in rows["recognition"]][-1] == (
+        "ava",
+        "generated",
+        "knee",
+        "healthy",
+        "1",
+    )
+    named = [r for r in rows["published"] if r["measure"].startswith("hurt part")]
+    assert [(r["configuration"], r["published"], r["ours"]) for r in named] == [("ava", "0.82", "0.5")]
     last = rows["training"][-2:]
     assert [r["held_out_turn"] for r in last] == ["0.25", ""]
     assert [r["held_out_mse"] for r in last] == ["", ""]

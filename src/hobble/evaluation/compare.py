@@ -31,18 +31,20 @@ class Measured:
     name: str
     resolved: Mapping[str, Any] = field(repr=False)
     accuracy: Mapping[str, Any] = field(repr=False)
+    rollouts: Mapping[str, Any] = field(repr=False)
     responsivity: Mapping[str, Any] = field(repr=False)
     injury: Mapping[str, Any] = field(repr=False)
+    recognition: Mapping[str, Any] = field(repr=False)
     pipeline: Mapping[str, Any] = field(repr=False)
     history: Mapping[str, list[float | None]] = field(repr=False)
 
 
 def read_measured(name: str, files: Mapping[str, str | Path]) -> Measured:
-    """Read one configuration's `configuration`, `accuracy`, `responsivity`, `injury`, `pipeline`, `history`.
+    """Read one configuration's files, named as the fields of `Measured` (`configuration` for `resolved`).
 
     Raises InputError naming the file that cannot be read.
     """
-    read = {key: read_json(files[key]) for key in ("accuracy", "responsivity", "injury", "pipeline")}
+    read = {key: read_json(path) for key, path in files.items() if key not in ("configuration", "history")}
     resolved = yaml.safe_load(Path(files["configuration"]).read_text(encoding="utf-8"))
     return Measured(name, resolved, **read, history=_history(files["history"]))
 
@@ -50,7 +52,8 @@ def read_measured(name: str, files: Mapping[str, str | Path]) -> Measured:
 def compare(all_measured: Sequence[Measured], published: Mapping[str, Any]) -> dict[str, Any]:
     """compare.json: lists with an entry for each configuration, in their order.
 
-    `configurations`, `accuracy`, `responsivity`, `injury`, `training`, `stages`: what each measured;
+    `configurations`, `accuracy`, `rollouts`, `responsivity`, `injury`, `recognition`, `training`, `stages`:
+    what each measured;
     `difference`: eq. 3.2 of the relative errors of each pair; `beside`: the published figures with ours;
     `published`: all of them. Whatever a frame's time decides stands under `milliseconds`: `difference`, `fit`
     and `beside` again.
@@ -58,8 +61,14 @@ def compare(all_measured: Sequence[Measured], published: Mapping[str, Any]) -> d
     return {
         "configurations": [describe(m) for m in all_measured],
         "accuracy": [{"dataset": _dataset(m), **m.accuracy, "configuration": m.name} for m in all_measured],
+        "rollouts": [
+            {"configuration": m.name, **{k: v for k, v in entry.items() if k != "clips"}}
+            for m in all_measured
+            for entry in m.rollouts["lengths"]
+        ],
         "responsivity": [entry for m in all_measured for entry in _by_mode(m)],
         "injury": [_injury(m) for m in all_measured],
+        "recognition": [{**m.recognition, "configuration": m.name} for m in all_measured],
         "training": [{"configuration": m.name, **m.history} for m in all_measured],
         "stages": [
             {"configuration": m.name, **{k: v for k, v in stage.items() if k != "rules"}}
@@ -192,6 +201,12 @@ def _beside(all_measured: Sequence[Measured], published: Mapping[str, Any]) -> l
         if "database" in row:
             ours = _stage(m, "database", "bytes") if m else None
             out.append(_row("database", row, row["database"], ours, "bytes"))
+    people = published["recognition"]
+    for m in all_measured:
+        if m.recognition["applies"]:
+            named = {**people, "configuration": m.name}
+            ours = m.recognition["generated"]["right"]
+            out.append(_row("hurt part named right (people; a classifier)", named, people["share"], ours, ""))
     return out
 
 

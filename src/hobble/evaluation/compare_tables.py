@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from hobble.evaluation.accuracy import COLUMNS
+from hobble.evaluation.accuracy import COLUMNS, SPLITS
+from hobble.evaluation.recognition import rows as recognition_rows
 
 STEPS = ("prepare", "input", "insert", "predict", "output", "update", "total")
 
@@ -18,6 +19,21 @@ def tables(compared: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
             {"configuration": entry["configuration"], **{key: clip.get(key) for key in COLUMNS}}
             for entry in compared["accuracy"]
             for clip in entry["clips"]
+        ],
+        "rollouts": [
+            {
+                "configuration": entry["configuration"],
+                "length": entry["length"],
+                "split": split,
+                **entry[split],
+            }
+            for entry in compared["rollouts"]
+            for split in SPLITS
+        ],
+        "recognition": [
+            {"configuration": entry["configuration"], **row}
+            for entry in compared["recognition"]
+            for row in recognition_rows(entry)
         ],
         "responsivity": [lap for entry in compared["responsivity"] for lap in _laps(entry)],
         "training": _training(compared),

@@ -182,7 +182,7 @@ def _strayed(
     truth = asked.y[:, layout.y_joint_position].reshape(len(asked.y), -1, 3)[:, joints]
     made, phase = roll_out(predictor, asked, starts, length)
     frames, moments = 0, Moments.nothing(2)
-    errors = np.zeros((0, len(joints), 2))
+    errors: Array = np.zeros((0, len(joints), 2))
     for age, place in enumerate(made):
         at = starts[: len(place)] + age
         errors = relative_and_distance(truth[at].astype(float), place[:, joints])

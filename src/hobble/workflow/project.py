@@ -32,8 +32,10 @@ RESERVED = (COMPARE, "datasets")  # folders of results/ that belong to no config
 MEASURED = {
     "configuration": "configuration.yaml",
     "accuracy": "evaluation/accuracy.json",
+    "rollouts": "evaluation/rollouts.json",
     "responsivity": "evaluation/responsivity.json",
     "injury": "evaluation/injury.json",
+    "recognition": "evaluation/recognition.json",
     "pipeline": "pipeline.json",
 }
 
