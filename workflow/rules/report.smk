@@ -113,3 +113,23 @@ rule report:
         code=project.code("report"),
     script:
         "../scripts/report.py"
+
+
+rule stimuli:
+    """Short loops of the character walking hurt: the thirteen of a questionnaire, and the page's presets."""
+    input:
+        weights=lambda w: project.network(w.configuration, "weights.npz"),
+    output:
+        folder=directory("results/{configuration}/stimuli"),
+    log:
+        "results/{configuration}/logs/report/stimuli.log",
+    benchmark:
+        "results/{configuration}/benchmarks/report/stimuli.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=15,
+    params:
+        runtime=lambda w: project.section(w.configuration, "runtime"),
+        code=project.code("stimuli"),
+    script:
+        "../scripts/stimuli.py"

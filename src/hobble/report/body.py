@@ -1,6 +1,6 @@
 """The body that the figure wears: tubes of elliptical sections between joints, and which links colour each.
 
-The tables here are all there is to its shape; `loft` turns them and a pose into a surface, and so does the page.
+The tables here are all there is to its shape; `loft` turns them and a pose into a surface, as the page does.
 """
 
 from __future__ import annotations
@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-# A section: at `t` of the way from one joint to another and `cm` further, `front` of it (for a leg: behind), with
-# half its width and depth in cm; `turn` blends the direction of its width from the hips' (0) to the shoulders' (1).
+# A section: at `t` of the way from one joint to another and `cm` further, `front` of it (for a leg: behind),
+# with half its width and depth in cm; `turn` blends the direction of its width from the hips' (0) to the
+# shoulders' (1).
 Section = tuple[str, str, float, float, float, float, float, float]
 
 TRUNK: tuple[Section, ...] = (
@@ -88,7 +89,7 @@ ARM: tuple[Section, ...] = (
     ("elbow", "wrist", 1.00, 16.5, 0.0, 2.6, 1.3, 0.0),
     ("elbow", "wrist", 1.00, 18.0, 0.0, 1.5, 0.9, 0.0),
 )
-# A foot lies along its sole: `t` and `cm` along it from the ankle, half its width, and its height above the sole.
+# A foot lies along its sole: `t` and `cm` along it from the ankle, half its width, its height above the sole.
 FOOT: tuple[tuple[float, float, float, float], ...] = (
     (0.0, -6.4, 1.6, 3.4),
     (0.0, -6.0, 2.6, 5.4),

@@ -31,8 +31,8 @@ def install(folder: str | Path) -> None:
     done = npm(arguments, return_completed_process=True, cwd=folder, capture_output=True, text=True)
     if done.returncode:
         raise HobbleError(
-            "the packages of the report's page could not be fetched from the npm registry. They are needed once: "
-            f"run again where it can be reached. npm says: {_last(done)}"
+            "the packages of the report's page could not be fetched from the npm registry. They are needed "
+            f"once: run again where it can be reached. npm says: {_last(done)}"
         )
 
 

@@ -1,4 +1,4 @@
-"""The surface of a body in a pose: rings around the sections of its tubes. What the page's `body.js` does too."""
+"""The surface of a body in a pose: rings around the sections of its tubes, as in the page's `body.js`."""
 
 from __future__ import annotations
 
@@ -23,10 +23,8 @@ def vertices(body: Mapping[str, Any], points: Array) -> Array:
     axes = {name: _unit(points[a] - points[b]) for name, (a, b) in body["axes"].items()}
     out = []
     for tube in body["tubes"]:
-        if tube["kind"] == "foot":
-            rings = _foot(tube, points, body["sole"])
-        else:
-            rings = _rings(tube, points, axes)
+        foot = tube["kind"] == "foot"
+        rings = _foot(tube, points, body["sole"]) if foot else _rings(tube, points, axes)
         out += [*rings.reshape(-1, 3), *_tips(rings)]
     return np.array(out)
 
@@ -78,7 +76,7 @@ def _rings(tube: Mapping[str, Any], points: Array, axes: Mapping[str, Array]) ->
 
 
 def _foot(tube: Mapping[str, Any], points: Array, sole: Array) -> Array:
-    """Corners (S, RING, 3) of a foot, upright on its sole, which reaches from under the ankle to under the toe."""
+    """Corners (S, RING, 3) of a foot, upright on its sole, from behind the ankle to before the toe."""
     ankle, toe = points[tube["ends"]]
     t, cm, width, height = np.array([row[:4] for row in tube["sections"]], float).T[..., None]
     length = np.linalg.norm(toe - ankle)

@@ -1,0 +1,120 @@
+"""Loops without a browser: they go round, what hurts is shown where asked, and other programs open them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from hobble.core.errors import HobbleError
+from hobble.core.skeleton import Skeleton
+from hobble.motion.read import read_bvh
+from hobble.report import stimuli
+from hobble.report.body import body
+from hobble.report.raster import BODY, Camera, Studio
+from hobble.runtime.network import Network, load_network
+
+
+@pytest.fixture(scope="module")
+def studio(holden31: Skeleton) -> Studio:
+    return Studio(body(holden31.joints, holden31.parents, holden31.roles, holden31.link_names))
+
+
+@pytest.fixture(scope="module")
+def standing(holden31: Skeleton) -> np.ndarray:
+    place = np.zeros((len(holden31.joints), 3))
+    for j, p in enumerate(holden31.parents):
+        place[j] = holden31.offsets[j] + (place[p] if p >= 0 else 0)
+    keep = body(holden31.joints, holden31.parents, holden31.roles)["keep"]
+    return place[keep] - [0, place[:, 1].min() - 2.7, 0]
+
+
+def test_thirteen_are_asked_about_and_each_preset_is_shown(network: Network) -> None:
+    wanted = stimuli.wanted(network)
+    assert len(stimuli.STUDY) == 13
+    assert [shown for *_, shown in wanted] == [False] * 13 + [True] * 4
+    hurt = [tuple(sorted(links)) for _, links, shown in wanted if not shown]
+    assert len(set(hurt)) == 13, "no two are the same"
+    assert dict(wanted[1][1]) == {"LeftUpLeg-LeftLeg": stimuli.SEVERITY}
+
+
+def test_the_body_stands_where_the_camera_says(studio: Studio, standing: np.ndarray) -> None:
+    camera = Camera(np.array([0.0, 82.0, 0.0]), yaw=0.0, pitch=0.1, size=200)
+    picture = studio.draw(standing, camera).astype(float)
+    bare = studio.draw(standing + np.array([0, 0, -5000.0]), camera).astype(float)
+    drawn = np.abs(picture - bare).max(axis=-1) > 25
+    x, y, _ = camera.project(standing).T
+    rows, columns = np.nonzero(drawn)
+    assert columns.min() == pytest.approx(x.min(), abs=22)  # hands reach on past the wrists
+    assert rows.max() == pytest.approx(y.max(), abs=6)
+    for joint in range(len(standing)):
+        assert drawn[int(y[joint]), int(x[joint])], joint
+    front = picture[int(y[0]), int(x[0])] / 255
+    assert np.ptp(front / BODY) < 0.05, "grey, lighter or darker"
+
+
+def test_what_hurts_is_coloured_where_asked(studio: Studio, standing: np.ndarray, holden31: Skeleton) -> None:
+    camera = Camera(np.array([0.0, 82.0, 0.0]), yaw=0.0, pitch=0.1, size=200)
+    severity = np.zeros(len(holden31.link_names))
+    severity[holden31.link_names.index("LeftLeg-LeftFoot")] = 10
+    plain, shown = (
+        studio.draw(standing, camera).astype(int),
+        studio.draw(standing, camera, severity).astype(int),
+    )
+    rows, columns = np.nonzero((shown[..., 0] - shown[..., 2] > 50) & (plain[..., 0] - plain[..., 2] <= 20))
+    assert len(rows) > 50
+    keep = body(holden31.joints, holden31.parents, holden31.roles)["keep"]
+    x, y, _ = camera.project(standing).T
+    knee, heel = (keep.index(holden31.joints.index(name)) for name in ("LeftLeg", "LeftFoot"))
+    assert y[knee] - 10 < rows.min() <= rows.max() < y[heel] + 10
+    assert np.all(np.abs(columns - x[knee]) < 15)
+
+
+def test_the_ground_goes_round_with_the_loop() -> None:
+    from hobble.report.raster import GRID, _ground
+
+    still = _ground(Camera(np.array([0.0, 82.0, 0.0]), size=80))
+    moved = _ground(Camera(np.array([0.0, 82.0, 3 * GRID]), size=80))
+    between = _ground(Camera(np.array([0.0, 82.0, 0.4 * GRID]), size=80))
+    assert np.abs(still - moved).max() < 1e-9
+    assert np.abs(still - between).max() > 0.01
+
+
+def test_a_walk_is_cut_where_it_repeats() -> None:
+    time = np.arange(stimuli.SETTLED + 60 + stimuli.LONGEST + stimuli.BLEND)
+    swing = np.stack([0 * time, 90 + np.sin(2 * np.pi * time / 67), 2.0 * time], axis=1)
+    leg = swing + np.stack([0 * time, -50 + 0 * time, 20 * np.sin(2 * np.pi * time / 67)], axis=1)
+    first, last, gap = stimuli.cut(np.stack([swing, leg], axis=1))
+    assert (last - first) % 67 == 0
+    assert gap < 1e-6
+
+
+def test_files_of_a_loop(network: Network, examples: ModuleType, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(stimuli, "STUDY", {"healthy": (), "left-foot": ("left foot",)})
+    monkeypatch.setattr(stimuli, "PRESETS", {"Bad back": {"lower back": 8}})
+    stimuli.write_stimuli(network, tmp_path / "a", size=64, **examples.RUNTIME)
+    names = {"healthy", "left-foot", "preset-bad-back"}
+    assert {p.name for p in (tmp_path / "a").iterdir()} == {"stimuli.json"} | {
+        f"{n}.{kind}" for n in names for kind in ("webp", "bvh")
+    }
+    listed = json.loads((tmp_path / "a/stimuli.json").read_text())["stimuli"]
+    assert [row["name"] for row in listed] == ["healthy", "left-foot", "preset-bad-back"]
+    with Image.open(tmp_path / "a/left-foot.webp") as image:
+        frames = len(read_bvh(tmp_path / "a/left-foot.bvh"))
+        assert image.n_frames == frames // stimuli.STRIDE
+        assert image.info["loop"] == 0
+        assert image.size == (64, 64)
+        assert frames / 60 == pytest.approx(listed[1]["seconds"])
+
+
+def test_a_network_that_cannot_be_hurt_says_which_can(
+    examples: ModuleType, holden31: Skeleton, tmp_path: Path
+) -> None:
+    examples.weights(tmp_path / "weights.npz", holden31, links=False)
+    with pytest.raises(HobbleError, match="`injured`"):
+        stimuli.write_stimuli(load_network(tmp_path / "weights.npz"), tmp_path / "out", **examples.RUNTIME)
+    assert not (tmp_path / "out").exists()

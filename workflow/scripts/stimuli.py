@@ -1,0 +1,11 @@
+"""Creates results/<configuration>/stimuli/: loops of the hurt character as animated images and BVH files."""
+
+from hobble.report.stimuli import write_stimuli
+from hobble.runtime.network import load_network
+from hobble.workflow.job import job
+
+with job(snakemake) as log:
+    made = write_stimuli(
+        load_network(snakemake.input.weights), snakemake.output.folder, **snakemake.params.runtime
+    )
+    log.info("wrote %d loops to %s", len(made), snakemake.output.folder)
