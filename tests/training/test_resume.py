@@ -18,7 +18,9 @@ from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.database.layout import CONTACTS, GAITS, RowLayout
 from hobble.database.reader import Database
-from hobble.training.checkpoint import pack
+from hobble.training import checkpoint
+from hobble.training import run as run_module
+from hobble.training.checkpoint import State, pack
 from hobble.training.run import run
 from hobble.training.start import recipe_hash
 from hobble.training.train import train
@@ -64,6 +66,79 @@ def test_killed_at_any_moment_it_ends_at_the_same_bits(
 def _sections(folder: Path) -> int:
     paths = list(folder.glob("*/checkpoint.npz"))
     return int(load_npz(paths[0])["sections"]) if paths else 0
+
+
+@pytest.mark.parametrize("recipe", [{}, {"schedule": "cosine", "warm_up": 0.3, "noise": 0.1, "batch": 256}])
+@pytest.mark.parametrize("written", [False, True])
+@pytest.mark.parametrize("number", [0, 1, 5])
+def test_killed_before_or_after_any_write_it_ends_at_the_same_bits(
+    data: Database,
+    network: Settings,
+    training: Settings,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    recipe: Settings,
+    written: bool,
+    number: int,
+) -> None:
+    """A checkpoint that is half written when the end comes, and one that has just taken its name."""
+    arguments: Settings = {"network": network, "training": training | recipe, "threads": 1}
+    count = iter(range(100))
+
+    def dying(path: Path, **arrays: np.ndarray) -> None:
+        if next(count) != number:
+            return save_npz(path, **arrays)
+        if written:
+            save_npz(path, **arrays)
+        else:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.with_name(f".{path.name}.1.part").write_bytes(b"half of it")
+        raise SystemExit
+
+    with monkeypatch.context() as patch:
+        patch.setattr(checkpoint, "save_npz", dying)
+        with pytest.raises(SystemExit):
+            train(data, **arguments, checkpoints=tmp_path / "killed")
+    final = train(data, **arguments, checkpoints=tmp_path / "killed")
+    whole = train(data, **arguments, checkpoints=tmp_path / "whole")
+    assert _numbers(final) == _numbers(whole)
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def _numbers(state: State) -> dict[str, bytes]:
+    """All that a run ends with but how long it took."""
+    arrays = pack(state, "")
+    arrays["history"][:, 3] = 0
+    return {name: array.tobytes() for name, array in arrays.items() if name != "seconds"}
+
+
+@pytest.mark.parametrize("last", ["write_weights", "write_history", "save_npz"])
+def test_killed_between_the_files_at_the_end(
+    small_database: Path,
+    network: Settings,
+    training: Settings,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    last: str,
+) -> None:
+    """Snakemake removes what an ended job had made; the same command then makes the same files."""
+
+    def go(folder: Path) -> dict[str, np.ndarray]:
+        files = {name: folder / name for name in ("weights", "history", "checkpoint")}
+        settings: Settings = {"network": network, "training": training, "start": None, "code": None}
+        run(small_database, configuration="c", checkpoints=folder / "c", threads=1, **settings, **files)
+        return load_npz(files["weights"]) | load_npz(files["checkpoint"])
+
+    def dying(*_: Any, **__: Any) -> None:
+        raise SystemExit
+
+    with monkeypatch.context() as patch:
+        patch.setattr(run_module, last, dying)
+        with pytest.raises(SystemExit):
+            go(tmp_path / "killed")
+    killed, whole = go(tmp_path / "killed"), go(tmp_path / "whole")
+    for name in set(whole) - {"history", "seconds"}:
+        assert np.array_equal(killed[name], whole[name]), name
 
 
 def test_more_passes_go_on_and_fewer_start_anew(

@@ -67,12 +67,9 @@ class Step:
 
     def masks(self, rows: int) -> list[Tensor]:
         """What each layer's inputs (rows, in) are multiplied by: 0 for those dropped, 1 / keep for others."""
-        flat = self.network.flat
-        masks = []
-        for width in self.network.sizes[:-1]:
-            drawn = torch.rand(rows, width, generator=self.generator, device=flat.device)
-            masks.append((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep))
-        return masks
+        flat, widths = self.network.flat, self.network.sizes[:-1]
+        drawn = torch.rand(rows, sum(widths), generator=self.generator, device=flat.device)
+        return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(widths, dim=1))
 
     def coefficients(self, p: Tensor) -> Tensor:
         """(B, K) of phases (B,)."""

@@ -1,0 +1,88 @@
+"""What is captured on CUDA is the plain update, shown with a graph that a CPU has too."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import Any
+
+import pytest
+import torch
+
+from hobble.training.fused import FusedStep
+from hobble.training.network import initialise
+from hobble.training.optimiser import Adam
+from hobble.training.step import Step
+from hobble.training.update import CapturedUpdate, Update, update_for
+
+ROWS = 12
+
+
+class Graph:
+    """Stands for a CUDA graph: what was captured is run again, from the same memory into the same memory."""
+
+    update: CapturedUpdate
+
+    def register_generator_state(self, generator: torch.Generator) -> None:
+        assert isinstance(generator, torch.Generator)
+
+    def replay(self) -> None:
+        self.update.loss.copy_(self.update._once())
+
+
+class Stream:
+    def wait_stream(self, other: Any) -> None:
+        assert isinstance(other, Stream)
+
+
+@pytest.fixture
+def cuda(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As much of CUDA as a capture asks for."""
+    for name, value in {
+        "CUDAGraph": Graph,
+        "Stream": Stream,
+        "current_stream": Stream,
+        "stream": lambda _: contextlib.nullcontext(),
+        "graph": lambda _: contextlib.nullcontext(),
+    }.items():
+        monkeypatch.setattr(torch.cuda, name, value)
+
+
+def updates(weight_decay: float) -> tuple[Update, CapturedUpdate]:
+    made: list[Update] = []
+    for kind in (Update, CapturedUpdate):
+        network = initialise((8, 7, 7, 5), 4, 1)
+        adam = Adam(network, 0.01, 0.9, 0.999, 0.01, weight_decay)
+        step = Step(network, 0.3)
+        made.append(kind(step, adam, ROWS) if kind is CapturedUpdate else kind(step, adam))
+        step.seed(3)
+    plain, captured = made
+    assert isinstance(captured, CapturedUpdate)
+    captured.graph.update = captured  # type: ignore[attr-defined]
+    return plain, captured
+
+
+@pytest.mark.usefixtures("cuda")
+@pytest.mark.parametrize("weight_decay", [0.0, 0.5])
+def test_a_captured_update_is_the_plain_one(weight_decay: float) -> None:
+    """Also with a shorter batch among others, and rates that change."""
+    plain, captured = updates(weight_decay)
+    assert torch.equal(plain.adam.network.flat, captured.adam.network.flat)
+    assert torch.count_nonzero(captured.adam.second) == 0
+    assert captured.adam.steps == 0
+    generator = torch.Generator().manual_seed(1)
+    losses = []
+    for rows, share in ((ROWS, 0.1), (ROWS, 1.0), (5, 0.7), (ROWS, 0.3)):
+        x, y = (torch.randn(rows, n, generator=generator) for n in (8, 5))
+        p = torch.rand(rows, generator=generator)
+        losses.append([update(x.clone(), y.clone(), p, share) for update in (plain, captured)])
+    for mine, theirs in losses:  # looked at afterwards, as the watch does
+        assert float(mine) == pytest.approx(float(theirs), rel=1e-5)
+    assert plain.adam.steps == captured.adam.steps == 4
+    for name in ("first", "second"):
+        assert torch.allclose(getattr(plain.adam, name), getattr(captured.adam, name), rtol=1e-4, atol=1e-7)
+    assert torch.allclose(plain.adam.network.flat, captured.adam.network.flat, rtol=1e-4, atol=1e-6)
+
+
+def test_nothing_is_captured_on_a_cpu() -> None:
+    network = initialise((8, 7, 5), 4, 1)
+    assert type(update_for(FusedStep(network, 0.3), Adam(network, 0.01, 0.9, 0.999, 0.0), 32)) is Update
