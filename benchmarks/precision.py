@@ -1,0 +1,78 @@
+"""What half precision on disk costs in held-out accuracy, beside what another seed does.
+
+    python benchmarks/precision.py [FOLDER] [--passes 3] [--seeds 1 2]
+
+FOLDER is a data set's results (results/datasets/synthetic), whose rows are there. They are merged into three
+databases, in float32, float16 and bfloat16, and the usual network is trained on each, with each seed, by the
+usual recipe. Accuracy is that of the evaluation: one-step predictions of the rows as they were before they
+were rounded. A difference means something where it is larger than that between seeds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from hobble.config.sections import Network, Training
+from hobble.database.manifest import Manifest
+from hobble.database.merge import write_database
+from hobble.evaluation.accuracy import measure
+from hobble.training.run import run
+
+DTYPES = ("float32", "float16", "bfloat16")
+
+
+def trained(database: Path, folder: Path, passes: int, seed: int, threads: int) -> Path:
+    """The weights of a network trained on a database."""
+    folder.mkdir()
+    files = {name: folder / name for name in ("weights", "history", "checkpoint")}
+    run(
+        database,
+        configuration="precision",
+        network=Network().model_dump(mode="json"),
+        training=Training(passes=passes, seed=seed).model_dump(mode="json"),
+        checkpoints=folder / "checkpoints",
+        threads=threads,
+        start=None,
+        code=None,
+        **files,
+    )
+    return files["weights"]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="?", default=Path("results/datasets/synthetic"))
+    parser.add_argument("--passes", type=int, default=3)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--threads", type=int, default=2)
+    asked = parser.parse_args()
+    made = Manifest.load(asked.folder / "database/healthy")
+    splits = {clip["clip"]: clip["split"] for clip in made.clips}
+    clips = {name: asked.folder / f"database/clips/{name}.npz" for name in splits}
+    frames = f"{made.rows('train'):,} frames to learn from, {made.rows('held_out'):,} held out"
+    print(f"{frames}, {asked.passes} passes")
+    print("on disk    share of the original's bytes   seed   held-out error    cm a joint   to float32")
+    errors: dict[tuple[str, int], float] = {}
+    with tempfile.TemporaryDirectory() as name:
+        for dtype in DTYPES:
+            database = Path(name, dtype)
+            options = {"injury": False, "joint_weight": made.joint_weight, "dtype": dtype}
+            manifest = write_database(database, clips, splits, **options)
+            for seed in asked.seeds:
+                weights = trained(database, Path(name, f"{dtype}-{seed}"), asked.passes, seed, asked.threads)
+                found = measure(weights, clips, splits, "precision")["held_out"]
+                errors[dtype, seed] = found["mean"]
+                more = found["mean"] / errors["float32", seed] - 1
+                print(f"{dtype:<10} {manifest.bytes / manifest.original_bytes:29.1%} {seed:6}", end="")
+                print(f"{found['mean']:16.4%} {found['position_error_cm']:13.3f} {more:+12.2%}", flush=True)
+    full = np.array([errors["float32", seed] for seed in asked.seeds])
+    if len(full) > 1:
+        print(f"between seeds, float32: {np.ptp(full) / full.mean():.2%} from the least to the largest")
+
+
+if __name__ == "__main__":
+    main()
