@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -290,6 +292,15 @@ def test_sides_in_unity_and_unreal() -> None:
     )
     with pytest.raises(ValueError, match="handed is right or left"):
         Axes("both")
+
+
+def test_what_a_game_loads(root: Path) -> None:
+    """No torch, and nothing of what only the workflow or an export needs."""
+    heavy = "{'torch', 'snakemake', 'pydantic', 'onnx', 'onnxruntime', 'matplotlib', 'plotly'}"
+    code = f"import sys, hobble.runtime; sys.exit(str({heavy} & set(sys.modules) or ''))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=root)
+    assert done.stderr == ""
+    assert done.returncode == 0
 
 
 def test_a_network_without_skeleton_is_refused(tmp_path: Path, network) -> None:

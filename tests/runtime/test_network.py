@@ -219,8 +219,10 @@ def test_release_folder_round_trip(tmp_path: Path, network: Network, holden31) -
 
 
 def test_what_is_wrong_with_a_release_folder_is_said(tmp_path: Path, network: Network) -> None:
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match=r"no weights.npz, and no Xmean.bin.* Train one"):
         load_network(tmp_path)
+    with pytest.raises(InputError, match="no such file"):
+        read_release(tmp_path)
     write_release(tmp_path, network)
     path = tmp_path / "W1_007.bin"
     whole = path.read_bytes()

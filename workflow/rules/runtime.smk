@@ -18,3 +18,46 @@ rule generate:
         code=project.code("generate"),
     script:
         "../scripts/generate.py"
+
+
+rule export_onnx:
+    """The network as one ONNX file in a phase mode, checked with onnxruntime."""
+    input:
+        weights=lambda w: project.network(w.configuration, "weights.npz"),
+    output:
+        onnx="results/{configuration}/export/{mode}.onnx",
+    log:
+        "results/{configuration}/logs/runtime/export_onnx_{mode}.log",
+    benchmark:
+        "results/{configuration}/benchmarks/runtime/export_onnx_{mode}.tsv"
+    wildcard_constraints:
+        mode="constant|linear|cubic",
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        mode=lambda w: w.mode,
+        code=project.code("export_onnx"),
+    script:
+        "../scripts/export_onnx.py"
+
+
+rule export_release:
+    """The network as the original release's folder of .bin files, for its demo and its ports."""
+    input:
+        weights=lambda w: project.network(w.configuration, "weights.npz"),
+    output:
+        folder=directory("results/{configuration}/export/pfnn"),
+    log:
+        "results/{configuration}/logs/runtime/export_release.log",
+    benchmark:
+        "results/{configuration}/benchmarks/runtime/export_release.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        code=project.code("export_release"),
+    script:
+        "../scripts/export_release.py"

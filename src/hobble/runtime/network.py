@@ -14,8 +14,11 @@ from hobble.core.errors import InputError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.core.untrusted import read_yaml
 from hobble.database.layout import GAITS, RowLayout
 
+# Rows: the four control points about a place between the second and the third; columns: powers of that place.
+CATMULL_ROM = 0.5 * np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]], float)
 STATISTICS = ("Xmean", "Xstd", "Ymean", "Ystd")
 
 
@@ -63,18 +66,36 @@ class Network:
         return sum(a * b + b for a, b in zip(self.sizes, self.sizes[1:], strict=False))
 
 
-def load_network(path: str | Path, skeleton: Skeleton | None = None) -> Network:
+def read_skeleton(path: str | Path) -> Skeleton:
+    """The skeleton of a file of config/skeletons. Raises InputError where it is none."""
+    data = read_yaml(path)
+    try:
+        keys = {key: value for key, value in data.items() if key != "maps"}
+        return Skeleton.from_dict({"name": Path(path).stem, **keys})
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise InputError(path, f"is no skeleton: {type(error).__name__} {error}") from None
+
+
+def load_network(path: str | Path, skeleton: Skeleton | str | Path | None = None) -> Network:
     """Read weights.npz, a folder that holds one, or a folder of the original release's .bin files.
 
-    skeleton: for files that carry none (the original release's).
+    skeleton: for files that carry none (the original release's); it, or a file of config/skeletons.
     Raises InputError where something is missing, damaged, not finite or of shapes that do not fit.
     """
     path = Path(path)
+    if isinstance(skeleton, str | Path):
+        skeleton = read_skeleton(skeleton)
     if path.is_dir():
         if (path / "weights.npz").exists():
             return load_network(path / "weights.npz", skeleton)
         from hobble.runtime.release import read_release
 
+        if not any(path.glob("*.bin")):
+            raise InputError(
+                path,
+                "holds no weights.npz, and no Xmean.bin, W0_000.bin, ...: not a network",
+                fix="Train one (snakemake results/<configuration>/network/weights.npz), or name its folder.",
+            )
         return network_from_arrays(path, read_release(path), skeleton)
     return network_from_arrays(path, load_npz(path), skeleton)
 
@@ -142,8 +163,7 @@ def catmull_rom(phase: Array, points: int) -> tuple[np.ndarray, Array]:
     first = np.floor(scaled).astype(int)
     t = (scaled - first)[..., None]
     indices = (first[..., None] + np.arange(-1, 3)) % points
-    matrix = 0.5 * np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]], float)
-    return indices, t ** np.arange(4) @ matrix.T
+    return indices, t ** np.arange(4) @ CATMULL_ROM.T
 
 
 def weights_at(points: Array, phase: Array) -> Array:

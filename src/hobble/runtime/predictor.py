@@ -28,15 +28,10 @@ class Predictor:
     """
 
     def __init__(self, network: Network, mode: str = "cubic", storage: str = "float32") -> None:
-        if mode not in MODES:
-            raise ValueError(f"mode {mode!r}: not one of {', '.join(MODES)}")
         if storage not in STORAGES:
             raise ValueError(f"storage {storage!r}: not one of {', '.join(STORAGES)}")
         self.network, self.mode, self.storage = network, mode, storage
-        tables = [(w, b) for w, b in zip(network.weights, network.biases, strict=True)]
-        if (points := MODES[mode]) is not None:
-            phases = np.arange(points) / points
-            tables = [(weights_at(w, phases), weights_at(b, phases)) for w, b in tables]
+        tables = phase_tables(network, mode)
         self.points = len(tables[0][0])
         packed = [_pack(w, storage) for w, _ in tables]
         self._weights = tuple(q for q, _ in packed)
@@ -44,7 +39,7 @@ class Predictor:
         self._biases = tuple(np.ascontiguousarray(b, np.float32) for _, b in tables)
         self._statistics = tuple(
             np.ascontiguousarray(a, np.float32)
-            for a in (network.x_mean, _inverse(network.x_std), network.y_mean, network.y_std)
+            for a in (network.x_mean, inverse(network.x_std), network.y_mean, network.y_std)
         )
         self._work = np.zeros((2, max(network.sizes)), np.float32)
         self._kind = 4 if mode == "cubic" else 2 if mode == "linear" else 1
@@ -81,7 +76,24 @@ CROWD = 2
 BLOCK = 4  # characters that go through a layer's weights together
 
 
-def _inverse(std: Array) -> Array:
+def phase_tables(network: Network, mode: str) -> list[tuple[Array, Array]]:
+    """What a mode looks up or blends: for each layer weights (points, out, in) and biases (points, out).
+
+    50 or 10 points, or the control points themselves. Raises ValueError for an unknown mode.
+    """
+    if mode not in MODES:
+        raise ValueError(f"mode {mode!r}: not one of {', '.join(MODES)}")
+    points = MODES[mode]
+    if points is None:
+        return list(zip(network.weights, network.biases, strict=True))
+    phases = np.arange(points) / points
+    return [
+        (weights_at(w, phases), weights_at(b, phases))
+        for w, b in zip(network.weights, network.biases, strict=True)
+    ]
+
+
+def inverse(std: Array) -> Array:
     """1 / std, and 0 for a column that never varied: it tells nothing and must not blow up."""
     return np.where(std > 0, 1 / np.maximum(std, 1e-30), 0)
 

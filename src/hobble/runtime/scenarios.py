@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -123,6 +123,19 @@ def run_scenario(network: Network, scenario: Scenario, **options: Any) -> Track:
     )
 
 
+def write_motions(network: Network, bvh: str | Path, **options: Any) -> Iterator[Track]:
+    """Run every scenario, write each as a BVH file into the folder `bvh` and yield what came of it."""
+    assert network.skeleton is not None
+    for scenario in scenarios(network):
+        track = run_scenario(network, scenario, **options)
+        own = "skeleton" in network.meta
+        body = (
+            network.skeleton if own else fitted_skeleton(network.skeleton, track.positions, track.rotations)
+        )
+        export_bvh(Path(bvh) / f"{scenario.name}.bvh", scenario.name, body, track.positions, track.rotations)
+        yield track
+
+
 def generate(network: Network, npz: str | Path, bvh: str | Path, **options: Any) -> None:
     """Run every scenario and write `npz` and, into the folder `bvh`, a BVH file each.
 
@@ -131,24 +144,20 @@ def generate(network: Network, npz: str | Path, bvh: str | Path, **options: Any)
     3), <name>/severity (F,) float32, <name>/hurt: the hurt link or "".
     """
     assert network.skeleton is not None
-    skeleton = network.skeleton
     arrays: dict[str, Any] = {}
     names = []
-    for scenario in scenarios(network):
-        track = run_scenario(network, scenario, **options)
-        names.append(scenario.name)
+    for track in write_motions(network, bvh, **options):
+        name = track.scenario.name
+        names.append(name)
         for key in ("positions", "contacts", "phase", "target", "root", "severity"):
-            arrays[f"{scenario.name}/{key}"] = getattr(track, key).astype(np.float32)
-        arrays[f"{scenario.name}/gait"] = track.gait
-        arrays[f"{scenario.name}/hurt"] = np.array(scenario.hurt or "")
-        own = "skeleton" in network.meta
-        body = skeleton if own else fitted_skeleton(skeleton, track.positions, track.rotations)
-        export_bvh(Path(bvh) / f"{scenario.name}.bvh", scenario.name, body, track.positions, track.rotations)
+            arrays[f"{name}/{key}"] = getattr(track, key).astype(np.float32)
+        arrays[f"{name}/gait"] = track.gait
+        arrays[f"{name}/hurt"] = np.array(track.scenario.hurt or "")
     save_npz(
         npz,
         names=np.array(names),
-        joints=np.array(skeleton.joints),
-        parents=np.array(skeleton.parents),
+        joints=np.array(network.skeleton.joints),
+        parents=np.array(network.skeleton.parents),
         fps=np.array(60.0),
         **arrays,
     )

@@ -1,0 +1,60 @@
+"""A network for other programs: python -m hobble.runtime onnx|bin|bvh NETWORK TARGET.
+
+python -m hobble.runtime onnx results/holden/network holden.onnx --mode cubic
+python -m hobble.runtime bin results/holden/network pfnn
+python -m hobble.runtime bvh pfnn motions --skeleton config/skeletons/holden31.yaml
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from hobble.core.errors import HobbleError
+from hobble.runtime.network import Network, load_network
+from hobble.runtime.onnx_export import write_checked
+from hobble.runtime.predictor import MODES
+from hobble.runtime.release import write_release
+from hobble.runtime.scenarios import write_motions
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m hobble.runtime", description="A network for other programs."
+    )
+    parser.add_argument(
+        "to",
+        choices=("onnx", "bin", "bvh"),
+        help="one ONNX file, checked with onnxruntime; the original release's .bin files; generated motions",
+    )
+    parser.add_argument("network", help="weights.npz, a folder that holds it, or a folder of .bin files")
+    parser.add_argument("target", help="the file or folder to write")
+    parser.add_argument("--mode", choices=tuple(MODES), default="cubic", help="how phase is looked up")
+    parser.add_argument("--skeleton", help="for a network that carries none: a file of config/skeletons")
+    options = parser.parse_args(arguments)
+    try:
+        network = load_network(options.network, options.skeleton)
+        print(_write(options.to, network, options.target, options.mode))
+    except HobbleError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+def _write(to: str, network: Network, target: str, mode: str) -> str:
+    if to == "bin":
+        write_release(target, network)
+        return f"{target}: weights at 50 phases"
+    if to == "bvh":
+        if network.skeleton is None:
+            raise HobbleError("the network carries no skeleton: name one with --skeleton")
+        names = [track.scenario.name for track in write_motions(network, target, mode=mode)]
+        return f"{target}: {', '.join(names)}"
+    difference = write_checked(target, network, mode)
+    return f"{target}: within {difference:.1g} of the runtime"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

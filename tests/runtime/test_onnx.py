@@ -1,0 +1,120 @@
+"""The network as ONNX: the same numbers in another program."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.database.layout import RowLayout
+from hobble.runtime.__main__ import main
+from hobble.runtime.network import load_network, weights_at
+from hobble.runtime.onnx_export import OPSET, TOLERANCE, check_onnx, export_onnx, write_checked
+from hobble.runtime.predictor import MODES, Predictor
+from hobble.runtime.release import write_release
+
+
+def run(path: Path, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    session = onnxruntime.InferenceSession(path, providers=["CPUExecutionProvider"])
+    return session.run(["y"], {"x": x, "phase": phase.astype(np.float32)})[0]
+
+
+@pytest.mark.parametrize("points", [4, 6])
+@pytest.mark.parametrize("mode", MODES)
+def test_onnxruntime_gives_the_runtimes_numbers(make_network, tmp_path: Path, mode: str, points: int) -> None:
+    network = make_network(control_points=points, scale=20.0)
+    assert 0 <= write_checked(tmp_path / "network.onnx", network, mode) <= TOLERANCE
+    rng = np.random.default_rng(3)
+    for rows in (1, 7):
+        x = rng.normal(0, 20, (rows, network.layout.x_size)).astype(np.float32)
+        # Also before 0 and after 1, and between every two points.
+        phase = rng.uniform(-1, 2, rows).astype(np.float32)
+        y = run(tmp_path / "network.onnx", x, phase)
+        np.testing.assert_allclose(y, Predictor(network, mode).predict(x, phase.astype(float)), atol=1e-4)
+
+
+def test_cubic_is_the_definition(make_network, tmp_path: Path) -> None:
+    """Weights blended first, in double precision."""
+    network = make_network(scale=20.0)
+    export_onnx(tmp_path / "network.onnx", network)
+    x = np.random.default_rng(4).normal(0, 20, (20, network.layout.x_size)).astype(np.float32)
+    phase = np.linspace(0, 1, 20, dtype=np.float32)
+    y = run(tmp_path / "network.onnx", x, phase)
+    for row, p, found in zip(x, phase, y, strict=True):
+        h = (row - network.x_mean.astype(float)) / network.x_std
+        for i, (w, b) in enumerate(zip(network.weights, network.biases, strict=True)):
+            h = weights_at(w, p)[0] @ h + weights_at(b, p)[0]
+            h = h if i == len(network.weights) - 1 else np.where(h > 0, h, np.expm1(h))
+        np.testing.assert_allclose(found, h * network.y_std + network.y_mean, atol=2e-4)
+
+
+def test_a_column_that_never_varied_is_ignored(network, tmp_path: Path) -> None:
+    std = network.x_std.copy()
+    std[5] = 0
+    export_onnx(tmp_path / "network.onnx", replace(network, x_std=std))
+    x = np.zeros((1, network.layout.x_size), np.float32)
+    before = run(tmp_path / "network.onnx", x, np.zeros(1))
+    x[:, 5] = 1e6
+    np.testing.assert_array_equal(run(tmp_path / "network.onnx", x, np.zeros(1)), before)
+
+
+def test_the_file_says_what_it_is(hurtable, tmp_path: Path) -> None:
+    export_onnx(tmp_path / "network.onnx", hurtable, "linear")
+    model = onnx.load(tmp_path / "network.onnx")
+    assert [(o.domain, o.version) for o in model.opset_import] == [("", OPSET)]
+    shapes = [[d.dim_param or d.dim_value for d in v.type.tensor_type.shape.dim] for v in model.graph.input]
+    assert shapes == [["batch", 372], ["batch"]]
+    (meta,) = (json.loads(p.value) for p in model.metadata_props if p.key == "hobble")
+    assert meta["mode"] == "linear"
+    assert RowLayout.from_dict(meta["layout"]) == hurtable.layout
+    assert meta["links"] == list(hurtable.links)
+    assert Skeleton.from_dict(meta["skeleton"]).joints == hurtable.skeleton.joints
+    export_onnx(tmp_path / "again.onnx", hurtable, "linear")
+    assert (tmp_path / "again.onnx").read_bytes() == (tmp_path / "network.onnx").read_bytes()
+
+
+def test_another_networks_file_is_told(make_network, tmp_path: Path) -> None:
+    network = make_network(scale=20.0)
+    export_onnx(tmp_path / "network.onnx", network)
+    other = replace(network, biases=tuple(b + np.float32(1e-3) for b in network.biases))
+    with pytest.raises(InputError, match=r"network.onnx: onnxruntime gives other numbers .* off by"):
+        check_onnx(tmp_path / "network.onnx", other)
+    with pytest.raises(ValueError, match="not one of constant, linear, cubic"):
+        export_onnx(tmp_path / "other.onnx", network, "quadratic")
+
+
+def test_the_command(hurtable, tmp_path: Path, root: Path, capsys: pytest.CaptureFixture) -> None:
+    write_release(tmp_path / "pfnn", hurtable)
+    skeleton = ["--skeleton", str(root / "config" / "skeletons" / "holden31.yaml")]
+    target = tmp_path / "out" / "network.onnx"
+    assert main(["onnx", str(tmp_path / "pfnn"), str(target), "--mode", "linear", *skeleton]) == 0
+    assert "network.onnx: within" in capsys.readouterr().out
+    assert target.exists()
+    assert main(["bin", str(tmp_path / "pfnn"), str(tmp_path / "copy"), *skeleton]) == 0
+    for path in (tmp_path / "pfnn").iterdir():
+        a, b = (np.fromfile(p, "<f4") for p in (path, tmp_path / "copy" / path.name))
+        np.testing.assert_allclose(a, b, atol=1e-6)
+    capsys.readouterr()
+    assert main(["onnx", str(tmp_path), str(tmp_path / "x.onnx")]) == 1
+    assert "not a network" in capsys.readouterr().err
+    assert main(["bin", str(tmp_path / "pfnn"), str(tmp_path), "--skeleton", str(root / "Makefile")]) == 1
+    assert "Makefile" in capsys.readouterr().err
+
+
+@pytest.mark.shared
+def test_the_released_network_in_onnx(shared: Path, tmp_path: Path) -> None:
+    data = np.load(shared / "reference" / "original_rows_LocomotionFlat09_000.npz")
+    network = load_network(shared / "reference" / "pfnn_release_network.npz")
+    x, phase = data["X"][::20].astype(np.float32), data["P"][::20].astype(np.float32)
+    for mode in ("cubic", "constant"):
+        export_onnx(tmp_path / "network.onnx", network, mode)
+        y = run(tmp_path / "network.onnx", x, phase)
+        assert np.abs(y - Predictor(network, mode).predict(x, phase.astype(float))).max() < 1e-4
+    assert np.abs(y - data["Y_release"][::20]).max() < 1e-3
