@@ -51,6 +51,7 @@ def test_the_report_and_everything_beside_it_is_made(finished) -> None:
     stages = {stage["stage"]: stage for stage in pipeline["stages"]}
     assert set(stages) >= {"synthetic", "motion", "labels", "injury", "terrain", "database", "training"}
     assert all(stage["seconds"] > 0 and stage["bytes"] > 0 for stage in stages.values())
+    assert pipeline["database"]["bytes"] < 0.27 * pipeline["database"]["original_bytes"]
     injury = json.loads((results / "evaluation/injury.json").read_text())
     assert injury["applies"]
     page = (finished.folder / TARGET).read_text()

@@ -9,6 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from hobble.core.errors import InputError
+from hobble.database.manifest import FILE as MANIFEST
+from hobble.database.manifest import Manifest
+from hobble.database.sizes import sizes
 from hobble.report.provenance import machine, versions
 
 
@@ -19,7 +22,8 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
     artefacts or folders of them}. What is not there is listed under `missing`, not refused: a stage may have
     been copied from another machine without its benchmarks. Returns `stages` (one entry each: jobs, seconds
     and longest in seconds, max_rss_mb, cpu_seconds, files, bytes, and the same for each rule),
-    `total_seconds`, `total_bytes`, `missing`, `machine`, `versions`.
+    `total_seconds`, `total_bytes`, `database` (see `hobble.database.sizes`; none where there is none),
+    `missing`, `machine`, `versions`.
     """
     missing: list[str] = []
     entries = []
@@ -43,6 +47,7 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
         "stages": entries,
         "total_seconds": round(sum(entry["seconds"] for entry in entries), 3),
         "total_bytes": sum(entry["bytes"] for entry in entries),
+        "database": _database(stages.get("database", {}).get("files", ())),
         "missing": sorted(missing),
         "machine": machine(),
         "versions": versions(),
@@ -99,6 +104,14 @@ def _sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
         else:
             missing.append(str(root))
     return sizes
+
+
+def _database(paths: Iterable[str]) -> dict[str, Any] | None:
+    """The sizes of the database among the artefacts of its stage."""
+    for path in map(Path, paths):
+        if (path / MANIFEST).is_file():
+            return sizes(Manifest.load(path))
+    return None
 
 
 def _total(rows: list[dict[str, float]]) -> dict[str, Any]:
