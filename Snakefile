@@ -4,11 +4,13 @@ import sys
 from pathlib import Path
 
 from hobble.core.errors import HobbleError
+from hobble.workflow.demands import Demands
 from hobble.workflow.project import Project
 
 try:
     # Relative, so that a checkout can be moved without making anything again.
     project = Project(Path(os.path.relpath(workflow.basedir)), config)
+    demands = Demands(project)
     project.check(
         argument for argument in sys.argv[1:] if argument.startswith("results/")
     )

@@ -13,8 +13,8 @@ rule database_clip:
         "results/datasets/{dataset}/benchmarks/database/database_clip/{rows}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.rows, 22, attempt),
+        runtime=lambda w, attempt: demands.minutes(w.dataset, w.rows, 0.15, attempt),
     params:
         clip=lambda w: w.rows,
         options=lambda w: project.options(w.dataset, "database"),
@@ -38,8 +38,10 @@ rule database_merge:
         "results/datasets/{dataset}/benchmarks/database/database_merge/{selection}.tsv"
     threads: 1
     resources:
-        mem_mb=1500,
-        runtime=120,
+        mem_mb=lambda w, attempt: demands.memory_of_longest(w.dataset, 10, 24, attempt),
+        runtime=lambda w, attempt: demands.minutes_of_all(
+            w.dataset, 0.1, attempt, least=5
+        ),
     params:
         splits=lambda w: project.selected(w.dataset, w.selection),
         injury=lambda w: w.selection == "all",

@@ -13,8 +13,8 @@ rule injury_clip:
         "results/datasets/{dataset}/benchmarks/injury/injury_clip/{clip}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 4, attempt),
+        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.1, attempt),
     params:
         clip=lambda w: w.clip,
         status=lambda w: project.entry(w.dataset, w.clip).status,
@@ -39,8 +39,8 @@ rule injury_mirror:
         "results/datasets/{dataset}/benchmarks/injury/injury_mirror/{clip}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 4, attempt),
+        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.1, attempt),
     params:
         clip=lambda w: f"{w.clip}_mirror",
         code=project.code("injury_mirror"),

@@ -13,8 +13,8 @@ rule labels_clip:
         "results/datasets/{dataset}/benchmarks/labels/labels_clip/{clip}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 5, attempt),
+        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.15, attempt),
     params:
         clip=lambda w: w.clip,
         gait=lambda w: project.entry(w.dataset, w.clip).gait,
@@ -40,8 +40,8 @@ rule labels_mirror:
         "results/datasets/{dataset}/benchmarks/labels/labels_mirror/{clip}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 4, attempt),
+        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.1, attempt),
     params:
         clip=lambda w: f"{w.clip}_mirror",
         options=lambda w: project.options(w.dataset, "labels"),

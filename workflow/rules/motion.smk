@@ -31,8 +31,8 @@ rule motion_clip:
         "results/datasets/{dataset}/benchmarks/motion/motion_clip/{clip}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 13, attempt),
+        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.2, attempt),
     params:
         clip=lambda w: w.clip,
         skeleton_name=lambda w: project.dataset(w.dataset).skeleton,
@@ -57,8 +57,8 @@ rule motion_mirror:
         "results/datasets/{dataset}/benchmarks/motion/motion_mirror/{clip}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 4, attempt),
+        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.1, attempt),
     params:
         clip=lambda w: f"{w.clip}_mirror",
         code=project.code("motion_mirror"),

@@ -13,8 +13,8 @@ rule synthetic_clip:
         "results/datasets/{dataset}/benchmarks/synthetic/synthetic_clip/{clip}.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
-        runtime=10,
+        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 13, attempt),
+        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.2, attempt),
     params:
         clip=lambda w: w.clip,
         frames=lambda w: project.frames(w.dataset, w.clip),

@@ -33,8 +33,10 @@ rule terrain_fits:
         "results/datasets/{dataset}/benchmarks/terrain/terrain_fits/{rows}.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.rows, 15, attempt),
+        runtime=lambda w, attempt: demands.minutes(
+            w.dataset, w.rows, 0.3, attempt, least=3
+        ),
     params:
         clip=lambda w: w.rows,
         ground=lambda w: project.entry(w.dataset, w.rows).ground,

@@ -13,8 +13,9 @@ rule training:
         "results/{configuration}/benchmarks/training/training.tsv"
     threads: 2
     resources:
-        mem_mb=3000,
-        runtime=1440,
+        mem_mb=lambda w, attempt: demands.training_memory(w.configuration, attempt),
+        runtime=lambda w, attempt: demands.training_minutes(w.configuration, attempt),
+        gpu=lambda w: demands.gpus(w.configuration),
     params:
         configuration=lambda w: w.configuration,
         network=lambda w: project.section(w.configuration, "network"),

@@ -1,0 +1,128 @@
+"""What a job asks of a cluster: memory and time, by how long its clip is and how many joints the figure has.
+
+All is known from the configuration and the size of the user's files, never from a file that a job has yet to
+make: the jobs of a clip travel as one, and are weighed before the first has run. The figures were measured on
+clips of 10,000 and 40,000 frames; `benchmarks/demands.py` holds them against the logs of a finished run.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import os
+import re
+from pathlib import Path
+
+from hobble.workflow.project import MIRROR, Project
+
+ENGINE_MB = 400  # Snakemake, twice in a cluster's job: as the step that SLURM starts, and beside the script
+PYTHON_MB = 200  # Python with numpy, scipy and the package
+SPARE = 1.5  # asked for each megabyte measured
+SLOWER = 10  # the share of a second's work that a second on a busy, old machine may do
+JOINTS = 31  # of the figure that was measured
+UNKNOWN = 20_000  # frames, of a clip that has yet to be downloaded
+VISITS = 10  # of a row in a pass of training, as of the original recipe
+TITLE = 1 << 20  # bytes, of a BVH file, within which its motion begins
+WEEK = 7 * 24 * 60  # minutes, the longest that a job asks for
+
+
+class Demands:
+    """What one project's jobs ask for. It grows with the attempt, so that a killed job gets more."""
+
+    def __init__(self, project: Project) -> None:
+        self.project = project
+
+    def memory(self, dataset: str, clip: str, each: float, attempt: int = 1) -> int:
+        """Megabytes for a job of one clip that takes `each` for a thousand frames of 31 joints."""
+        return _megabytes(each * self.thousands(dataset, clip), attempt)
+
+    def minutes(self, dataset: str, clip: str, each: float, attempt: int = 1, least: int = 1) -> int:
+        """Minutes for a job of one clip that takes `each` seconds for a thousand frames, `least` at least."""
+        return _minutes(each * self.thousands(dataset, clip), attempt, least)
+
+    def memory_of_longest(self, dataset: str, each: float, rows: float = 0.0, attempt: int = 1) -> int:
+        """Megabytes for a job that takes one clip after another, and `rows` bytes for each frame of all."""
+        longest = max(self.thousands(dataset, clip) for clip in self.project.clips(dataset))
+        return _megabytes(each * longest + rows * self.all_thousands(dataset) / 1e3, attempt)
+
+    def minutes_of_all(self, dataset: str, each: float, attempt: int = 1, least: int = 1) -> int:
+        """Minutes for a job that takes `each` seconds for a thousand frames of all clips and mirrors."""
+        return _minutes(each * self.all_thousands(dataset), attempt, least)
+
+    def training_memory(self, configuration: str, attempt: int = 1) -> int:
+        """Megabytes for a training: PyTorch, the part of the database it holds, weights and their moments."""
+        training = self.project.section(configuration, "training")
+        return _megabytes(500 + training["memory_mb"] + 32e-6 * self.weights(configuration), attempt)
+
+    def training_minutes(self, configuration: str, attempt: int = 1) -> int:
+        """Minutes for a training, as long as a week; killed by its limit it goes on from its last checkpoint.
+
+        It does some 6.4e9 products of weights in a second (10,700 samples of 342-512-512-311, two cores).
+        """
+        training = self.project.section(configuration, "training")
+        dataset = self.project.configuration(configuration).dataset
+        frames = 1e3 * self.all_thousands(dataset) * JOINTS / self._joints(dataset)
+        samples = frames * VISITS * training["passes"]
+        return _minutes(samples * self.weights(configuration) / 4 / 6.4e9, attempt, least=60)
+
+    def gpus(self, configuration: str) -> int:
+        """1 where a training is told to use CUDA: `auto` takes what it finds, but asks for none."""
+        return int(self.project.section(configuration, "training")["device"] == "cuda")
+
+    # Sizes
+
+    def thousands(self, dataset: str, clip: str) -> float:
+        """Thousands of frames at the data set's rate, as if of 31 joints."""
+        return self._frames(dataset, clip.removesuffix(MIRROR)) / 1e3 * self._joints(dataset) / JOINTS
+
+    def weights(self, configuration: str) -> float:
+        """Weights of the network, of all its control points, by the sizes of the rows of a figure."""
+        network = self.project.section(configuration, "network")
+        joints = self._joints(self.project.configuration(configuration).dataset)
+        inputs, outputs, units = 156 + 7 * joints, 32 + 9 * joints, network["units"]
+        return network["control_points"] * units * (inputs + (network["hidden_layers"] - 1) * units + outputs)
+
+    @functools.cache  # noqa: B019 - one for as long as the process lives
+    def all_thousands(self, dataset: str) -> float:
+        """Thousands of frames of all clips, mirrors included."""
+        once = sum(self.thousands(dataset, clip) for clip in self.project.clips(dataset))
+        return once * (1 + self.project.dataset(dataset).mirror)
+
+    @functools.cache  # noqa: B019
+    def _joints(self, dataset: str) -> int:
+        return len(self.project.catalogue.skeleton(self.project.dataset(dataset).skeleton).joints)
+
+    @functools.cache  # noqa: B019
+    def _frames(self, dataset: str, clip: str) -> float:
+        if self.project.dataset(dataset).synthetic is not None:
+            return self.project.frames(dataset, clip)
+        seconds = bvh_seconds(Path(self.project.source(dataset, clip)))
+        rate = self.project.options(dataset, "motion")["fps"]
+        return UNKNOWN if seconds is None else seconds * rate
+
+
+def bvh_seconds(path: Path) -> float | None:
+    """Length of a BVH file in seconds, by its frame time and the length of its first row, or None.
+
+    The count in the header is not believed: it may promise what the file does not hold.
+    """
+    try:
+        size = os.path.getsize(path)
+        with open(path, "rb") as file:
+            start = file.read(TITLE)
+    except OSError:
+        return None
+    begins = re.search(rb"Frame Time:[ \t]*([0-9.eE+-]+)\s*\n([^\n]+\n)", start)
+    try:
+        seconds = min(float(begins[1]), 1.0) if begins else 0.0
+    except ValueError:
+        return None
+    return seconds * (size - begins.start(2)) / len(begins[2]) if begins and seconds > 0 else None
+
+
+def _megabytes(measured: float, attempt: int) -> int:
+    return math.ceil((ENGINE_MB + PYTHON_MB + SPARE * measured) * attempt)
+
+
+def _minutes(seconds: float, attempt: int, least: int) -> int:
+    return min(max(least, math.ceil(SLOWER * seconds / 60)) * attempt, WEEK)
