@@ -15,7 +15,8 @@ from hobble.motion.root import RootFrames, root_frames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
 from hobble.terrain.feet import HEEL, feet_of, heel_above_toe
 from hobble.terrain.ground import fit_cycle
-from hobble.terrain.patches import Patches
+from hobble.terrain.heightmaps import heightmaps
+from hobble.terrain.patches import Patches, draw_patches
 
 GROUNDS = {
     "level": lambda x, z: np.zeros_like(z),
@@ -254,6 +255,28 @@ def test_a_single_low_frame_lowers_the_soles_a_fault_of_capture_does_not(made: S
         found = feet_of(clip, walk.labels["contacts"], frames, True, **AUTO)
         assert found.toe_height == pytest.approx(expected)
         assert replace(found).heel_height == pytest.approx(7.0)
+
+
+def honest_over(heightmap: dict, files: list[Path], made: SimpleNamespace) -> None:
+    """A walk over waves stands on patches of one heightmap."""
+    options = made.options(patches=100)
+    maps = heightmaps([{"seed": 0, **heightmap}], files, cell=options["cell"], height_scale=3.0)
+    names = ("cell", "size", "highest", "seed")
+    patches = draw_patches(maps, count=100, **{name: options[name] for name in names})
+    walk = made.walk(GROUNDS["waves"])
+    fits = clip_fits(walk.clip, walk.labels, patches, "rocky", options, made.database())
+    assert np.ptp(patches.at(range(100), np.zeros((1, 2), np.float32))) > 1  # it has hills
+    assert fits.foot_error[..., 0].max() < 1
+    assert fits.foot_below.max() <= 1
+
+
+def test_real_landscape_is_ground_to_walk_on(made: SimpleNamespace) -> None:
+    honest_over({"kind": "elevation"}, [], made)
+
+
+@pytest.mark.shared
+def test_so_is_the_originals_heightmap(shared: Path, made: SimpleNamespace) -> None:
+    honest_over({"kind": "file"}, [shared / "mocap/pfnn/hmap_001_smooth.txt"], made)
 
 
 @pytest.mark.shared

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from hobble.core.errors import InputError
 from hobble.terrain.generate import KINDS, generate
@@ -61,6 +62,34 @@ def test_every_kind_of_file_is_read_alike(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"map{suffix}"
     write(path, RAMP)
     assert np.array_equal(read_heights(path), RAMP)
+
+
+@pytest.mark.parametrize("dtype", [np.int16, np.int32, np.float32])
+@pytest.mark.parametrize("compression", [None, "tiff_deflate", "tiff_lzw"])
+def test_a_geotiff_has_heights_below_zero_and_holes(
+    tmp_path: Path, dtype: type[np.number], compression: str | None
+) -> None:
+    """With the tags that GDAL writes: the size of a cell, where it lies, and what stands for no data."""
+    heights = (RAMP - 7).astype(dtype)
+    heights[1, 2] = -9999
+    tags = ImageFileDirectory_v2()
+    tags[33550], tags[33922], tags[42113] = (10.0, 10.0, 0.0), (0, 0, 0, 5e5, 4e6, 0.0), "-9999"
+    tags.tagtype.update({33550: 12, 33922: 12, 42113: 2})
+    if dtype is np.int16:
+        tags[339] = 2  # signed
+        image = Image.fromarray(heights.view(np.uint16))
+    else:
+        image = Image.fromarray(heights)
+    image.save(tmp_path / "map.tif", tiffinfo=tags, compression=compression)
+    read = read_heights(tmp_path / "map.tif")
+    assert np.isnan(read[1, 2])
+    assert np.array_equal(np.where(np.isnan(read), -9999, read), heights)
+
+
+def test_an_esri_grid_has_a_header_and_holes(tmp_path: Path) -> None:
+    header = "ncols 3\nnrows 2\nxllcorner 0.0\nyllcorner 0.0\ncellsize 30\nNODATA_value -9999\n"
+    (tmp_path / "map.asc").write_text(header + "1 2 3\n4 -9999 6\n")
+    assert np.array_equal(read_heights(tmp_path / "map.asc"), [[1, 2, 3], [4, np.nan, 6]], equal_nan=True)
 
 
 def test_files_are_scaled_and_may_say_their_own_cell_and_scale(tmp_path: Path) -> None:

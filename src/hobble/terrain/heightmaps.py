@@ -19,6 +19,19 @@ MOST_CELLS = 1 << 26  # of a map: 8192 squared, half a gigabyte; 322 m a side at
 MOST_TEXT = 1 << 28  # of a map as text, which takes some eight times that while it is read
 
 
+ESRI_HEADER = {
+    "ncols",
+    "nrows",
+    "xllcorner",
+    "xllcenter",
+    "yllcorner",
+    "yllcenter",
+    "cellsize",
+    "nodata_value",
+}
+GDAL_NODATA = 42113  # the tag of a TIFF in which GDAL says, as text, what stands for no data
+
+
 @dataclass(frozen=True)
 class Heightmap:
     """Heights (rows, columns) in cm, a cell being `cell` centimetres wide; nan where the map has a hole."""
@@ -77,9 +90,10 @@ def elevation(cell: float) -> Array:
 def read_heights(path: str | Path) -> Array:
     """Heights (rows, columns) as a file has them: a text matrix, an image, a NumPy array.
 
-    .txt .csv .dat .asc: numbers in rows, apart by spaces, commas or semicolons. .npy; .npz: its only array of
-    two dimensions, or the one called `heights` or `elevation`. .png .tif .tiff: grey values. Raises
-    InputError.
+    .txt .csv .dat .asc: numbers in rows, apart by spaces, commas or semicolons, after the header of an ESRI
+    grid if there is one. .npy; .npz: its only array of two dimensions, or the one called `heights` or
+    `elevation`. .png .tif .tiff: grey values, of up to 32 bits. What a GeoTIFF or a grid calls no data is a
+    hole. Raises InputError.
     """
     path = Path(path)
     if not path.is_file():
@@ -98,11 +112,15 @@ def read_heights(path: str | Path) -> Array:
 
 def _text(path: Path) -> Array:
     rows: list[list[float]] = []
+    header: dict[str, float] = {}
     for number, line in enumerate(read_text(path, MOST_TEXT).splitlines(), 1):
         words = line.split("#")[0].replace(",", " ").replace(";", " ").split()
         if not words:
             continue
         try:
+            if not rows and words[0].lower() in ESRI_HEADER:
+                header[words[0].lower()] = float(" ".join(words[1:]))
+                continue
             rows.append([float(word) for word in words])
         except ValueError as error:
             raise InputError(
@@ -113,7 +131,8 @@ def _text(path: Path) -> Array:
             raise InputError(path, problem, line=number)
     if not rows:
         raise InputError(path, "holds no heights")
-    return np.array(rows)
+    heights, nothing = np.array(rows), header.get("nodata_value")
+    return heights if nothing is None else np.where(heights == nothing, np.nan, heights)
 
 
 def _npy(path: Path) -> Array:
@@ -147,6 +166,10 @@ def _image(path: Path) -> Array:
             if image.width * image.height > MOST_CELLS:
                 raise InputError(path, f"{image.width} x {image.height} cells, more than {MOST_CELLS}")
             grey = image if image.mode in ("L", "I", "F", "I;16", "I;16B", "1") else image.convert("L")
-            return np.asarray(grey, float)
+            heights = np.asarray(grey, float)
+            nothing = getattr(image, "tag_v2", {}).get(GDAL_NODATA)
+            return heights if nothing is None else np.where(heights == float(nothing), np.nan, heights)
     except (UnidentifiedImageError, Image.DecompressionBombError, OSError, SyntaxError, ValueError) as error:
-        raise InputError(path, f"not an image that can be read ({error})") from error
+        wide = "Numbers of 64 bits are not read from a TIFF; save them as 32 bits or as .npy."
+        fix = wide if path.suffix.lower() in (".tif", ".tiff") else None
+        raise InputError(path, f"not an image that can be read ({error})", fix=fix) from error

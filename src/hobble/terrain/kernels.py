@@ -21,7 +21,7 @@ FAST = {"reassoc", "contract", "nsz", "nnan"}  # lets sums be vectorised; no hei
 ONE = np.uint32(1)
 
 
-@numba.njit(fastmath=FAST)
+@numba.njit(fastmath=FAST, inline="always")
 def height(heights, rows, columns, r, c):
     """Bilinear height of one map at row r, column c (float32, inside the map)."""
     i = min(np.int32(r), np.int32(rows - 2))
@@ -42,7 +42,7 @@ def map_of(heights, starts, shapes, m):
     return heights[starts[m] : starts[m] + rows * columns], rows, columns
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath=FAST)
 def view_heights(heights, starts, shapes, which, affine, mean, points):
     """Heights (P, N) of P patches at the same N points (N, 2), in cells from the middle, inside the patch."""
     out = np.empty((len(which), len(points)), np.float32)
@@ -57,7 +57,7 @@ def view_heights(heights, starts, shapes, which, affine, mean, points):
     return out
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath=FAST)
 def view_extents(heights, starts, shapes, which, affine, size, highest):
     """Mean height of each of P views over its `size` x `size` cells, and whether no cell is further from it
     than `highest`.
@@ -128,7 +128,7 @@ def lowest_cone(x, z, place_x, place_z, heights, steepness):
     return out
 
 
-@numba.njit(fastmath=FAST)
+@numba.njit(fastmath=FAST, inline="always")
 def _down_means(heights, rows, columns, a, points):
     """How far the patch is above the first foot in contact; mean, mean square of how much further above all.
 
@@ -148,7 +148,7 @@ def _down_means(heights, rows, columns, a, points):
     return first, total / len(u), squares / len(u)
 
 
-@numba.njit(fastmath=FAST)
+@numba.njit(fastmath=FAST, inline="always")
 def _up_sum(heights, rows, columns, a, offset, points, jumps):
     """Sum of squares of how far the ground is above feet that are up, or too far below them in jumps."""
     u, v, foot = points
@@ -164,7 +164,7 @@ def _up_sum(heights, rows, columns, a, offset, points, jumps):
     return squares
 
 
-@numba.njit(fastmath=FAST)
+@numba.njit(fastmath=FAST, inline="always")
 def _beside_sum(heights, rows, columns, a, points):
     """Sum of squares of how far the ground beside the path is above BEAM_HEIGHT below the path."""
     u, v, path_u, path_v = points
@@ -181,7 +181,7 @@ def _beside_sum(heights, rows, columns, a, points):
     return squares
 
 
-@numba.njit
+@numba.njit(inline="always")
 def _error(heights, rows, columns, a, tables, jumps, limit):
     """The error of one patch, or infinity as soon as it is known to lie above `limit`."""
     down, up_head, up_rest, beside = tables
@@ -207,7 +207,7 @@ def _terms(a):
     return (a[0, 0], a[0, 1], a[0, 2]), (a[1, 0], a[1, 1], a[1, 2])
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath=FAST)
 def view_errors(heights, starts, shapes, which, affine, tables, jumps):
     """The error (P,) of every view. tables: see `hobble.terrain.search`."""
     out = np.empty(len(which))
@@ -217,7 +217,7 @@ def view_errors(heights, starts, shapes, which, affine, tables, jumps):
     return out
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath=FAST)
 def search_views(heights, starts, shapes, which, affine, tables, jumps, count):
     """Indices and errors (count,) of the views of lowest error, the best first; of equal ones the first."""
     best = np.full(count, -1)
