@@ -154,6 +154,31 @@ def test_an_injury_is_kept_from_walking_into_jogging(hurtable) -> None:
     assert rows[None, 0.0]["jog_from_healthy_cm"] == 0
 
 
+def test_each_gait_is_held_against_its_own_healthy_one(hurtable) -> None:
+    """A network whose jog is another motion than its walk."""
+    healthy, *hurt = into_a_jog(hurtable, [KNEE], 1.0, RUNTIME)
+    assert healthy["walk_from_healthy_cm"] == healthy["jog_from_healthy_cm"] == 0
+    assert all(row["jog_from_healthy_cm"] != row["walk_from_healthy_cm"] for row in hurt)
+
+
+def test_the_way_back_is_measured_on_its_own(hurtable) -> None:
+    """Rows whose way back is another than their way up."""
+    sweep = Sweep(hurtable, [KNEE], "walk", 0.2, RUNTIME)
+    rows = sweep.rows(0)
+    rng = np.random.default_rng(2)
+    for row in rows:
+        row["speed"], row["from_way_up"] = float(rng.integers(9)), 0.0
+    rows[15]["from_way_up"] = 4.0
+    found = sweep.response(0, rows)
+    up, back = ([row["speed"] for row in some] for some in (rows[:11], rows[10:]))
+    assert found["spearman"]["speed"] == pytest.approx(spearmanr(SEVERITIES, up).statistic, abs=1e-5)
+    assert found["spearman_back"]["speed"] == pytest.approx(
+        spearmanr(SEVERITIES[::-1], back).statistic, abs=1e-5
+    )
+    assert found["way_back_cm"] == pytest.approx(4.0 - rows[0]["from_healthy"])
+    assert found["after_healing_cm"] == pytest.approx(rows[20]["from_healthy"] - rows[0]["from_healthy"])
+
+
 def test_divided_severities_are_smaller_ones(hurtable) -> None:
     found = divided_severities(slowing(hurtable), [KNEE], 2.0, RUNTIME)
     away = {(r["scale"], r["severity"]): r["from_healthy_cm"] for r in found}
