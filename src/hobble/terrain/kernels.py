@@ -4,9 +4,9 @@ A patch is a view of a heightmap. Its cell (u, v), counted from the middle of th
 and z, shows the map at row, column = A (u, v, 1). Maps of any size lie one after another in one float32
 array; `starts` and `shapes` say where. All loops are over plain arrays, so that one compiled version serves
 every data set. They are in one file because what numba compiled and kept is only made anew when the file
-of the function that was called has changed. Only the functions called from outside are kept: what they call
-is then always compiled along with them, and not at times taken from disk, where the compiler cannot look
-into it and may round sums in another order.
+of the function that was called has changed. Only the functions called from outside are kept, and what they
+call is forced into them: as functions of their own, those would be compiled apart from them the first time
+and along with them when they come from disk, and sums would be rounded in another order.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ FAST = {"reassoc", "contract", "nsz", "nnan"}  # lets sums be vectorised; no hei
 ONE = np.uint32(1)
 
 
-@numba.njit(fastmath=FAST, inline="always")
+@numba.njit(fastmath=FAST, forceinline=True)
 def height(heights, rows, columns, r, c):
     """Bilinear height of one map at row r, column c (float32, inside the map)."""
     i = min(np.int32(r), np.int32(rows - 2))
@@ -42,7 +42,7 @@ def map_of(heights, starts, shapes, m):
     return heights[starts[m] : starts[m] + rows * columns], rows, columns
 
 
-@numba.njit(cache=True, fastmath=FAST)
+@numba.njit(cache=True)
 def view_heights(heights, starts, shapes, which, affine, mean, points):
     """Heights (P, N) of P patches at the same N points (N, 2), in cells from the middle, inside the patch."""
     out = np.empty((len(which), len(points)), np.float32)
@@ -57,7 +57,7 @@ def view_heights(heights, starts, shapes, which, affine, mean, points):
     return out
 
 
-@numba.njit(cache=True, fastmath=FAST)
+@numba.njit(cache=True)
 def view_extents(heights, starts, shapes, which, affine, size, highest):
     """Mean height of each of P views over its `size` x `size` cells, and whether no cell is further from it
     than `highest`.
@@ -128,7 +128,7 @@ def lowest_cone(x, z, place_x, place_z, heights, steepness):
     return out
 
 
-@numba.njit(fastmath=FAST, inline="always")
+@numba.njit(fastmath=FAST, forceinline=True)
 def _down_means(heights, rows, columns, a, points):
     """How far the patch is above the first foot in contact; mean, mean square of how much further above all.
 
@@ -148,7 +148,7 @@ def _down_means(heights, rows, columns, a, points):
     return first, total / len(u), squares / len(u)
 
 
-@numba.njit(fastmath=FAST, inline="always")
+@numba.njit(fastmath=FAST, forceinline=True)
 def _up_sum(heights, rows, columns, a, offset, points, jumps):
     """Sum of squares of how far the ground is above feet that are up, or too far below them in jumps."""
     u, v, foot = points
@@ -164,7 +164,7 @@ def _up_sum(heights, rows, columns, a, offset, points, jumps):
     return squares
 
 
-@numba.njit(fastmath=FAST, inline="always")
+@numba.njit(fastmath=FAST, forceinline=True)
 def _beside_sum(heights, rows, columns, a, points):
     """Sum of squares of how far the ground beside the path is above BEAM_HEIGHT below the path."""
     u, v, path_u, path_v = points
@@ -181,7 +181,7 @@ def _beside_sum(heights, rows, columns, a, points):
     return squares
 
 
-@numba.njit(inline="always")
+@numba.njit(forceinline=True)
 def _error(heights, rows, columns, a, tables, jumps, limit):
     """The error of one patch, or infinity as soon as it is known to lie above `limit`."""
     down, up_head, up_rest, beside = tables
@@ -207,7 +207,7 @@ def _terms(a):
     return (a[0, 0], a[0, 1], a[0, 2]), (a[1, 0], a[1, 1], a[1, 2])
 
 
-@numba.njit(cache=True, fastmath=FAST)
+@numba.njit(cache=True)
 def view_errors(heights, starts, shapes, which, affine, tables, jumps):
     """The error (P,) of every view. tables: see `hobble.terrain.search`."""
     out = np.empty(len(which))
@@ -217,7 +217,7 @@ def view_errors(heights, starts, shapes, which, affine, tables, jumps):
     return out
 
 
-@numba.njit(cache=True, fastmath=FAST)
+@numba.njit(cache=True)
 def search_views(heights, starts, shapes, which, affine, tables, jumps, count):
     """Indices and errors (count,) of the views of lowest error, the best first; of equal ones the first."""
     best = np.full(count, -1)
