@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from hobble.core.skeleton import Skeleton
-from hobble.report import page as page_module
+from hobble.report import templates
 from hobble.report.gather import Material, gather
 from hobble.report.page import render
 
@@ -83,7 +83,7 @@ def test_needs_nothing_else(page: str, outline: Outline) -> None:
     assert [e["href"] for e in outline.all("link")] == ["data:,"]
     (policy,) = [e["content"] for e in outline.all("meta") if e.get("http-equiv")]
     assert (policy or "").startswith("default-src 'none'")
-    own = "".join(p.read_text() for p in page_module.TEMPLATES.glob("web/*.js"))
+    own = "".join(p.read_text() for p in templates.FOLDER.glob("web/*.js"))
     assert not re.search(r"fetch\(|XMLHttpRequest|import\(|WebSocket|sendBeacon", own)
 
 

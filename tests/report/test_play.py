@@ -142,7 +142,8 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
     index = "Hobble.player.actors[0].spec.links.indexOf('LeftLeg-LeftFoot')"
     assert tab.until(f"Hobble.player.actors[0].character.severity[{index}] > .1")
     apart = f"""(() => {{
-      const [{{ spec }}] = Hobble.player.actors, hurt = Hobble.character(spec), healthy = Hobble.character(spec);
+      const [{{ spec }}] = Hobble.player.actors;
+      const hurt = Hobble.character(spec), healthy = Hobble.character(spec);
       hurt.wished[{index}] = 2;
       for (let f = 0; f < 60; f++) for (const c of [hurt, healthy]) c.frame([0, 2.5], null, "walk", () => 0);
       return Math.max(...hurt.pose.map((v, i) => Math.abs(v - healthy.pose[i])));

@@ -115,6 +115,30 @@ rule report:
         "../scripts/report.py"
 
 
+rule report_compare:
+    """Configurations side by side, and two of them in the same world."""
+    input:
+        compared=rules.compare.output.json,
+        configuration=lambda w: project.measured()["configuration"],
+        weights=lambda w: [
+            project.network(name, "weights.npz") for name in project.compared()
+        ],
+        template=project.templates(),
+        bundle=rules.page_bundle.output.js,
+    output:
+        html="results/compare/report.html",
+    log:
+        "results/compare/logs/report/report_compare.log",
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        configurations=lambda w: project.compared(),
+        code=project.code("report_compare"),
+    script:
+        "../scripts/report_compare.py"
+
+
 rule stimuli:
     """Short loops of the character walking hurt: the thirteen of a questionnaire, and the page's presets."""
     input:

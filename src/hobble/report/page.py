@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import yaml
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup
 
 from hobble.report import (
     accuracy_section,
@@ -19,13 +16,11 @@ from hobble.report import (
     terrain_section,
     training_section,
 )
-from hobble.report.charts import Chart, Family
-from hobble.report.formats import duration, embedded, number, plain, size
+from hobble.report.formats import embedded, plain
 from hobble.report.gather import Material
 from hobble.report.ground_pictures import ground_pictures
 from hobble.report.provenance import commit, machine, versions
-
-TEMPLATES = Path(__file__).parent
+from hobble.report.templates import FOLDER, specs, style, template, trusted
 
 
 def render(
@@ -42,20 +37,12 @@ def render(
 
     Every value is escaped where it stands; data for the scripts is JSON in which no "<" is left.
     """
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=select_autoescape(default=True, default_for_string=True),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters.update(duration=duration, size=size, number=number)
     sections = _sections(material)
     strips = data_section.strips(material)
     scenes = dict(scenes or {})
     grounds = ground_pictures(material.terrain, material.network["skeleton"])
     data = {
-        "charts": _specs(sections),
+        "charts": specs(sections),
         "scenes": scenes,
         "strips": strips,
         "grounds": grounds,
@@ -63,9 +50,11 @@ def render(
         "playable": {material.name: playable} if playable else {},
         "compare": compared or {},
     }
-    return environment.get_template("page.html.j2").render(
+    return template("page.html.j2").render(
         material=material,
+        name=material.name,
         title=material.title or material.name,
+        eyebrow=f"Hobble report · configuration {material.name} · data set {material.dataset}",
         figures=findings.key_figures(material),
         hints=findings.hints(material),
         lead=findings.lead(material),
@@ -76,10 +65,10 @@ def render(
         compared=[clip["name"] for clip in (compared or {}).get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],
-        style=_trusted("page.css", (TEMPLATES / "page.css").read_text(encoding="utf-8")),
-        bundle=_trusted("the bundle", bundle),
+        style=style(),
+        bundle=trusted("the bundle", bundle),
         configuration=yaml.safe_dump(plain(dict(material.resolved)), sort_keys=False, allow_unicode=True),
-        provenance={"commit": commit(TEMPLATES), "machine": machine(), "versions": versions()},
+        provenance={"commit": commit(FOLDER), "machine": machine(), "versions": versions()},
         **sections,
     )
 
@@ -119,20 +108,3 @@ def _sections(material: Material) -> dict[str, dict[str, Any]]:
             "remarks": data.remarks_table(material),
         },
     }
-
-
-def _specs(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """What the scripts need of every chart, wherever in a section it stands."""
-    found: dict[str, Any] = {}
-    for section in sections.values():
-        for item in section.values():
-            charts = item.charts if isinstance(item, Family) else item if isinstance(item, list) else [item]
-            found.update({chart.name: chart.spec() for chart in charts if isinstance(chart, Chart)})
-    return found
-
-
-def _trusted(name: str, text: str) -> Markup:
-    """Our own CSS or script, which is trusted; it must not end its own element."""
-    if "</script" in text.lower() or "</style" in text.lower():
-        raise ValueError(f"{name} holds the end of the element it is put into")
-    return Markup(text)

@@ -8,7 +8,7 @@ export const palette = () => {
   const dark = rgb("paper")[0] < 128;
   return {
     dark, body: dark ? [158, 167, 176] : [186, 193, 199], low: rgb("hurt-low"), high: rgb("hurt-high"),
-    line: rgb("faint"), ink: rgb("ink"), accent: rgb("accent"), predicted: rgb("predicted"), second: rgb("g2"), ground: rgb("ground"),
+    line: rgb("faint"), ink: rgb("ink"), accent: rgb("accent"), predicted: rgb("predicted"), second: rgb("g3"), ground: rgb("ground"),
     floor: rgb("sunken"),
   };
 };

@@ -1,0 +1,77 @@
+"""The page of configurations side by side: one file that needs nothing else, like the reports themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from hobble.report import compare_sections as parts
+from hobble.report.formats import embedded
+from hobble.report.provenance import commit, machine, versions
+from hobble.report.templates import FOLDER, specs, style, template, trusted
+
+LARGEST = 21_000_000  # characters of networks that the page may hold, so that it stays under 25 MB
+NAME = "compare"
+
+
+def render_compared(
+    compared: Mapping[str, Any], playables: Mapping[str, Mapping[str, Any]] | None = None, bundle: str = ""
+) -> str:
+    """The comparison as one HTML document.
+
+    compared: compare.json; playables: of `playable.playable` for each configuration that is to be played, of
+    which as many are kept as there is room for, in their order; bundle: the scripts, of `bundle.bundle`.
+    """
+    kept, left_out = fitting(playables or {}, LARGEST)
+    sections: dict[str, dict[str, Any]] = {
+        "overview": {"table": parts.configuration_table(compared), "beside": parts.beside_table(compared)},
+        "accuracy": {
+            "boxes": parts.error_boxes(compared),
+            "clips": parts.clip_dots(compared),
+            "rollouts": parts.rollout_chart(compared),
+            "differences": parts.difference_map(compared),
+            "table": parts.difference_table(compared),
+        },
+        "injury": {"table": parts.injury_table(compared)},
+        "speed": {"laps": parts.lap_lines(compared), "fit": parts.fit_chart(compared)},
+        "training": {"curves": parts.training_curves(compared)},
+        "stages": {"charts": parts.stage_dots(compared)},
+    }
+    names = parts.names(compared)
+    data = {"name": NAME, "charts": specs(sections), "playable": kept}
+    return template("compare.html.j2").render(
+        name=NAME,
+        title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
+        eyebrow="Hobble report · configurations side by side",
+        lead="What the same measurements say of " + ", ".join(names) + ", beside the published figures.",
+        embedded=embedded(data),
+        playable=list(kept),
+        left_out=left_out,
+        hurts=any(spec["links"] for spec in kept.values()),
+        style=style(),
+        bundle=trusted("the bundle", bundle),
+        provenance={"commit": commit(FOLDER), "machine": machine(), "versions": versions()},
+        **sections,
+    )
+
+
+def fitting(
+    playables: Mapping[str, Mapping[str, Any]], largest: int
+) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
+    """Those that fit into so many characters together, in their order, and the names of the others.
+
+    One that does not fit leaves room to a smaller one after it.
+
+    >>> fitting({"a": {"x": 1}, "b": {"x": "long" * 9}, "c": {"x": 2}}, 20)
+    ({'a': {'x': 1}, 'c': {'x': 2}}, ['b'])
+    """
+    kept: dict[str, Mapping[str, Any]] = {}
+    left_out, used = [], 0
+    for name, spec in playables.items():
+        needed = len(embedded(spec))
+        if used + needed > largest:
+            left_out.append(name)
+        else:
+            used += needed
+            kept[name] = spec
+    return kept, left_out

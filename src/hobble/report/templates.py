@@ -1,0 +1,50 @@
+"""What the pages have in common: templates that escape, our own style and scripts, their charts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template, select_autoescape
+from markupsafe import Markup
+
+from hobble.report.charts import Chart, Family
+from hobble.report.formats import duration, number, size
+
+FOLDER = Path(__file__).parent
+
+
+def template(name: str) -> Template:
+    """A template in which every value is escaped where it stands, and a missing one is an error."""
+    environment = Environment(
+        loader=FileSystemLoader(FOLDER),
+        autoescape=select_autoescape(default=True, default_for_string=True),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(duration=duration, size=size, number=number)
+    return environment.get_template(name)
+
+
+def specs(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """What the scripts need of every chart, wherever in a section it stands."""
+    found: dict[str, Any] = {}
+    for section in sections.values():
+        for item in section.values():
+            charts = item.charts if isinstance(item, Family) else item if isinstance(item, list) else [item]
+            found.update({chart.name: chart.spec() for chart in charts if isinstance(chart, Chart)})
+    return found
+
+
+def style() -> Markup:
+    """The pages' style sheet."""
+    return trusted("page.css", (FOLDER / "page.css").read_text(encoding="utf-8"))
+
+
+def trusted(name: str, text: str) -> Markup:
+    """Our own CSS or script; raises ValueError where it would end its own element."""
+    if "</script" in text.lower() or "</style" in text.lower():
+        raise ValueError(f"{name} holds the end of the element it is put into")
+    return Markup(text)

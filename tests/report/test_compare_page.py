@@ -1,0 +1,177 @@
+"""Configurations side by side, as one page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+import yaml
+
+from hobble.core.skeleton import Skeleton
+from hobble.evaluation.compare import Measured, compare
+from hobble.report import compare_sections as parts
+from hobble.report.compare_page import render_compared
+from hobble.report.gather import PUBLISHED, Material
+from hobble.report.playable import playable
+from hobble.runtime.network import load_network
+
+
+@pytest.fixture(scope="module")
+def compared(material: Material) -> dict[str, Any]:
+    """Two configurations: the example, and one of half its error and twice its time."""
+    resolved = {
+        "configuration": {
+            "dataset": "made_up",
+            "injury": True,
+            "network": {"hidden_layers": 2, "units": 16, "control_points": 4},
+            "training": {"passes": 3},
+        }
+    }
+    counts = {"true": 5000, "table_6_1": 4000, "table_6_1_as_printed": 3000}
+    better = [{**row, "mean": row["mean"] / 2} for row in material.accuracy["clips"]]
+    measured = []
+    for name, clips, factor in (("holden", material.accuracy["clips"], 1), ("ava", better, 2)):
+        responsivity = {**material.responsivity, "parameters": {k: factor * v for k, v in counts.items()}}
+        splits = {
+            s: {
+                **part,
+                "mean": part["mean"] / factor,
+                "mean_of_clips": part["mean"] / factor,
+                **{f"p{q:02}": part["mean"] * q / 50 / factor for q in (5, 25, 50, 75, 95)},
+            }
+            for s, part in ((s, material.accuracy[s]) for s in ("train", "held_out"))
+        }
+        lengths = [
+            {
+                "length": n,
+                "clips": [],
+                **{s: {"position_error_cm": n * factor} for s in ("train", "held_out")},
+            }
+            for n in (1, 10)
+        ]
+        measured.append(
+            Measured(
+                name=name,
+                resolved=resolved,
+                accuracy={**material.accuracy, **splits, "clips": clips, "joints": 31},
+                rollouts={"lengths": lengths},
+                responsivity=responsivity,
+                injury=material.injury,
+                recognition={"applies": False, "reason": "not tried"},
+                pipeline=material.pipeline,
+                history=material.history,
+            )
+        )
+    return compare(measured, yaml.safe_load(PUBLISHED.read_text()))
+
+
+@pytest.fixture(scope="module")
+def pair(
+    character: dict[str, Any], examples: ModuleType, holden31: Skeleton, tmp_path_factory: Any
+) -> dict[str, Any]:
+    """Two characters, of which one cannot be hurt."""
+    path = tmp_path_factory.mktemp("pair") / "weights.npz"
+    examples.weights(path, holden31, links=False)
+    return {"holden": character, "ava": playable(load_network(path), examples.RUNTIME)}
+
+
+@pytest.fixture(scope="module")
+def tab(
+    compared: dict[str, Any], pair: dict[str, Any], script: str, tools: ModuleType, tmp_path_factory: Any
+) -> Iterator[Any]:
+    yield from tools.opened(render_compared(compared, pair, script), tmp_path_factory.mktemp("compared"))
+
+
+def test_boxes_stand_at_the_quantiles_and_published_means_beside_them(compared: dict[str, Any]) -> None:
+    chart = parts.error_boxes(compared)
+    assert chart is not None
+    boxes = [t for t in chart.options["held-out clips"] if t["type"] == "box"]
+    assert [box["name"] for box in boxes] == ["holden", "ava"]
+    assert boxes[0]["q3"][0] == pytest.approx(1.5 * boxes[0]["mean"][0])
+    assert boxes[0]["mean"][0] == pytest.approx(2 * boxes[1]["mean"][0])
+    (points,) = [t for t in chart.options["held-out clips"] if t["type"] == "scatter"]
+    assert dict(zip(points["x"], points["y"], strict=True)) == {"holden": 4.39, "ava": 1.48}
+
+
+def test_training_is_drawn_over_passes_seconds_and_samples(
+    compared: dict[str, Any], material: Material
+) -> None:
+    chart = parts.training_curves(compared)
+    assert chart is not None
+    assert list(chart.options) == ["passes", "seconds of training", "samples seen"]
+    assert chart.options["seconds of training"][0]["x"] == material.history["seconds"]
+    assert chart.options["passes"][0]["x"][-1] == max(material.history["pass"])
+
+
+def test_every_pair_is_in_the_table_and_the_map(compared: dict[str, Any]) -> None:
+    table, chart = parts.difference_table(compared), parts.difference_map(compared)
+    assert table is not None
+    assert chart is not None
+    overall = next(row for row in table.rows if row[2] == "error, held out")
+    assert (
+        chart.options["held-out clips"][0]["z"][0][1]
+        == overall[-1]
+        == chart.options["held-out clips"][0]["z"][1][0]
+    )
+
+
+def test_published_figures_have_ours_beside_them(compared: dict[str, Any]) -> None:
+    rows = {(row[0], row[1]): row[2:4] for row in parts.beside_table(compared).rows}
+    assert rows["a frame", "holden"][0] == "0.376 ms"
+    assert rows["a frame", "holden"][1].endswith(" ms")
+    assert rows["relative error, held_out clips", "holden-xl"] == ["0.0448", ""]
+
+
+def test_networks_that_are_too_large_together_are_left_out(
+    compared: dict[str, Any], pair: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from hobble.report import compare_page
+
+    monkeypatch.setattr(compare_page, "LARGEST", len(compare_page.embedded(pair["holden"])) + 10)
+    page = render_compared(compared, pair)
+    assert "not here: ava" in page
+    assert 'id="play-second"' not in page
+
+
+def test_two_figures_take_the_same_wishes(tab: Any) -> None:
+    tab.run("document.getElementById('play-view').scrollIntoView({ behavior: 'instant', block: 'center' })")
+    tab.run("document.getElementById('play-stage').focus({ preventScroll: true })")
+    assert tab.run("Hobble.player.actors.length") == 2
+    tab.send("Input.dispatchKeyEvent", type="keyDown", key="w", code="KeyW", text="w")
+    wished = "Hobble.player.actors.map(({ character }) => character.velocity)"
+    assert tab.until(f"{wished}.every((v) => Math.hypot(...v) > 2)")
+    first, second = tab.run(wished)
+    tab.send("Input.dispatchKeyEvent", type="keyUp", key="w", code="KeyW")
+    assert first[0] * second[0] + first[1] * second[1] > 0
+    tab.run("[...document.querySelectorAll('#play-presets button')][0].click()")
+    hurt = "Math.max(0, ...Hobble.player.actors[{0}].character.severity)"
+    assert tab.until(f"{hurt.format(0)} > .1")
+    assert tab.run(hurt.format(1)) == 0
+    assert "holden" in tab.run("document.getElementById('play-panel').textContent")
+
+
+def test_another_configuration_is_chosen_and_linked_to(tab: Any) -> None:
+    tab.run(
+        "(() => { const s = document.getElementById('play-first'); s.value = 'ava';"
+        " s.dispatchEvent(new Event('change')); })()"
+    )
+    assert tab.run("Hobble.player.actors.map(({ spec }) => spec.links.length)") == [0, 0]
+    tab.run("document.getElementById('play-share').click()")
+    assert "of=ava%2Cava" in tab.run("location.hash")
+
+
+def test_charts_are_drawn_and_nothing_is_said_or_asked_for(tab: Any, tmp_path_factory: Any) -> None:
+    tab.run("Hobble.drawAll()")
+    undrawn = (
+        "[...document.querySelectorAll('[data-chart]')].filter((e) => !e.querySelector('.main-svg')).length"
+    )
+    assert tab.run(undrawn) == 0
+    folder: Path = tmp_path_factory.getbasetemp() / "report-sections"
+    folder.mkdir(exist_ok=True)
+    for section in ("summary", "play", "accuracy", "speed", "training", "costs", "published"):
+        tab.picture(folder / f"compare-{section}.png", f"#{section}")
+    assert tab.console == []
+    assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in tab.requests)

@@ -1,0 +1,25 @@
+"""Creates results/compare/report.html from compare.json and the networks of the configurations."""
+
+from pathlib import Path
+
+import yaml
+
+from hobble.core.files import read_json, write_text
+from hobble.report.compare_page import render_compared
+from hobble.report.playable import playable
+from hobble.runtime.network import load_network
+from hobble.workflow.job import job
+
+with job(snakemake):
+    given = snakemake.input
+    playables, seen = {}, set()
+    for name, weights, resolved in zip(
+        snakemake.params.configurations, given.weights, given.configuration, strict=True
+    ):
+        if weights not in seen:  # a network that two configurations read is one character
+            runtime = yaml.safe_load(Path(resolved).read_text(encoding="utf-8"))["configuration"]["runtime"]
+            playables[name] = playable(load_network(weights), runtime)
+        seen.add(weights)
+    bundle = Path(given.bundle).read_text(encoding="utf-8")
+    page = render_compared(read_json(given.compared), playables, bundle)
+    write_text(snakemake.output.html, page)
