@@ -10,7 +10,7 @@ from hobble.core.quat import Array
 STANDING = 0.8  # cm a frame at 60 Hz: a heel slower than this is treated as standing
 SHORTEST = 1 / 20  # seconds
 RAMP = 1 / 15  # seconds before and after standing over which the tilt sets in and goes
-MOST_TILT = np.radians(15.0)  # half of all frames need 0.3 degrees, nine of ten less than 3.5
+MOST_TILT = np.radians(10.5)  # half of all frames need 0.3 degrees, nine of ten less than 3.5
 LOW = 2.5  # cm of height of the ankle above the ball from which on tilting helps
 
 
@@ -35,8 +35,13 @@ def level_heels(foot: Array, heel: Array, toe: Array, fps: float) -> Array:
     height = foot[:, 1]
     pitch = np.sum(missing * ahead, axis=1) * height / (height**2 + LOW**2)
     yaw = np.sum(missing * side, axis=1) / np.maximum(across[:, 0], LOW)
-    tilt = quat.from_axis_angle(side, MOST_TILT * np.tanh(pitch / MOST_TILT))
-    return quat.mul(quat.yaw(MOST_TILT * np.tanh(yaw / MOST_TILT)), tilt)
+    tilt = quat.from_axis_angle(side, _held(pitch))
+    return quat.mul(quat.yaw(_held(yaw)), tilt)
+
+
+def _held(angle: Array) -> Array:
+    """The angle, held below MOST_TILT; what is well below it stays as it is."""
+    return angle / (1 + (angle / MOST_TILT) ** 6) ** (1 / 6)
 
 
 def standing_runs(point: Array, slow: float, shortest: int) -> list[tuple[int, int]]:
