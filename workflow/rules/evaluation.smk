@@ -15,8 +15,12 @@ rule accuracy:
         "results/{configuration}/benchmarks/evaluation/accuracy.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
-        runtime=60,
+        mem_mb=lambda w, attempt: demands.evaluation_memory(
+            w.configuration, 12, attempt
+        ),
+        runtime=lambda w, attempt: demands.evaluation_minutes(
+            w.configuration, 0.2, attempt, least=10
+        ),
     params:
         configuration=lambda w: w.configuration,
         splits=lambda w: project.splits(w.configuration),
@@ -43,8 +47,12 @@ rule rollouts:
         "results/{configuration}/benchmarks/evaluation/rollouts.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
-        runtime=240,
+        mem_mb=lambda w, attempt: demands.evaluation_memory(
+            w.configuration, 27, attempt
+        ),
+        runtime=lambda w, attempt: demands.evaluation_minutes(
+            w.configuration, 0.6, attempt, least=30
+        ),
     params:
         configuration=lambda w: w.configuration,
         splits=lambda w: project.splits(w.configuration),
@@ -98,8 +106,12 @@ rule injury_response:
         "results/{configuration}/benchmarks/evaluation/injury_response.tsv"
     threads: 1
     resources:
-        mem_mb=2000,
-        runtime=60,
+        mem_mb=lambda w, attempt: demands.evaluation_memory(
+            w.configuration, 14, attempt
+        ),
+        runtime=lambda w, attempt: demands.evaluation_minutes(
+            w.configuration, 0.2, attempt, least=60
+        ),
     params:
         configuration=lambda w: w.configuration,
         runtime=lambda w: project.section(w.configuration, "runtime"),
@@ -124,8 +136,12 @@ rule recognition:
         "results/{configuration}/benchmarks/evaluation/recognition.tsv"
     threads: 1
     resources:
-        mem_mb=1000,
-        runtime=30,
+        mem_mb=lambda w, attempt: demands.evaluation_memory(
+            w.configuration, 18, attempt
+        ),
+        runtime=lambda w, attempt: demands.evaluation_minutes(
+            w.configuration, 0.2, attempt, least=30
+        ),
     params:
         configuration=lambda w: w.configuration,
         splits=lambda w: project.splits(w.configuration),
@@ -162,8 +178,8 @@ rule compare:
     log:
         "results/compare/logs/evaluation/compare.log",
     resources:
-        mem_mb=500,
-        runtime=5,
+        mem_mb=1000,
+        runtime=10,
     params:
         configurations=lambda w: project.compared(),
         files=lambda w: sorted(project.measured()),

@@ -40,7 +40,7 @@ rule configuration:
     log:
         "results/{configuration}/logs/report/configuration.log",
     resources:
-        mem_mb=500,
+        mem_mb=700,
         runtime=5,
     params:
         name=lambda w: w.configuration,
@@ -66,7 +66,7 @@ rule pipeline_summary:
     log:
         "results/{configuration}/logs/report/pipeline_summary.log",
     resources:
-        mem_mb=500,
+        mem_mb=700,
         runtime=5,
     params:
         configuration=lambda w: w.configuration,
@@ -103,8 +103,12 @@ rule report:
     benchmark:
         "results/{configuration}/benchmarks/report/report.tsv"
     resources:
-        mem_mb=2000,
-        runtime=10,
+        mem_mb=lambda w, attempt: demands.evaluation_memory(
+            w.configuration, 12, attempt
+        ),
+        runtime=lambda w, attempt: demands.evaluation_minutes(
+            w.configuration, 0.1, attempt, least=10
+        ),
     params:
         configuration=lambda w: w.configuration,
         dataset=lambda w: project.configuration(w.configuration).dataset,
