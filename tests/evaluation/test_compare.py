@@ -14,8 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
-from hobble.evaluation.compare import compare, read_measured
+from hobble.evaluation.compare import compare
 from hobble.evaluation.compare_tables import tables
+from hobble.evaluation.measured import read_measured
 from hobble.evaluation.responsivity import parameter_counts
 from hobble.evaluation.series import difference, line
 from hobble.evaluation.tables import write_csv
@@ -168,6 +169,16 @@ def test_tables_hold_the_same_whatever_columns_each_has(compared, tmp_path) -> N
     assert [r["held_out_turn"] for r in last] == ["0.25", ""]
     assert [r["held_out_mse"] for r in last] == ["", ""]
     json.dumps(compared, allow_nan=False)
+
+
+def test_published_clips_stand_beside_ours_of_the_same_name(tmp_path, published) -> None:
+    clips = {"LocomotionFlat04_000": 0.03, "LocomotionFlat04_000_mirror": 0.07, "walk": 0.05}
+    found = compare([read_measured("a", left_behind(tmp_path, "a", clips, SIZES["holden"]))], published)
+    rows = [r for r in found["beside"] if "LocomotionFlat04" in r["measure"]]
+    assert [(r["source"], r["published"], r["ours"]) for r in rows] == [
+        ("segerstedt", 0.0448, 0.03),
+        ("release", 0.0396, 0.03),
+    ]
 
 
 def test_one_configuration_alone(tmp_path, published) -> None:

@@ -5,8 +5,9 @@ from pathlib import Path
 import yaml
 
 from hobble.core.files import write_json
-from hobble.evaluation.compare import compare, read_measured
+from hobble.evaluation.compare import compare
 from hobble.evaluation.compare_tables import tables
+from hobble.evaluation.measured import read_measured
 from hobble.evaluation.tables import write_csv
 from hobble.workflow.job import job
 
