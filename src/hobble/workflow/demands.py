@@ -49,6 +49,15 @@ class Demands:
         """Minutes for a job that takes `each` seconds for a thousand frames of all clips and mirrors."""
         return _minutes(each * self.all_thousands(dataset), attempt, least)
 
+    def evaluation_memory(self, configuration: str, each: float, attempt: int = 1) -> int:
+        """Megabytes for a measurement of a network on one clip of its data set after another."""
+        return self.memory_of_longest(self.project.configuration(configuration).dataset, each, 0.0, attempt)
+
+    def evaluation_minutes(self, configuration: str, each: float, attempt: int = 1, least: int = 1) -> int:
+        """Minutes for a measurement that takes `each` seconds for a thousand frames of the data set."""
+        dataset = self.project.configuration(configuration).dataset
+        return self.minutes_of_all(dataset, each, attempt, least)
+
     def training_memory(self, configuration: str, attempt: int = 1) -> int:
         """Megabytes for a training: PyTorch, the part of the database it holds, weights and their moments."""
         training = self.project.section(configuration, "training")
