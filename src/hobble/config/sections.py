@@ -215,15 +215,14 @@ class Training(Section):
     beta2: Share = 0.999
     dropout: Share = Field(0.3, description="share of units dropped before each layer, the input included")
     l1: Annotated[float, Field(ge=0)] = Field(0.01, description="weight of the mean absolute weights")
-    weight_decay: Annotated[float, Field(ge=0)] = Field(
-        0.0, description="share of its weights that the network would lose in a step at a learning rate of 1"
-    )
-    noise: Annotated[float, Field(ge=0)] = Field(
-        0.0, description="on the previous pose in the input, in standard deviations of a pose over the clips"
+    feedback: Annotated[float, Field(ge=0)] = Field(
+        0.0, description="how many times its last errors are added to the pose that the network is given"
     )
     seed: int = 1
     memory_mb: Positive = Field(512, description="largest part of the database held in memory")
-    continues: str | None = Field(None, description="a configuration whose last checkpoint is the start")
+    continues: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")] | None = Field(
+        None, description="a configuration whose last checkpoint is the start"
+    )
     device: Literal["auto", "cpu", "cuda"] = "auto"
     precision: Literal["auto", "float32", "tf32", "bfloat16"] = Field(
         "auto",

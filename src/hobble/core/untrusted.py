@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 MB = 1 << 20
 MOST_TEXT = 64 * MB  # labels and status: 1 kB a frame of a clip of ten minutes at 100 Hz
 MOST_YAML = 4 * MB  # a data set that lists 20,000 clips with five keys each
+DEEPEST_YAML = 100
 MOST_NODES = 1_000_000  # of a YAML file with its aliases written out: some 100 MB as Python objects
 
 
@@ -57,8 +59,11 @@ def read_yaml(path: str | Path) -> Any:
     """
     import yaml  # not needed by most jobs, which are many and short
 
-    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)(read_text(path, MOST_YAML))
+    text = read_text(path, MOST_YAML)
+    kind = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    loader = kind(text)
     try:
+        _check_depth(yaml.parse(text, kind))
         node = loader.get_single_node()
         if node is None:
             return None
@@ -74,6 +79,17 @@ def read_yaml(path: str | Path) -> Any:
         raise InputError(path, f"not valid YAML: {' '.join(str(error).split())}") from None
     finally:
         loader.dispose()
+
+
+def _check_depth(events: Iterable[yaml.Event]) -> None:
+    """Raise RecursionError before the loader does: libyaml's would end the process with it."""
+    import yaml
+
+    depth = 0
+    for event in events:
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST_YAML:
+            raise RecursionError
 
 
 def _written_out(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:

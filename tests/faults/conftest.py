@@ -1,0 +1,22 @@
+"""What the tests of faults share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hobble.core.skeleton import Skeleton
+from hobble.synthetic.clip import write_clip
+
+from .texts import base_bvh
+
+
+@pytest.fixture(scope="session")
+def tiny_bvh(holden31: Skeleton, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A BVH of a second and a half."""
+    folder = tmp_path_factory.mktemp("walk")
+    names = {"bvh": "a.bvh", "footsteps": "f.txt", "gait": "g.txt", "status": "s.txt"}
+    paths = {key: folder / name for key, name in names.items()}
+    write_clip("walk", holden31.to_dict(), 600, None, None, {"fps": 120, "seed": 1}, **paths)
+    return base_bvh(Path(paths["bvh"]))
