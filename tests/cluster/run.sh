@@ -67,7 +67,7 @@ if ! slurm_install; then exit 77; fi
 site=$("$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
 echo "import site; site.addsitedir('$site')" >"$("$folder/venv/bin/python" -c \
     'import sysconfig; print(sysconfig.get_path("purelib"))')/environment.pth"
-"$folder/venv/bin/python" -m pip install --quiet --disable-pip-version-check \
+"$folder/venv/bin/python" -m pip install -qq --disable-pip-version-check \
     --constraint "$root/constraints.txt" snakemake-executor-plugin-slurm || fail "the plugin cannot be installed"
 slurm_up "$folder/node" || exit 77
 say "SLURM $(slurmctld -V | awk '{print $2}') is up on one node, memory and time of jobs enforced"
