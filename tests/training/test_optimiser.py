@@ -14,7 +14,7 @@ from hobble.training.optimiser import Adam
 def test_the_compiled_sweep_is_the_plain_one(dtype: torch.dtype) -> None:
     networks = [initialise((40, 30, 20), 4, 1) for _ in range(2)]
     generator = torch.Generator().manual_seed(1)
-    adams = [Adam(network, 0.01, 0.9, 0.999, 0.1, 0.5) for network in networks]
+    adams = [Adam(network, 0.01, 0.9, 0.999, 0.1) for network in networks]
     for share in (0.2, 0.6, 1.0, 0.7, 0.0):
         gradients = [torch.randn(layer.shape, generator=generator).to(dtype) for layer in networks[0].layers]
         adams[0].step(gradients, share)

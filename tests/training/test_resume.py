@@ -68,7 +68,9 @@ def _sections(folder: Path) -> int:
     return int(load_npz(paths[0])["sections"]) if paths else 0
 
 
-@pytest.mark.parametrize("recipe", [{}, {"schedule": "cosine", "warm_up": 0.3, "noise": 0.1, "batch": 256}])
+@pytest.mark.parametrize(
+    "recipe", [{}, {"schedule": "cosine", "warm_up": 0.3, "feedback": 1.0, "batch": 256}]
+)
 @pytest.mark.parametrize("written", [False, True])
 @pytest.mark.parametrize("number", [0, 1, 5])
 def test_killed_before_or_after_any_write_it_ends_at_the_same_bits(

@@ -1,4 +1,4 @@
-"""The learning rate goes as the configuration says, and noise is where it is meant to be."""
+"""The learning rate goes as the configuration says, and errors are fed back where they belong."""
 
 from __future__ import annotations
 
@@ -13,14 +13,16 @@ import torch
 from hobble.config.sections import Training
 from hobble.database.reader import Database
 from hobble.training.batches import HostRows
+from hobble.training.feedback import Feedback
+from hobble.training.fused import FusedStep
 from hobble.training.network import initialise
-from hobble.training.noise import Noise
 from hobble.training.optimiser import Adam
 from hobble.training.schedule import share
+from hobble.training.step import Step
 from hobble.training.train import train
 
 Settings = dict[str, Any]
-FAST = {"schedule": "cosine", "warm_up": 0.5, "noise": 0.1, "weight_decay": 1.0, "batch": 300}
+FAST = {"schedule": "cosine", "warm_up": 0.5, "feedback": 1.0, "batch": 300}
 
 
 def test_a_cosine_falls_from_one_to_nothing() -> None:
@@ -101,61 +103,37 @@ def _stopping_at(turn: int) -> Any:
     return stopping
 
 
-def test_noise_is_on_the_fed_back_pose_alone_and_as_large_as_said(data: Database) -> None:
-    noise = Noise(data, 0.5, torch.device("cpu"))
-    x = torch.zeros(4000, data.layout.x_size)
-    noise.seed(3)
-    noise.add(x)
+def test_errors_are_fed_back_into_the_pose_alone_in_centimetres(data: Database) -> None:
+    feedback = Feedback(data, 2.0, torch.device("cpu"))
     layout, s = data.layout, data.statistics
+    x = torch.zeros(5, layout.x_size)
+    feedback.begin()
+    feedback.add(x)
+    assert torch.count_nonzero(x) == 0
+    error = torch.randn(4, layout.y_size, generator=torch.Generator().manual_seed(1))
+    feedback.remember(error)
+    feedback.add(x)
     for of_x, of_y in (
         (layout.x_joint_position, layout.y_joint_position),
         (layout.x_joint_velocity, layout.y_joint_velocity),
     ):
-        centimetres = x[:, of_x].numpy().std(0) * s.x_std[of_x]
-        assert centimetres == pytest.approx(0.5 * s.y_std[of_y], rel=0.06)
+        centimetres = x[:4, of_x].numpy() * s.x_std[of_x]
+        assert centimetres == pytest.approx(2 * error[:, of_y].numpy() * s.y_std[of_y], rel=1e-5)
+    assert torch.count_nonzero(x[4]) == 0
     x[:, layout.x_joint_position.start : layout.x_joint_velocity.stop] = 0
     assert torch.count_nonzero(x) == 0
 
 
-def test_noise_is_drawn_anew_and_again_from_its_seed(data: Database) -> None:
-    noise = Noise(data, 0.5, torch.device("cpu"))
-    drawn = []
-    for seed in (3, 3, 4):
-        noise.seed(seed)
-        drawn.append(torch.zeros(3, data.layout.x_size))
-        noise.add(drawn[-1])
-    assert torch.equal(drawn[0], drawn[1])
-    assert not torch.equal(drawn[0], drawn[2])
-    noise.add(again := torch.zeros(3, data.layout.x_size))
-    assert not torch.equal(again, drawn[2])
-
-
-def test_no_noise_draws_nothing(data: Database) -> None:
-    x = torch.ones(3, data.layout.x_size)
-    Noise(data, 0.0, torch.device("cpu")).add(x)
-    assert torch.equal(x, torch.ones_like(x))
-
-
-def test_weight_decay_is_that_of_adamw() -> None:
-    """Against PyTorch's own, on the weights; biases are left alone."""
-    network = initialise((8, 6, 4), 4, 1)
-    network.layers[0][:, :, -1] = 1.0
-    layers = [layer.clone().requires_grad_() for layer in network.layers]
-    theirs = torch.optim.AdamW(layers, lr=0.01, weight_decay=0.5)
-    ours = Adam(network, 0.01, 0.9, 0.999, 0.0, weight_decay=0.5)
+@pytest.mark.parametrize("kind", [Step, FusedStep])
+def test_a_step_keeps_its_errors(kind: type[Step]) -> None:
+    network = initialise((6, 5, 4), 4, 1)
     generator = torch.Generator().manual_seed(1)
-    for _ in range(10):
-        gradients = [torch.randn(layer.shape, generator=generator) for layer in layers]
-        for layer, gradient in zip(layers, gradients, strict=True):
-            layer.grad = gradient
-        biases = [layer[:, :, -1].detach().clone() for layer in layers]
-        theirs.step()
-        with torch.no_grad():
-            for layer, bias in zip(layers, biases, strict=True):
-                layer[:, :, -1] += 0.01 * 0.5 * bias
-        ours.step(gradients)
-    for mine, plain in zip(network.layers, layers, strict=True):
-        assert torch.allclose(mine, plain, rtol=1e-4, atol=1e-6)
+    x, y = (torch.randn(7, n, generator=generator) for n in (6, 4))
+    p = torch.rand(7, generator=generator)
+    step = kind(network, 0.0)
+    loss = step(x, y, p, step.masks(7))
+    assert torch.allclose(step.error, network(x, p) - y, atol=1e-5)
+    assert float(loss) == pytest.approx(float(step.error.square().mean()), rel=1e-6)
 
 
 def test_a_rate_that_ends_at_nothing_cannot_be_gone_on_from() -> None:

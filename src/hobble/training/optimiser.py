@@ -1,4 +1,4 @@
-"""Adam, with the L1 term of the loss and weight decay, in one sweep over the flat parameters."""
+"""Adam, with the L1 term of the loss, in one sweep over the flat parameters."""
 
 from __future__ import annotations
 
@@ -28,23 +28,12 @@ def l1_slopes(network: Network, l1: float) -> list[float]:
 class Adam:
     """Adam (Kingma and Ba 2015) on `network.flat`; it adds the gradient of the L1 term itself.
 
-    weight_decay: share of its weights, not its biases, that the network loses in a step at a rate of 1, apart
-    from the gradient (AdamW, Loshchilov and Hutter 2019). first, second: the running moments, laid out like
-    `network.flat`. steps: how many were made.
+    first, second: the running moments, laid out like `network.flat`. steps: how many were made.
     """
 
-    def __init__(
-        self,
-        network: Network,
-        learning_rate: float,
-        beta1: float,
-        beta2: float,
-        l1: float,
-        weight_decay: float = 0.0,
-    ) -> None:
+    def __init__(self, network: Network, learning_rate: float, beta1: float, beta2: float, l1: float) -> None:
         self.network = network
         self.learning_rate, self.beta1, self.beta2 = learning_rate, beta1, beta2
-        self.weight_decay = weight_decay
         self.slopes = l1_slopes(network, l1)
         self.steps = 0
         self.first = torch.zeros_like(network.flat)
@@ -61,54 +50,41 @@ class Adam:
         else:
             self.move(gradients, torch.tensor(self.numbers(share), device=self.network.flat.device))
 
-    def numbers(self, share: float) -> tuple[float, float, float]:
-        """What changes from step to step: (rate, root, keep).
+    def numbers(self, share: float) -> tuple[float, float]:
+        """What changes from step to step: (rate, root).
 
         rate: the learning rate, made up for the first moment's start at 0; root: likewise for the root of the
-        second; keep: what weight decay leaves.
+        second.
         """
         steps = max(self.steps, 1)
         rate = share * self.learning_rate / (1 - self.beta1**steps)
-        root = 1 / (1 - self.beta2**steps) ** 0.5
-        return rate, root, 1 - share * self.learning_rate * self.weight_decay
+        return rate, 1 / (1 - self.beta2**steps) ** 0.5
 
-    def _sweep(self, gradients: list[Tensor], rate: float, root: float, keep: float) -> None:
+    def _sweep(self, gradients: list[Tensor], rate: float, root: float) -> None:
         """One pass over memory, whose bandwidth is all that bounds it on a CPU."""
         views = [self.network.layers, self.network.views(self.first), self.network.views(self.second)]
         for *layer, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
             arrays = [bits(array.flatten(0, 1)) for array in layer]
             arrays.append(bits(gradient.view(layer[0].shape).flatten(0, 1)))
             team(layer[0].numel())
-            numbers = (self.beta1, self.beta2, rate, root, keep, slope, EPSILON)
+            numbers = (self.beta1, self.beta2, rate, root, slope, EPSILON)
             _fused(*arrays, *(arrays[0].dtype.type(number) for number in numbers))
 
     def move(self, gradients: list[Tensor], numbers: Tensor) -> None:
-        """The same in PyTorch on any device; `numbers` (3,) are those of `numbers`, on it."""
-        rate, root, keep = numbers.to(self.network.flat.dtype).unbind()
+        """The same in PyTorch on any device; `numbers` (2,) are those of `numbers`, on it."""
+        rate, root = numbers.to(self.network.flat.dtype).unbind()
         views = [self.network.layers, self.network.views(self.first), self.network.views(self.second)]
         for w, m, v, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
             g = gradient.view(w.shape).to(w.dtype, copy=True)
             g[:, :, :-1].add_(torch.sign(w[:, :, :-1]), alpha=slope)
             m.lerp_(g, 1 - self.beta1)
             v.mul_(self.beta2).addcmul_(g, g, value=1 - self.beta2)
-            if self.weight_decay:
-                w[:, :, :-1] *= keep
             w.addcdiv_(m * -rate, v.sqrt().mul_(root).add_(EPSILON))
 
 
 @numba.njit(parallel=True, error_model="numpy", cache=True)
 def _fused(
-    w: Any,
-    m: Any,
-    v: Any,
-    g: Any,
-    b1: Any,
-    b2: Any,
-    rate: Any,
-    root: Any,
-    keep: Any,
-    slope: Any,
-    epsilon: Any,
+    w: Any, m: Any, v: Any, g: Any, b1: Any, b2: Any, rate: Any, root: Any, slope: Any, epsilon: Any
 ) -> None:
     one, zero = w.dtype.type(1), w.dtype.type(0)
     last = w.shape[1] - 1
@@ -116,10 +92,8 @@ def _fused(
     for row in numba.prange(w.shape[0]):
         for i in range(w.shape[1]):
             d = w.dtype.type(widened(g[row, i])) if half else w.dtype.type(g[row, i])
-            kept = one
             if i < last:  # the last column holds the biases
                 d += slope * (one if w[row, i] > zero else (-one if w[row, i] < zero else zero))
-                kept = keep
             m[row, i] = b1 * m[row, i] + (one - b1) * d
             v[row, i] = b2 * v[row, i] + (one - b2) * d * d
-            w[row, i] = kept * w[row, i] - rate * m[row, i] / (root * np.sqrt(v[row, i]) + epsilon)
+            w[row, i] -= rate * m[row, i] / (root * np.sqrt(v[row, i]) + epsilon)

@@ -27,7 +27,7 @@ from hobble.training.step import Step
 log = logging.getLogger("hobble.training")
 
 NOT_IN_THE_NAME = ("continues", "device")
-OF_ADAM = ("learning_rate", "beta1", "beta2", "l1", "weight_decay")
+OF_ADAM = ("learning_rate", "beta1", "beta2", "l1")
 HALF_FROM = 256  # batch from which the products take most of the time
 
 

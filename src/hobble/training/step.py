@@ -24,7 +24,8 @@ class Step:
     network: what is trained; read anew at every call.
     dropout: share of units dropped before each layer, the input included; the rest is scaled up to make up
     for it. half: round the factors of the products to bfloat16; their sums, and all else, stay float32.
-    gradients: of the last call, (out, K (in + 1)) for each layer, in bfloat16 with `half`.
+    gradients: of the last call, (out, K (in + 1)) for each layer, in bfloat16 with `half`. error: of the last
+    call, (B, Y), prediction minus y.
     """
 
     def __init__(self, network: Network, dropout: float, half: bool = False) -> None:
@@ -34,6 +35,7 @@ class Step:
         self.factors = network.flat.to(torch.bfloat16) if half else network.flat
         self.generator = torch.Generator(network.flat.device)
         self.gradients: list[Tensor] = []
+        self.error = torch.empty(0, network.sizes[-1], device=network.flat.device)
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
         """Find `gradients` for x (B, X), y (B, Y), p (B,); returns the mean squared error, a scalar tensor.
@@ -51,15 +53,15 @@ class Step:
             expanded.append(e)
             slopes.append(slope)
             x = product(e, weight).to(y.dtype)
-        error = x.sub_(y)
-        d = error * (2.0 / error.numel())
+        self.error = x.sub_(y)
+        d = self.error * (2.0 / y.numel())
         self.gradients = [d] * len(weights)
         for number in range(len(weights) - 1, -1, -1):
             d = d.to(self.factors.dtype)
             self.gradients[number] = product(d.T, expanded[number].T)
             if number:
                 d = self.contracted(number, product(d, weights[number].T), c, slopes[number])
-        return torch.mean(error.mul_(error))
+        return torch.mean(torch.square(self.error))
 
     def seed(self, seed: int) -> None:
         """Begin a new sequence of dropout masks, 0 <= seed < 2^63."""

@@ -15,16 +15,14 @@ from hobble.database.reader import Database
 from hobble.training.batches import TRAIN, Watch
 from hobble.training.checkpoint import Saver, State, pack
 from hobble.training.device_rows import rows_for
+from hobble.training.feedback import Feedback
 from hobble.training.held_out import HeldOut
 from hobble.training.history import duration
-from hobble.training.noise import Noise
 from hobble.training.schedule import share
 from hobble.training.start import begin, recipe_hash, step_for, use_threads
 from hobble.training.update import update_for
 
 log = logging.getLogger("hobble.training")
-
-DROPOUT, NOISE = 1, 2  # what is drawn in a section, so that no two draw the same numbers
 
 
 def train(
@@ -61,7 +59,7 @@ def _run(state: State, database: Database, training: Mapping[str, Any], saver: S
     update = update_for(step, state.adam, training["batch"])
     rows = rows_for(database, device)
     held_out = HeldOut(database, device, database.pairs(TRAIN) // sections)
-    noise = Noise(database, training["noise"], device)
+    feedback = Feedback(database, training["feedback"], device)
     pairs = database.pairs(TRAIN)
     progress = Progress(state, passes * pairs)
     for turn in range(state.sections, passes * sections):
@@ -69,11 +67,12 @@ def _run(state: State, database: Database, training: Mapping[str, Any], saver: S
         where = f"pass {pass_index + 1} of {passes}, section {section + 1} of {sections}"
         watch = Watch(where, database.clips)
         step.seed(section_seed(seed, turn))
-        noise.seed(section_seed(seed, turn, NOISE))
+        feedback.begin()
         for batch in rows.batches(pass_index, section, sections, seed, training["batch"]):
-            noise.add(batch.x)
+            feedback.add(batch.x)
             rate = share(training, (state.samples + watch.seen) / pairs)
             watch.add(update(*batch[:3], rate), batch)
+            feedback.remember(step.error)
             progress.bar.update(len(batch.p))
         train_mse = watch.mean()
         state.sections, state.samples = turn + 1, state.samples + watch.samples
@@ -87,9 +86,9 @@ def _run(state: State, database: Database, training: Mapping[str, Any], saver: S
     saver.wait()
 
 
-def section_seed(seed: int, turn: int, what: int = DROPOUT) -> int:
-    """Seed of what is drawn at random in section `turn`, counted from the start."""
-    return int(np.random.SeedSequence([seed, what, turn]).generate_state(1, np.uint64)[0] >> 1)
+def section_seed(seed: int, turn: int) -> int:
+    """Seed of what is drawn at random in section `turn`, counted from the start: dropout."""
+    return int(np.random.SeedSequence([seed, 1, turn]).generate_state(1, np.uint64)[0] >> 1)
 
 
 class Progress:
