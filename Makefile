@@ -3,10 +3,10 @@ PYTHON ?= python3
 CORES ?= 2
 BIN := .venv/bin
 
-.PHONY: help env report test check format clean
+.PHONY: help env report test cluster-test check format clean
 
 help:            ## list these targets
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
 
 env: .venv/.ready  ## the environment in .venv
 
@@ -22,6 +22,9 @@ report: env      ## train the default configuration and make its report
 
 test: env        ## the whole test suite
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile
+
+cluster-test: env ## the test configuration through a SLURM of one node (root, Debian)
+	tests/cluster/run.sh
 
 check: env       ## lint, format and types
 	$(BIN)/ruff check .
