@@ -245,6 +245,39 @@ def test_prefixes_of_names_do_not_matter(walk, bvh, make):
     assert clip.skeleton.joints == walk.skeleton.joints
 
 
+def carried(clip, turn, place):
+    """The clip below a "Reference" that turns (F, 4) and moves (F, 3), with a camera hanging from it too."""
+    own, n = clip.skeleton, len(clip)
+    joints, parents = ("Reference", *own.joints, "Camera"), (-1, *(p + 1 for p in own.parents), 0)
+    offsets = np.concatenate([np.zeros((1, 3)), own.offsets, [[0, 180, 300]]])
+    skeleton = replace(own, joints=joints, parents=parents, offsets=offsets)
+    rotations = np.concatenate([turn[:, None], clip.rotations, turn[:, None]], axis=1)
+    rotations[:, 1] = quat.mul(quat.inv(turn), clip.rotations[:, 0])
+    moved = np.tile(offsets, (n, 1, 1))
+    moved[:, 1] = quat.rotate(quat.inv(turn), clip.root - place)
+    return replace(clip, skeleton=skeleton, rotations=rotations, root=place, translations=moved)
+
+
+@pytest.mark.parametrize("moves", [False, True])
+@pytest.mark.parametrize("rig", ["holden31", "mixamo55"])
+def test_a_joint_above_the_hips_is_folded_into_them_and_said(walker, bvh, make, root, rig, moves):
+    from hobble.motion.rig import load_skeleton
+
+    clip = walker(load_skeleton(root / f"config/skeletons/{rig}.yaml").skeleton, 121, 60.0)
+    time = moves * np.linspace(0, 1, len(clip))
+    turn = quat.mul(quat.yaw(2 * time), quat.from_axis_angle(np.array([1.0, 0, 0]), -np.pi / 2 + 0 * time))
+    place = np.stack([50 * time, 20 + 0 * time, 90 * time**2], axis=1)
+    made, report = make(bvh(carried(clip, turn, place), name="carried"))
+    alone, without = make(bvh(clip))
+    np.testing.assert_allclose(made.positions, alone.positions, atol=1e-4)
+    assert report["notes"][0] == "What stands above Hips (Reference) was folded into it."
+    assert report["rig"] == without["rig"] == rig
+    assert without["repairs"] == []
+    assert len(report["repairs"]) == 1
+    assert "only repeat their offsets and were dropped" in report["repairs"][0]
+    assert made.translations is None
+
+
 def test_joints_in_another_order_are_sorted(walk, bvh, make, holden31):
     order = np.array([0, *range(11, 31), *range(6, 11), *range(1, 6)])
     back = {int(old): new for new, old in enumerate(order)}

@@ -231,3 +231,33 @@ def test_the_checksums_are_those_of_the_files(root: Path, shared: Path) -> None:
     for clip in project.clips("cmu"):
         data = (shared / f"mocap/cmu/{clip}.bvh").read_bytes()
         assert project.download("cmu", clip)["sha256"] == hashlib.sha256(data).hexdigest()
+
+
+def test_a_clip_depends_on_the_skeleton_that_it_is_retargeted_from(complete: Path, root: Path) -> None:
+    shutil.copy(root / "config/skeletons/mixamo55.yaml", complete / "config/skeletons")
+    joints = ("Hips", "Spine2", "LeftHandThumb1", "LeftHandThumb2", "LeftUpLeg")
+    header = (
+        "HIERARCHY\n" + "".join(f"JOINT mixamorig:{name}{{\r\n" for name in joints) + "MOTION\nJOINT Neck1\n"
+    )
+    (complete / "data/mine/b.bvh").write_text(header)
+    project = Project(complete, {})
+    assert [Path(f).name for f in project.rig_files("mine", "b")] == ["mixamo55.yaml"]
+    assert project.rig_files("mine", "a") == []
+    assert [Path(f).name for f in Project(root, {}).rig_files("synthetic-ava", "walk-1")] == ["holden31.yaml"]
+    assert Project(root, {}).rig_files("synthetic", "walk-1") == []
+
+
+@pytest.mark.shared
+def test_the_plan_and_the_job_agree_on_the_rig(root: Path, shared: Path) -> None:
+    from hobble.config.sections import Motion
+    from hobble.motion.make import load_source
+    from hobble.motion.read import read_bvh
+    from hobble.motion.rig import load_skeleton
+
+    project = Project(root, {"mocap": str(shared / "mocap")})
+    target = load_skeleton(root / "config/skeletons/holden31.yaml")
+    options = Motion().model_dump(mode="json")
+    for clip in ("Injured_Ilde", "Injured_Walk_LLL", "Injured_Run_LLL_extended_converted"):
+        file = read_bvh(project.source("ferre", clip))
+        rig = load_source(file, target, root / "config/skeletons", options).match.rig
+        assert [Path(f).stem for f in project.rig_files("ferre", clip)] == [rig] * (rig != "holden31")

@@ -22,6 +22,7 @@ rule motion_clip:
     input:
         bvh=lambda w: project.source(w.dataset, w.clip),
         skeleton=lambda w: project.skeleton_file(w.dataset),
+        rig=lambda w: project.rig_files(w.dataset, w.clip),
     output:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
         report="results/datasets/{dataset}/motion/{clip}.json",

@@ -14,13 +14,23 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import Axes, straighten, turned
-from hobble.motion.decode import Decoded, decode, frame_rate
+from hobble.motion.decode import Decoded, frame_rate
 from hobble.motion.defects import flips, repair
+from hobble.motion.fold import below_hips, decode_below
 from hobble.motion.loop import loop_clip
 from hobble.motion.read import MOST_POSES, Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.retarget import plan, retarget_clip
-from hobble.motion.rig import Match, Target, clean_names, leg_length, load_skeleton, match_rig, unit_of
+from hobble.motion.rig import (
+    Match,
+    Target,
+    clean_names,
+    find_hips,
+    leg_length,
+    load_skeleton,
+    match_rig,
+    unit_of,
+)
 from hobble.motion.root import facing
 
 STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
@@ -118,11 +128,12 @@ def first_facing(clip: Clip) -> float:
 def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[str, Any]) -> Source:
     """A file's motion in centimetres and Y up on its own rig, checked and where allowed repaired."""
     repairs = _frame_count(file, options["defects"])
-    rig = _rig(file)
+    hips = find_hips(clean_names(file.names), target, maps)
+    rig = _rig(below_hips(file, hips))
     match = match_rig(file.path, rig, target, maps)
     rig = replace(rig, roles=match.roles)
     unit, unit_name = _unit(file.path, rig, options["unit"])
-    decoded = decode(file, STILL / unit)
+    decoded = decode_below(file, hips, STILL / unit)
     repairs += decoded.repairs
     fps = options["source_fps"] or frame_rate(file.frame_time, file.frame_time_text)
     clip = _scaled(file.path.stem, rig, decoded, fps, unit)

@@ -63,6 +63,19 @@ def clean_names(names: Sequence[str]) -> tuple[str, ...]:
     return short if len(set(short)) == len(short) and all(short) else tuple(names)
 
 
+def find_hips(names: Sequence[str], target: Target, folder: str | Path) -> int:
+    """Which of a clip's joints is the hips by the known skeleton that has most of its names; else the root.
+
+    Some programs export a joint above the hips. folder: where the skeleton files lie.
+    """
+    if names[0] == target.skeleton.roles["hips"]:
+        return 0
+    known = [target, *(load_skeleton(file) for file in sorted(Path(folder).glob("*.yaml")))]
+    shared = [len(set(names) & set(one.skeleton.joints)) for one in known]
+    hips = known[int(np.argmax(shared))].skeleton.roles["hips"]
+    return names.index(hips) if hips in names else 0
+
+
 def match_rig(path: Path, rig: Skeleton, target: Target, folder: str | Path) -> Match:
     """Find out which known skeleton a clip's rig is, and how it gets onto the target.
 

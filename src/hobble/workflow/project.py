@@ -18,7 +18,7 @@ from hobble.config.sections import COMPARED
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import MOST_TEXT, read_bytes
 from hobble.workflow.fingerprint import fingerprint
-from hobble.workflow.sources import find_clips, read_checksums, the_file
+from hobble.workflow.sources import find_clips, joint_names, nearest_rig, read_checksums, the_file
 
 DATASETS = "results/datasets"
 MIRROR = "_mirror"
@@ -115,7 +115,7 @@ class Project:
     def _check_dataset(self, name: str) -> None:
         self.catalogue.skeleton(self.dataset(name).skeleton)
         for clip in self.clips(name):
-            self.source(name, clip)
+            self.rig_files(name, clip)
         self.selected(name, "all")
 
     def digest(self, configuration: str) -> str:
@@ -194,8 +194,7 @@ class Project:
 
     def download(self, dataset: str, clip: str) -> dict[str, str]:
         """What fetches a clip: its `url`, the `sha256` that it must have, the `folder` that lacks it."""
-        options = self.dataset(dataset).download
-        if options is None or clip not in self._checksums(dataset):
+        if (options := self.dataset(dataset).download) is None or clip not in self._checksums(dataset):
             raise HobbleError(f"data set {dataset}: clip {clip} cannot be downloaded")
         return {
             "url": options.url.format(clip=quote(clip), subject=quote(clip.partition("_")[0])),
@@ -354,6 +353,16 @@ class Project:
     def skeleton_file(self, dataset: str) -> str:
         """Path of the data set's skeleton."""
         return str(self.base / "config" / "skeletons" / f"{self.dataset(dataset).skeleton}.yaml")
+
+    def rig_files(self, dataset: str, clip: str) -> list[str]:
+        """The skeleton file of the rig that the clip is on, where that is another than the data set's."""
+        model, folder = self.dataset(dataset), self.base / "config" / "skeletons"
+        if model.synthetic is not None:
+            name: str | None = self.dataset(model.source or dataset).skeleton
+        else:
+            known = {path.stem: self.catalogue.skeleton(path.stem).joints for path in folder.glob("*.yaml")}
+            name = nearest_rig(joint_names(Path(self.source(dataset, clip))), known, model.skeleton)
+        return [str(folder / f"{name}.yaml")] if name not in (None, model.skeleton) else []
 
     def stages(self, configuration: str) -> dict[str, dict[str, list[str]]]:
         """For the account of costs: the benchmark files and the artefacts of each stage."""

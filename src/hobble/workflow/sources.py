@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_text
 
 SUFFIX = ".bvh"
+HEADER = 1 << 20  # bytes; that of 191 joints takes 40 kB
+JOINT = re.compile(r"^\s*(?:ROOT|JOINT)\s+(.*?)\s*\{?\s*$", re.MULTILINE | re.IGNORECASE)
 LINE = re.compile(r"([0-9a-fA-F]{64}) [ *](\S+)\.bvh")
 
 
@@ -30,6 +33,25 @@ def find_clips(folder: Path) -> dict[str, list[Path]]:
             if suffix.lower() == SUFFIX and not name.startswith("."):
                 found.setdefault(stem, []).append(Path(here, name))
     return found
+
+
+def joint_names(path: Path) -> set[str]:
+    """The joints of a BVH file without prefixes, as far as its beginning says; none of a missing one."""
+    try:
+        with open(path, "rb") as file:
+            header = file.read(HEADER).partition(b"MOTION")[0].decode("latin-1")
+    except OSError:
+        return set()
+    return {name.rpartition(":")[2].strip() for name in JOINT.findall(header)}
+
+
+def nearest_rig(joints: set[str], known: Mapping[str, Collection[str]], target: str) -> str | None:
+    """The known skeleton with most of the joints' names, where it has more of them than the target."""
+    best, nearest = len(joints & set(known[target])), None
+    for name in sorted(known):
+        if len(joints & set(known[name])) > best:
+            best, nearest = len(joints & set(known[name])), name
+    return nearest
 
 
 def the_file(clip: str, files: list[Path]) -> Path:
