@@ -257,14 +257,16 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     read in the other's time.
     """
     from hobble.config.sections import Network, Training
-    from hobble.training.batches import batches
+    from hobble.training.batches import HostRows
     from hobble.training.start import fresh, step_for, use_threads
+    from hobble.training.update import update_for
 
     use_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
     options = Training(memory_mb=memory_mb).model_dump(mode="json")
     disk, memory = (Database.open(folder / "db", mb) for mb in (memory_mb, 1 << 20))
     state = fresh(disk, Network().model_dump(mode="json"), options)
-    step, device = step_for(state.network, options), state.network.flat.device
+    device = state.network.flat.device
+    update = update_for(step_for(state.network, options), state.adam, options["batch"])
     rows = disk.block_rows(options["batch"])
     stretch = WINDOWS * disk.window("train", rows) * disk.manifest.chunks["train"][0].rows
     stretch = min(stretch, disk.section_pairs("train", 0, 10))
@@ -272,17 +274,13 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     def turn(db: Database, section: int) -> tuple[float, float]:
         """Samples a second over one stretch, by the clock and by processor time, that of all threads."""
         start, used, done = time.perf_counter(), time.process_time(), 0
-        for batch in batches(db, 0, section % 10, 10, 1, options["batch"]):
-            x, y, p = (torch.from_numpy(array).to(device) for array in batch[:3])
-            loss = step(x, y, p, step.masks(len(x)))
-            state.adam.step(step.gradients)
-            done += len(p)
+        for batch in HostRows(db, device).batches(0, section % 10, 10, 1, options["batch"]):
+            loss = update(*batch[:3], 1.0)
+            done += len(batch.p)
             if done >= stretch:
                 break
         float(loss)
         return done / (time.perf_counter() - start), done / (time.process_time() - used)
-
-    import torch
 
     pairs = []
     turn(memory, 0)
