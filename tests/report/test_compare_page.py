@@ -93,7 +93,7 @@ def test_boxes_stand_at_the_quantiles_and_published_means_beside_them(compared: 
     assert boxes[0]["q3"][0] == pytest.approx(1.5 * boxes[0]["mean"][0])
     assert boxes[0]["mean"][0] == pytest.approx(2 * boxes[1]["mean"][0])
     (points,) = [t for t in chart.options["held-out clips"] if t["type"] == "scatter"]
-    assert dict(zip(points["x"], points["y"], strict=True)) == {"holden": 4.39, "ava": 1.48}
+    assert dict(zip(points["x"], points["y"], strict=True)) == pytest.approx({"holden": 4.39, "ava": 1.48})
 
 
 def test_training_is_drawn_over_passes_seconds_and_samples(

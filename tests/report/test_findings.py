@@ -55,7 +55,7 @@ def test_waypoints_flips_and_links_that_do_nothing(material: Material) -> None:
     assert found["The character reached 113 of 114 waypoints."] == "warn"
     assert found["A joint turned by 175 degrees in one frame."] == "warn"
     deaf = {"applies": True, "responses": [{"gait": "walk", "link": "a-b", "from_healthy_cm": 0.1}]}
-    assert "1 of 1 links hardly change the walk at severity 10" in heads(material, injury=deaf)
+    assert "1 of 1 link hardly changes the walk at severity 10" in heads(material, injury=deaf)
 
 
 def test_most_pressing_first(material: Material) -> None:

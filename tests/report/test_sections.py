@@ -9,7 +9,17 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.report import accuracy_section, cost_section, data_section, terrain_section, training_section
+from hobble.core.skeleton import Skeleton
+from hobble.database.clip_rows import load_clip_rows, save_clip_rows
+from hobble.report import (
+    accuracy_section,
+    cost_section,
+    coverage,
+    data_section,
+    injury_cases,
+    terrain_section,
+    training_section,
+)
 from hobble.report.charts import Chart
 from hobble.report.gather import Material, describe_network, read_history
 from hobble.report.ground_pictures import ground_pictures
@@ -38,7 +48,7 @@ def test_a_curve_without_held_out_clips(material: Material) -> None:
 def test_weights_that_are_not(tmp_path: Path) -> None:
     path = tmp_path / "weights.npz"
     path.write_bytes(b"nothing")
-    with pytest.raises(InputError, match="not a network's weights"):
+    with pytest.raises(InputError, match="damaged or not an npz file"):
         describe_network(path)
 
 
@@ -66,14 +76,29 @@ def test_gait_seconds_add_up(material: Material) -> None:
     assert drawn == pytest.approx(sum(sum(r["seconds"].values()) for r in material.labels))
 
 
-def test_hurt_seconds_by_link_and_severity(material: Material) -> None:
-    chart = data_section.injury_coverage(material)
+def test_turns_speeds_and_severities_are_counted_in_seconds(
+    examples: ModuleType, holden31: Skeleton, tmp_path: Path
+) -> None:
+    rows = load_clip_rows(examples.rows(tmp_path / "walk.npz", holden31))
+    y, severity = np.array(rows.y), np.zeros_like(rows.severity)
+    y[:, rows.layout.y_root_velocity] = [0.0, 2.05]  # 1.23 m/s
+    y[:, rows.layout.y_turn] = np.radians(-30.0) / 60  # the world turns right, the figure left
+    knee = holden31.link_names.index("LeftUpLeg-LeftLeg")
+    severity[: len(rows) // 2, knee] = 7.2
+    save_clip_rows(tmp_path / "walk.npz", replace(rows, y=y, severity=severity))
+    found = coverage.counted([tmp_path / "walk.npz"], {rows.clip: "held_out"})
+    seconds, hurt = len(np.unique(rows.frame)) / 60, len(np.unique(rows.frame[: len(rows) // 2])) / 60
+    turns = dict(zip(coverage._middles(coverage.TURNS), found["turns"]["held_out"], strict=True))
+    assert turns[30.0] == pytest.approx(seconds)
+    assert sum(turns.values()) == pytest.approx(seconds)
+    assert not found["turns"]["train"].any()
+    row, column = np.argwhere(found["both"] > 0)[0]
+    assert (coverage._middles(coverage.TURNS)[row], coverage._middles(coverage.SPEEDS)[column]) == (30.0, 1.3)
+    assert list(found["hurt"]) == ["LeftUpLeg-LeftLeg"]
+    assert found["hurt"]["LeftUpLeg-LeftLeg"][6] == pytest.approx(hurt, abs=1 / 60 + 1e-9)
+    chart = coverage.severity_chart(found)
     assert chart is not None
-    (cells,) = chart.traces
-    assert cells["x"] == ["5", "7"]
-    assert set(cells["y"]) == {"LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg", "Hips-LowerBack"}
-    total = sum(v for row in cells["z"] for v in row if v)
-    assert total == pytest.approx(sum(h["seconds"] for r in material.injuries for h in r["hurt"].values()))
+    assert chart.traces[0]["z"][0][6] == pytest.approx(hurt, abs=0.02)
 
 
 def test_strips_carry_what_hurts(material: Material) -> None:
@@ -94,8 +119,16 @@ def test_stages_beside_the_published(material: Material) -> None:
 def test_steps_of_a_frame_in_their_order(material: Material) -> None:
     chart = cost_section.lap_chart(material)
     assert chart is not None
-    assert [t["name"] for t in chart.traces] == ["prepare", "input", "insert", "predict", "output", "update"]
-    total = sum(trace["y"][0] for trace in chart.traces)
+    traces = next(iter(chart.options.values()))
+    assert [t["name"] for t in traces] == [
+        "prepare",
+        "input",
+        "insert",
+        "predict",
+        "output",
+        "update",
+    ]
+    total = sum(trace["y"][0] for trace in traces)
     assert total == pytest.approx(material.responsivity["laps"][0]["milliseconds"]["total"])
 
 
@@ -115,7 +148,7 @@ def test_ground_profiles_are_the_centre_heights_of_now(tmp_path: Path) -> None:
 def test_a_damaged_terrain_file_is_named(tmp_path: Path) -> None:
     path = tmp_path / "clip.npz"
     np.savez(path, frame=np.arange(3))
-    with pytest.raises(InputError, match=r"clip\.npz: not the terrain of a clip"):
+    with pytest.raises(InputError, match=r"clip\.npz: damaged or not an npz file"):
         terrain_section.read_fits(path)
 
 
@@ -138,3 +171,31 @@ def test_examples_are_seeded(examples: ModuleType, holden31: Any, tmp_path: Path
     for name in ("a", "b"):
         examples.scenarios(tmp_path / f"{name}.npz", holden31)
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+def test_confusions_are_shares_of_what_hurts_and_name_how_often_it_was_right() -> None:
+    confusion = {"knee": {"knee": 3, "back": 1}, "back": {"knee": 0, "back": 2}}
+    part = {"confusion": confusion, "right": 5 / 6}
+    found = {"applies": True, "classes": ["knee", "back"], "chance": 0.5, "people": 0.82}
+    chart = injury_cases.recognition_chart({**found, "generated": part, "captured": {}})
+    assert chart is not None
+    assert list(chart.options) == ["generated walks, window by window: 83 % right"]
+    (trace,) = next(iter(chart.options.values()))
+    assert trace["z"] == [[0.75, 0.25], [None, 1.0]]
+    assert "50 %" in chart.caption
+    assert "82 %" in chart.caption
+    assert injury_cases.recognition_chart({"applies": False}) is None
+
+
+def test_a_second_injury_has_a_line_for_each_link_over_each_first() -> None:
+    rows = [
+        {"first": f, "second": s, "severity": v, "from_first_cm": 0.1 * v * k}
+        for f in ("a", "b")
+        for k, s in enumerate(("c", "d"))
+        for v in (0.0, 5.0, 10.0)
+    ]
+    chart = injury_cases.second_chart(rows)
+    assert chart is not None
+    assert list(chart.options) == ["a at 7", "b at 7"]
+    assert [(t["name"], t["y"][-1]) for t in chart.options["a at 7"]] == [("c", 0.0), ("d", 1.0)]
+    assert injury_cases.second_chart([]) is None

@@ -80,8 +80,10 @@ rule report:
     """One HTML file that a person opens, reads and plays with."""
     input:
         accuracy=rules.accuracy.output.json,
+        rollouts=rules.rollouts.output.json,
         responsivity=rules.responsivity.output.json,
         injury=rules.injury_response.output.json,
+        recognition=rules.recognition.output.json,
         pipeline=rules.pipeline_summary.output.json,
         scenarios=rules.generate.output.scenarios,
         configuration=rules.configuration.output.yaml,

@@ -29,11 +29,14 @@ with job(snakemake):
         labels=given.labels,
         injuries=given.injuries,
         terrain=given.terrain,
+        rows=given.rows,
+        rollouts=given.rollouts,
+        recognition=given.recognition,
     )
     network = material.network
     play = scenes(given.scenarios, network["skeleton"], network["links"])
     trained = load_network(given.weights)
     character = playable(trained, material.resolved["configuration"]["runtime"])
-    compared = comparisons(trained, given.get("rows", []), asked.splits)
+    compared = comparisons(trained, given.rows, asked.splits)
     bundle = Path(given.bundle).read_text(encoding="utf-8")
     write_text(snakemake.output.html, render(material, play, character, compared, bundle))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hobble.report.charts import Chart, axis, mark
+from hobble.report.charts import Chart, axis, line, log_axis, mark
 from hobble.report.findings import published
 from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
@@ -122,6 +122,34 @@ def clip_boxes(material: Material) -> Chart | None:
             "boxmode": "overlay",
         },
         height=_height(len(rows)),
+    )
+
+
+def rollout_chart(material: Material) -> Chart | None:
+    """How the error grows when the figure is fed its own pose."""
+    traces = []
+    for split in ("held_out", "train"):
+        rows = [
+            (entry["length"], entry[split]["position_error_cm"])
+            for entry in material.rollouts.get("lengths", ())
+            if (entry.get(split) or {}).get("position_error_cm") is not None
+        ]
+        if rows:
+            x, y = zip(*rows, strict=True)
+            traces.append(line(NAMES[split], x, y, COLOURS[split], mode="lines+markers"))
+    if not traces:
+        return None
+    return Chart(
+        "rollouts",
+        "Fed its own pose",
+        "Mean distance of a joint from the captured one when the network goes on from what it predicted "
+        "itself, as at run time, over roll-outs of so many frames. A line that flattens is a figure that "
+        "keeps to its feet; 60 frames are a second.",
+        traces,
+        {
+            "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),
+            "yaxis": axis("cm a joint", rangemode="tozero"),
+        },
     )
 
 

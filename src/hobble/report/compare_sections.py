@@ -374,22 +374,22 @@ def beside_table(compared: Compared) -> Table:
 
 def injury_table(compared: Compared) -> Table | None:
     """What severities do, on average, in the configurations that know them."""
-    rows = [entry for entry in compared["injury"] if entry.get("applies") and entry.get("summary")]
+    rows = [
+        (entry["configuration"], gait, summary)
+        for entry in compared["injury"]
+        if entry.get("applies")
+        for gait, summary in (entry.get("summary") or {}).items()
+    ]
     if not rows:
         return None
-    keys = list(
-        dict.fromkeys(k for e in rows for k, v in e["summary"].items() if isinstance(v, (int, float)))
-    )
-    right = {e["configuration"]: e for e in compared.get("recognition", ()) if e.get("applies")}
-    columns = [Column("configuration"), *(Column.number(key.replace("_", " ")) for key in keys)]
-    columns.append(Column("walks whose hurt part is named right", _percent, "n"))
+    keys = list(dict.fromkeys(key for *_, summary in rows for key in summary))
+    right = {e["configuration"]: e["generated"] for e in compared["recognition"] if e.get("applies")}
+    columns = [Column("configuration"), Column("gait")]
+    columns += [Column.number(key.replace("_", " ")) for key in keys]
+    columns.append(Column("hurt part named right", _percent, "n"))
     table = [
-        [
-            entry["configuration"],
-            *(entry["summary"].get(key) for key in keys),
-            (right.get(entry["configuration"], {}).get("generated") or {}).get("right"),
-        ]
-        for entry in rows
+        [name, gait, *(summary.get(key) for key in keys), right.get(name, {}).get("right")]
+        for name, gait, summary in rows
     ]
     return Table("compare-injury", columns, table, "Means over links")
 

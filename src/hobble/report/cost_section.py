@@ -26,7 +26,7 @@ def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
     """Milliseconds a frame of each step of a lap, without their total."""
     value = lap.get("milliseconds")
     if isinstance(value, dict):
-        return {k: v for k, v in value.items() if k != "total" and isinstance(v, (int, float))}
+        return {k: v for k, v in value.items() if k not in ("total", "sd") and isinstance(v, (int, float))}
     return {"frame": value} if isinstance(value, (int, float)) else {}
 
 
@@ -35,14 +35,48 @@ def _place(step: str) -> int:
 
 
 def lap_chart(material: Material) -> Chart | None:
-    """Milliseconds a frame of each step, stacked, lap by lap."""
-    laps = material.responsivity.get("laps")
+    """Milliseconds a frame of each step, stacked, lap by lap, for each way of looking up the phase."""
+    found = material.responsivity
+    options = {}
+    for entry in found.get("modes") or [found]:
+        traces = _lap_bars(entry)
+        if traces:
+            options[f"{entry.get('mode', 'the')} phase"] = traces
+    if not options:
+        return None
+    own = f"{found.get('mode', 'the')} phase"
+    options = {name: options[name] for name in sorted(options, key=lambda name: name != own)}
+    shapes, notes = [], []
+    theirs = published(material, "responsivity")
+    if theirs:
+        shape, note = mark(theirs["milliseconds"], f"{theirs['label']} as published", vertical=False)
+        shapes, notes = [shape], [note]
+    laps = max(len(trace["x"]) for traces in options.values() for trace in traces)
+    return Chart(
+        "laps",
+        "Milliseconds a frame, lap by lap",
+        "Each bar is one lap of the six-waypoint track; its parts are the steps of a frame. The bars should "
+        "be of one height: a slow first lap is warming up, a slow one in between was another program's "
+        "doing. A frame at 60 Hz has 16.7 ms.",
+        layout={
+            "barmode": "stack",
+            "xaxis": axis("lap", dtick=1 if laps < 25 else None),
+            "yaxis": axis("ms a frame", rangemode="tozero"),
+            "shapes": shapes,
+            "annotations": notes,
+        },
+        choose="Looked up by" if len(options) > 1 else None,
+        options=options,
+    )
+
+
+def _lap_bars(entry: dict[str, Any]) -> list[Trace]:
+    laps = entry.get("laps")
     laps = [lap for lap in laps if lap_steps(lap)] if isinstance(laps, list) else []
     if not laps:
-        return None
+        return []
     numbers = [lap.get("lap", i + 1) for i, lap in enumerate(laps)]
-    steps = sorted(lap_steps(laps[0]), key=_place)
-    traces: list[Trace] = [
+    return [
         {
             "type": "bar",
             "name": step,
@@ -51,28 +85,8 @@ def lap_chart(material: Material) -> Chart | None:
             "marker": {"color": STEPS.get(step, "@g0")},
             "hovertemplate": "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>",
         }
-        for step in steps
+        for step in sorted(lap_steps(laps[0]), key=_place)
     ]
-    shapes, notes = [], []
-    theirs = published(material, "responsivity")
-    if theirs:
-        shape, note = mark(theirs["milliseconds"], f"{theirs['label']} as published", vertical=False)
-        shapes, notes = [shape], [note]
-    return Chart(
-        "laps",
-        "Milliseconds a frame, lap by lap",
-        "Each bar is one lap of the six-waypoint track; its parts are the steps of a frame. The bars should "
-        "be of one height: a slow first lap is warming up, a slow one in between was another program's "
-        "doing. A frame at 60 Hz has 16.7 ms.",
-        traces,
-        {
-            "barmode": "stack",
-            "xaxis": axis("lap", dtick=1 if len(laps) < 25 else None),
-            "yaxis": axis("ms a frame", rangemode="tozero"),
-            "shapes": shapes,
-            "annotations": notes,
-        },
-    )
 
 
 def lap_table(material: Material) -> Table | None:
@@ -137,8 +151,8 @@ def stage_charts(material: Material) -> list[Chart]:
     names = [stage["stage"] for stage in stages]
     charts = []
     for key, title, label, show, caption in (
-        ("seconds", "Time of each stage", "seconds of computing", duration,
-         "Added up over the jobs of a stage; with several cores the wait is shorter. Each line is ten "
+        ("seconds", "Time of each stage", "seconds, summed over jobs", duration,
+         "With several cores the wait is shorter than the sum over the jobs of a stage. Each line is ten "
          "times the one before."),
         ("bytes", "Size of each stage", "bytes", size,
          "What each stage leaves on disk."),
@@ -173,11 +187,15 @@ def log_range(values: list[float]) -> list[float]:
 
 def stage_table(material: Material) -> Table:
     """A row per stage, the published figures beside ours."""
-    theirs = {row["stage"]: row for row in material.published["stages"]}
+    theirs = {row["stage"]: dict(row) for row in material.published["stages"]}
+    own = published(material, "sizes") or {}
+    for stage, key in (("database", "database"), ("training", "weights")):
+        if key in own:  # of this configuration, where it was published
+            theirs[stage]["bytes"] = own[key]
     columns = [
         Column("stage"),
         Column.count("jobs"),
-        Column("time", lambda v: duration(float(v)), "n"),
+        Column("time, summed over jobs", lambda v: duration(float(v)), "n"),
         Column("longest job", lambda v: duration(float(v)), "n"),
         Column("peak memory", lambda v: f"{number(v)} MB", "n"),
         Column.count("files"),

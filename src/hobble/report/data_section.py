@@ -82,44 +82,6 @@ def speed_chart(material: Material) -> Chart | None:
     return Chart("speeds", "How fast", caption, traces, layout, 300)
 
 
-def hurt_seconds(report: dict[str, Any]) -> dict[str, tuple[float, float]]:
-    """Link -> (seconds hurt, highest severity) of an injury report."""
-    hurt = report.get("hurt") or {}
-    return {link: (float(value["seconds"]), float(value["highest"])) for link, value in hurt.items()}
-
-
-def injury_coverage(material: Material) -> Chart | None:
-    """Seconds in which each link is hurt, by the highest severity of the clip."""
-    cells: dict[str, dict[float, float]] = {}
-    for report in material.injuries:
-        for link, (seconds, severity) in hurt_seconds(report).items():
-            row = cells.setdefault(link, {})
-            row[severity] = row.get(severity, 0.0) + seconds
-    if not cells:
-        return None
-    levels = sorted({level for row in cells.values() for level in row})
-    links = list(cells)[::-1]
-    trace = {
-        "type": "heatmap",
-        "x": [f"{level:g}" for level in levels],
-        "y": links,
-        "z": [[cells[link].get(level) for level in levels] for link in links],
-        "colorscale": [[0, "@hurt-low"], [1, "@hurt-high"]],
-        "xgap": 3,
-        "ygap": 3,
-        "colorbar": {"title": {"text": "s"}, "thickness": 10, "outlinewidth": 0},
-        "hovertemplate": "%{y} at %{x}: %{z:.1f} s<extra></extra>",
-    }
-    layout = {"xaxis": axis("highest severity", type="category"), "yaxis": {"automargin": True}}
-    caption = (
-        "Seconds of data for each link and severity, mirrors counted. Where there is no cell the network has "
-        "seen nothing and can only interpolate."
-    )
-    return Chart(
-        "injury-coverage", "What is hurt, and how much", caption, [trace], layout, 120 + 24 * len(links)
-    )
-
-
 def clip_table(material: Material) -> Table:
     """Every clip: its file, length, split, repairs and checksum."""
     labels = {report["clip"]: report for report in material.labels}

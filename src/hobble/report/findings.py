@@ -252,7 +252,8 @@ def _injury(material: Material) -> Iterator[Hint]:
     if deaf:
         yield Hint(
             "note",
-            f"{len(deaf)} of {len(walks)} links hardly change the walk at severity 10",
+            f"{len(deaf)} of {_plural(len(walks), 'link')} hardly "
+            f"{'changes' if len(deaf) == 1 else 'change'} the walk at severity 10",
             f"(under half a centimetre a joint): {', '.join(deaf[:4])}{' …' if len(deaf) > 4 else ''}.",
         )
     rough = [r["link"] for r in walks if _rho(r) < 0.7 and r["link"] not in deaf]
@@ -271,6 +272,15 @@ def _injury(material: Material) -> Iterator[Hint]:
         )
     if not deaf and not rough:
         yield Hint("good", "Every link's severity shifts the walk, and steadily.", "")
+
+
+def _plural(count: int, word: str) -> str:
+    """A count with its word.
+
+    >>> _plural(1, "link"), _plural(2, "link")
+    ('1 link', '2 links')
+    """
+    return f"{count} {word}{'' if count == 1 else 's'}"
 
 
 def _rho(response: Mapping[str, Any]) -> float:

@@ -25,8 +25,8 @@ class Material:
     """What one configuration left behind.
 
     history: column -> values, one per section of training; None where a cell is empty. motion, labels,
-    injuries: the reports of the clips, in one order. terrain: paths of their fits. splits: clip -> "train" or
-    "held_out".
+    injuries: the reports of the clips, in one order. terrain, rows: paths of their fits and of their rows.
+    splits: clip -> "train" or "held_out".
     """
 
     name: str
@@ -44,6 +44,9 @@ class Material:
     labels: list[dict[str, Any]] = field(repr=False)
     injuries: list[dict[str, Any]] = field(repr=False)
     terrain: list[str] = field(repr=False)
+    rows: list[str] = field(repr=False)
+    rollouts: Mapping[str, Any] = field(repr=False)
+    recognition: Mapping[str, Any] = field(repr=False)
     published: Mapping[str, Any] = field(repr=False)
 
     def split(self, clip: str) -> str:
@@ -73,6 +76,9 @@ def gather(
     labels: Iterable[str],
     injuries: Iterable[str],
     terrain: Iterable[str] = (),
+    rows: Iterable[str] = (),
+    rollouts: str | None = None,
+    recognition: str | None = None,
 ) -> Material:
     """Read the files a report is made from. Raises InputError naming the one that cannot be read."""
     return Material(
@@ -91,6 +97,9 @@ def gather(
         labels=[read_json(path) for path in labels],
         injuries=[read_json(path) for path in injuries],
         terrain=list(terrain),
+        rows=list(rows),
+        rollouts=read_json(rollouts) if rollouts else {},
+        recognition=read_json(recognition) if recognition else {},
         published=read_yaml(PUBLISHED),
     )
 

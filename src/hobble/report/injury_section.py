@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from hobble.report import injury_cases as cases
 from hobble.report.charts import Chart, Family, Trace, axis, line
 from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
@@ -55,14 +56,19 @@ def section(material: Material) -> dict[str, Any]:
     return {
         "applies": True,
         "overview": overview(responses),
-        "curves": curves(rows) if rows else None,
+        "curves": curves(rows, injury.get("back") or ()) if rows else None,
+        "recognition": cases.recognition_chart(material.recognition),
+        "second": cases.second_chart(injury.get("second") or ()),
+        "second_table": cases.second_table(material.name, injury.get("second") or ()),
+        "divided": cases.divided_chart(injury.get("divided") or ()),
+        "into_a_jog": cases.jog_chart(injury.get("into_a_jog") or ()),
         "responses": response_table(material.name, responses),
         "rows": sweep_table(material.name, rows),
     }
 
 
-def curves(rows: Sequence[Mapping[str, Any]]) -> Family:
-    """A small chart for each measure over severity, for the gait and link chosen."""
+def curves(rows: Sequence[Mapping[str, Any]], back: Sequence[Mapping[str, Any]] = ()) -> Family:
+    """A small chart for each measure over severity, for a chosen gait and link; dotted: on the way back."""
     sweeps: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
         sweeps.setdefault(f"{row['link']}, {row['gait']}", []).append(row)
@@ -76,6 +82,12 @@ def curves(rows: Sequence[Mapping[str, Any]]) -> Family:
                 | {"marker": {"size": 5}}
                 for column, label, colour in lines
             ]
+            healing = [row for row in back if f"{row['link']}, {row['gait']}" == sweep]
+            for column, label, colour in lines if healing else ():
+                x, y = [row["severity"] for row in healing], [row.get(column) for row in healing]
+                traces.append(
+                    line(f"{label}, healing", x, y, colour, width=1.3, dash="dot", showlegend=False)
+                )
             options[sweep] = traces
         layout = {
             "xaxis": axis("severity", dtick=2, range=[-0.3, 10.3]),
@@ -105,7 +117,7 @@ def curves(rows: Sequence[Mapping[str, Any]]) -> Family:
         "Every point is a walk of its own, healthy for a quarter and measured over its last half. Look for "
         "lines that bend smoothly from left to right (a gradient), for left and right that part (a limp), "
         "and for jumps between neighbours (the network switches between two gaits it knows). Pose distances "
-        "are means over joints at the same phase.",
+        "are means over joints at the same phase. Dotted: on the way back to 0.",
         charts,
         "Link and gait",
     )
@@ -174,10 +186,13 @@ def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
     columns = [
         Column("gait"),
         Column("link"),
+        Column("in training", lambda v: "hurt" if v else "never hurt"),
         Column.number("pose at 10, cm"),
         Column.number("speed share"),
         Column.number("settles in, s"),
+        Column.number("heals in, s"),
         Column.number("left after healing, cm"),
+        Column.number("way back, cm"),
         Column.number("acceleration share"),
         Column.number("ρ pose"),
         Column.number("ρ speed"),
@@ -186,10 +201,13 @@ def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
         [
             r["gait"],
             r["link"],
+            r.get("trained", True),
             r.get("from_healthy_cm"),
             r.get("speed_share"),
             r.get("settle_seconds"),
+            r.get("heal_seconds"),
             r.get("after_healing_cm"),
+            r.get("way_back_cm"),
             r.get("acceleration_share"),
             (r.get("spearman") or {}).get("from_healthy"),
             (r.get("spearman") or {}).get("speed"),

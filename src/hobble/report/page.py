@@ -10,6 +10,7 @@ import yaml
 from hobble.report import (
     accuracy_section,
     cost_section,
+    coverage,
     data_section,
     findings,
     injury_section,
@@ -76,6 +77,7 @@ def render(
 def _sections(material: Material) -> dict[str, dict[str, Any]]:
     """Charts and tables by section; None where there is nothing to show."""
     accuracy, costs, data, training = accuracy_section, cost_section, data_section, training_section
+    found = coverage.counted(material.rows, material.splits)
     return {
         "training": {
             "curve": training.learning_curve(material),
@@ -85,6 +87,7 @@ def _sections(material: Material) -> dict[str, dict[str, Any]]:
         "accuracy": {
             "bars": accuracy.clip_bars(material),
             "boxes": accuracy.clip_boxes(material),
+            "rollouts": accuracy.rollout_chart(material),
             "table": accuracy.accuracy_table(material),
             "published": accuracy.beside_published(material),
         },
@@ -103,7 +106,9 @@ def _sections(material: Material) -> dict[str, dict[str, Any]]:
         "data": {
             "gaits": data.gait_chart(material),
             "speeds": data.speed_chart(material),
-            "hurt": data.injury_coverage(material),
+            "turns": coverage.turn_chart(found),
+            "both": coverage.both_chart(found),
+            "hurt": coverage.severity_chart(found),
             "clips": data.clip_table(material),
             "remarks": data.remarks_table(material),
         },

@@ -111,6 +111,7 @@ def _constants() -> dict[str, float]:
         "owedRate": trajectory.OWED_RATE,
         "owedWithin": trajectory.OWED_WITHIN,
         "mostOwed": trajectory.MOST_OWED,
+        "held": trajectory.HELD,
         "furthestTurn": float(trajectory.FURTHEST_TURN),
         "strafeFrom": float(animation.STRAFE_FROM),
         "turnInPlace": float(animation.TURN_IN_PLACE),

@@ -150,7 +150,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     for (let i = 0; i < 4; i++) c.contacts[i] = y[Y.contacts + i];
     for (let f = 0; f < 2; f++) placeFoot(f, ground);
   };
-  const update = (y) => {
+  const update = (y, wish) => {
     for (let i = 0; i < M; i++) {
       c.px[i] = c.px[i + 1];
       c.pz[i] = c.pz[i + 1];
@@ -160,8 +160,16 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     }
     const moving = max(0, 1 - c.gait[M * G]) ** .25, [vx, vz] = [y[Y.root_velocity], y[Y.root_velocity + 1]];
     let yaw = atan2(c.dx[M], c.dz[M]);
-    c.px[M] += moving * (vx * cos(yaw) + vz * sin(yaw));
-    c.pz[M] += moving * (vz * cos(yaw) - vx * sin(yaw));
+    // Half of a movement that nobody asked for is held back: against the wish, or where the figure turns on the spot.
+    let a = moving * (vx * cos(yaw) + vz * sin(yaw)), b = moving * (vz * cos(yaw) - vx * sin(yaw));
+    const held = spec.steering > 0 ? k.held : 0, squared = wish[0] ** 2 + wish[1] ** 2;
+    if (squared < k.still ** 2) [a, b] = [(1 - held) * a, (1 - held) * b];
+    else {
+      const against = held * min(0, a * wish[0] + b * wish[1]) / squared;
+      [a, b] = [a - against * wish[0], b - against * wish[1]];
+    }
+    c.px[M] += a;
+    c.pz[M] += b;
     yaw -= moving * y[Y.turn];
     const si = c.dx[M] = sin(yaw), co = c.dz[M] = cos(yaw);
     for (let i = M + 1; i < T; i++) {
@@ -229,7 +237,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     input();
     const y = predict(x, c.phase);
     output(y, ground);
-    update(y);
+    update(y, velocity);
   };
   return c;
 };

@@ -45,7 +45,7 @@ export let drawAll;
     const chosen = spec.options.length ? spec.options[drawn.get(element) || 0] : null;
     const config = {
       displaylogo: false, responsive: true, displayModeBar: narrow ? false : "hover",
-      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "sendChartToCloud", "sendDataToCloud"],
       toImageButtonOptions: { format: "svg", filename: spec.name },
     };
     const traces = resolve(chosen ? chosen.traces : spec.traces);

@@ -1,0 +1,127 @@
+"""What the network learns from, counted over the rows of the database: seconds of speed, turn, severity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.database.clip_rows import load_clip_rows
+from hobble.report.charts import Chart, Trace, axis
+
+FPS = 60.0
+SPEEDS = np.arange(0, 6.01, 0.2)  # metres a second
+TURNS = np.arange(-220, 221, 20.0)  # degrees a second, to the left positive
+LEVELS = np.arange(0.5, 11.0)  # edges of the severities 1 to 10
+SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
+
+
+def counted(paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str, Any]:
+    """Seconds over the rows in `database/clips/<clip>.npz`, each frame counted once.
+
+    `turns`: for each split, of each turn; `both`: of each turn and speed; `hurt`: link -> of each severity.
+    """
+    turns = {split: np.zeros(len(TURNS) - 1) for split, *_ in SPLITS}
+    both = np.zeros((len(TURNS) - 1, len(SPEEDS) - 1))
+    hurt: dict[str, Array] = {}
+    for path in paths:
+        rows = load_clip_rows(path)
+        once = np.unique(rows.frame, return_index=True)[1]
+        y, layout = np.asarray(rows.y[once], float), rows.layout
+        speed = np.linalg.norm(y[:, layout.y_root_velocity], axis=1) * FPS / 100
+        turn = np.degrees(-y[:, layout.y_turn][:, 0]) * FPS  # the column is the world's, seen from the root
+        speed, turn = (np.clip(v, e[0], e[-1] - 1e-6) for v, e in ((speed, SPEEDS), (turn, TURNS)))
+        turns[splits.get(rows.clip, "train")] += np.histogram(turn, TURNS)[0] / FPS
+        both += np.histogram2d(turn, speed, (TURNS, SPEEDS))[0] / FPS
+        for link, values in zip(
+            Skeleton.from_dict(rows.skeleton).link_names, rows.severity[once].T, strict=True
+        ):
+            if values.any():
+                found = np.histogram(values, LEVELS)[0] / FPS
+                hurt[link] = hurt.get(link, 0) + found
+    return {"turns": turns, "both": both, "hurt": hurt}
+
+
+def turn_chart(found: Mapping[str, Any]) -> Chart | None:
+    """Seconds at each turn."""
+    traces: list[Trace] = [
+        {
+            "type": "bar",
+            "name": label,
+            "x": _middles(TURNS),
+            "y": np.round(found["turns"][split], 3).tolist(),
+            "marker": {"color": colour},
+            "hovertemplate": "%{x}°/s: %{y:.1f} s<extra></extra>",
+        }
+        for split, label, colour in SPLITS
+        if found["turns"][split].any()
+    ]
+    if not traces:
+        return None
+    layout = {
+        "barmode": "stack",
+        "bargap": 0.08,
+        "xaxis": axis("degrees a second, to the left positive"),
+        "yaxis": axis("seconds", rangemode="tozero"),
+    }
+    caption = "Seconds at each turn of the figure. Both sides should be alike; mirrors make them so."
+    return Chart("turns", "How sharply it turns", caption, traces, layout, 300)
+
+
+def both_chart(found: Mapping[str, Any]) -> Chart | None:
+    """Seconds at each speed and turn together."""
+    both = found["both"]
+    if not both.any():
+        return None
+    last = int(np.flatnonzero(both.any(axis=0)).max()) + 1
+    trace = {
+        "type": "heatmap",
+        "x": _middles(SPEEDS)[:last],
+        "y": _middles(TURNS),
+        "z": [[v or None for v in row] for row in np.round(both[:, :last], 3).tolist()],
+        "colorscale": [[0, "@sunken"], [0.15, "@muted"], [1, "@accent"]],
+        "zmax": float(np.percentile(both[both > 0], 95)),
+        "zmin": 0,
+        "colorbar": {"title": {"text": "s"}, "thickness": 10, "outlinewidth": 0},
+        "hovertemplate": "%{x:.1f} m/s, %{y}°/s: %{z:.1f} s<extra></extra>",
+    }
+    layout = {"xaxis": axis("m/s"), "yaxis": axis("degrees a second", automargin=True)}
+    caption = (
+        "Seconds at each speed and turn together. Where nothing is coloured, the network has seen nothing."
+    )
+    return Chart("speed-turn", "Speed and turn together", caption, [trace], layout, 300)
+
+
+def severity_chart(found: Mapping[str, Any]) -> Chart | None:
+    """Seconds at each severity of each link."""
+    hurt: Mapping[str, Array] = found["hurt"]
+    if not hurt:
+        return None
+    links = list(hurt)[::-1]
+    trace = {
+        "type": "heatmap",
+        "x": list(range(1, 11)),
+        "y": links,
+        "z": [[round(float(v), 3) or None for v in hurt[link]] for link in links],
+        "colorscale": [[0, "@hurt-low"], [1, "@hurt-high"]],
+        "xgap": 3,
+        "ygap": 3,
+        "colorbar": {"title": {"text": "s"}, "thickness": 10, "outlinewidth": 0},
+        "hovertemplate": "%{y} at %{x}: %{z:.1f} s<extra></extra>",
+    }
+    layout = {"xaxis": axis("severity", dtick=1, range=[0.4, 10.6]), "yaxis": {"automargin": True}}
+    caption = (
+        "Seconds of rows at each severity of each link, mirrors counted. Where there is no cell the network "
+        "has seen nothing and can only interpolate."
+    )
+    return Chart(
+        "injury-coverage", "What is hurt, and how much", caption, [trace], layout, 120 + 24 * len(links)
+    )
+
+
+def _middles(edges: Array) -> list[float]:
+    return np.round((edges[:-1] + edges[1:]) / 2, 3).tolist()

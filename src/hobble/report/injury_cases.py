@@ -1,0 +1,164 @@
+"""More of the injury response: a second injury, a jog after a hurt walk, severities divided, what is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from hobble.report.charts import Chart, Trace, axis, line
+from hobble.report.tables import Column, Table
+
+COLOURS = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0")
+
+
+def recognition_chart(found: Mapping[str, Any]) -> Chart | None:
+    """Confusion tables of the classifier that names what hurts."""
+    if not found.get("applies"):
+        return None
+    generated, captured = found["generated"], found["captured"]
+    tables = {
+        "generated walks, each named once": generated.get("by_walk"),
+        "generated walks, window by window": generated,
+        "captured clips, each left out in turn": captured.get("cross_validated"),
+        "captured clips kept from training": captured.get("held_out"),
+    }
+    options: dict[str, list[Trace]] = {}
+    for label, table in tables.items():
+        if not table or not table.get("confusion"):
+            continue
+        confusion = table["confusion"]
+        named = list(dict.fromkeys(name for row in confusion.values() for name in row))
+        hurt = list(confusion)
+        share = [[confusion[h].get(n, 0) / max(1, sum(confusion[h].values())) for n in named] for h in hurt]
+        title = f"{label}: {100 * table['right']:.0f} % right" if table.get("right") is not None else label
+        options[title] = [
+            {
+                "type": "heatmap",
+                "x": named,
+                "y": hurt,
+                "z": [[v or None for v in row] for row in share],
+                "customdata": [[confusion[h].get(n, 0) for n in named] for h in hurt],
+                "colorscale": [[0, "@sunken"], [1, "@accent"]],
+                "zmin": 0,
+                "zmax": 1,
+                "xgap": 2,
+                "ygap": 2,
+                "showscale": False,
+                "hovertemplate": "%{y} hurts, %{x} is named: %{customdata} (%{z:.0%})<extra></extra>",
+            }
+        ]
+    if not options:
+        return None
+    classes = len(found.get("classes") or ())
+    people = found.get("people")
+    beside = (
+        f" People named the part right {100 * people:.0f} % of the time (Ferre et al.)." if people else ""
+    )
+    return Chart(
+        "recognition",
+        "Can one tell what hurts?",
+        "A classifier of the captured clips names the hurt part of walks. Down: what hurts; across: what was "
+        f"named; the diagonal is right. Guessing would be right {100 * (found.get('chance') or 0):.0f} % of "
+        f"the time.{beside}",
+        layout={
+            "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
+            "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
+        },
+        height=max(300, 190 + 20 * classes),
+        choose="Of",
+        options=options,
+    )
+
+
+def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
+    """What a second injury adds to a first one."""
+    options: dict[str, list[Trace]] = {}
+    for row in rows:
+        options.setdefault(f"{row['first']} at 7", [])
+    for first, traces in options.items():
+        some = [row for row in rows if f"{row['first']} at 7" == first]
+        for i, second in enumerate(dict.fromkeys(row["second"] for row in some)):
+            points = [(r["severity"], r.get("from_first_cm")) for r in some if r["second"] == second]
+            x, y = zip(*points, strict=True)
+            dash = "solid" if i < len(COLOURS) else "dot"
+            traces.append(line(second, x, y, COLOURS[i % len(COLOURS)], dash=dash, mode="lines+markers"))
+    if not options:
+        return None
+    return Chart(
+        "second-injury",
+        "A second injury over a first",
+        "How far the pose goes from that of the first injury alone as a second link hurts more and more. A "
+        "line that stays at 0 is a second injury that the first one hides.",
+        layout={
+            "xaxis": axis("severity of the second", dtick=2, range=[-0.3, 10.3]),
+            "yaxis": axis("cm a joint", rangemode="tozero"),
+        },
+        height=400,
+        choose="First",
+        options=options,
+    )
+
+
+def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+    """Every walk with two injuries, as in injury_second.csv."""
+    if not rows:
+        return None
+    keys = [key for key, value in rows[0].items() if not isinstance(value, (dict, list))]
+    columns = [
+        Column(k.replace("_", " ")) if isinstance(rows[0][k], str) else Column.number(k.replace("_", " "))
+        for k in keys
+    ]
+    table = [[row.get(k) for k in keys] for row in rows]
+    return Table(f"{name}-second-injury", columns, table, "Every walk with two injuries")
+
+
+def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
+    """What dividing severities does."""
+    options: dict[str, list[Trace]] = {}
+    scales = sorted({row["scale"] for row in rows})
+    for link in dict.fromkeys(row["link"] for row in rows):
+        traces = []
+        for scale, colour in zip(scales, COLOURS, strict=False):
+            some = [row for row in rows if row["link"] == link and row["scale"] == scale]
+            x, y = [row["severity"] for row in some], [row["from_healthy_cm"] for row in some]
+            traces.append(line(f"divided by {scale:g}", x, y, colour, mode="lines+markers"))
+        options[link] = traces
+    if not options:
+        return None
+    return Chart(
+        "divided",
+        "Severities divided",
+        "The same severities, divided by a scale before the network sees them: distance of the pose from the "
+        "healthy walk.",
+        layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm a joint", rangemode="tozero")},
+        choose="Link",
+        options=options,
+    )
+
+
+def jog_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
+    """How much of an injury is left when a walk becomes a jog."""
+    links = [link for link in dict.fromkeys(row["link"] for row in rows) if link is not None]
+    traces: list[Trace] = []
+    for link, colour in zip(links, _cycled(len(links)), strict=True):
+        some = [row for row in rows if row["link"] == link]
+        x, y = [row["severity"] for row in some], [row.get("jog_from_healthy_cm") for row in some]
+        traces.append(line(link, x, y, colour, mode="lines", width=1.4))
+    if not traces:
+        return None
+    return Chart(
+        "into-a-jog",
+        "From a hurt walk into a jog",
+        "How far the jog that follows is from the healthy jog. A line at 0 is an injury that is forgotten "
+        "when the figure begins to jog.",
+        traces,
+        {
+            "xaxis": axis("severity", dtick=2),
+            "yaxis": axis("cm a joint", rangemode="tozero"),
+            "showlegend": False,
+        },
+    )
+
+
+def _cycled(count: int) -> list[str]:
+    return [COLOURS[i % len(COLOURS)] for i in range(count)]
