@@ -39,9 +39,12 @@ def prediction(
     return y
 
 
-def move(y: np.ndarray, position, direction, gait, phase=None) -> np.ndarray:
+def move(
+    y: np.ndarray, position, direction, gait, phase=None, wish=(0.0, 1.0), held: float = 0.0
+) -> np.ndarray:
     phase = np.zeros(1) if phase is None else phase
-    trajectory.advance(y, trajectory.advance_columns(LAYOUT), position, direction, gait, phase)
+    columns = trajectory.advance_columns(LAYOUT)
+    trajectory.advance(y, columns, np.array([wish], float), held, position, direction, gait, phase)
     return phase
 
 
@@ -81,6 +84,22 @@ def test_a_standing_figure_is_held() -> None:
     np.testing.assert_allclose(position[0, MIDDLE], 0, atol=1e-12)
     np.testing.assert_allclose(direction[0, MIDDLE], [0, 1], atol=1e-12)
     assert phase[0] == pytest.approx(0.1 * 0.02)
+
+
+@pytest.mark.parametrize(
+    ("wish", "moved"),
+    [
+        ((0.0, 0.0), (0.375, 1.5)),  # nobody asked it to go anywhere
+        ((0.0, 3.0), (0.5, 2.0)),
+        ((2.0, 2.0), (0.5, 2.0)),
+        ((0.0, -3.0), (0.5, 1.5)),  # against the wish, but not across it
+        ((-1.0, 0.0), (0.375, 2.0)),
+    ],
+)
+def test_movement_that_nobody_asked_for_is_held_back(wish, moved) -> None:
+    position, direction, gait = path()
+    move(prediction(speed=2.0, side=0.5), position, direction, gait, wish=wish, held=0.25)
+    np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
 
 
 def test_a_wish_that_is_kept_changes_nothing() -> None:

@@ -95,7 +95,7 @@ class Controller:
         t4 = clock()
         self._output(ground)
         t5 = clock()
-        self._update()
+        self._update(wish_velocity)
         t6 = clock()
         self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
 
@@ -140,9 +140,10 @@ class Controller:
             self.pose_rotation,
         )  # fmt: skip
 
-    def _update(self) -> None:
+    def _update(self, velocity: Array) -> None:
         c = self.character
-        trajectory.advance(self.y, self._y_columns, c.position, c.direction, c.gait, c.phase)
+        held = trajectory.HELD if self.steering > 0 else 0.0
+        trajectory.advance(self.y, self._y_columns, velocity, held, c.position, c.direction, c.gait, c.phase)
 
 
 def _heights(ground: Ground, x: Array, z: Array) -> Array:

@@ -21,6 +21,7 @@ OWED_RATE = 0.01  # a frame, of what is missing: a second or two until it is mad
 OWED_WITHIN = 0.8  # share of the wish; who lacks more is still on the way to it
 MOST_OWED = 1.0  # share of the wish
 FURTHEST_TURN = np.radians(137)
+HELD = 0.5  # share of a movement that nobody asked for; all of it would drag the feet along
 STILL = 0.1  # cm a frame: a slower wish is a wish to stand
 
 
@@ -163,11 +164,15 @@ def prepare(
 
 
 @njit(cache=True)
-def advance(y: Any, at: Any, position: Any, direction: Any, gait: Any, phase: Any) -> None:
+def advance(
+    y: Any, at: Any, wish: Any, held: float, position: Any, direction: Any, gait: Any, phase: Any
+) -> None:
     """One frame on: shift the past, move and turn the root, take the predicted future, advance the phase.
 
     y: (C, outputs) prediction; at: columns of y (root velocity, turn, phase change, position, direction) and
-    the future samples and step. A standing figure is held: movement is scaled by (1 - stand)^.25.
+    the future samples and step. A standing figure is held: movement is scaled by (1 - stand)^.25. So is one
+    that goes where it should not: `held` is the share that it loses of its movement against the velocity
+    `wish` (C, 2), and of all of it where it is to turn on the spot; 0 is the original runtime.
     The predicted yaw velocity is that of the world seen from the root, so the root turns by its negative.
     """
     length = position.shape[1]
@@ -184,8 +189,15 @@ def advance(y: Any, at: Any, position: Any, direction: Any, gait: Any, phase: An
         yaw = np.arctan2(direction[c, middle, 0], direction[c, middle, 1])
         sin, cos = np.sin(yaw), np.cos(yaw)
         vx, vz = y[c, at[0]], y[c, at[0] + 1]
-        position[c, middle, 0] += moving * (vx * cos + vz * sin)
-        position[c, middle, 1] += moving * (vz * cos - vx * sin)
+        x, z = moving * (vx * cos + vz * sin), moving * (vz * cos - vx * sin)
+        speed = wish[c, 0] * wish[c, 0] + wish[c, 1] * wish[c, 1]
+        if speed < STILL * STILL:
+            x, z = (1.0 - held) * x, (1.0 - held) * z
+        else:
+            against = held * min(0.0, x * wish[c, 0] + z * wish[c, 1]) / speed
+            x, z = x - against * wish[c, 0], z - against * wish[c, 1]
+        position[c, middle, 0] += x
+        position[c, middle, 1] += z
         yaw -= moving * y[c, at[1]]
         sin, cos = np.sin(yaw), np.cos(yaw)
         direction[c, middle, 0], direction[c, middle, 1] = sin, cos
