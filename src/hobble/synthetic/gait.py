@@ -28,13 +28,13 @@ TABLE: dict[str, tuple[tuple[float, float], ...]] = {
     "behind": ((4, 0), (9.9, 5.5), (7.5, 3), (10, 5)),  # of an ankle behind the body in mid-stance
     "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # of an ankle from the path
     "toe_out": ((8, 0), (6, 0), (3, 0), (10, 0)),
-    "height": ((94.6, 0), (94.8, -1.0), (94.5, -0.8), (55, 0)),  # of the hips above the ground
+    "height": ((94.6, 0), (94.8, -1.0), (94.5, -0.8), (65, 0)),  # of the hips above the ground
     "bob": ((0, 0), (1.3, 1.2), (-2.0, 0.3), (0.8, 0)),  # + highest in mid-stance, - lowest
     "sway": ((1.6, 0), (2.2, -0.8), (0.8, 0), (2.5, 0)),
     "pelvis_yaw": ((0.3, 0), (9, 2), (6, 1), (5, 0)),
     "pelvis_list": ((1.0, 0), (6, 1), (4, 0), (3, 0)),
     "pelvis_tilt": ((3, 0), (7, 1), (6, 1), (34, 0)),
-    "lean": ((1, 0), (3, 2), (10, 2), (69, 0)),  # of the trunk, forward
+    "lean": ((1, 0), (3, 2), (10, 2), (79, 0)),  # of the trunk, forward
     "chest_yaw": ((0.3, 0), (4, 2), (9, 2), (4, 0)),
     "arm_swing": ((0.8, 0), (17, 12), (27, 4), (9, 0)),
     "arm_mean": ((1, 0), (-1, 0), (-8, 0), (14, 0)),  # + forward
@@ -54,6 +54,7 @@ SIDED: tuple[str, ...] = (
 )
 SIDED += ("arm_mean", "elbow", "elbow_swing", "abduction")
 LEFT, RIGHT = 0, 1
+SPIN = 0.6  # a quicker cadence, share of it at a radian a second and more
 SIGN = (1.0, -1.0)  # +X is the figure's left
 
 
@@ -150,6 +151,8 @@ def _directed(style: Style, path: Path) -> Style:
     forward, back, side = forward[:, None], back[:, None], side[:, None]
     stride = path.speed / style.frequency
     sideways = np.abs(path.velocity[:, 0]) / speed * moving
+    # Who turns on the spot steps around quickly, in steps of some 40 degrees.
+    spin = np.clip(np.abs(np.gradient(path.facing)) * path.fps, 0, 1) * np.clip(1 - path.speed / 60, 0, 1)
     return style.changed(
         land_pitch=style.land_pitch * forward - 16 * back - 8 * side,
         off_pitch=style.off_pitch * forward + 8 * back - 16 * side,
@@ -157,7 +160,7 @@ def _directed(style: Style, path: Path) -> Style:
         width=style.width + 0.25 * stride / (1 + 0.6 * sideways) * sideways,
         behind=4 + (style.behind - 4) * ahead,
         lift=style.lift + 3 * (back + side),
-        frequency=style.frequency * (1 + 0.6 * sideways + 0.15 * back[:, 0]),
+        frequency=style.frequency * (1 + 0.6 * sideways + 0.15 * back[:, 0] + SPIN * spin),
         lean=style.lean * (1 - 0.6 * back[:, 0]),
         pelvis_yaw=style.pelvis_yaw * ahead,
         arm_swing=style.arm_swing * (0.25 + 0.75 * forward),
