@@ -1,0 +1,115 @@
+"""Does the figure fall apart? The worst of minutes of walks, jogs, crouches, strafes, stops and turns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.evaluation.motion_measures import foot_slide, largest_turn
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.network import Network
+
+FPS = 60
+# speed in cm a frame, whether it looks elsewhere than it goes, gait
+KINDS: dict[str, tuple[float, bool, str]] = {
+    "walk": (2.5, False, "walk"),
+    "jog": (7.0, False, "jog"),
+    "crouch": (2.0, False, "crouch"),
+    "strafe": (2.2, True, "walk"),
+    "stop": (0.0, False, "walk"),
+    "turn": (0.0, True, "walk"),
+}
+LIMITS = {
+    "hips_lowest_cm": 60.0,
+    "hips_highest_cm": 110.0,
+    "largest_turn_degrees": 60.0,
+    "foot_slide_cm": 2.0,
+}
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """One thing asked for: velocity (2,) cm a frame, facing (2,) or None, gait, for `frames`."""
+
+    kind: str
+    velocity: Array
+    facing: Array | None
+    gait: str
+    frames: int
+
+
+def stretches(minutes: float, seed: int = 1) -> Iterator[Stretch]:
+    """Two to eight seconds of each kind in a random order, in random directions, `minutes` together."""
+    rng = np.random.default_rng(seed)
+    left = int(minutes * 60 * FPS)
+    while left > 0:
+        kind = str(rng.choice(list(KINDS)))
+        frames = min(left, int(rng.integers(2 * FPS, 8 * FPS)))
+        going, looking = rng.uniform(-np.pi, np.pi, 2)
+        speed, aside, gait = KINDS[kind]
+        facing = np.array([np.sin(looking), np.cos(looking)]) if aside else None
+        yield Stretch(kind, speed * np.array([np.sin(going), np.cos(going)]), facing, gait, frames)
+        left -= frames
+
+
+def stability(network: Network, minutes: float = 10.0, seed: int = 1, **options: Any) -> dict[str, Any]:
+    """The worst of `minutes` on flat ground, over all and by kind; options: of ProceduralAnimation.
+
+    `finite`; `hips_lowest_cm`, `hips_highest_cm` above the ground; `largest_turn_degrees` of a joint in a
+    frame, in the world; `foot_slide_cm` a step, mean, and `steps`; `stable`: whether all keeps within LIMITS.
+    """
+    animation = ProceduralAnimation(network, **options)
+    assert network.skeleton is not None
+    role = network.skeleton.role
+    toes = [role("left_toe"), role("right_toe")]
+    parts: dict[str, list[dict[str, Array]]] = {kind: [] for kind in KINDS}
+    last = None
+    for stretch in stretches(minutes, seed):
+        poses = [
+            animation.next_pose(stretch.velocity, stretch.facing, stretch.gait) for _ in range(stretch.frames)
+        ]
+        rotations = np.array([p.rotations for p in poses])
+        parts[stretch.kind].append(
+            {
+                "finite": np.array([np.isfinite(p.positions).all() for p in poses]),
+                "hips": np.array([p.positions[role("hips"), 1] - p.root[1] for p in poses]),
+                "turn": np.array(
+                    [largest_turn(rotations if last is None else np.concatenate([last, rotations]))]
+                ),
+                "slide": foot_slide(
+                    np.array([p.positions[toes] for p in poses]), np.array([p.contacts for p in poses])
+                ),
+            }
+        )
+        last = rotations[-1:]
+    worst = _worst([part for each in parts.values() for part in each])
+    return {
+        "minutes": minutes,
+        **worst,
+        "kinds": {kind: _worst(each) for kind, each in parts.items() if each},
+    }
+
+
+def _worst(parts: list[dict[str, Array]]) -> dict[str, Any]:
+    one = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    out: dict[str, Any] = {
+        "frames": len(one["hips"]),
+        "finite": bool(one["finite"].all() and np.isfinite(one["turn"]).all()),
+        "hips_lowest_cm": round(float(one["hips"].min()), 2),
+        "hips_highest_cm": round(float(one["hips"].max()), 2),
+        "largest_turn_degrees": round(float(one["turn"].max()), 2),
+        "foot_slide_cm": round(float(one["slide"].mean()), 3) if len(one["slide"]) else None,
+        "steps": len(one["slide"]),
+    }
+    out["stable"] = (
+        out["finite"]
+        and out["hips_lowest_cm"] >= LIMITS["hips_lowest_cm"]
+        and out["hips_highest_cm"] <= LIMITS["hips_highest_cm"]
+        and out["largest_turn_degrees"] <= LIMITS["largest_turn_degrees"]
+        and (out["foot_slide_cm"] or 0.0) < LIMITS["foot_slide_cm"]
+    )
+    return out
