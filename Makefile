@@ -3,7 +3,7 @@ PYTHON ?= python3
 CORES ?= 2
 BIN := .venv/bin
 
-.PHONY: help env report test cluster-test check format clean
+.PHONY: help env report test browser cluster-test check format clean
 
 help:            ## list these targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -20,11 +20,20 @@ env: .venv/.ready  ## the environment in .venv
 report: env      ## train the default configuration and make its report
 	$(BIN)/snakemake -c$(CORES) results/holden/report.html
 
-test: env        ## the whole test suite
+test: env browser  ## the whole test suite
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile
 
 cluster-test: env ## the test configuration through a SLURM of one node (root, Debian)
 	tests/cluster/run.sh
+
+# The tests that open the report need a browser. As root on Debian it is installed; elsewhere they say that they did not run.
+browser:         ## find or install the browser of the tests
+	@for name in chromium chromium-browser google-chrome; do command -v $$name >/dev/null && exit 0; done; \
+	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	  echo "installing chromium, for the tests that open the report"; \
+	  { apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends chromium; } >/dev/null 2>&1 && exit 0; \
+	fi; \
+	echo "no chromium here, and none could be installed: the tests that open the report will be skipped"
 
 check: env       ## lint, format and types
 	$(BIN)/ruff check .

@@ -95,3 +95,20 @@ def server() -> Iterator[Server]:
     http.shutdown()
     http.server_close()
     thread.join()
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say which tests of the report did not run for want of a browser, and where its pictures lie."""
+    skipped = terminalreporter.getreports("skipped")
+    missed = [report.nodeid for report in skipped if "the page was not opened" in str(report.longrepr)]
+    if missed:
+        terminalreporter.section(
+            f"{len(missed)} tests of the report did not run: no browser, or no npm packages"
+        )
+        for name in missed:
+            terminalreporter.write_line(name)
+    pictures = ROOT / "build" / "report-sections"
+    if pictures.is_dir() and any(
+        "tests/report" in str(r.nodeid) for r in terminalreporter.getreports("passed")
+    ):
+        terminalreporter.write_line(f"pictures of the report's sections: {pictures}")

@@ -165,7 +165,7 @@ def opened(page: str, folder: Path) -> Iterator[Browser]:
     if path is None:
         pytest.skip(f"no browser here ({', '.join(BROWSERS)}): the page was not opened in one")
     if "<script></script>" in page:
-        pytest.skip("the npm registry cannot be reached, so the page has no scripts: it was not opened")
+        pytest.skip("the npm registry cannot be reached, so the page has no scripts: the page was not opened")
     (folder / "report.html").write_text(page, encoding="utf-8")
     browser = Browser(path, folder / "profile")
     browser.open((folder / "report.html").as_uri())

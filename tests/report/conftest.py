@@ -47,6 +47,14 @@ def tools() -> ModuleType:
 
 
 @pytest.fixture(scope="session")
+def pictures(root: Path) -> Path:
+    """Where pictures of the page's sections are kept for a person to look at; not tracked."""
+    folder = root / "build" / "report-sections"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+@pytest.fixture(scope="session")
 def inputs(
     examples: ModuleType, holden31: Skeleton, tmp_path_factory: pytest.TempPathFactory
 ) -> dict[str, Any]:

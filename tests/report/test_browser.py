@@ -189,10 +189,14 @@ def test_says_nothing_and_asks_for_nothing(tab: Any) -> None:
     assert len([url for url in tab.requests if url.startswith("file:")]) == 1
 
 
-def test_sections_as_pictures(tab: Any, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """For a person to look at: one PNG a section, in the folder that pytest keeps."""
-    folder: Path = tmp_path_factory.getbasetemp() / "report-sections"
-    folder.mkdir(exist_ok=True)
-    for section in ("summary", "walking", "accuracy", "injury", "terrain"):
-        tab.picture(folder / f"{section}.png", f"#{section}")
-        assert (folder / f"{section}.png").stat().st_size > 5000
+def test_sections_as_pictures(tab: Any, pictures: Path) -> None:
+    """For a person to look at: one PNG a section, on a wide screen and on a phone, where `pictures` says."""
+    tab.run("Hobble.drawAll()")
+    for width, suffix in ((1280, ""), (390, "-phone")):
+        tab.size(width, 900)
+        for section in tab.run("[...document.querySelectorAll('main section')].map(({ id }) => id)"):
+            tab.run(f"document.getElementById('{section}').scrollIntoView({{ behavior: 'instant' }})")
+            tab.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+            tab.picture(pictures / f"{section}{suffix}.png", f"#{section}")
+            assert (pictures / f"{section}{suffix}.png").stat().st_size > 4000
+    tab.size(1280, 900)

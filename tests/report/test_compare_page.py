@@ -163,15 +163,13 @@ def test_another_configuration_is_chosen_and_linked_to(tab: Any) -> None:
     assert "of=ava%2Cava" in tab.run("location.hash")
 
 
-def test_charts_are_drawn_and_nothing_is_said_or_asked_for(tab: Any, tmp_path_factory: Any) -> None:
+def test_charts_are_drawn_and_nothing_is_said_or_asked_for(tab: Any, pictures: Path) -> None:
     tab.run("Hobble.drawAll()")
     undrawn = (
         "[...document.querySelectorAll('[data-chart]')].filter((e) => !e.querySelector('.main-svg')).length"
     )
     assert tab.run(undrawn) == 0
-    folder: Path = tmp_path_factory.getbasetemp() / "report-sections"
-    folder.mkdir(exist_ok=True)
     for section in ("summary", "play", "accuracy", "speed", "training", "costs", "published"):
-        tab.picture(folder / f"compare-{section}.png", f"#{section}")
+        tab.picture(pictures / f"compare-{section}.png", f"#{section}")
     assert tab.console == []
     assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in tab.requests)
