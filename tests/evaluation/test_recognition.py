@@ -15,7 +15,7 @@ from hobble.evaluation import recognition as module
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.discriminant import learn
 from hobble.evaluation.gait_features import features
-from hobble.evaluation.recognition import HEALTHY, recognition, rows, walking_windows
+from hobble.evaluation.recognition import HEALTHY, Window, recognition, rows, walking_windows
 
 RUNTIME = {
     "mode": "cubic",
@@ -81,9 +81,11 @@ def judged(network, motion, splits=SPLITS) -> dict[str, Any]:
 def test_two_clouds_are_told_apart_along_the_line_that_parts_them() -> None:
     """Fisher's direction is that of the inverse covariance times the difference of the means."""
     rng = np.random.default_rng(3)
-    spread = np.array([[2.0, 1.5], [1.5, 2.0]])
-    a = rng.multivariate_normal([0, 0], spread, 4000)
-    b = rng.multivariate_normal([1, -1], spread, 1000)
+    # That of both classes, which count the same however many there are of each.
+    one, other = np.array([[3.0, 1.5], [1.5, 1.0]]), np.array([[1.0, 0.5], [0.5, 3.0]])
+    spread = (one + other) / 2
+    a = rng.multivariate_normal([0, 0], one, 4000)
+    b = rng.multivariate_normal([1, -1], other, 1000)
     found = learn(np.concatenate([a, b]), ["a"] * 4000 + ["b"] * 1000)
     across = found.weights[:, 1] - found.weights[:, 0]
     expected = np.linalg.solve(spread, [1.0, -1.0])
@@ -154,14 +156,28 @@ def test_windows_are_of_one_hurt_walking_ahead(hurtable) -> None:
     assert walking_windows(replace(good, velocity=0.1 * good.velocity), hurtable) == []
     assert walking_windows(replace(good, gait=0 * good.gait), hurtable) == []
     severity = good.severity.copy()
-    severity[200:] = 0
+    severity[150:] = 0  # half way through the second part, in which no window is all of a kind
     healed = walking_windows(replace(good, severity=severity), hurtable)
-    assert [w.hurt for w in healed] == [KNEE] * 6 + [HEALTHY] * 6
+    assert [w.hurt for w in healed] == [KNEE] * 3 + [HEALTHY] * 6
     severity = good.severity.copy()
     severity[:, hurtable.links.index(ARM)] = 2
     both = walking_windows(replace(good, severity=severity), hurtable)
     assert {(w.hurt, w.severity) for w in both} == {(f"{KNEE} and {ARM}", 5.0)}
     assert module.WINDOW == 60
+
+
+def test_what_is_judged_was_not_learnt() -> None:
+    """Windows that nothing but their label tells apart are named by chance."""
+    rng = np.random.default_rng(6)
+    windows = [
+        Window("a", f"{n % 2}", 5.0, {f"{d}": float(v) for d, v in enumerate(rng.normal(size=60))}, n // 10)
+        for n in range(40)
+    ]
+    found = module._cross_validated(windows)
+    assert found["windows"] == 40
+    assert found["right"] < 0.8
+    leaked = learn(module.table(windows), [w.hurt for w in windows]).names(module.table(windows))
+    assert leaked == [w.hurt for w in windows]
 
 
 def test_what_cannot_be_tried_says_why(network, hurtable, motion) -> None:
