@@ -164,6 +164,8 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
     xt = catalogue.configuration("holden-xt")
     assert (xt.training.passes, xt.training.continues) == (40, "holden")
     assert xt.training.model_copy(update={"passes": 20, "continues": None}) == t
+    hurried = Catalogue(root / "config", {"training": "fast"}).configuration("holden-xt").training
+    assert hurried == catalogue.configuration("fast").training != t
     assert catalogue.configuration("ava-m").network_of == "ava"
     assert catalogue.configuration("injured").injury
     assert catalogue.dataset("synthetic").terrain.fits == 10
