@@ -71,14 +71,14 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[Inputs, np.nda
 def test_a_roll_out_is_what_the_runtime_does(hurtable: Network, ground: Any) -> None:
     """Fed what the runtime was asked, the joints and the phase go where they went there."""
     scale = hurtable.x_std.copy()  # one that feels its own velocities and its phase
-    scale[hurtable.layout.x_joint_velocity] = 0.2
+    scale[hurtable.layout.x_joint_velocity] = 1.0
     hurtable = replace(hurtable, x_std=scale, y_std=np.full_like(hurtable.y_std, 0.2))
     asked, local = recorded(hurtable, 80, ground)
     starts = np.array([1, 2, 17, 40, 79])
     made, phase = roll_out(Predictor(hurtable), asked, starts, 60)
     assert [len(place) for place in made] == [5] + [4] * 39 + [3] * 20
     for age, place in enumerate(made):
-        np.testing.assert_allclose(place, local[starts[: len(place)] + age], atol=0.01)
+        np.testing.assert_allclose(place, local[starts[: len(place)] + age], atol=1e-3)
     np.testing.assert_allclose(phase[:2], asked.phase[starts[:2] + 60], atol=1e-4)
     # The pose is its own: a start from another pose stays another for a while.
     other = Inputs(asked.x.copy(), *list(vars(asked).values())[1:])
