@@ -18,6 +18,7 @@ from hobble.runtime import Pose, ProceduralAnimation
 from hobble.runtime.axes import MATRICES, Axes
 from hobble.runtime.ground import Heightmap
 from hobble.runtime.network import load_network
+from hobble.runtime.waypoints import Waypoint
 
 KNEE = "LeftUpLeg-LeftLeg"
 
@@ -95,6 +96,26 @@ def test_the_pose_is_that_of_the_prediction(network) -> None:
     assert pose.rotations.shape == (31, 4)
 
 
+def test_no_joint_turns_faster_than_a_joint_can(steady) -> None:
+    """A prediction that jumps half a turn is followed at 25 degrees a frame, the shorter way round."""
+    character = ProceduralAnimation(steady)
+    evaluate, hand = character._predictor.evaluate, steady.skeleton.role("left_wrist")
+    first = steady.layout.y_joint_rotation.start + 3 * hand
+    angles = iter([10.0, 30.0, *[175.0] * 9, *[-175.0] * 3])
+
+    def jumping(z, phase, out) -> None:
+        evaluate(z, phase, out)
+        out[:, first : first + 3] = [0.0, 0.0, np.radians(next(angles)) / 2]
+
+    character._predictor.evaluate = jumping
+    seen = []
+    for _ in range(14):
+        q = character.next_pose((0, 1.5)).rotations[hand]
+        seen.append(np.degrees(2 * np.arctan2(q[3], q[0])) % 360)
+    expected = [10, 30, 55, 80, 105, 130, 155, 175, 175, 175, 175, 185, 185, 185]
+    np.testing.assert_allclose(seen, expected, atol=1e-3)
+
+
 def test_what_the_caller_does_to_a_pose_stays_with_the_caller(network) -> None:
     left, right = ProceduralAnimation(network), ProceduralAnimation(network)
     for _ in range(40):
@@ -157,8 +178,10 @@ def test_gaits(network) -> None:
     assert shares((0, 7.0)) == {"jog": 1}
     assert shares((0, 7.0), "crouch") == {"crouch": 1}
     assert shares((0, 2.5), np.array([0, 0.5, 0.5, 0, 0, 0])) == {"walk": 0.5, "jog": 0.5}
-    with pytest.raises(KeyError, match="no gait 'moonwalk': stand, walk, jog"):
+    with pytest.raises(KeyError, match=r"no gait 'moonwalk'; did you mean walk\?"):
         character.next_pose((0, 1), gait="moonwalk")
+    with pytest.raises(KeyError, match="no gait 'swim': there are stand, walk, jog"):
+        character.next_pose((0, 1), gait="swim")
 
 
 def test_gait_blends_slowly_into_the_future(network) -> None:
@@ -186,28 +209,77 @@ def test_severities_come_on_at_their_rate_and_are_scaled(hurtable) -> None:
 
 @pytest.mark.parametrize("injury", [{"LeftUpLeg-LeftLeg": 11}, {KNEE: -0.1}, {KNEE: np.nan}])
 def test_a_severity_out_of_range(hurtable, injury) -> None:
-    with pytest.raises(ValueError, match="from 0 to 10"):
+    with pytest.raises(ValueError, match=r"the severity of LeftUpLeg-LeftLeg is .* from 0 to 10"):
         ProceduralAnimation(hurtable).next_pose((0, 1), injury=injury)
 
 
 def test_wishes_that_make_no_sense(network) -> None:
     character = ProceduralAnimation(network, characters=2)
-    with pytest.raises(ValueError, match="not a finite vector"):
+    with pytest.raises(ValueError, match="target_velocity is not a finite vector"):
         character.next_pose((0, np.nan))
+    with pytest.raises(ValueError, match=r"facing is a vector of 2 or 3 .* each of 2, not of shape \(3, 2\)"):
+        character.next_pose((0, 1), np.ones((3, 2)))
+    with pytest.raises(ValueError, match=r"target_velocity is a vector .* not of shape \(4,\)"):
+        character.next_pose((0, 1, 2, 3))
+    with pytest.raises(ValueError, match=r"terrain gave heights of shape \(2,\) for 72 places"):
+        character.next_pose((0, 1), terrain=lambda x, z: np.zeros(2))
+    for shares in (np.ones(5), np.array([-1.0, 0, 0, 0, 0, 0]), np.ones((3, 6))):
+        with pytest.raises(ValueError, match=r"shares of gaits are \(6,\) or \(2, 6\) .* order: stand, walk"):
+            character.next_pose((0, 1), gait=shares)
     with pytest.raises(ValueError, match="heights that are not finite"):
         character.next_pose((0, 1), terrain=lambda x, z: x * np.nan)
     with pytest.raises(ValueError, match="1 gaits for 2 characters"):
         character.next_pose((0, 1), gait=["walk"])
-    for options in ({"characters": 0}, {"severity_rate": 0}, {"severity_scale": -1}):
-        with pytest.raises(ValueError, match="are positive"):
-            ProceduralAnimation(network, **options)
+    for name, value in (
+        ("characters", 0),
+        ("severity_rate", 0),
+        ("severity_scale", -1),
+        ("steering", np.nan),
+    ):
+        with pytest.raises(ValueError, match=f"{name} is {value!r}, but has to be"):
+            ProceduralAnimation(network, **{name: value})
+    with pytest.raises(KeyError, match=r"no gait 'jogging'; did you mean jog\?"):
+        ProceduralAnimation(network, waypoints=[Waypoint((0, 0), "walk", 2), Waypoint((9, 0), "jogging", 2)])
+
+
+def test_the_ground_may_be_one_height(network) -> None:
+    level, flat = ProceduralAnimation(network), ProceduralAnimation(network)
+    for _ in range(9):
+        a, b = level.next_pose((0, 2), terrain=lambda x, z: 30.0), flat.next_pose((0, 2))
+    np.testing.assert_allclose(a.positions - a.root, b.positions - b.root, atol=15)
+    assert a.root[1] == 30.0
+
+
+def test_a_facing_of_no_length_looks_where_it_goes(network) -> None:
+    crowd, one = ProceduralAnimation(network, characters=2), ProceduralAnimation(network)
+    for _ in range(20):
+        many = crowd.next_pose((1, 2), [(0, 0), (1, 0)])
+        single = one.next_pose((1, 2))
+    np.testing.assert_array_equal(many.positions[0], single.positions)
+    assert np.abs(many.positions[1] - single.positions).max() > 0.1
 
 
 def test_unknown_links_are_named(hurtable, network) -> None:
-    with pytest.raises(KeyError, match="no link 'Tail': Hips-LHipJoint, "):
+    with pytest.raises(KeyError, match=r"^no link 'Tail': there are Hips-LHipJoint, "):
         ProceduralAnimation(hurtable).next_pose((0, 1), injury={"Tail": 1})
-    with pytest.raises(KeyError, match="no severity inputs"):
+    with pytest.raises(KeyError, match=r"^no link 'LeftUpLeg-LeftFoot'; did you mean .*LeftUpLeg-LeftLeg"):
+        ProceduralAnimation(hurtable).next_pose((0, 1), injury={"LeftUpLeg-LeftFoot": 1})
+    with pytest.raises(ValueError, match="no severity inputs; train a configuration with `injury: true`"):
         ProceduralAnimation(network).next_pose((0, 1), injury={KNEE: 1})
+
+
+def test_severities_of_another_shape(hurtable, network) -> None:
+    crowd = ProceduralAnimation(hurtable, characters=3)
+    for injury in (np.ones((3, 30)), np.ones(30), {KNEE: [1, 2, 3]}, {KNEE: 4}, {}):
+        crowd.next_pose((0, 1), injury=injury)
+    with pytest.raises(
+        ValueError, match=r"severities are \(30,\) or \(3, 30\) numbers, not of shape \(29,\)"
+    ):
+        crowd.next_pose((0, 1), injury=np.ones(29))
+    with pytest.raises(ValueError, match=rf"{KNEE}: a severity, or 3, not of shape \(2,\)"):
+        crowd.next_pose((0, 1), injury={KNEE: [1, 2]})
+    with pytest.raises(ValueError, match="30 severities given, but this network has no severity inputs"):
+        ProceduralAnimation(network).next_pose((0, 1), injury=np.ones(30))
 
 
 def test_terrain_as_function_heightmap_and_array(network) -> None:

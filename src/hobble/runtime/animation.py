@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,21 @@ from hobble.runtime.waypoints import Follower, Waypoint
 
 JOG_FROM = 5.0  # cm a frame: between walking at 2.5 and jogging at 7.5
 TERRAIN_SIDE = 25.0  # centimetres from the path to the side heights, where a network does not tell
+BLIND = "this network has no severity inputs; train a configuration with `injury: true`"
 TURN_IN_PLACE = np.radians(20)  # a standing figure steps around to face what is further aside than this
+
+
+class UnknownName(KeyError):
+    """A link or a gait that the network does not have; the text names those that are nearest."""
+
+    def __init__(self, what: str, name: object, known: Iterable[str]) -> None:
+        names = list(known)
+        near = difflib.get_close_matches(str(name), names, 3, 0.5)
+        hint = f"; did you mean {' or '.join(near)}?" if near else f": there are {', '.join(names)}"
+        super().__init__(f"no {what} {name!r}{hint}")
+
+    def __str__(self) -> str:
+        return str(self.args[0])
 
 
 @dataclass(frozen=True)
@@ -71,10 +86,15 @@ class ProceduralAnimation:
     ) -> None:
         if network.skeleton is None:
             raise ValueError("the network carries no skeleton: load it with skeleton=")
-        if characters < 1 or severity_rate <= 0 or severity_scale <= 0 or steering < 0:
-            raise ValueError(
-                "characters, severity_rate and severity_scale are positive, steering not negative"
-            )
+        for name, value, least in (
+            ("characters", characters, 1),
+            ("severity_rate", severity_rate, 1e-9),
+            ("severity_scale", severity_scale, 1e-9),
+            ("steering", steering, 0),
+        ):
+            if not least <= value < np.inf:
+                bound = f"{least} or more" if least in (0, 1) else "more than 0"
+                raise ValueError(f"{name} is {value!r}, but has to be {bound}")
         self.network, self.skeleton = network, network.skeleton
         self.characters, self.axes = characters, axes or Axes()
         self.severity_scale = severity_scale
@@ -85,28 +105,33 @@ class ProceduralAnimation:
             "side": float(network.meta.get("terrain_side", TERRAIN_SIDE)),
         }
         self._predictor = Predictor(network, mode, storage)
-        self._waypoints = waypoints
+        self._waypoints = list(waypoints) if waypoints is not None else None
         self._links = {name: i for i, name in enumerate(network.links)}
         self._gaits = {name: i for i, name in enumerate(network.gaits)}
+        for waypoint in self._waypoints or ():
+            self._known_gait(waypoint.gait)
         self._terrain: tuple[Any, Any] = (None, None)
         self.reset(position, facing)
 
     @classmethod
     def load(
-        cls, path: str | Path, *, skeleton: Skeleton | None = None, **options: Any
+        cls, path: str | Path, *, skeleton: Skeleton | str | Path | None = None, **options: Any
     ) -> ProceduralAnimation:
         """From weights.npz, a folder that holds it, or a folder of the original release's .bin files.
 
-        skeleton: where the file carries none. mode: "constant", "linear" or "cubic". storage: "float32" or
-        "int16". characters: how many. waypoints: a track to follow when `next_pose` is given no velocity.
-        severity_rate: largest change of a severity in a second; severity_scale: severities are divided by
-        this. foot_locking: hold feet in contact where they landed. steering: how hard a velocity that is not
-        reached is asked for, 0 as the original. axes: the caller's convention. position, facing: as of
-        `reset`. Raises InputError where the file is not a network that fits.
+        skeleton: where the file carries none; it, or a file of config/skeletons. mode: "constant", "linear"
+        or "cubic". storage: "float32" or "int16". characters: how many. waypoints: a track to follow when
+        `next_pose` is given no velocity. severity_rate: largest change of a severity in a second;
+        severity_scale: severities are divided by this. foot_locking: hold feet in contact where they landed.
+        steering: how hard a velocity that is not reached is asked for, 0 as the original. axes: the caller's
+        convention. position, facing: as of `reset`.
+        Raises InputError where the file is not a network that fits, ValueError for an option out of range,
+        UnknownName for a gait that the network does not have.
         """
         network = load_network(path, skeleton)
         if network.skeleton is None:
-            raise InputError(path, "carries no skeleton", fix="Pass skeleton=, with as many joints.")
+            fix = f"Pass skeleton=, one of {network.layout.joints} joints: a file of config/skeletons, say."
+            raise InputError(path, "carries no skeleton", fix=fix)
         return cls(network, **options)
 
     def reset(self, position: Any = None, facing: Any = None) -> None:
@@ -121,12 +146,12 @@ class ProceduralAnimation:
         places = (
             np.broadcast_to(place, (count, 2))
             if position is None
-            else self._level(position, self.axes.points_in)
+            else self._level("position", position, self.axes.points_in)
         )
         if facing is None:
             yaws = np.full(count, yaw)
         else:
-            ahead = self._level(facing, self.axes.directions_in)
+            ahead = self._level("facing", facing, self.axes.directions_in)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
         self.state: Character = standing(self.network, count, np.array(places, float), yaws)
         self._controller = Controller(self._predictor, self.state, **self._of_controller)
@@ -147,31 +172,32 @@ class ProceduralAnimation:
     ) -> Pose:
         """One 60 Hz frame on.
 
-        target_velocity: (2,) on the ground or (3,), or (C, 2 or 3), per frame; None follows the waypoints or
-        stands. facing: direction to look in, likewise; None looks where it goes. gait: a name ("walk"), one
-        for each, shares (C, 6), or None to choose by speed; below 0.1 cm a frame the figure stands, whatever
-        the gait. injury: link -> severity 0..10 (or (C,) severities), or (L,) or (C, L); links not named
-        heal; None leaves all as they were. terrain: None for flat at zero, a function of two ground
-        coordinates (arrays) to heights, a `ground.Heightmap` or a 2D array.
-        Raises KeyError for a link or gait that the network does not have, ValueError for a severity out of
-        range, or vectors or heights that are not finite.
+        target_velocity: (2,) on the ground or (3,), or (C, 2 or 3), how far to go in this frame (at 60 Hz, in
+        your unit); None follows the waypoints or stands. facing: direction to look in, likewise, of any
+        length; None or zero looks where it goes. gait: a name ("walk"), one for each, shares (6,) or (C, 6),
+        or None to choose by speed; below 0.1 cm a frame the figure stands, whatever the gait. injury: link
+        -> severity 0..10 (or (C,) severities), or (L,) or (C, L); links not named heal; None leaves all as
+        they were. terrain: None for flat at zero, a function of two ground coordinates (arrays) to heights, a
+        `ground.Heightmap` or a 2D array; give the same object every frame.
+        Raises UnknownName (a KeyError) for a link or gait that the network does not have, ValueError for
+        severities out of range and for what is not finite or of another shape.
         """
         velocity, ahead, gait = self._wish(target_velocity, facing, gait)
         strafe, direction = self._facing(velocity, ahead)
-        if injury is not None:
-            self.state.severity_target[:] = self._severities(injury)
+        shares = self._gait(velocity, direction, gait)
         if terrain is not self._terrain[0]:
             self._terrain = (terrain, as_ground(terrain, self.axes))
-        shares = self._gait(velocity, direction, gait)
+        if injury is not None:
+            self.state.severity_target[:] = self._severities(injury)
         self._controller.frame(velocity, direction, strafe, shares, self._terrain[1])
         return self._pose()
 
     def _wish(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array | None, Any]:
         if velocity is not None:
-            ahead = None if facing is None else self._level(facing, self.axes.directions_in)
-            return self._level(velocity, self.axes.points_in), ahead, gait
+            ahead = None if facing is None else self._level("facing", facing, self.axes.directions_in)
+            return self._level("target_velocity", velocity, self.axes.points_in), ahead, gait
         if self.follower is None:
-            ahead = None if facing is None else self._level(facing, self.axes.directions_in)
+            ahead = None if facing is None else self._level("facing", facing, self.axes.directions_in)
             return np.zeros((self.characters, 2)), ahead, gait
         middle = self.network.layout.window
         wish, heading = self.follower.lead(self.state.position[:, middle])
@@ -181,11 +207,18 @@ class ProceduralAnimation:
                 ahead[c] = waypoint.facing
         return wish, ahead, [w.gait for w in heading] if gait is None else gait
 
-    def _level(self, vector: Any, convert: Any) -> Array:
+    def _level(self, what: str, vector: Any, convert: Any) -> Array:
         """The caller's vectors as our x, z (C, 2); two components are those on the ground."""
         v = np.asarray(vector, float)
+        if (
+            v.shape[-1:] not in ((2,), (3,))
+            or v.ndim > 2
+            or v.shape[:-1] not in ((), (1,), (self.characters,))
+        ):
+            each = f", or one for each of {self.characters}" if self.characters > 1 else ""
+            raise ValueError(f"{what} is a vector of 2 or 3 components{each}, not of shape {v.shape}")
         if not np.isfinite(v).all():
-            raise ValueError(f"not a finite vector: {vector}")
+            raise ValueError(f"{what} is not a finite vector: {vector}")
         if v.shape[-1] == 2:
             if self.axes.native:
                 return np.array(np.broadcast_to(v, (self.characters, 2)), order="C")
@@ -203,13 +236,23 @@ class ProceduralAnimation:
             return np.zeros(self.characters), np.where(going[:, None], velocity, self.state.target_direction)
         angle = np.arctan2(velocity[:, 0], velocity[:, 1]) - np.arctan2(ahead[:, 0], ahead[:, 1])
         aside = np.abs(np.mod(angle + np.pi, 2 * np.pi) - np.pi)
-        return np.where(going, np.minimum(1.0, aside / STRAFE_FROM), 1.0), ahead
+        strafe = np.where(going, np.minimum(1.0, aside / STRAFE_FROM), 1.0)
+        nowhere = (ahead == 0).all(axis=1)
+        if nowhere.any():
+            _, where = self._facing(velocity, None)
+            strafe, ahead = np.where(nowhere, 0.0, strafe), np.where(nowhere[:, None], where, ahead)
+        return strafe, ahead
 
     def _gait(self, velocity: Array, direction: Array, gait: Any) -> Array:
         """Shares (C, 6) of each gait that the wish amounts to."""
         shares = self._wish_gait
         speed = np.hypot(velocity[:, 0], velocity[:, 1])
         if isinstance(gait, np.ndarray) and gait.dtype.kind == "f":
+            if gait.shape not in (shares.shape, shares.shape[1:]) or not (gait >= 0).all():
+                raise ValueError(
+                    f"shares of gaits are {shares.shape[1:]} or {shares.shape} numbers of 0 or more, not "
+                    f"{gait.tolist()}; their order: {', '.join(self._gaits)}"
+                )
             shares[:] = gait
             return shares
         names = [gait] * self.characters if gait is None or isinstance(gait, str) else gait
@@ -219,8 +262,7 @@ class ProceduralAnimation:
         for c, name in enumerate(names):
             if name is None:
                 name = "jog" if speed[c] >= JOG_FROM else "walk"
-            if name not in self._gaits:
-                raise KeyError(f"no gait {name!r}: {', '.join(self._gaits)}")
+            self._known_gait(name)
             if speed[c] < STILL:
                 shares[c, self._gaits["stand"]] = 1.0 - self._turning(c, direction[c])
                 shares[c, self._gaits["walk"]] = 1.0 - shares[c, self._gaits["stand"]]
@@ -229,6 +271,10 @@ class ProceduralAnimation:
             shares[c, self._gaits[name]] = 1.0
         return shares
 
+    def _known_gait(self, name: Any) -> None:
+        if name not in self._gaits:
+            raise UnknownName("gait", name, self._gaits)
+
     def _turning(self, c: int, direction: Array) -> float:
         """1 where a standing figure has to step around to face `direction`, else 0."""
         x, z = self.state.direction[c, self.network.layout.window]
@@ -236,18 +282,29 @@ class ProceduralAnimation:
         return float(abs(angle) > TURN_IN_PLACE)
 
     def _severities(self, injury: Any) -> Array:
-        values: Array
+        shape = (self.characters, len(self._links))
+        values = np.zeros(shape)
         if isinstance(injury, Mapping):
-            values = np.zeros((self.characters, len(self._links)))
             for name, value in injury.items():
+                if not self._links:
+                    raise ValueError(f"{name} cannot be hurt: {BLIND}")
                 if name not in self._links:
-                    known = ", ".join(self._links) or "none: this network has no severity inputs"
-                    raise KeyError(f"no link {name!r}: {known}")
+                    raise UnknownName("link", name, self._links)
+                if np.shape(value) not in ((), (1,), shape[:1]):
+                    raise ValueError(f"{name}: a severity, or {shape[0]}, not of shape {np.shape(value)}")
                 values[:, self._links[name]] = value
         else:
-            values = np.array(np.broadcast_to(injury, (self.characters, len(self._links))), float)
-        if not np.all((values >= 0) & (values <= 10)):
-            raise ValueError("a severity is a number from 0 to 10")
+            given = np.asarray(injury, float)
+            if not self._links and given.size:
+                raise ValueError(f"{given.size} severities given, but {BLIND}")
+            if given.shape not in (shape, shape[1:]):
+                raise ValueError(f"severities are {shape[1:]} or {shape} numbers, not of shape {given.shape}")
+            values[:] = given
+        wrong = ~((values >= 0) & (values <= 10))
+        if wrong.any():
+            c, k = np.argwhere(wrong)[0]
+            name, value = self.network.links[k], values[c, k]
+            raise ValueError(f"the severity of {name} is {value:g}, but it is a number from 0 to 10")
         return values / self.severity_scale
 
     def _pose(self) -> Pose:

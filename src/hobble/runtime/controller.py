@@ -150,9 +150,11 @@ def _heights(ground: Ground, x: Array, z: Array) -> Array:
     """The caller's ground at x, z (N,); raises ValueError where it is not finite, which would stay in the
     state."""
     heights = np.asarray(ground(x, z), float)
+    if heights.shape not in ((), x.shape):
+        raise ValueError(f"the terrain gave heights of shape {heights.shape} for {x.size} places")
     if not np.isfinite(heights).all():
         raise ValueError("the terrain has heights that are not finite")
-    return heights
+    return np.broadcast_to(heights, x.shape)
 
 
 @njit(cache=True)
