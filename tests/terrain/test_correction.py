@@ -48,17 +48,17 @@ def test_a_point_that_counts_m_times_is_m_points_at_one_place() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000))
-def test_large_residuals_are_met_in_turns_and_small_ones_left_as_in_the_original(seed: int) -> None:
+def test_large_residuals_are_met_and_small_ones_left_as_in_the_original(seed: int) -> None:
     """As under feet beside a beam: half a metre apart, and closer together than the smoothing likes."""
     rng = np.random.default_rng(seed)
     place = rng.uniform(-60, 60, (40, 2))
     at = Stances(place, np.zeros(40), rng.integers(1, 9, 40).astype(float))
     residual = np.stack([rng.normal(0, 0.1, 40), rng.choice([0.0, 50.0], 40)])
-    once, turns = bends(at, residual, 0.1), bends(at, residual, 0.1, 0.5)
-    left = [np.abs(r - s.at(place)) @ at.count / at.count.sum() for r, s in zip(residual, turns, strict=True)]
+    once, met = bends(at, residual, 0.1), bends(at, residual, 0.1, 0.5)
+    left = [np.abs(r - s.at(place)) @ at.count / at.count.sum() for r, s in zip(residual, met, strict=True)]
     assert max(left) <= 0.5 + 1e-9
     assert np.abs(residual[1] - once[1].at(place)) @ at.count / at.count.sum() > 0.5
-    assert np.array_equal(once[0].weights, turns[0].weights)
+    assert np.array_equal(once[0].weights, met[0].weights)
 
 
 def test_points_that_are_all_at_one_place_bend_nothing() -> None:

@@ -14,7 +14,7 @@ from hobble.core.quat import Array
 from hobble.terrain.feet import Mask
 
 STEEPNESS = 2.0  # cm of height per cm: the walls of what is dug out
-MOST_TURNS = 50  # in which what a surface leaves is taken up
+LESS_SMOOTH = 8  # times, by a quarter each, a surface is made anew that leaves too much
 
 
 @dataclass(frozen=True)
@@ -76,38 +76,32 @@ class Bend:
         return distance_sum(*_columns(points), *_columns(self.places), self.weights / self.spread)
 
 
-def bends(points: Stances, residual: Array, smoothing: float, most: float | None = None) -> list[Bend]:
+def bends(
+    points: Stances, residual: Array, smoothing: float, most: float | None = None, standing: int | None = None
+) -> list[Bend]:
     """The surfaces through each row of `residual` (K, N) at N points, regularised by `smoothing`.
 
     A point that counts m times has a diagonal of smoothing / m, and weighs m in the mean distance: that is
-    exactly what m points at one place come to. most: if more than this is left at the points on average (cm),
-    what is left gets a surface too, and so on, as under feet that stand half a metre beside a beam.
+    exactly what m points at one place come to. most: a surface that leaves more than this at the points on
+    average (cm), as under feet that stand half a metre beside a beam, is smoothed less. standing: only the
+    first so many points are looked at for that.
     """
     apart = distances(points.place, points.place)
     spread = float(points.count @ apart @ points.count / points.count.sum() ** 2)
     if spread < 1e-6:
         return [Bend(points.place[:1], np.zeros(1), 1.0)] * len(residual)
-    matrix = apart / spread - np.diag(smoothing / points.count)
-    weights = np.linalg.solve(matrix, residual.T).T
-    if most is not None:
-        weights += _repeated(matrix, weights, smoothing / points.count, points.count, most)
-    return [Bend(points.place, w, spread) for w in weights]
-
-
-def _repeated(matrix: Array, weights: Array, diagonal: Array, count: Array, most: float) -> Array:
-    """What to add to the weights (K, N) of surfaces that leave more than `most` at their points.
-
-    What a surface leaves is its weights times what smoothing took off the matrix's diagonal; each turn leaves
-    less.
-    """
-    more, left = np.zeros_like(weights), -diagonal * weights
-    for _ in range(MOST_TURNS):
-        left[np.abs(left) @ count / count.sum() <= most] = 0
-        if not left.any():
+    diagonal = smoothing / points.count
+    weights = np.linalg.solve(apart / spread - np.diag(diagonal), residual.T).T
+    share = points.count[:standing] / points.count[:standing].sum()
+    rough = np.arange(len(residual)) if most is not None else np.zeros(0, int)
+    for _ in range(LESS_SMOOTH):
+        left = np.abs(weights[rough] * diagonal)[:, :standing] @ share  # at the points, of the residual
+        rough = rough[left > (most or 0.0)]
+        if not len(rough):
             break
-        again = np.linalg.solve(matrix, left.T).T
-        more, left = more + again, -diagonal * again
-    return more
+        diagonal = diagonal / 4
+        weights[rough] = np.linalg.solve(apart / spread - np.diag(diagonal), residual[rough].T).T
+    return [Bend(points.place, w, spread) for w in weights]
 
 
 @dataclass(frozen=True)

@@ -109,8 +109,8 @@ def flat_ground(
 
 
 def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None) -> Ground:
-    """Add the surface of what is left between the ground and the feet in contact, in as many turns as it
-    takes to leave no more than half of `deepest` on average.
+    """Add the surface of what is left between the ground and the feet in contact, as smooth as leaves no more
+    than half of `deepest` on average.
 
     Feet that are then below the ground (by more than half of `deepest`) join those points, and the surface is
     made again; where it still covers a foot by more than `deepest` it is dug out.
@@ -142,7 +142,7 @@ def _joined(
     """The surface of fit k through the feet in contact and through those that it covered."""
     points = together(standing, covered)
     residual = points.height - plain.at(points.place)[k]
-    return bends(points, residual[None], smoothing, most)[0]
+    return bends(points, residual[None], smoothing, most, len(standing.count))[0]
 
 
 def beside_path(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:
