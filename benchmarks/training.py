@@ -11,6 +11,8 @@ floor is the time that the products alone take, at their own best, with the same
 - PyTorch, float32: `hobble.training.step.Step`, the way that other devices take;
 - fused, float32: `hobble.training.fused.FusedStep`, the default below batch 256;
 - fused, bfloat16: the same with factors rounded to bfloat16, the default from there on.
+
+`training_cuda.py` measures a GPU.
 """
 
 from __future__ import annotations
@@ -85,19 +87,20 @@ def by_hand(kind: type[Step], half: bool, sizes: tuple[int, ...]) -> Callable[[B
     return go
 
 
-def products(half: bool, sizes: tuple[int, ...]) -> Callable[[Batch], None]:
+def products(
+    half: bool, sizes: tuple[int, ...], device: torch.device | str = "cpu"
+) -> Callable[[Batch], None]:
     """Nothing but a step's products: outputs, gradients of weights and of all inputs but the first."""
     dtype = torch.bfloat16 if half else torch.float32
-    weights = [torch.randn(out, POINTS * (size + 1)).to(dtype) for size, out in pairwise(sizes)]
+    like = {"dtype": dtype, "device": device}
+    weights = [torch.randn(out, POINTS * (size + 1), **like) for size, out in pairwise(sizes)]
     inputs: dict[int, list[tuple[Tensor, Tensor]]] = {}
 
     def go(batch: Batch) -> None:
         rows = len(batch[0])
         if rows not in inputs:
             shapes = [weight.shape for weight in weights]
-            inputs[rows] = [
-                (torch.randn(rows, i).to(dtype), torch.randn(rows, o).to(dtype)) for o, i in shapes
-            ]
+            inputs[rows] = [(torch.randn(rows, i, **like), torch.randn(rows, o, **like)) for o, i in shapes]
         for number, ((e, d), weight) in enumerate(zip(inputs[rows], weights, strict=True)):
             product(e, weight)
             product(d.T, e.T)
