@@ -100,6 +100,19 @@ def test_limps_and_rough_ground_lose_no_step(shared: Path, read, options, name):
 
 
 @pytest.mark.shared
+@pytest.mark.parametrize(
+    ("name", "gait"),
+    [("07_12", WALK), ("08_08", WALK), ("105_03", WALK), ("105_17", WALK), ("02_03", JOG), ("09_04", JOG)],
+)
+def test_a_brisk_walk_is_a_walk_and_a_run_a_jog_though_nobody_says_so(shared, read, options, name, gait):
+    clip, motion = read(shared / "mocap/cmu" / f"{name}.bvh")
+    labels, _ = label_clip(clip, [], motion, None, "rocky", options)
+    found = np.bincount(labels.gait.argmax(axis=1), minlength=6)
+    assert found[WALK + JOG - gait] == 0
+    assert found[gait] > 0.5 * len(clip)
+
+
+@pytest.mark.shared
 def test_the_original_s_rows_come_out(shared: Path, read, options):
     """Cycles, phase, phase change, contacts and gaits of the original generator, exactly."""
     rows = np.load(shared / "reference/original_rows_LocomotionFlat09_000.npz")

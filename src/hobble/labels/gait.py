@@ -17,8 +17,9 @@ GRAVITY = 981.0 / 3600.0
 
 # Each is where the evidence for a gait outweighs that for walking; set once on the labelled clips.
 STANDING_SPEED = 0.15
-JOG_BOUNCE = 0.22
+JOG_BOUNCE = 0.24
 JOG_FLIGHT = 0.35
+JOG_SPEED = 3.2
 CROUCHED_HEAD = 0.8
 CROUCHED_HIPS = 0.85
 SAID = 0.3
@@ -57,7 +58,8 @@ def _evidence(clip: Clip, swings: list[Swing], dominant: str | None) -> Array:
     frames = len(clip)
     speed, bounce = _speed_and_bounce(clip)
     flight = gaussian(feet_up(swings, frames).all(axis=1).astype(float), 15.0)
-    jog = bounce / JOG_BOUNCE + flight / JOG_FLIGHT + 0.15 * np.clip(speed - 2.0, -1.0, 2.0) - 2.0
+    fast = 0.5 * np.clip(speed - JOG_SPEED, -1.0, 2.0)
+    jog = bounce / JOG_BOUNCE + flight / JOG_FLIGHT + fast - 2.0
     jog += {"jog": SAID, "walk": -SAID}.get(dominant or "", 0.0)
     stand = np.clip((STANDING_SPEED - speed) / 0.15, -1.0, 1.0)
     head, hips = _relative_heights(clip)
@@ -70,7 +72,8 @@ def _speed_and_bounce(clip: Clip) -> tuple[Array, Array]:
     """(F,) speed of the hips along the ground, cm a frame, and root mean square of their vertical
     acceleration, g.
 
-    Jogging bounces the hips by a third of a gravity and more, on the spot too; walking by a quarter and less.
+    Jogging bounces the hips by a third of a gravity and more, on the spot too; walking by a quarter and less, but
+    for turns and brisk walks, which speed tells from a jog.
     """
     if len(clip) < 3:
         return np.zeros(len(clip)), np.zeros(len(clip))
