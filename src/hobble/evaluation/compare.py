@@ -82,17 +82,18 @@ def time_differences(all_measured: Sequence[Measured]) -> list[dict[str, Any]]:
 def fits(all_measured: Sequence[Measured], published: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Lines of milliseconds a frame over computations: of ours for each mode and step, and as published.
 
-    `computations` says which of the counts; slope in milliseconds per computation. Configurations that read
-    another's network, and those of one size, are points like any other.
+    `computations` says which of the counts, `step` what of a frame: the mean of `total`, as published, or of
+    `predict`, or the `median` of the total, which a busy machine moves least. Slope in milliseconds per
+    computation. Configurations that read another's network, and those of one size, are points like any other.
     """
     out = []
     entries = [(m, entry) for m in all_measured for entry in by_mode(m)]
     modes = list(dict.fromkeys(entry["mode"] for _, entry in entries))
     for counts in COUNTS:
         for mode in modes:
-            for step in ("total", "predict"):
+            for step in ("total", "predict", "median"):
                 points = [
-                    (m.responsivity["parameters"][counts], entry["milliseconds"][step])
+                    (m.responsivity["parameters"][counts], _time(entry["milliseconds"], step))
                     for m, entry in entries
                     if entry["mode"] == mode
                 ]
@@ -106,6 +107,10 @@ def fits(all_measured: Sequence[Measured], published: Mapping[str, Any]) -> list
         ]
         out.append(_fit("published", None, "total", counts, points))
     return out
+
+
+def _time(milliseconds: Mapping[str, Any], step: str) -> float:
+    return (milliseconds["spread"] if step == "median" else milliseconds)[step]
 
 
 def _fit(
