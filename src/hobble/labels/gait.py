@@ -72,8 +72,8 @@ def _speed_and_bounce(clip: Clip) -> tuple[Array, Array]:
     """(F,) speed of the hips along the ground, cm a frame, and root mean square of their vertical
     acceleration, g.
 
-    Jogging bounces the hips by a third of a gravity and more, on the spot too; walking by a quarter and less, but
-    for turns and brisk walks, which speed tells from a jog.
+    Jogging bounces the hips by a third of a gravity and more, on the spot too; walking by a quarter and less,
+    but for turns and brisk walks, which speed tells from a jog.
     """
     if len(clip) < 3:
         return np.zeros(len(clip)), np.zeros(len(clip))
