@@ -194,6 +194,35 @@ def test_a_damaged_chunk_is_named(sources, tmp_path, harm):
             whole_pass(Database.open(tmp_path / "db", memory), "train", 0, 10)
 
 
+def test_any_byte_of_a_chunk_that_changes_is_noticed(sources, tmp_path):
+    manifest = write_database(
+        tmp_path / "db", {"a": sources["rocky"]}, {"a": "train"}, injury=True, joint_weight=0.1
+    )
+    (chunk,) = manifest.chunks["train"]
+    file = tmp_path / "db" / manifest.folder / chunk.file
+    whole = file.read_bytes()
+    rng = np.random.default_rng(0)
+    for at in [0, 7, 8, 9, len(whole) - 1, *rng.integers(0, len(whole), 60)]:
+        data = bytearray(whole)
+        data[at] ^= 1 << rng.integers(8)
+        file.write_bytes(data)
+        with pytest.raises(InputError, match=f"{chunk.file}: damaged"):
+            whole_pass(Database.open(tmp_path / "db", DISK), "train", 0, 10)
+    file.write_bytes(whole)
+    assert len(whole_pass(Database.open(tmp_path / "db", DISK), "train", 0, 10).p) == 400
+
+
+def test_a_manifest_that_counts_otherwise_than_its_chunks_is_noticed(sources, tmp_path):
+    write_database(tmp_path, {"a": sources["rocky"]}, {"a": "train"}, injury=True, joint_weight=0.1)
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    chunk = manifest["chunks"]["train"][0]
+    for field, change in (("rows", -1), ("rows", 1), ("rows", 900), ("fits", -3), ("fits", 7)):
+        other = {**manifest, "chunks": {"train": [{**chunk, field: chunk[field] + change}], "held_out": []}}
+        (tmp_path / "manifest.json").write_text(json.dumps(other))
+        with pytest.raises(InputError, match=chunk["file"]):
+            whole_pass(Database.open(tmp_path, DISK), "train", 0, 10)
+
+
 def test_half_a_database_is_none(path, tmp_path):
     with pytest.raises(InputError, match="did not finish"):
         Database.open(tmp_path)

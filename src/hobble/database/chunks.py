@@ -18,6 +18,7 @@ import numpy as np
 
 from hobble.core.errors import InputError
 
+LENGTH = 8  # bytes that say how long the header is
 MOST_PARTS = 16  # of one vectored read: what POSIX has every system take
 TYPES = {"<f2": "F16", "<u2": "BF16", "<f4": "F32", "<i4": "I32"}
 HINT = "Delete the database's folder; the next run makes it again."
@@ -71,7 +72,8 @@ def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], ver
     where it is missing, of another length or, with `verify`, of another checksum.
     """
     path = folder / chunk.file
-    header = np.empty(chunk.bytes - sum(array.nbytes for array in arrays.values()), np.uint8)
+    beside = chunk.bytes - sum(array.nbytes for array in arrays.values())
+    header = np.empty(max(beside, LENGTH), np.uint8)
     parts = [_bytes(array) for array in (header, *arrays.values())]
     try:
         with open(path, "rb", buffering=0) as file:
@@ -84,6 +86,8 @@ def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], ver
         raise InputError(path, f"cannot be read ({error.strerror})", fix=HINT) from error
     if verify and _checksum(parts) != chunk.crc32:
         raise InputError(path, "damaged: its checksum is not the manifest's", fix=HINT)
+    if LENGTH + int.from_bytes(header[:LENGTH].tobytes(), "little") != beside:
+        raise InputError(path, "holds other arrays than the manifest says", fix=HINT)
 
 
 def _bytes(array: np.ndarray) -> memoryview:
