@@ -3,7 +3,7 @@ PYTHON ?= python3
 CORES ?= 2
 BIN := .venv/bin
 
-.PHONY: help env report test browser cluster-test check format clean
+.PHONY: help env report test faults browser cluster-test check format clean
 
 help:            ## list these targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -22,6 +22,9 @@ report: env      ## train the default configuration and make its report
 
 test: env browser  ## the whole test suite
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile
+
+faults: env      ## throw N faults at the workflow (make faults N=200 SEED=7), see docs/faults.md
+	$(BIN)/python -m tests.faults --rounds $(or $(N),100) $(if $(SEED),--seed $(SEED))
 
 cluster-test: env ## the test configuration through a SLURM of one node (root, Debian)
 	tests/cluster/run.sh

@@ -83,6 +83,21 @@ DAMAGES: dict[str, Damage] = {
 }
 
 
+# As the table counts them.
+GROUPS = {
+    "cut or emptied": ("cut", "empty"),
+    "flipped": ("flip_bit", "flip_bytes", "flip_digit"),
+    "zeroed": ("zero", "zero_all"),
+    "moved, lost or added": ("lose", "repeat", "swap", "append"),
+    "replaced by noise": ("noise",),
+}
+
+
+def group_of(name: str) -> str:
+    """What a harm by name is counted as."""
+    return next(group for group, names in GROUPS.items() if name in names)
+
+
 def damaged(rng: Random, name: str, data: bytes) -> bytes:
     """The bytes after a harm by name, other than before."""
     for _ in range(50):

@@ -27,13 +27,23 @@ def _started(lab: Lab, rng: Random) -> Iterator[tuple[Path, list[Job]]]:
     try:
         shutil.copytree(lab.run, folder, symlinks=True, dirs_exist_ok=True)
         lacking = rng.sample(lab.jobs, rng.randint(1, 3))
-        for path in (folder / path for job in lacking for path in job.outputs):
+        for path in (folder / path for path in _following(lab, lacking)):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
         for path in folder.glob("results/*/checkpoints"):
             shutil.rmtree(path)
         yield folder, lacking
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _following(lab: Lab, jobs: list[Job]) -> set[str]:
+    """Outputs of some jobs and of all that follow: Snakemake makes nothing that no job to be done needs."""
+    gone = {path for job in jobs for path in job.outputs}
+    before = 0
+    while len(gone) > before:
+        before = len(gone)
+        gone |= {path for job in lab.jobs if gone & set(job.inputs) for path in job.outputs}
+    return gone
 
 
 def _start(lab: Lab, folder: Path, said: Path) -> subprocess.Popen[bytes]:
@@ -65,9 +75,9 @@ def _tree(root: int) -> list[int]:
 def kill_run(lab: Lab, rng: Random) -> Throw:
     """SIGKILL of a process of a whole run at a random moment, then the same command again."""
     victim = rng.choice(("a job", "snakemake", "snakemake and its jobs"))
-    what = f"SIGKILL of {victim} in a whole run"
+    what = f"SIGKILL of {victim}, then the same command"
     with _started(lab, rng) as (folder, lacking):
-        at = lacking[0].rule
+        at = "a whole run"
         said = folder / "said"
         process = _start(lab, folder, said)
         time.sleep(rng.uniform(0.5, 4 + 3 * sum(lab.seconds[job.name] for job in lacking)))
@@ -127,7 +137,7 @@ def _compared(lab: Lab, folder: Path, what: str, at: str, happened: str, end: En
 
 def two_runs(lab: Lab, rng: Random) -> Throw:
     """Two snakemake processes on the same folder: one does the work, the other says that it may not."""
-    with _started(lab, rng) as (folder, lacking):
+    with _started(lab, rng) as (folder, _):
         said = [folder / "said-1", folder / "said-2"]
         first = _start(lab, folder, said[0])
         time.sleep(rng.uniform(0, 3))
@@ -136,8 +146,15 @@ def two_runs(lab: Lab, rng: Random) -> Throw:
         words = [path.read_text(errors="replace") for path in said]
         for status, text in zip(ends, words, strict=True):
             if status and LOCKED not in text:
-                return Throw("two at once", lacking[0].rule, FAULT, f"status {status}: {text[-2500:]}")
+                return Throw(
+                    "two snakemakes in one folder", "a whole run", FAULT, f"status {status}: {text[-2500:]}"
+                )
         if all(ends):
-            return Throw("two at once", lacking[0].rule, FAULT, f"neither did the work: {words[0][-1500:]}")
+            return Throw(
+                "two snakemakes in one folder",
+                "a whole run",
+                FAULT,
+                f"neither did the work: {words[0][-1500:]}",
+            )
         happened = REFUSED if any(ends) else UNHARMED
-        return _rerun(lab, folder, "two at once", lacking[0].rule, happened)
+        return _rerun(lab, folder, "two snakemakes in one folder", "a whole run", happened)

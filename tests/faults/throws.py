@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
-from .damage import DAMAGES, damaged
+from .damage import DAMAGES, damaged, group_of
 from .lab import NOBODY, Bench, End, Job, Lab
 
 OLD = b"what an earlier run made"
 TRACEBACK = "Traceback (most recent call last)"
 BUG = "This is a fault of Hobble"
+ANY = "any job"
 REFUSED, UNHARMED, REMADE, SKIPPED, FAULT = "refused", "unharmed", "made again", "skipped", "FAULT"
 
 
@@ -63,10 +64,10 @@ def kill(lab: Lab, rng: Random) -> Throw:
             (bench.folder / path).write_bytes(OLD)
         end = bench.run(kill_after=after)
         torn = [path for path in files if not _old_or_new(bench, path, older)]
-        what = f"killed after a random time, {'older' if older else 'no'} artefacts there"
+        what = f"SIGKILL of a job at a random moment, {'older' if older else 'no'} artefacts there"
         if torn or _half_a_database(bench):
-            return Throw(what, job.rule, FAULT, f"{job.name} after {after:.3f} s left half of {torn}")
-        return _again(bench, what, job.rule, UNHARMED if end.status == 0 else REMADE)
+            return Throw(what, ANY, FAULT, f"{job.name} after {after:.3f} s left half of {torn}")
+        return _again(bench, what, ANY, UNHARMED if end.status == 0 else REMADE)
 
 
 def _old_or_new(bench: Bench, path: str, older: bool) -> bool:
@@ -105,7 +106,7 @@ def harm(lab: Lab, rng: Random, only: str | None = None) -> Throw:
         target = _some_file(bench, rng)
         whole, times = target.read_bytes(), target.stat()
         if not whole:
-            return Throw(name, kind(str(target)), SKIPPED, "an empty file")
+            return Throw("bytes " + group_of(name), kind(str(target)), SKIPPED, "an empty file")
         target.write_bytes(damaged(rng, name, whole))
         os.utime(target, ns=(times.st_atime_ns, times.st_mtime_ns))
         return _judged(bench, name, target, rng)
@@ -120,7 +121,7 @@ def gone(lab: Lab, rng: Random) -> Throw:
         folder = rng.random() < 0.3
         if folder:
             target.mkdir()
-        return _judged(bench, "a folder in its place" if folder else "gone", target, rng)
+        return _judged(bench, "a folder where a file was" if folder else "a file that is gone", target, rng)
 
 
 def _some_file(bench: Bench, rng: Random) -> Path:
@@ -133,7 +134,8 @@ def _some_file(bench: Bench, rng: Random) -> Path:
 
 def _judged(bench: Bench, what: str, target: Path, rng: Random) -> Throw:
     """A damaged input is refused by name, or the result is that of the whole one."""
-    at = kind(str(target))
+    at = kind(str(target)) if target.is_file() else "any file"
+    what = f"bytes {group_of(what)}" if what in DAMAGES else what
     end = bench.run()
     if end.status == 0:
         if unlike := bench.unlike():
@@ -156,17 +158,17 @@ def full_disk(lab: Lab, rng: Random) -> Throw:
     job = rng.choice(lab.jobs)
     with lab.bench(job) as bench, _disk(bench, rng) as disk:
         if disk is None:
-            return Throw("a full disk", job.rule, SKIPPED, "nothing may be mounted here")
+            return Throw("a full disk", ANY, SKIPPED, "nothing may be mounted here")
         end = bench.run()
+        subprocess.run(["mount", "-o", "remount,size=2g", str(disk)], check=True)
         if end.status == 0:
-            return _again(bench, "a full disk", job.rule, UNHARMED)
+            return _again(bench, "a full disk", ANY, UNHARMED)
         if wrong := refusal(end, job, "the disk is full"):
-            return Throw("a full disk", job.rule, FAULT, f"{job.name}: {wrong}")
+            return Throw("a full disk", ANY, FAULT, f"{job.name}: {wrong}")
         torn = [p for p in job.outputs if (bench.folder / p).is_file() and p in bench.unlike()]
         if torn or _half_a_database(bench) or list(disk.rglob("*.part")):
-            return Throw("a full disk", job.rule, FAULT, f"{job.name} left half of {torn}")
-        subprocess.run(["mount", "-o", "remount,size=2g", str(disk)], check=True)
-        return _again(bench, "a full disk", job.rule, REFUSED)
+            return Throw("a full disk", ANY, FAULT, f"{job.name} left half of {torn}")
+        return _again(bench, "a full disk", ANY, REFUSED)
 
 
 @contextlib.contextmanager
@@ -220,12 +222,12 @@ def no_permission(lab: Lab, rng: Random) -> Throw:
         target.chmod(0o644 if target.is_file() else 0o755)
         if end.status == 0:
             if unlike := bench.unlike():
-                return Throw(what, job.rule, FAULT, f"{job.name} made another {unlike}")
-            return Throw(what, job.rule, UNHARMED)
+                return Throw(what, ANY, FAULT, f"{job.name} made another {unlike}")
+            return Throw(what, ANY, UNHARMED)
         named = target.name if target.is_file() else Path(job.outputs[0]).parent.name
         if wrong := refusal(end, job, named, "ermission"):
-            return Throw(what, job.rule, FAULT, f"{job.name}: {wrong}")
-        return _again(bench, what, job.rule, REFUSED)
+            return Throw(what, ANY, FAULT, f"{job.name}: {wrong}")
+        return _again(bench, what, ANY, REFUSED)
 
 
 def become_nobody() -> None:

@@ -33,6 +33,13 @@ def test_a_job_goes_on_though_the_log_cannot_be_written(log: str) -> None:
     assert (end.returncode, end.stdout, end.stderr) == (0, "done\n", "")
 
 
+def test_what_the_disk_refuses_is_no_fault_of_ours(tmp_path) -> None:
+    end = ended(str(tmp_path / "job.log"), "open('/proc/1/nowhere')")
+    assert end.returncode == 1
+    assert end.stderr.startswith("stage: /proc/1/nowhere: No such file or directory. See ")
+    assert "Traceback" in (tmp_path / "job.log").read_text()
+
+
 def test_a_fault_of_ours_leaves_its_traceback_in_the_log_only(tmp_path) -> None:
     path = tmp_path / "logs" / "job.log"
     end = ended(str(path), "{}['left knee']")

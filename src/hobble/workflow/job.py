@@ -53,13 +53,24 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
     except MemoryError:
         logger.error("ran out of memory. Give the job more, or make the data set or the batch smaller.")
         sys.exit(1)
+    except OSError as error:
+        # Of the disk or of permissions, where nobody below knew better.
+        place, reason = error.filename or "a file", error.strerror or error
+        logger.error("%s: %s. See %s", place, reason, path)
+        _to_log_only(logger, to_terminal)
+        sys.exit(1)
     except Exception as error:
         logger.error("%s: %s. %s See %s", type(error).__name__, error, BUG, path)
-        logger.removeHandler(to_terminal)
-        logger.error("%s", traceback.format_exc())
+        _to_log_only(logger, to_terminal)
         sys.exit(1)
     finally:
         logging.shutdown()
+
+
+def _to_log_only(logger: logging.Logger, terminal: logging.Handler) -> None:
+    """Leave the traceback in the log."""
+    logger.removeHandler(terminal)
+    logger.error("%s", traceback.format_exc())
 
 
 class _LogFile(logging.FileHandler):

@@ -1,0 +1,119 @@
+"""A few faults of every kind, at the jobs that make two clips' rows; `make faults N=200` throws more."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from . import bvh_grammar, runs, status_grammar, texts, throws
+from .damage import DAMAGES
+from .grammar import Case, mutated
+from .lab import Lab
+from .same import same
+from .throws import FAULT, REFUSED, UNHARMED
+
+pytestmark = pytest.mark.workflow
+SEED = 20
+CLIPS = ("walk-straight-1", "injured-left-shank")
+TARGETS = [f"results/datasets/tiny/database/clips/{clip}.npz" for clip in CLIPS]
+
+
+@pytest.fixture(scope="module")
+def lab() -> Iterator[Lab]:
+    with tempfile.TemporaryDirectory(prefix="lab-") as folder:
+        Path(folder).chmod(0o755)  # pytest's own folders let nobody in, as whom a job is run
+        made = Lab(Path(folder) / "lab")
+        made.undisturbed(*TARGETS)
+        rules = {job.rule for job in made.jobs}
+        assert rules >= {"synthetic_clip", "motion_clip", "terrain_fits", "database_clip"}
+        yield made
+
+
+@pytest.mark.parametrize(
+    ("throw", "times"),
+    [
+        (throws.kill, 12),
+        (throws.gone, 5),
+        (throws.full_disk, 4),
+        (throws.no_permission, 4),
+        (throws.changing_clip, 6),
+    ],
+)
+def test_faults_at_jobs(lab: Lab, throw, times: int) -> None:
+    thrown = [throw(lab, Random(f"{SEED}-{number}")) for number in range(times)]
+    assert "\n".join(one.detail for one in thrown if one.happened == FAULT) == ""
+
+
+@pytest.mark.parametrize(
+    "rule", ["motion_clip", "labels_clip", "injury_clip", "terrain_fits", "database_clip"]
+)
+def test_harm_to_what_a_job_reads(lab: Lab, rule: str) -> None:
+    thrown = [throws.harm(lab, Random(f"{SEED}-{number}"), rule) for number in range(8)]
+    assert "\n".join(one.detail for one in thrown if one.happened == FAULT) == ""
+    assert sum(one.happened == REFUSED for one in thrown) >= 4
+
+
+def test_two_snakemakes_at_once(lab: Lab) -> None:
+    thrown = runs.two_runs(lab, Random(SEED))
+    assert thrown.happened in (REFUSED, UNHARMED), thrown
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("texts")
+
+
+def test_every_mutation_of_a_bvh(tiny_bvh: str, folder: Path) -> None:
+    assert len(bvh_grammar.MUTATIONS) > 150
+    path = folder / "clip.bvh"
+    path.write_text(tiny_bvh)
+    whole = texts.read_clip(path)
+    for number, name in enumerate(bvh_grammar.MUTATIONS):
+        case = mutated(tiny_bvh, bvh_grammar.MUTATIONS, [name], number)
+        texts.judge(case, path, texts.read_clip, whole)
+
+
+def test_every_mutation_of_a_status_file(folder: Path) -> None:
+    assert len(status_grammar.MUTATIONS) > 100
+    path = folder / "clip_injuries.txt"
+    path.write_text(status_grammar.BASE)
+    whole = texts.read_severity(path)
+    for number, name in enumerate(status_grammar.MUTATIONS):
+        case = mutated(status_grammar.BASE, status_grammar.MUTATIONS, [name], number)
+        texts.judge(case, path, texts.read_severity, whole)
+
+
+def test_mutations_together(folder: Path) -> None:
+    became: list[str] = []
+
+    def told(case: Case, what: str) -> None:
+        became.append(what)
+
+    texts.throw("status", status_grammar.BASE, folder, 60, SEED, told)
+    assert len(became) >= 60
+
+
+def test_damage_always_changes_the_bytes() -> None:
+    from .damage import damaged
+
+    for name in DAMAGES:
+        for number in range(20):
+            rng = Random(number)
+            data = rng.randbytes(rng.randint(1, 300))
+            assert damaged(rng, name, data) != data
+
+
+def test_same_forgives_times_and_nothing_else(tmp_path: Path) -> None:
+    a, b = tmp_path / "a/responsivity.json", tmp_path / "b/responsivity.json"
+    for path, time, laps in ((a, 1, 2), (b, 9, 2)):
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(f'{{"milliseconds": {{"total": {time}}}, "laps": {laps}}}')
+    assert same(a, b)
+    assert same(a.parent, b.parent)
+    b.write_text('{"milliseconds": {"total": 1}, "laps": 3}')
+    assert not same(a, b)
+    assert not same(a.parent, b.parent)
