@@ -26,6 +26,13 @@ wildcard_constraints:
     selection="healthy|all",
 
 
+def kept(files):
+    """Files of the checkout or the user: they stay where they are, though results may lie in an object store."""
+    many = [files] if isinstance(files, str) else files
+    many = [f if f.startswith("results/") else local(f) for f in many]
+    return many[0] if isinstance(files, str) else many
+
+
 rule all:
     default_target: True
     input:

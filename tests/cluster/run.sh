@@ -37,10 +37,10 @@ fail() {
 
 # SLURM kills what runs: waits until a job whose comment holds $1 has written the log $2 of one of its rules.
 kill_job() {
-    local job deadline=$((SECONDS + 420))
+    local job deadline=$((SECONDS + 900))
     until compgen -G "$folder/cluster/$2" >/dev/null; do
         kill -0 "$cluster" 2>/dev/null || fail "it ended before a job of $1 could be killed"
-        [ $SECONDS -lt $deadline ] || fail "no job of $1 within seven minutes"
+        [ $SECONDS -lt $deadline ] || fail "no job of $1 within a quarter of an hour"
         sleep 0.05
     done
     job=$(squeue -h -t R -o '%i %k' | awk -v of="$1" '$2 ~ of {print $1; exit}')

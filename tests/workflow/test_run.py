@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hobble.workflow.asked import measured, planned
+
 pytestmark = pytest.mark.workflow
 
 TARGET = "results/test/report.html"
@@ -145,3 +147,9 @@ def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> Non
     begun = (copied.folder / "results/test/network/history.csv").read_text().splitlines()
     assert rows[: len(begun)] == begun
     assert len(rows) == 1 + 3 * 10
+
+
+def test_no_job_took_more_than_its_rule_asks_of_a_cluster(finished) -> None:
+    jobs = list(measured(planned(finished.run("-n", "-F", TARGET)), finished.folder))
+    assert {"motion_clip", "terrain_fits", "training", "report"} <= {job.rule for job in jobs if job.took_mb}
+    assert [(job.log, job.memory, job.time) for job in jobs if max(job.memory, job.time) >= 1] == []

@@ -3,8 +3,8 @@ rule accuracy:
     input:
         weights=lambda w: project.network(w.configuration, "weights.npz"),
         clips=lambda w: project.of_dataset(w.configuration, "database/clips/{clip}.npz"),
-        skeleton=lambda w: project.skeleton_file(
-            project.configuration(w.configuration).dataset
+        skeleton=lambda w: kept(
+            project.skeleton_file(project.configuration(w.configuration).dataset)
         ),
     output:
         json="results/{configuration}/evaluation/accuracy.json",
@@ -35,8 +35,8 @@ rule rollouts:
     input:
         weights=lambda w: project.network(w.configuration, "weights.npz"),
         clips=lambda w: project.of_dataset(w.configuration, "database/clips/{clip}.npz"),
-        skeleton=lambda w: project.skeleton_file(
-            project.configuration(w.configuration).dataset
+        skeleton=lambda w: kept(
+            project.skeleton_file(project.configuration(w.configuration).dataset)
         ),
     output:
         json="results/{configuration}/evaluation/rollouts.json",
@@ -126,7 +126,7 @@ rule recognition:
     input:
         weights=lambda w: project.network(w.configuration, "weights.npz"),
         clips=lambda w: project.of_dataset(w.configuration, "database/clips/{clip}.npz"),
-        published=project.published(),
+        published=kept(project.published()),
     output:
         json="results/{configuration}/evaluation/recognition.json",
         csv="results/{configuration}/evaluation/recognition.csv",
@@ -162,7 +162,7 @@ rule compare:
         recognition=lambda w: project.measured()["recognition"],
         pipeline=lambda w: project.measured()["pipeline"],
         history=lambda w: project.measured()["history"],
-        published=project.published(),
+        published=kept(project.published()),
     output:
         json="results/compare/compare.json",
         configurations="results/compare/configurations.csv",

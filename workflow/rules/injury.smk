@@ -3,7 +3,7 @@ rule injury_clip:
     input:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
         report="results/datasets/{dataset}/motion/{clip}.json",
-        status=lambda w: project.status_files(w.dataset, w.clip),
+        status=lambda w: kept(project.status_files(w.dataset, w.clip)),
     output:
         injury="results/datasets/{dataset}/injury/{clip}.npz",
         report="results/datasets/{dataset}/injury/{clip}.json",

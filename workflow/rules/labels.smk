@@ -3,7 +3,7 @@ rule labels_clip:
     input:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
         report="results/datasets/{dataset}/motion/{clip}.json",
-        files=lambda w: project.label_files(w.dataset, w.clip),
+        files=lambda w: kept(project.label_files(w.dataset, w.clip)),
     output:
         labels="results/datasets/{dataset}/labels/{clip}.npz",
         report="results/datasets/{dataset}/labels/{clip}.json",

@@ -2,7 +2,7 @@
 rule download_clip:
     """A clip that the user's folder lacks, from the address that the data set names."""
     output:
-        bvh=project.downloaded("{dataset}", "{clip}"),
+        bvh=local(project.downloaded("{dataset}", "{clip}")),
     log:
         "results/datasets/{dataset}/logs/motion/download_clip/{clip}.log",
     localrule: True
@@ -20,8 +20,8 @@ rule download_clip:
 rule motion_clip:
     """A BVH file, read, checked and put on the data set's skeleton at 60 Hz."""
     input:
-        bvh=lambda w: project.source(w.dataset, w.clip),
-        skeleton=lambda w: project.skeleton_file(w.dataset),
+        bvh=lambda w: kept(project.source(w.dataset, w.clip)),
+        skeleton=lambda w: kept(project.skeleton_file(w.dataset)),
         rig=lambda w: project.rig_files(w.dataset, w.clip),
     output:
         clip="results/datasets/{dataset}/motion/{clip}.npz",

@@ -1,11 +1,12 @@
 rule page_packages:
     """What the page takes from the npm registry, as its lock file says; fetched once."""
     input:
-        project.web(".json"),
+        kept(project.web(".json")),
     output:
         "results/page/node_modules/.package-lock.json",
     log:
         "results/page/logs/report/page_packages.log",
+    localrule: True
     resources:
         mem_mb=1000,
         runtime=10,
@@ -19,7 +20,7 @@ rule page_bundle:
     """The page's scripts in one, shared by every report."""
     input:
         packages=rules.page_packages.output,
-        scripts=project.web(".js"),
+        scripts=kept(project.web(".js")),
     output:
         js="results/page/bundle.js",
     log:
@@ -96,7 +97,7 @@ rule report:
         terrain=lambda w: project.of_dataset(
             w.configuration, "terrain/clips/{clip}.npz"
         ),
-        template=project.templates(),
+        template=kept(project.templates()),
         bundle=rules.page_bundle.output.js,
     output:
         html="results/{configuration}/report.html",
@@ -129,7 +130,7 @@ rule report_compare:
         weights=lambda w: [
             project.network(name, "weights.npz") for name in project.compared()
         ],
-        template=project.templates(),
+        template=kept(project.templates()),
         bundle=rules.page_bundle.output.js,
     output:
         html="results/compare/report.html",

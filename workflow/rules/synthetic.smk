@@ -1,7 +1,7 @@
 rule synthetic_clip:
     """One clip of the embedded walker, as a user's folder would hold it."""
     input:
-        skeleton=lambda w: project.skeleton_file(w.dataset),
+        skeleton=lambda w: kept(project.skeleton_file(w.dataset)),
     output:
         bvh="results/datasets/{dataset}/synthetic/{clip}.bvh",
         footsteps="results/datasets/{dataset}/synthetic/{clip}_footsteps.txt",

@@ -1,7 +1,7 @@
 rule terrain_patches:
     """Patches of ground drawn from the heightmaps."""
     input:
-        files=lambda w: project.heightmap_files(w.dataset),
+        files=lambda w: kept(project.heightmap_files(w.dataset)),
     output:
         patches="results/datasets/{dataset}/terrain/patches.npz",
     log:

@@ -1,0 +1,122 @@
+"""What a cluster is asked for: how many jobs, and how much memory and time for each."""
+
+from __future__ import annotations
+
+import collections
+import math
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+from hobble.workflow.asked import measured, planned
+from hobble.workflow.demands import ENGINE_MB, WEEK, Demands, bvh_seconds
+from hobble.workflow.project import Project
+
+CLIPS = 40
+MANY = "skeleton: holden31\nfolder: many\nmirror: true\nheld_out: [clip-00]\n"
+
+
+@pytest.fixture
+def demands(root: Path) -> Demands:
+    return Demands(Project(root, {}))
+
+
+def profile(root: Path, name: str) -> dict:
+    return yaml.safe_load((root / f"workflow/profiles/{name}/config.v9+.yaml").read_text())
+
+
+def bvh(path: Path, rows: int, promised: int, frame_time: str = "0.01") -> Path:
+    head = f"HIERARCHY\nROOT Hips\nMOTION\nFrames: {promised}\nFrame Time: {frame_time}\n"
+    path.write_text(head + "0.00 1.00 2.00\n" * rows)
+    return path
+
+
+@pytest.mark.workflow
+def test_thousands_of_clips_make_a_hundred_jobs(root, workflow, tmp_path) -> None:
+    (workflow.checkout / "config/datasets/many.yaml").write_text(MANY)
+    (workflow.checkout / "config/many.yaml").write_text("extends: holden\ndataset: many\ninjury: true\n")
+    (tmp_path / "many").mkdir()
+    for number in range(CLIPS):
+        bvh(tmp_path / f"many/clip-{number:02}.bvh", 100, 100)
+    options = profile(root, "slurm")
+    groups = ["--groups", *options["groups"], "--group-components", *options["group-components"]]
+    plan = workflow.run("-n", *groups, "--config", f"mocap={tmp_path}", "--", "results/many/report.html")
+    batches = len(re.findall("Group job clips ", plan))
+    alone = collections.Counter(re.findall(r"^rule (\w+):", plan, re.M))
+    size = int(options["group-components"][0].split("=")[1])
+    assert batches == math.ceil(CLIPS / size)
+    # Whatever is not in a batch is there once for the data set or the configuration, not once for each clip.
+    assert alone["training"] == 1
+    assert max(alone.values()) == 1, alone
+    assert math.ceil(2500 / size) + sum(alone.values()) <= 100
+    assert len(re.findall(r"^ +rule database_clip:", plan, re.M)) == 2 * CLIPS
+
+
+@pytest.mark.parametrize("name", ["slurm", "kubernetes", "s3"])
+def test_a_profile_keeps_what_the_default_one_says(root, name: str) -> None:
+    ours, default = profile(root, name), profile(root, "default")
+    asked = default.pop("default-resources")
+    assert {key: ours.get(key) for key in default} == default
+    assert ours["default-resources"].items() >= asked.items()
+
+
+def test_a_pod_is_what_a_job_is(root) -> None:
+    for key in ("groups", "group-components", "cores", "retries"):
+        assert profile(root, "kubernetes")[key] == profile(root, "slurm")[key]
+
+
+@pytest.mark.workflow
+def test_configurations_train_side_by_side(workflow) -> None:
+    names = ["holden", "holden-xl", "injured"]
+    plan = workflow.run("-n", *(f"results/{name}/network/weights.npz" for name in names))
+    trainings = re.findall(r"^rule training:\n    input: (.*)$", plan, re.M)
+    assert len(trainings) == len(names)
+    assert all("/network/" not in files for files in trainings)
+
+
+@pytest.mark.workflow
+def test_a_gpu_is_asked_for_where_training_is_told_to_use_one(workflow) -> None:
+    weights = "results/test/network/weights.npz"
+    told = workflow.run("-n", "--config", "training={device: cuda}", "--", weights)
+    assert len(re.findall("gpu=1", told)) == 1
+    assert "gpu=1" not in workflow.run("-n", weights)
+
+
+def test_more_motion_asks_for_more_and_a_second_attempt_too(demands) -> None:
+    short, long = (demands.memory("synthetic", clip, 20) for clip in ("jog-2", "jog-1"))
+    assert short < long
+    assert demands.memory("synthetic", "jog-1", 20, attempt=2) == pytest.approx(2 * long, abs=1)
+    assert demands.memory("synthetic", "jog-1_mirror", 20) == long
+    assert demands.memory("synthetic-ava", "jog-1", 20) > long
+    assert demands.minutes("synthetic", "jog-1", 600.0, attempt=3) == 3 * demands.minutes(
+        "synthetic", "jog-1", 600.0
+    )
+    assert demands.training_memory("ava") > demands.training_memory("holden")
+    assert demands.training_minutes("ava", attempt=10_000) == WEEK
+
+
+def test_the_length_of_a_clip_is_that_of_its_rows_not_what_its_header_promises(tmp_path) -> None:
+    assert bvh_seconds(bvh(tmp_path / "a.bvh", 500, 2_000_000_000)) == pytest.approx(5.0)
+    assert bvh_seconds(bvh(tmp_path / "b.bvh", 500, 500, "1e9")) <= 500
+    assert bvh_seconds(bvh(tmp_path / "c.bvh", 0, 500)) is None
+    assert bvh_seconds(bvh(tmp_path / "d.bvh", 5, 5, "1.2.3")) is None
+    assert bvh_seconds(tmp_path / "not there.bvh") is None
+
+
+def test_what_a_job_took_stands_beside_what_its_rule_asks_for(tmp_path) -> None:
+    plan = (
+        "rule motion_clip:\n    input: a\n    log: results/x/logs/motion/motion_clip/a.log\n"
+        "    resources: tmpdir=/tmp, mem_mb=1000, mem=1 GB, runtime=2, gpu=0\n[now]\n"
+        "rule later:\n    log: results/x/logs/later.log\n    resources: mem_mb=500, runtime=1\n"
+    )
+    log = tmp_path / "results/x/logs/motion/motion_clip/a.log"
+    benchmark = tmp_path / "results/x/benchmarks/motion/motion_clip/a.tsv"
+    for path, text in ((log, "took 500 MB of memory at most\n"), (benchmark, "s\tmax_rss\n30.0\t7.1\n")):
+        path.parent.mkdir(parents=True)
+        path.write_text(text)
+    (job,) = measured(planned(plan), tmp_path)
+    assert job.rule == "motion_clip"
+    assert job.memory == pytest.approx((500 + ENGINE_MB) / 1000)
+    assert job.time == pytest.approx(0.25)
