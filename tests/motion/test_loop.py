@@ -100,15 +100,19 @@ def test_injured_cycles_loop_without_a_jerk(shared, make, file):
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("file", ["Walk_LLL", "Run_LLL"])
-def test_legs_move_as_in_the_authors_own_retargeting(shared, root, make, file):
-    """Their loops of the same motion on 31 joints; their arms hang from shrugged shoulders."""
+@pytest.mark.parametrize(("file", "degrees"), [("Walk_LLL", 6), ("Run_LLL", 7), ("Walk_RUL", 10)])
+def test_legs_move_as_in_the_authors_own_retargeting(shared, root, make, file, degrees):
+    """Their loops of the same motion on 31 joints; their arms hang from shrugged shoulders.
+
+    Mean angle between their leg bones and ours: 4.4, 5.7 and 8.2 degrees.
+    """
     folder = root / "config" / "skeletons"
     theirs, _ = make(shared / f"mocap/ferre/Injured_{file}_extended_converted.bvh", proportions="clip")
     ours, _ = make(shared / f"mocap/ferre/Injured_{file}.bvh", skeleton="mixamo55")
     rig = load_skeleton(folder / "mixamo55.yaml")
     pairs = {theirs_: mine for mine, theirs_ in rig.maps["holden31"].items()}
     ours = retarget_clip(ours, plan(ours.skeleton, theirs.skeleton, pairs))
+    apart = []
     for side in ("left", "right"):
         for a, b in (("hip", "knee"), ("knee", "heel")):
             ways = []
@@ -121,4 +125,5 @@ def test_legs_move_as_in_the_authors_own_retargeting(shared, root, make, file):
                     way[: len(ours) - 1] / np.linalg.norm(way[: len(ours) - 1], axis=-1, keepdims=True)
                 )
             cosine = np.clip(np.sum(ways[0] * ways[1], axis=-1), -1, 1)
-            assert np.degrees(np.arccos(cosine)).mean() < 12
+            apart.append(np.degrees(np.arccos(cosine)).mean())
+    assert np.mean(apart) < degrees
