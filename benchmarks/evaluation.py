@@ -1,0 +1,83 @@
+"""How much the measurements gain from many figures at once: sweeps of injury, and roll-outs of clips.
+
+    python benchmarks/evaluation.py [weights.npz or folder]
+
+Without a file, a random network of the published size with 30 severities is used: the times are the same.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+from runtime import SKELETON, load_skeleton, random_network
+
+from hobble.evaluation.crowd import Stretch, run, severities
+from hobble.evaluation.rollouts import Inputs, roll_out
+from hobble.runtime.network import Network, load_network
+from hobble.runtime.predictor import Predictor
+
+RUNTIME = {"mode": "cubic"}
+FRAMES = 120
+
+
+def seconds(work: Callable[[], object]) -> float:
+    """CPU seconds of the second of two runs: compiled code is loaded in the first."""
+    work()
+    start = process_time()
+    work()
+    return process_time() - start
+
+
+def sweep(network: Network) -> tuple[float, float]:
+    """CPU microseconds of a figure's frame: a figure for each link at once, and one after another."""
+    links = network.links or ("",) * 30
+    hurt = severities(network, [{link: 5.0} if link else {} for link in links])
+
+    def walk(rows: np.ndarray) -> None:
+        run(network, [Stretch(FRAMES, ["walk"] * len(rows), rows)], RUNTIME)
+
+    per = 1e6 / FRAMES / len(links)
+    return per * seconds(lambda: walk(hurt)), per * seconds(lambda: [walk(row[None]) for row in hurt])
+
+
+def roll_outs(network: Network) -> tuple[float, float]:
+    """CPU microseconds of a roll-out's frame: all starts of a stretch at once, and one after another."""
+    layout, count, length = network.layout, 400, 60
+    rng = np.random.default_rng(1)
+    x = (network.x_mean + 0.1 * rng.normal(size=(count, layout.x_size))).astype(np.float32)
+    still = np.zeros(count)
+    asked = Inputs(
+        x,
+        np.zeros((count, layout.y_size), np.float32),
+        still,
+        rng.random(count),
+        still,
+        np.zeros((count, 2)),
+        still + 1,
+    )
+    starts = np.arange(1, count - length, 6)
+    predictor = Predictor(network)
+    per = 1e6 / length / len(starts)
+    together = seconds(lambda: roll_out(predictor, asked, starts, length))
+    apart = seconds(
+        lambda: [roll_out(predictor, asked, starts[i : i + 1], length) for i in range(len(starts))]
+    )
+    return per * together, per * apart
+
+
+def main() -> None:
+    if len(sys.argv) > 1:
+        network = load_network(Path(sys.argv[1]))
+    else:
+        network = random_network(load_skeleton(SKELETON))
+    print("microseconds of CPU a frame       at once  one by one  ratio")
+    for name, (together, apart) in (("injury sweep", sweep(network)), ("roll-outs", roll_outs(network))):
+        print(f"{name:32}{together:9.0f}{apart:12.0f}{apart / together:7.1f}")
+
+
+if __name__ == "__main__":
+    main()
