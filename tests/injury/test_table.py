@@ -79,6 +79,14 @@ def test_a_bvh_file_without_frames_is_named(tmp_path):
         bvh_frames(tmp_path / "a.bvh")
 
 
+def test_clips_in_subfolders_and_in_capitals_are_found(folder):
+    (folder / "takes").mkdir()
+    (folder / "walk.bvh").rename(folder / "takes/walk.BVH")
+    (path,) = write_statuses(table(folder, "walk,LowerBack-Spine,3,,\n"), folder, LINKS)
+    assert path == folder / "takes/walk_injuries.txt"
+    assert path.is_file()
+
+
 def test_the_command_line(folder, root, capsys):
     skeleton = str(root / "config/skeletons/holden31.yaml")
     path = table(folder, "walk,RightFoot-RightToeBase,5,,\n")

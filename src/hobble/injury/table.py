@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from hobble.core.clip_files import find_clips, the_file
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_text
 from hobble.injury.status import Spell, Status, check_link, check_severity, write_status
@@ -88,18 +89,18 @@ def bvh_frames(path: Path) -> int:
 
 
 def write_statuses(table: str | Path, folder: str | Path, links: Sequence[str]) -> list[Path]:
-    """Write `<clip>_injuries.txt` beside each clip of `folder` that the table names; returns the paths.
+    """Write `<clip>_injuries.txt` beside each clip below `folder` that the table names; returns the paths.
 
     Everything is checked before the first file is written.
     """
     rows = read_table(table, links)
     folder = Path(folder)
-    clips = dict.fromkeys(row.clip for row in rows)
-    files = {clip: folder / f"{clip}.bvh" for clip in clips if Path(clip).name == clip}
-    frames = {clip: bvh_frames(file) for clip, file in files.items() if file.is_file()}
+    there = find_clips(folder)
+    files = {row.clip: the_file(row.clip, there[row.clip]) for row in rows if row.clip in there}
+    frames = {clip: bvh_frames(file) for clip, file in files.items()}
     written = []
     for clip, status in statuses(rows, frames, table).items():
-        written.append(folder / f"{clip}_injuries.txt")
+        written.append(files[clip].with_name(f"{clip}_injuries.txt"))
         write_status(written[-1], status)
     return written
 

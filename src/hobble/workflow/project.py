@@ -15,10 +15,11 @@ from urllib.parse import quote
 from hobble.config.load import Catalogue
 from hobble.config.models import ClipEntry, Configuration, Dataset
 from hobble.config.sections import COMPARED
+from hobble.core.clip_files import find_clips, the_file
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import MOST_TEXT, read_bytes
 from hobble.workflow.fingerprint import fingerprint
-from hobble.workflow.sources import find_clips, joint_names, nearest_rig, read_checksums, the_file
+from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 
 DATASETS = "results/datasets"
 MIRROR = "_mirror"

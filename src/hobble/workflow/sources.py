@@ -1,8 +1,7 @@
-"""Where a data set's clips come from: a folder of the user's, and what can be downloaded instead."""
+"""What is known of a data set before anything is made of it: its rigs, and what can be downloaded."""
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -10,29 +9,9 @@ from pathlib import Path
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_text
 
-SUFFIX = ".bvh"
 HEADER = 1 << 20  # bytes; that of 191 joints takes 40 kB
 JOINT = re.compile(r"^\s*(?:ROOT|JOINT)\s+(.*?)\s*\{?\s*$", re.MULTILINE | re.IGNORECASE)
 LINE = re.compile(r"([0-9a-fA-F]{64}) [ *](\S+)\.bvh")
-
-
-def find_clips(folder: Path) -> dict[str, list[Path]]:
-    """Clip -> its BVH files in a folder and those below it, whether they end in .bvh or .BVH, sorted.
-
-    Hidden folders are left out. Raises InputError where a folder cannot be read.
-    """
-
-    def refuse(error: OSError) -> None:
-        raise InputError(error.filename or folder, f"cannot be read: {error.strerror}") from None
-
-    found: dict[str, list[Path]] = {}
-    for here, folders, files in os.walk(folder, onerror=refuse):
-        folders[:] = sorted(name for name in folders if not name.startswith("."))
-        for name in sorted(files):
-            stem, suffix = os.path.splitext(name)
-            if suffix.lower() == SUFFIX and not name.startswith("."):
-                found.setdefault(stem, []).append(Path(here, name))
-    return found
 
 
 def joint_names(path: Path) -> set[str]:
@@ -52,17 +31,6 @@ def nearest_rig(joints: set[str], known: Mapping[str, Collection[str]], target: 
         if len(joints & set(known[name])) > best:
             best, nearest = len(joints & set(known[name])), name
     return nearest
-
-
-def the_file(clip: str, files: list[Path]) -> Path:
-    """The only one of a clip's files; raises InputError where there are two."""
-    if len(files) > 1:
-        raise InputError(
-            files[1],
-            f"a second file of clip {clip}, beside {files[0]}",
-            fix="Rename one of them: a clip is called what its file is called, whatever its folder.",
-        )
-    return files[0]
 
 
 def read_checksums(path: Path) -> dict[str, str]:

@@ -1,0 +1,40 @@
+"""The BVH files of a folder by the names of their clips."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from hobble.core.errors import InputError
+
+SUFFIX = ".bvh"
+
+
+def find_clips(folder: Path) -> dict[str, list[Path]]:
+    """Clip -> its BVH files in a folder and those below it, whether they end in .bvh or .BVH, sorted.
+
+    Hidden folders are left out. Raises InputError where a folder cannot be read.
+    """
+
+    def refuse(error: OSError) -> None:
+        raise InputError(error.filename or folder, f"cannot be read: {error.strerror}") from None
+
+    found: dict[str, list[Path]] = {}
+    for here, folders, files in os.walk(folder, onerror=refuse):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        for name in sorted(files):
+            stem, suffix = os.path.splitext(name)
+            if suffix.lower() == SUFFIX and not name.startswith("."):
+                found.setdefault(stem, []).append(Path(here, name))
+    return found
+
+
+def the_file(clip: str, files: list[Path]) -> Path:
+    """The only one of a clip's files; raises InputError where there are two."""
+    if len(files) > 1:
+        raise InputError(
+            files[1],
+            f"a second file of clip {clip}, beside {files[0]}",
+            fix="Rename one of them: a clip is called what its file is called, whatever its folder.",
+        )
+    return files[0]
