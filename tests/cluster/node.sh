@@ -81,8 +81,14 @@ CONF
 
 slurm_down() {
     [ -n "$slurm_folder" ] || return 0
-    scancel --user="$(id -un)" >/dev/null 2>&1
     local file process tries
+    # Jobs end before the daemon that would end them does.
+    scancel --signal=KILL --full --user="$(id -un)" >/dev/null 2>&1
+    scancel --user="$(id -un)" >/dev/null 2>&1
+    for tries in $(seq 100); do
+        [ -n "$(squeue -h 2>/dev/null)" ] || break
+        sleep 0.2
+    done
     for file in "$slurm_folder/slurmd.pid" "$slurm_folder/slurmctld.pid" /run/munge/hobble.pid; do
         process=$(cat "$file" 2>/dev/null) || continue
         kill "$process" 2>/dev/null

@@ -16,7 +16,7 @@ running=()
 
 finish() {
     local status=$? process
-    for process in "${running[@]}"; do kill "$process" 2>/dev/null && wait "$process" 2>/dev/null; done
+    for process in "${running[@]}"; do kill -KILL -- "-$process" 2>/dev/null; done
     slurm_down
     if [ "$status" = 0 ] || [ "$status" = 77 ]; then
         rm -rf "$folder"
@@ -49,14 +49,12 @@ kill_job() {
 }
 
 # The same command as on a real cluster; only the polling is for one that has nothing else to do.
-through_slurm() {
-    "$folder/venv/bin/python" -m snakemake -s "$root/Snakefile" -d "$folder/cluster" \
-        --workflow-profile "$root/workflow/profiles/slurm" --slurm-init-seconds-before-status-checks 2 "$target"
-}
+through_slurm=("$folder/venv/bin/python" -m snakemake -s "$root/Snakefile" -d "$folder/cluster"
+    --workflow-profile "$root/workflow/profiles/slurm" --slurm-init-seconds-before-status-checks 2 "$target")
 
 export OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=1
 mkdir "$folder/local" "$folder/cluster"
-"$python" -m snakemake -s "$root/Snakefile" -d "$folder/local" -c2 \
+setsid "$python" -m snakemake -s "$root/Snakefile" -d "$folder/local" -c2 \
     --workflow-profile "$root/workflow/profiles/default" "$target" >"$folder/local.log" 2>&1 &
 local_run=$!
 running+=("$local_run")
@@ -72,7 +70,7 @@ echo "import site; site.addsitedir('$site')" >"$("$folder/venv/bin/python" -c \
 slurm_up "$folder/node" || exit 77
 say "SLURM $(slurmctld -V | awk '{print $2}') is up on one node, memory and time of jobs enforced"
 
-through_slurm >"$log" 2>&1 &
+setsid "${through_slurm[@]}" >"$log" 2>&1 &
 cluster=$!
 running+=("$cluster")
 kill_job clips 'results/datasets/tiny/logs/labels/labels_clip/*.log'
@@ -87,5 +85,5 @@ say "$submitted jobs submitted, $restarts of them a second time"
 
 wait "$local_run" || { tail -n 40 "$folder/local.log" >&2; fail "the local run failed"; }
 "$python" "$here/same.py" "$folder/local" "$folder/cluster" || fail "the results differ"
-through_slurm >"$log" 2>&1 && grep -q 'Nothing to be done' "$log" || fail "a second run had something to do"
+"${through_slurm[@]}" >"$log" 2>&1 && grep -q 'Nothing to be done' "$log" || fail "a second run had something to do"
 say "passed in $SECONDS s"
