@@ -3,8 +3,8 @@
     python benchmarks/report.py [results/injured/report.html ...] [--seconds 5] [--width 1280]
 
 Headless Chromium draws on the processor, in software, many times slower than the graphics of any laptop; the
-character's milliseconds are what they are anywhere on that processor. Ratios: of the character to the 16.7 ms of
-a frame at 60 Hz, and to Python's frame on the same network, if `--python` names its folder.
+character's milliseconds are what they are anywhere on that processor. Ratios: of the character to the 16.7 ms
+of a frame at 60 Hz, and to Python's frame on the same network, if `--python` names its folder.
 """
 
 from __future__ import annotations
@@ -102,7 +102,8 @@ def main() -> None:
                     ratio = f", {median / python_milliseconds(asked.python):.1f} times Python's"
                 share = f"{median / FRAME:.1%} of a frame at 60 Hz"
                 print(
-                    f"  character {name}: {median:.2f} ms a frame ({share}{ratio}), one in a hundred over {slow:.2f} ms"
+                    f"  character {name}: {median:.2f} ms a frame ({share}{ratio}), "
+                    f"one in a hundred over {slow:.2f} ms"
                 )
             drawn = browser.run(f"{DRAWING}({asked.seconds})")
             width, height = drawn["view"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import importlib.util
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
-from hobble.report.bundle import bundle, install
+from hobble.report.bundle import WEB, bundle, install
 from hobble.report.compare import comparisons
 from hobble.report.gather import Material, gather
 from hobble.report.page import render
@@ -97,17 +98,18 @@ def compared(
 @pytest.fixture(scope="session")
 def modules(tmp_path_factory: pytest.TempPathFactory) -> Path | None:
     """The page's npm packages, fetched once for all workers; None where they cannot be had."""
-    shared = tmp_path_factory.getbasetemp().parent / "page-packages"
+    lock = (WEB / "package-lock.json").read_bytes()
+    shared = tmp_path_factory.getbasetemp().parent / f"page-{hashlib.sha256(lock).hexdigest()[:12]}"
     shared.mkdir(exist_ok=True)
-    with open(shared / "lock", "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    with open(shared / "lock", "w") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
         if not (shared / "done").exists():
             try:
                 install(shared)
-            except HobbleError as error:
-                (shared / "failed").write_text(str(error))
+            except HobbleError:
+                return None
             (shared / "done").touch()
-    return None if (shared / "failed").exists() else shared / "node_modules"
+    return shared / "node_modules"
 
 
 @pytest.fixture(scope="session")

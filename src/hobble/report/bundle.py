@@ -28,11 +28,12 @@ def install(folder: str | Path) -> None:
     for name in PACKAGES:
         shutil.copyfile(WEB / name, folder / name)
     arguments = ["ci", "--ignore-scripts", "--no-audit", "--no-fund", "--prefer-offline", "--loglevel=error"]
+    arguments += ["--fetch-retries=2", "--fetch-retry-mintimeout=1000", "--fetch-retry-maxtimeout=4000"]
     done = npm(arguments, return_completed_process=True, cwd=folder, capture_output=True, text=True)
     if done.returncode:
         raise HobbleError(
             "the packages of the report's page could not be fetched from the npm registry. They are needed "
-            f"once: run again where it can be reached. npm says: {_last(done)}"
+            f"once: run again where it can be reached. npm says: {_said(done)[-600:]}"
         )
 
 
@@ -62,11 +63,10 @@ def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -
         env={**os.environ, "NODE_PATH": str(modules)},
     )
     if done.returncode:
-        raise HobbleError(f"the page's scripts could not be bundled: {_last(done)}")
+        raise HobbleError(f"the page's scripts could not be bundled: {_said(done)[:300]}")
     write_text(target, str(done.stdout))
 
 
-def _last(done: CompletedProcess[Any]) -> str:
-    """The last lines of what a program said, on one line."""
-    lines = [line.strip() for line in str(done.stderr or done.stdout).splitlines() if line.strip()]
-    return " ".join(lines[-4:])[:600]
+def _said(done: CompletedProcess[Any]) -> str:
+    """What a program said, on one line."""
+    return " ".join(str(done.stderr or done.stdout).split())

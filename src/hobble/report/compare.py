@@ -15,12 +15,13 @@ from hobble.report.body import body
 from hobble.report.scenes import FPS, UNIT, pack_positions, packed
 from hobble.runtime.network import Network
 
-CLIPS = 6
+CLIPS = 6  # that are shown at least, if there are so many; every held-out clip is
+MOST = 40
 LONGEST = 12 * 60  # frames of a clip that are shown
 
 
 def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str, Any]:
-    """The longest unbroken stretch of up to CLIPS clips, held-out ones first; {} without any.
+    """The longest unbroken stretch of each held-out clip, and of others up to CLIPS in all; {} without any.
 
     paths: `database/clips/<clip>.npz`. Predictions are one frame ahead from the true input, on the first fit
     of each row, as accuracy is measured; both are drawn at the captured root.
@@ -31,12 +32,11 @@ def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[s
     keep = dressed["keep"]
     order = sorted(paths, key=lambda path: (splits.get(Path(path).stem) != "held_out", Path(path).stem))
     clips = []
-    for path in order:
+    held_out = sum(splits.get(Path(path).stem) == "held_out" for path in order)
+    for path in order[: min(max(CLIPS, held_out), MOST)]:
         rows = load_clip_rows(path)
         if rows.layout.joints == network.layout.joints and len(rows):
             clips.append(_compared(network, rows, splits.get(rows.clip, "train"), keep))
-        if len(clips) == CLIPS:
-            break
     found = {"fps": FPS, "unit": UNIT, "joints": len(keep), "body": dressed, "clips": clips}
     return found if clips else {}
 

@@ -1,0 +1,53 @@
+"""The page's scripts: from a lock file, the same bytes each time, and a message where they cannot be made."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from hobble.core.errors import HobbleError
+from hobble.report.bundle import WEB, bundle, install
+
+
+def test_the_lock_file_holds_every_package_by_its_hash_and_no_host() -> None:
+    package, lock = (json.loads((WEB / f"package{name}.json").read_text()) for name in ("", "-lock"))
+    wanted = package["dependencies"] | package["devDependencies"]
+    assert all(re.fullmatch(r"\d+\.\d+\.\d+", version) for version in wanted.values())
+    packages = {path: entry for path, entry in lock["packages"].items() if path}
+    for name, version in wanted.items():
+        assert packages[f"node_modules/{name}"]["version"] == version
+    assert all(entry["integrity"].startswith("sha512-") for entry in packages.values())
+    assert "://" not in (WEB / "package-lock.json").read_text().replace("https://opencollective.com", "")
+
+
+def test_the_bundle_needs_nothing_else_and_comes_out_the_same(
+    script: str, modules: Path, tmp_path: Path
+) -> None:
+    if not script:
+        pytest.skip("the npm registry cannot be reached, so the page has no scripts")
+    bundle(modules, tmp_path / "again.js")
+    assert (tmp_path / "again.js").read_text(encoding="utf-8") == script
+    assert not re.search(r"^\s*(import|export)\b", script, re.MULTILINE)
+    assert "</script" not in script.lower()
+    assert "three.js" in script.lower() or "Three.js" in script
+
+
+def test_a_script_that_is_wrong_is_named(script: str, modules: Path, tmp_path: Path) -> None:
+    if not script:
+        pytest.skip("the npm registry cannot be reached, so the page has no scripts")
+    (tmp_path / "index.js").write_text("const a = ;")
+    with pytest.raises(HobbleError, match=r"index\.js:1"):
+        bundle(modules, tmp_path / "out.js", tmp_path)
+    assert not (tmp_path / "out.js").exists()
+
+
+def test_without_the_registry_the_message_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("npm_config_registry", "http://127.0.0.1:9/")
+    monkeypatch.setenv("npm_config_cache", str(tmp_path / "cache"))
+    monkeypatch.setenv("npm_config_fetch_retries", "0")
+    with pytest.raises(HobbleError, match="could not be fetched from the npm registry") as error:
+        install(tmp_path / "page")
+    assert "Traceback" not in str(error.value)
