@@ -1,0 +1,132 @@
+"""Clips with awkward names, and files that may not be read, through the real workflow."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from hobble.core.errors import HobbleError
+from hobble.workflow.project import Project
+
+from .lab import Lab
+from .texts import SKELETON
+from .throws import TRACEBACK, become_nobody
+
+pytestmark = pytest.mark.workflow
+DATASET = "skeleton: holden31\nfolder: mine\n"
+NAMES = (
+    'it\'s a "walk" – 走',
+    "$(touch pwned) `touch pwned`",
+    "a; touch pwned & touch pwned | tee pwned #",
+    "-rf *",
+)
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Lab:
+    """A checkout with a data set of a user's own, whose clips lie in run/mocap/mine."""
+    made = Lab(tmp_path / "lab")
+    (made.checkout / "config/datasets/mine.yaml").write_text(DATASET)
+    (made.run / "mocap/mine").mkdir(parents=True)
+    return made
+
+
+def run(lab: Lab, *arguments: str) -> tuple[int, str]:
+    end = lab.snakemake(lab.run, *arguments, "--config", "mocap=mocap")
+    assert TRACEBACK not in end.said
+    assert not list(lab.run.rglob("pwned")) + list(lab.checkout.glob("pwned"))
+    return end.status, end.said
+
+
+def test_no_name_reaches_a_shell(lab: Lab, tiny_bvh: str) -> None:
+    for name in NAMES:
+        (lab.run / f"mocap/mine/{name}.bvh").write_text(tiny_bvh)
+    made = [f"results/datasets/mine/motion/{name}.npz" for name in NAMES]
+    status, said = run(lab, "-c2", *made)
+    assert status == 0, said
+    assert all((lab.run / path).is_file() for path in made)
+
+
+def test_a_name_that_cannot_be_one_ends_before_the_first_job(lab: Lab, tiny_bvh: str) -> None:
+    (lab.run / "mocap/mine/a\ntouch pwned\n.bvh").write_text(tiny_bvh)
+    status, said = run(lab, "-n", "results/datasets/mine/database/all")
+    assert status == 1
+    assert "mocap/mine: a clip is called" in said
+    assert "Building DAG" not in said
+
+
+def test_a_configuration_makes_no_objects(lab: Lab) -> None:
+    text = "extends: test\nreport:\n  title: !!python/object/apply:os.system ['touch pwned']\n"
+    (lab.checkout / "config/mine.yaml").write_text(text)
+    status, said = run(lab, "-n", "results/mine/report.html")
+    assert status == 1
+    assert "mine.yaml, line 3: not valid YAML" in said
+
+
+@pytest.fixture
+def reachable() -> Iterator[Path]:
+    """A folder that nobody may enter, as the user of that name."""
+    if os.getuid():
+        pytest.skip("not root, so that nothing can be read as somebody else")
+    with tempfile.TemporaryDirectory(prefix="reachable-") as folder:
+        Path(folder).chmod(0o755)
+        yield Path(folder)
+
+
+def as_nobody(read: Callable[[], object]) -> str:
+    """What `read` says when it may read what everybody may."""
+    read_end, write_end = os.pipe()
+    pid = os.fork()
+    if not pid:
+        try:
+            become_nobody()
+            said = f"read: {read()}"
+        except HobbleError as error:
+            said = str(error)
+        except BaseException as error:
+            said = f"{TRACEBACK}: {error!r}"
+        os.write(write_end, said.encode())
+        os._exit(0)
+    os.close(write_end)
+    with os.fdopen(read_end) as pipe:
+        said = pipe.read()
+    os.waitpid(pid, 0)
+    return said
+
+
+@pytest.mark.parametrize(
+    "closed",
+    [
+        "mocap/mine",
+        "mocap/mine/a_injuries.txt",
+        "config/datasets/mine.yaml",
+        "config/skeletons/holden31.yaml",
+    ],
+)
+def test_what_decides_on_the_jobs_but_may_not_be_read_is_named(reachable: Path, closed: str) -> None:
+    for path, text in {
+        "config/datasets/mine.yaml": DATASET,
+        "config/test.yaml": "dataset: mine\ninjury: true\n",
+        "config/skeletons/holden31.yaml": SKELETON.read_text(),
+        "mocap/mine/a.bvh": "HIERARCHY",
+        "mocap/mine/a_injuries.txt": "frames:9\n",
+    }.items():
+        (reachable / path).parent.mkdir(parents=True, exist_ok=True)
+        (reachable / path).write_text(text)
+
+    def read() -> object:
+        project = Project(reachable, {"mocap": reachable / "mocap"})
+        project.check(["results/test/report.html"])
+        return project.selected("mine", "healthy")
+
+    read()  # imports what nobody could not
+    assert as_nobody(read).startswith("read: ")
+    (reachable / closed).chmod(0)
+    said = as_nobody(read)
+    assert closed in said
+    assert "ermission" in said
+    assert TRACEBACK not in said
