@@ -117,6 +117,25 @@ def test_keys_move_the_figure(tab: Any) -> None:
     assert tab.until(f"/Speed\\d\\.\\d\\d m\\/sPhase.*A frame\\d+\\.\\d ms/.test({panel})"), tab.run(panel)
 
 
+def test_a_gamepad_and_a_thumb_steer_too(tab: Any) -> None:
+    show(tab)
+    tab.run("Hobble.player.start()")
+    velocity = "Hobble.player.actors[0].character.velocity"
+    pad = "{ connected: true, axes: [0, -1, 0, 0], buttons: [{ pressed: true }] }"
+    tab.run(f"navigator.getGamepads = () => [null, {pad}]")
+    assert tab.until(f"Math.hypot(...{velocity}) > 6"), "the first button jogs"
+    tab.run("navigator.getGamepads = () => []")
+    assert tab.until(f"Math.hypot(...{velocity}) < .01")
+    x, y = tab.run(
+        "(({ x, y, width }) => [x + width / 2, y + 4])"
+        "(document.getElementById('play-pad').getBoundingClientRect())"
+    )
+    tab.send("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y}])
+    assert tab.until(f"Math.hypot(...{velocity}) > 2")
+    tab.send("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+    assert tab.until(f"Math.hypot(...{velocity}) < .01")
+
+
 def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> None:
     show(tab)
     tab.run("Hobble.player.view.orbit.yaw = 0")  # from the front no leg hides the other
