@@ -28,7 +28,7 @@ OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0}
 # A data set as the original made it: what differs from the defaults, as a configuration would say it.
 ORIGINAL = {
     "motion": {"proportions": "clip", "defects": "refuse"},
-    "labels": {},
+    "labels": {"margins": "drop"},
     "terrain": {
         "flat_level": "feet",
         "heel_height": 5.0,

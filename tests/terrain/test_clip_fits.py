@@ -116,7 +116,7 @@ def test_flat_ground_is_zero_and_one_fit(made: SimpleNamespace, patches: Patches
 
 @pytest.mark.parametrize("bent", [True, False])
 def test_a_floor_that_is_not_flat_is_bent_only_if_asked(
-    made: SimpleNamespace, patches: Patches, bent: bool
+    made: SimpleNamespace, patches: Patches, caplog: pytest.LogCaptureFixture, bent: bool
 ) -> None:
     walk = made.walk(GROUNDS["waves"])
     options = made.options(bend_flat=bent)
@@ -125,6 +125,7 @@ def test_a_floor_that_is_not_flat_is_bent_only_if_asked(
     assert np.any(fits.heights != 0) is np.bool_(bent)
     assert (fits.foot_error[..., 0].max() < 1) is np.bool_(bent)
     assert (fits.foot_below.max() <= 1) is np.bool_(bent)
+    assert ("figure: feet in contact are" in caplog.text) is not bent
 
 
 def test_a_foot_that_dips_into_a_flat_floor_makes_a_pit_and_nothing_else(

@@ -83,7 +83,7 @@ def clip_fits(
         if c in shown and np.any(heights[-1]):
             pictures.append(picture_of(clip, c, fit, feet, around))
     frame, cycle = _rows(cycles)
-    return ClipFits(
+    fits = ClipFits(
         frame=frame,
         cycle=cycle,
         fits=np.array([len(fit.chosen) for fit, _, _ in fitted], np.int32)[cycle],
@@ -93,6 +93,18 @@ def clip_fits(
         toe_height=feet.toe_height,
         pictures=tuple(pictures),
     )
+    _warn(clip.name, fits, options["deepest"])
+    return fits
+
+
+def _warn(name: str, fits: ClipFits, deepest: float | None) -> None:
+    """Say it where the ground is not where the feet are."""
+    if deepest is None or not len(fits.patch):
+        return
+    mean, below = float(fits.foot_error[..., 0].mean()), float(fits.foot_below.max())
+    if max(mean, below) > 1.001 * deepest:
+        text = "%s: feet in contact are %.2f cm from their ground on average, the deepest foot %.2f cm in it"
+        log.warning(text, name, mean, below)
 
 
 def _feet(
