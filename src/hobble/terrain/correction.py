@@ -95,7 +95,7 @@ def bends(
     share = points.count[:standing] / points.count[:standing].sum()
     rough = np.arange(len(residual)) if most is not None else np.zeros(0, int)
     for _ in range(LESS_SMOOTH):
-        left = np.abs(weights[rough] * diagonal)[:, :standing] @ share  # at the points, of the residual
+        left = np.sum(np.abs(weights[rough] * diagonal)[:, :standing] * share, axis=1)  # of the residual
         rough = rough[left > (most or 0.0)]
         if not len(rough):
             break
