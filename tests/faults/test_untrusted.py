@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from hobble.config.load import Catalogue
 from hobble.core.clip import load_clip
@@ -85,7 +86,8 @@ def test_two_billion_frames_are_refused_from_the_header(tmp_path: Path) -> None:
 @pytest.mark.parametrize("deep", [True, False])
 def test_a_million_joints_are_refused_from_the_header(tmp_path: Path, deep: bool) -> None:
     closing = "" if deep else "}\n"
-    joints = "".join(f"JOINT j{i}\n{{\nOFFSET 0 1 0\n{closing}" for i in range(1_000_000))
+    joint = f"JOINT j%d\n{{\nOFFSET 0 1 0\n{closing}"
+    joints = "".join(joint % i for i in range(5_000)) + joint * 995_000
     text = HEADER + joints + "}\n" * (1_000_001 if deep else 1) + "MOTION\nFrames: 1\nFrame Time: 0.0083\n1\n"
     path = write(tmp_path / "a.bvh", text)
     refused(lambda: bvh.read_bvh(path), "a.bvh, line ", f"more than {bvh.MOST_JOINTS} joints", mb=1000)
@@ -344,6 +346,29 @@ def test_a_configuration_names_nothing_outside_its_folder(catalogue: Path, key: 
     with pytest.raises(HobbleError, match="mine") as refusal:
         Project(catalogue.parent, {}).check(["results/mine/report.html"])
     assert "secret" not in str(refusal.value)
+
+
+HUGE = {
+    "network": {"units": 10**9},
+    "training": {"batch": 10**12},
+    "evaluation": {"laps": 10**12, "seconds": float("inf")},
+}
+HUGE_DATA = {
+    "synthetic": {"frames": 10**15},
+    "motion": {"loops": 10**9, "fps": float("inf")},
+    "terrain": {"patches": 10**12, "size": 10**6},
+    "database": {"window": 10**9, "step": 10**9},
+}
+
+
+def test_a_configuration_cannot_ask_for_a_mountain(catalogue: Path) -> None:
+    for section, values in (HUGE | HUGE_DATA).items():
+        for key, value in values.items():
+            folder = catalogue if section in HUGE else catalogue / "datasets"
+            given = {} if section in HUGE else {"skeleton": "holden31", "folder": "mine"}
+            write(folder / "mine.yaml", yaml.safe_dump({**given, section: {key: value}}))
+            read = Catalogue(catalogue).configuration if section in HUGE else Catalogue(catalogue).dataset
+            refused(lambda read=read: read("mine"), "mine.yaml", f"{section}.{key}")
 
 
 @pytest.mark.parametrize("value", ["../x", "/etc", "a/../../x", "a\nb"])

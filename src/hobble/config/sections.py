@@ -21,8 +21,9 @@ def _inside(path: str) -> str:
     return path
 
 
-Positive = Annotated[int, Field(gt=0)]
-PositiveFloat = Annotated[float, Field(gt=0)]
+# Upper bounds keep a mistyped or a stranger's configuration from asking for more memory than machines have.
+Positive = Annotated[int, Field(gt=0, le=1_000_000)]
+PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, lt=1)]
 Inside = Annotated[str, AfterValidator(_inside)]
 Ground = Literal["flat", "rocky", "jumpy", "beam"]
@@ -41,7 +42,7 @@ class Section(BaseModel):
 class Synthetic(Section):
     """The embedded data set: how much of it, and from which seed."""
 
-    frames: Annotated[int, Field(ge=600)] = Field(
+    frames: Annotated[int, Field(ge=600, le=1_000_000_000)] = Field(
         20_000, description="frames at 60 Hz over all clips together"
     )
     fps: Literal[60, 120] = Field(120, description="frames a second in the files written")
@@ -126,7 +127,7 @@ class Terrain(Section):
     patches: Positive = 20_000
     fits: Positive = Field(10, description="fits kept for each cycle; a flat cycle has one, counted so often")
     cell: PositiveFloat = Field(3.937007874, description="centimetres a cell")
-    size: Positive = Field(128, description="cells a side of a patch")
+    size: Annotated[int, Field(gt=0, le=2048)] = Field(128, description="cells a side of a patch")
     height_scale: PositiveFloat = 3.0
     highest: PositiveFloat = Field(50.0, description="a patch that goes further from its mean is dropped")
     smoothing: Annotated[float, Field(ge=0)] = Field(0.1, description="regularisation of the residual's RBF")
@@ -175,7 +176,9 @@ class Heightmap(Section):
 class Database(Section):
     """What a row holds and how rows lie on disk."""
 
-    window: Positive = Field(60, description="frames to each side of the present one")
+    window: Annotated[int, Field(gt=0, le=3600)] = Field(
+        60, description="frames to each side of the present one"
+    )
     step: Positive = Field(10, description="frames between trajectory samples")
     facing_sigma: PositiveFloat = Field(20.0, description="smoothing of the facing direction, frames")
     joint_weight: PositiveFloat = 0.1
@@ -196,7 +199,7 @@ class Network(Section):
     """The phase-functioned network. Two hidden layers is what the published weight sizes show."""
 
     hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
-    units: Positive = 512
+    units: Annotated[int, Field(gt=0, le=8192)] = 512
     control_points: Annotated[int, Field(ge=4, le=16)] = 4
 
 
