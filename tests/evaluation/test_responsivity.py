@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hobble.evaluation import responsivity as module
 from hobble.evaluation.responsivity import lap_rows, parameter_counts, responsivity
 from hobble.evaluation.tables import write_csv
 from hobble.runtime.controller import STEPS
@@ -22,8 +23,14 @@ RUNTIME = {
 }
 # So near to each other that standing in their midst is arriving at each.
 NEAR = tuple(Waypoint((x, 0.0), "walk", 2.5) for x in (0.0, 30.0, 60.0))
-# Straight ahead of the start, 3 m away, where a figure that glides straight on comes by; then behind it.
+# Straight ahead of the start, 4 m away, where a figure that glides straight on comes by; then the start.
 AHEAD = (Waypoint((0.0, 400.0), "walk", 1.5), Waypoint((0.0, 0.0), "walk", 1.5))
+# Likewise, and then aside of the way that it glides on.
+ASIDE = (
+    Waypoint((0.0, 400.0), "walk", 1.5),
+    Waypoint((3000.0, 1400.0), "walk", 1.5),
+    Waypoint((0.0, 0.0), "walk", 1.5),
+)
 
 
 def without_times(value: Any) -> Any:
@@ -47,16 +54,17 @@ def test_laps_that_are_finished(steady) -> None:
 
 
 def test_a_character_that_cannot_turn_is_ended_by_the_clock(steady) -> None:
-    result = run(steady, AHEAD, seconds=8.0)
+    result = run(steady, ASIDE, seconds=8.0)
     for lap in result["laps"]:
         assert lap["frames"] == 480
         assert lap["seconds"] == 8.0
         assert not lap["finished"]
-        # It passes the first waypoint after 200 frames of 1.5 cm; the other lies behind it.
+        # It passes the first waypoint after 200 frames of 1.5 cm, and never comes to the one aside.
         assert lap["waypoints_reached"] == 1
-        assert lap["path_overshoot_cm"] == pytest.approx(480 * 1.5 - 400, abs=30)
+        past = 480 * 1.5 - 400
+        assert lap["path_overshoot_cm"] == pytest.approx(past * 3 / np.sqrt(3**2 + 1), abs=30)
     assert result["waypoints_reached"] == 2
-    assert result["waypoints"] == 4
+    assert result["waypoints"] == 6
     # The second lap begins where the first did.
     np.testing.assert_allclose(
         result["laps"][0]["path_distance_cm"], result["laps"][1]["path_distance_cm"], atol=1e-6
@@ -95,6 +103,17 @@ def test_each_mode_runs_its_own_laps(network) -> None:
     )
     assert [entry["mode"] for entry in some["modes"]] == ["linear"]
     assert without_times(some["laps"]) == without_times(modes["linear"]["laps"])
+
+
+def test_times_of_steps_that_are_known() -> None:
+    """Two frames, of steps 1 .. 6 ms and of twice that; the whole call takes 1 ms more."""
+    steps = np.arange(1.0, 7.0)
+    times = np.array([[*steps, 22.0], [*(2 * steps), 43.0]]) / 1000
+    found = module._milliseconds(times)
+    assert [found[step] for step in STEPS] == pytest.approx(1.5 * steps)
+    assert [found["sd"][step] for step in STEPS] == pytest.approx(0.5 * steps)
+    assert found["total"] == pytest.approx(31.5)
+    assert found["spread"] == pytest.approx({"sd": 10.5, "median": 31.5, "p99": 41.79, "whole_call": 32.5})
 
 
 def test_a_lap_is_timed_step_by_step(steady) -> None:
