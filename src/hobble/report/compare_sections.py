@@ -29,35 +29,38 @@ def colours(compared: Compared) -> dict[str, str]:
 def configuration_table(compared: Compared) -> Table:
     """What sets each configuration apart, with its main figures."""
     accuracy = {entry["configuration"]: entry for entry in compared["accuracy"]}
-    frames = {e["configuration"]: e["milliseconds"]["total"] for e in reversed(compared["responsivity"])}
+    frames = {
+        entry["configuration"]: entry["milliseconds"]["total"]
+        for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] == "cubic")
+    }
     columns = [
         Column("configuration"),
-        Column("data set"),
-        Column.count("joints"),
-        Column.count("hidden layers"),
-        Column.count("units"),
-        Column.count("passes"),
-        Column("severities"),
-        Column.count("parameters"),
-        Column("weights, cubic", lambda v: size(float(v)), "n"),
         Column("held-out error", _percent, "n"),
         Column("training error", _percent, "n"),
         Column.number("ms a frame"),
+        Column.count("parameters"),
+        Column("severities"),
+        Column("data set"),
+        Column.count("joints"),
+        Column.count("layers"),
+        Column.count("units"),
+        Column.count("passes"),
+        Column("weights", lambda v: size(float(v)), "n"),
     ]
     rows = [
         [
             entry["configuration"],
+            accuracy[entry["configuration"]]["held_out"]["mean"],
+            accuracy[entry["configuration"]]["train"]["mean"],
+            frames.get(entry["configuration"]),
+            entry["computations"]["true"],
+            "inputs" if entry["injury"] else "none",
             entry["dataset"],
             entry["joints"],
             entry["hidden_layers"],
             entry["units"],
             entry["passes"],
-            "inputs" if entry["injury"] else "none",
-            entry["computations"]["true"],
             entry["weights_bytes"]["cubic"],
-            accuracy[entry["configuration"]]["held_out"]["mean"],
-            accuracy[entry["configuration"]]["train"]["mean"],
-            frames.get(entry["configuration"]),
         ]
         for entry in compared["configurations"]
     ]
@@ -183,7 +186,7 @@ def rollout_chart(compared: Compared) -> Chart | None:
 def lap_lines(compared: Compared) -> Chart | None:
     """Milliseconds a frame, lap by lap, for each phase mode."""
     options: dict[str, list[Trace]] = {}
-    for entry in compared["responsivity"]:
+    for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] != "cubic"):
         laps = [lap for lap in entry["laps"] if isinstance(lap.get("milliseconds"), dict)]
         x, y = [lap["lap"] for lap in laps], [lap["milliseconds"]["total"] for lap in laps]
         colour = colours(compared)[entry["configuration"]]
@@ -357,7 +360,8 @@ def beside_table(compared: Compared) -> Table:
     sources = compared["published"]["sources"]
     shows = {"bytes": size, "s": duration}
     rows = []
-    for row in (*compared["beside"], *compared["milliseconds"]["beside"]):
+    found = (*compared["beside"], *compared["milliseconds"]["beside"])
+    for row in sorted(found, key=lambda row: row["ours"] is None):
         show = shows.get(row["unit"], lambda value: number(value, 3))
         unit = f" {row['unit']}" if row["unit"] and row["unit"] not in shows else ""
         texts = ["" if row[k] is None else f"{show(float(row[k]))}{unit}" for k in ("published", "ours")]
