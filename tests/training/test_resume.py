@@ -26,6 +26,7 @@ from hobble.training.start import recipe_hash
 from hobble.training.train import train
 
 Settings = dict[str, Any]
+HURRIED = {"schedule": "cosine", "warm_up": 0.3, "feedback": 1.0, "batch": 256}
 
 PROCESS = """
 import json, sys
@@ -69,10 +70,9 @@ def _sections(folder: Path) -> int:
 
 
 @pytest.mark.parametrize(
-    "recipe", [{}, {"schedule": "cosine", "warm_up": 0.3, "feedback": 1.0, "batch": 256}]
+    ("recipe", "written", "number"),
+    [({}, False, 0), ({}, True, 5), (HURRIED, True, 1), (HURRIED, False, 3)],
 )
-@pytest.mark.parametrize("written", [False, True])
-@pytest.mark.parametrize("number", [0, 1, 5])
 def test_killed_before_or_after_any_write_it_ends_at_the_same_bits(
     data: Database,
     network: Settings,

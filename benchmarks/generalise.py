@@ -1,0 +1,63 @@
+"""What recipes of training give on clips they never saw: one frame ahead, and fed their own poses.
+
+    python benchmarks/generalise.py DATABASE < recipes
+
+DATABASE is results/datasets/<dataset>/database/healthy, beside the `clips` it was made from. Each line of the
+input is one recipe, in keys of the training section: `passes: 2, batch: 256, dropout: 0.1`. For each, the
+mean squared error of the last section of its training (with dropout and feedback) and of every held-out row;
+and how far joints are from the recorded ones over roll-outs of 1, 10 and 60 frames, cm, as the evaluation
+stage measures it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import hobble.training  # noqa: F401 - first, since it says how threads wait
+
+# isort: split
+import torch
+import yaml
+
+from hobble.config.sections import Network, Training
+from hobble.database.reader import Database
+from hobble.evaluation.rollouts import measure_roll_outs
+from hobble.training.held_out import HeldOut
+from hobble.training.train import train
+from hobble.training.weights import write_weights
+
+LENGTHS = (1, 10, 60)
+
+
+def measured(database: Database, recipe: dict, threads: int) -> str:
+    network = Network().model_dump(mode="json")
+    training = Training(**recipe).model_dump(mode="json")
+    clips = {c["clip"]: c["split"] for c in database.manifest.clips if c["split"] == "held_out" and c["rows"]}
+    files = {name: database.path.parent / "clips" / f"{name}.npz" for name in clips}
+    with tempfile.TemporaryDirectory() as folder:
+        weights = Path(folder) / "weights.npz"
+        state = train(database, network=network, training=training, checkpoints=Path(folder), threads=threads)
+        write_weights(weights, state.network, database, "benchmark", {})
+        rolled = measure_roll_outs(weights, files, clips, "benchmark", lengths=LENGTHS)
+    whole = HeldOut(database, torch.device("cpu"), 0).whole(state.network)[0]
+    strayed = " ".join(f"{entry['held_out']['position_error_cm']:5.2f}" for entry in rolled["lengths"])
+    return f"{state.history[-1][4]:7.4f} {whole:9.4f}  {strayed}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("database", type=Path)
+    parser.add_argument("--threads", type=int, default=2)
+    options = parser.parse_args()
+    database = Database.open(options.database, Training().memory_mb)
+    print(f"  train  held out  cm over {', '.join(map(str, LENGTHS))} frames", flush=True)
+    for line in sys.stdin:
+        recipe = yaml.safe_load("{" + line + "}")
+        print(f"{measured(database, recipe, options.threads)}  {line.strip()}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
