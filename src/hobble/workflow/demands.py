@@ -16,7 +16,7 @@ from pathlib import Path
 from hobble.workflow.project import MIRROR, Project
 
 ENGINE_MB = 400  # Snakemake, twice in a cluster's job: as the step that SLURM starts, and beside the script
-PYTHON_MB = 300  # Python with numpy, scipy and the package
+PYTHON_MB = 400  # Python with numpy, scipy and the package
 SPARE = 1.5  # asked for each megabyte measured
 SLOWER = 10  # the share of a second's work that a second on a busy, old machine may do
 JOINTS = 31  # of the figure that was measured
