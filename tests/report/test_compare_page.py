@@ -13,6 +13,7 @@ import yaml
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.compare import Measured, compare
 from hobble.report import compare_sections as parts
+from hobble.report import compare_tables as tables
 from hobble.report.compare_page import render_compared
 from hobble.report.gather import PUBLISHED, Material
 from hobble.report.playable import playable
@@ -107,7 +108,7 @@ def test_training_is_drawn_over_passes_seconds_and_samples(
 
 
 def test_every_pair_is_in_the_table_and_the_map(compared: dict[str, Any]) -> None:
-    table, chart = parts.difference_table(compared), parts.difference_map(compared)
+    table, chart = tables.difference_table(compared), parts.difference_map(compared)
     assert table is not None
     assert chart is not None
     overall = next(row for row in table.rows if row[2] == "error, held out")
@@ -119,7 +120,7 @@ def test_every_pair_is_in_the_table_and_the_map(compared: dict[str, Any]) -> Non
 
 
 def test_published_figures_have_ours_beside_them(compared: dict[str, Any]) -> None:
-    rows = {(row[0], row[1]): row[2:4] for row in parts.beside_table(compared).rows}
+    rows = {(row[0], row[1]): row[2:4] for row in tables.beside_table(compared).rows}
     assert rows["a frame", "holden"][0] == "0.376 ms"
     assert rows["a frame", "holden"][1].endswith(" ms")
     assert rows["relative error, held_out clips", "holden-xl"] == ["0.0448", ""]

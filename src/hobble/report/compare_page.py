@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hobble.report import compare_sections as parts
+from hobble.report import compare_tables as tables
 from hobble.report.formats import embedded
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
@@ -24,15 +25,15 @@ def render_compared(
     """
     kept, left_out = fitting(playables or {}, LARGEST)
     sections: dict[str, dict[str, Any]] = {
-        "overview": {"table": parts.configuration_table(compared), "beside": parts.beside_table(compared)},
+        "overview": {"table": tables.configuration_table(compared), "beside": tables.beside_table(compared)},
         "accuracy": {
             "boxes": parts.error_boxes(compared),
             "clips": parts.clip_dots(compared),
             "rollouts": parts.rollout_chart(compared),
             "differences": parts.difference_map(compared),
-            "table": parts.difference_table(compared),
+            "table": tables.difference_table(compared),
         },
-        "injury": {"table": parts.injury_table(compared)},
+        "injury": {"table": tables.injury_table(compared)},
         "speed": {"laps": parts.lap_lines(compared), "fit": parts.fit_chart(compared)},
         "training": {"curves": parts.training_curves(compared)},
         "stages": {"charts": parts.stage_dots(compared)},

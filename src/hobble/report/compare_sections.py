@@ -1,4 +1,4 @@
-"""Charts and tables of configurations side by side, from compare.json."""
+"""Charts of configurations side by side, from compare.json."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import Any
 
 from hobble.report.accuracy_section import quantiles
 from hobble.report.charts import Chart, Trace, axis, line, log_axis
-from hobble.report.formats import duration, number, size
-from hobble.report.tables import Column, Table
+from hobble.report.formats import duration, size
 
 Compared = Mapping[str, Any]
 PALETTE = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0", "@g1", "@predicted")
@@ -24,47 +23,6 @@ def names(compared: Compared) -> list[str]:
 def colours(compared: Compared) -> dict[str, str]:
     """A colour for each configuration, the same in every chart."""
     return {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(names(compared))}
-
-
-def configuration_table(compared: Compared) -> Table:
-    """What sets each configuration apart, with its main figures."""
-    accuracy = {entry["configuration"]: entry for entry in compared["accuracy"]}
-    frames = {
-        entry["configuration"]: entry["milliseconds"]["total"]
-        for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] == "cubic")
-    }
-    columns = [
-        Column("configuration"),
-        Column("held-out error", _percent, "n"),
-        Column("training error", _percent, "n"),
-        Column.number("ms a frame"),
-        Column.count("parameters"),
-        Column("severities"),
-        Column("data set"),
-        Column.count("joints"),
-        Column.count("layers"),
-        Column.count("units"),
-        Column.count("passes"),
-        Column("weights", lambda v: size(float(v)), "n"),
-    ]
-    rows = [
-        [
-            entry["configuration"],
-            accuracy[entry["configuration"]]["held_out"]["mean"],
-            accuracy[entry["configuration"]]["train"]["mean"],
-            frames.get(entry["configuration"]),
-            entry["computations"]["true"],
-            "inputs" if entry["injury"] else "none",
-            entry["dataset"],
-            entry["joints"],
-            entry["hidden_layers"],
-            entry["units"],
-            entry["passes"],
-            entry["weights_bytes"]["cubic"],
-        ]
-        for entry in compared["configurations"]
-    ]
-    return Table("compare-configurations", columns, rows, "The configurations")
 
 
 def error_boxes(compared: Compared) -> Chart | None:
@@ -337,67 +295,6 @@ def difference_map(compared: Compared) -> Chart | None:
     )
 
 
-def difference_table(compared: Compared) -> Table | None:
-    """Every pair and what it is over, errors and frame times."""
-    keys = ("mean_a", "sd_a", "mean_b", "sd_b", "difference")
-    found = [("error", r) for r in compared["difference"]]
-    found += [("ms a frame", r) for r in compared["milliseconds"]["difference"]]
-    rows = [
-        [r["a"], r["b"], f"{what}, {r['over'].replace('_', ' ')}", *(r[key] for key in keys)]
-        for what, r in found
-    ]
-    if not rows:
-        return None
-    columns = [Column("one"), Column("other"), Column("of")]
-    columns += [
-        Column.number(label) for label in ("mean, one", "sd, one", "mean, other", "sd, other", "eq. 3.2")
-    ]
-    return Table("compare-difference", columns, rows, "Every pair")
-
-
-def beside_table(compared: Compared) -> Table:
-    """The published figures with ours."""
-    sources = compared["published"]["sources"]
-    shows = {"bytes": size, "s": duration}
-    rows = []
-    found = (*compared["beside"], *compared["milliseconds"]["beside"])
-    for row in sorted(found, key=lambda row: row["ours"] is None):
-        show = shows.get(row["unit"], lambda value: number(value, 3))
-        unit = f" {row['unit']}" if row["unit"] and row["unit"] not in shows else ""
-        texts = ["" if row[k] is None else f"{show(float(row[k]))}{unit}" for k in ("published", "ours")]
-        rows.append([row["measure"], row["configuration"], *texts, sources.get(row["source"], row["source"])])
-    columns = [
-        Column("measure"),
-        Column("configuration"),
-        Column("published"),
-        Column("ours"),
-        Column("source"),
-    ]
-    return Table("compare-published", columns, rows, "Beside the published figures")
-
-
-def injury_table(compared: Compared) -> Table | None:
-    """What severities do, on average, in the configurations that know them."""
-    rows = [
-        (entry["configuration"], gait, summary)
-        for entry in compared["injury"]
-        if entry.get("applies")
-        for gait, summary in (entry.get("summary") or {}).items()
-    ]
-    if not rows:
-        return None
-    keys = list(dict.fromkeys(key for *_, summary in rows for key in summary))
-    right = {e["configuration"]: e["generated"] for e in compared["recognition"] if e.get("applies")}
-    columns = [Column("configuration"), Column("gait")]
-    columns += [Column.number(key.replace("_", " ")) for key in keys]
-    columns.append(Column("hurt part named right", _percent, "n"))
-    table = [
-        [name, gait, *(summary.get(key) for key in keys), right.get(name, {}).get("right")]
-        for name, gait, summary in rows
-    ]
-    return Table("compare-injury", columns, table, "Means over links")
-
-
 def _dots(name: str, x: Sequence, y: Sequence, colour: str, hover: str) -> Trace:
     return {
         "type": "scatter",
@@ -415,7 +312,3 @@ def _passes(entry: Mapping[str, Any]) -> list[float]:
     sections = [s for s in entry.get("section", ()) if s is not None]
     most = max(sections, default=1)
     return [p - 1 + s / most for p, s in zip(entry.get("pass", ()), entry.get("section", ()), strict=True)]
-
-
-def _percent(value: Any) -> str:
-    return f"{100 * float(value):.2f} %"
