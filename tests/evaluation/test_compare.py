@@ -32,7 +32,7 @@ JUDGED = {"windows": 4, "right": 0.75, "confusion": {"knee": {"knee": 3, "health
 RECOGNISED = {
     "applies": True,
     "captured": {"cross_validated": JUDGED, "held_out": JUDGED},
-    "generated": {**JUDGED, "right": 0.5},
+    "generated": {**JUDGED, "right": 0.5, "by_severity": [{"severity": 10.0, "right": 0.9}]},
 }
 
 
@@ -171,7 +171,10 @@ def test_tables_hold_the_same_whatever_columns_each_has(compared, tmp_path) -> N
         "1",
     )
     named = [r for r in rows["published"] if r["measure"].startswith("hurt part")]
-    assert [(r["configuration"], r["published"], r["ours"]) for r in named] == [("ava", "0.82", "0.5")]
+    assert [(r["configuration"], r["published"], r["ours"]) for r in named] == [
+        ("ava", "0.82", "0.5"),
+        ("ava", "0.82", "0.9"),
+    ]
     last = rows["training"][-2:]
     assert [r["held_out_turn"] for r in last] == ["0.25", ""]
     assert [r["held_out_mse"] for r in last] == ["", ""]

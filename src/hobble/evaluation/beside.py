@@ -47,8 +47,11 @@ def beside(all_measured: Sequence[Measured], published: Mapping[str, Any]) -> li
     for m in all_measured:
         if m.recognition["applies"]:
             named = {**people, "configuration": m.name}
-            ours = m.recognition["generated"]["right"]
-            out.append(_row("hurt part named right (people; a classifier)", named, people["share"], ours, ""))
+            found = m.recognition["generated"]
+            shares = {"all severities": found["right"]}
+            shares |= {f"severity {row['severity']:g}": row["right"] for row in found["by_severity"]}
+            for which, ours in shares.items():
+                out.append(_row(f"hurt part named right, {which}", named, people["share"], ours, ""))
     return out
 
 
