@@ -11,7 +11,7 @@ STANDING = 0.8  # cm a frame at 60 Hz: a heel slower than this is treated as sta
 SHORTEST = 1 / 20  # seconds
 RAMP = 1 / 15  # seconds before and after standing over which the tilt sets in and goes
 MOST_TILT = np.radians(10.5)  # half of all frames need 0.3 degrees, nine of ten less than 3.5
-LOW = 2.5  # cm of height of the ankle above the ball from which on tilting helps
+LOW = 1.5  # cm of height of the ankle above the ball from which on tilting helps
 
 
 def level_heels(foot: Array, heel: Array, toe: Array, fps: float) -> Array:
@@ -33,7 +33,7 @@ def level_heels(foot: Array, heel: Array, toe: Array, fps: float) -> Array:
     side = np.cross([0.0, 1.0, 0.0], ahead)
     # Raising the heel by an angle moves it level by that times its height; where it has none, nothing helps.
     height = foot[:, 1]
-    pitch = np.sum(missing * ahead, axis=1) * height / (height**2 + LOW**2)
+    pitch = np.sum(missing * ahead, axis=1) * height**3 / (height**4 + LOW**4)
     yaw = np.sum(missing * side, axis=1) / np.maximum(across[:, 0], LOW)
     tilt = quat.from_axis_angle(side, _held(pitch))
     return quat.mul(quat.yaw(_held(yaw)), tilt)
