@@ -49,7 +49,8 @@ def beside(all_measured: Sequence[Measured], published: Mapping[str, Any]) -> li
             named = {**people, "configuration": m.name}
             found = m.recognition["generated"]
             shares = {"all severities": found["right"]}
-            shares |= {f"severity {row['severity']:g}": row["right"] for row in found["by_severity"]}
+            hurt = [row for row in found["by_severity"] if row["severity"] > 0]
+            shares |= {f"severity {row['severity']:g}": row["right"] for row in hurt}
             for which, ours in shares.items():
                 out.append(_row(f"hurt part named right, {which}", named, people["share"], ours, ""))
     return out
