@@ -13,6 +13,7 @@ import pytest
 
 from hobble.core import quat
 from hobble.core.errors import InputError
+from hobble.core.skeleton import forward_kinematics
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
 from hobble.runtime import Pose, ProceduralAnimation
 from hobble.runtime.axes import MATRICES, Axes
@@ -349,6 +350,33 @@ def test_the_callers_axes(network, handed: str, up: str, unit: str) -> None:
     )
 
 
+@pytest.mark.parametrize("unit", ["cm", "m"])
+@pytest.mark.parametrize(("handed", "up"), MATRICES)
+def test_an_asymmetric_pose_is_the_same_in_every_convention(
+    holden31, handed: str, up: str, unit: str
+) -> None:
+    """Left arm up, right knee bent: the caller's own bones, turned by the rotations it gets, end where it is
+    told that the joints are, and the left hand is on the caller's left."""
+    local = np.tile([1.0, 0, 0, 0], (1, 31, 1))
+    for joint, axis, angle in (("left_shoulder", [0.3, 0, 1.0], 1.1), ("right_hip", [1.0, 0.2, 0], -0.7)):
+        axis = np.array(axis) / np.linalg.norm(axis)
+        local[0, holden31.role(joint)] = quat.from_axis_angle(axis, angle)
+    local[0, 0] = quat.from_axis_angle([0, 1.0, 0], 0.4)
+    ours, placed = forward_kinematics(holden31, local, np.array([[10.0, 95, 20]]))
+    axes = Axes(handed, up, unit)
+    rotations, positions = axes.rotations_out(ours[0]), axes.points_out(placed[0])
+    bones = axes.points_out(holden31.offsets)
+    for joint, parent in enumerate(holden31.parents):
+        if parent >= 0:
+            end = positions[parent] + quat.rotate(rotations[parent], bones[joint])
+            np.testing.assert_allclose(end, positions[joint], atol=1e-9)
+    hand = positions[holden31.role("left_wrist")] - positions[0]
+    across = quat.rotate(rotations[0], axes.directions_out(np.array([1.0, 0, 0])))
+    assert hand @ across > 0.2 * np.linalg.norm(hand)
+    assert hand["XYZ".index(up)] > 60 * axes.scale
+    np.testing.assert_allclose(axes.points_in(positions), placed[0], atol=1e-9)
+
+
 def test_sides_in_unity_and_unreal() -> None:
     """The left hand of a figure that faces ahead is where those engines have left."""
     left, up, ahead = np.eye(3)
@@ -410,3 +438,29 @@ def test_the_released_network_does_not_fall_apart(shared: Path, holden31, mode: 
     assert np.abs(stop - stop[0]).max() < 3
     # Its turn in place ends facing -X, which a wrong sign of the turn would never reach.
     assert abs(np.sin(poses[7 * 450 - 1].yaw) + 1) < 0.05
+
+
+@pytest.mark.shared
+def test_the_released_network_keeps_its_feet_on_hills(shared: Path, holden31) -> None:
+    """A quarter of a minute in a curve over rolling ground: soles neither in it nor floating, nor sliding."""
+    network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
+    character = ProceduralAnimation(network)
+    legs = character._controller._legs
+    sole = np.tile(character._controller._sole, 2)
+
+    def rolling(x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        return 14 * np.sin(x / 170) * np.cos(z / 140) + 8 * np.sin((x + z) / 260)
+
+    above, contacts, toes = [], [], []
+    for frame in range(900):
+        turn = 0.004 * frame
+        pose = character.next_pose((2.5 * np.sin(turn), 2.5 * np.cos(turn)), gait="walk", terrain=rolling)
+        feet = pose.positions[legs[:, 2:]].reshape(4, 3)
+        above.append(feet[:, 1] - rolling(feet[:, 0], feet[:, 2]) - sole)
+        contacts.append(pose.contacts)
+        toes.append(pose.positions[legs[:, 3]])
+    standing = np.array(contacts) > 0.5
+    assert np.min(above) > -1
+    assert np.median(np.array(above)[standing]) < 1.5
+    assert np.percentile(np.array(above)[standing], 95) < 5
+    assert foot_slide(np.array(toes), np.array(contacts)).mean() < 2
