@@ -33,6 +33,9 @@ def test_parts_are_the_links_of_their_roles(holden31: Skeleton) -> None:
     assert names["lower back"] == "Hips-LowerBack"
     assert set(names) == {label for label, *_ in PARTS}
     assert body_parts(holden31, ()) == {}
+    links = holden31.link_names
+    back = body_parts(holden31, links, {"LowerBack-Spine", "Spine1-Neck"})["lower back"]
+    assert links[back] == "LowerBack-Spine", "the one that was hurt in training"
 
 
 def test_weights_are_kept_to_a_part_in_sixty_thousand(network: Network, character: dict[str, Any]) -> None:

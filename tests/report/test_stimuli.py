@@ -50,7 +50,7 @@ def test_the_body_stands_where_the_camera_says(studio: Studio, standing: np.ndar
     x, y, _ = camera.project(standing).T
     rows, columns = np.nonzero(drawn)
     assert columns.min() == pytest.approx(x.min(), abs=22)  # hands reach on past the wrists
-    assert rows.max() == pytest.approx(y.max(), abs=6)
+    assert rows.max() == pytest.approx(y.max(), abs=10)  # and toes past their joints
     for joint in range(len(standing)):
         assert drawn[int(y[joint]), int(x[joint])], joint
     front = picture[int(y[0]), int(x[0])] / 255

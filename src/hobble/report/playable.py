@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,7 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
     weights, biases = list(network.weights), list(network.biases)
     weights[-1], biases[-1] = weights[-1][:, :outputs], biases[-1][:, :outputs]
     legs = feet.leg_joints(skeleton)
-    parts = body_parts(skeleton, network.links)
+    parts = body_parts(skeleton, network.links, network.hurt_links)
     sole = feet.sole_heights(network, legs).tolist()
     return {
         "layers": [_layer(w, b) for w, b in zip(weights, biases, strict=True)],
@@ -68,6 +68,7 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
         "y": {name: block.start for name, block in layout.blocks("y").items()},
         "gaits": list(network.gaits),
         "links": list(network.links),
+        "trained": list(network.hurt_links),
         "legs": legs.tolist(),
         "carried": [np.flatnonzero(row).tolist() for row in feet.carried(skeleton, legs)],
         "sole": sole,
@@ -86,18 +87,25 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def body_parts(skeleton: Skeleton, links: tuple[str, ...]) -> dict[str, int]:
-    """Label -> index of the link that the part is, for those that the network knows."""
+def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] = ()) -> dict[str, int]:
+    """Label -> index of the link that the part is, for those that the network knows.
+
+    Of the links between the part's two ends it is the uppermost of those that were `hurt` in training, or the
+    uppermost of all where none was: hurting another would change nothing.
+    """
     found = {}
     for label, upper, lower in PARTS:
         if upper not in skeleton.roles or lower not in skeleton.roles:
             continue
         joint, top = skeleton.role(lower), skeleton.role(upper)
+        way = []
         while joint != top and skeleton.parents[joint] >= 0:
-            name = f"{skeleton.joints[skeleton.parents[joint]]}-{skeleton.joints[joint]}"
-            if name in links:
-                found[label] = links.index(name)  # the last found is the one nearest to the upper end
+            way.append(f"{skeleton.joints[skeleton.parents[joint]]}-{skeleton.joints[joint]}")
             joint = skeleton.parents[joint]
+        known = [name for name in reversed(way) if name in links]
+        if known:
+            best = next((name for name in known if name in hurt), known[0])
+            found[label] = list(links).index(best)
     return found
 
 

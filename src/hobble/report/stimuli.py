@@ -98,7 +98,7 @@ def write_stimuli(
 def wanted(network: Network) -> list[tuple[str, dict[str, float], bool]]:
     """Name, severities by link, and whether they are shown as colours, of each image."""
     assert network.skeleton is not None
-    parts = body_parts(network.skeleton, network.links)
+    parts = body_parts(network.skeleton, network.links, network.hurt_links)
     out = []
     for name, labels in STUDY.items():
         out.append((name, {network.links[parts[label]]: SEVERITY for label in labels}, False))

@@ -87,7 +87,10 @@ const createPlay = (stage, playables) => {
     if (!pressed || Math.hypot(event.offsetX - pressed[0], event.offsetY - pressed[1]) > 5) return;
     for (const actor of player.actors) {
       const links = actor.under(event.offsetX, event.offsetY);
-      if (links && links.length) { injuries.worse(links.at(-1), event.shiftKey ? -2 : 2); return; }
+      if (!links || !links.length) continue;
+      const felt = links.filter((link) => actor.spec.trained.includes(link)); // another would change nothing
+      injuries.worse((felt.length ? felt : links).at(-1), event.shiftKey ? -2 : 2);
+      return;
     }
   });
 
@@ -123,7 +126,7 @@ const film = (button, canvas, name) => {
   let recorder = null;
   button.addEventListener("click", () => {
     if (recorder) { recorder.stop(); recorder = null; button.textContent = "Film"; return; }
-    const type = ["video/webm;codecs=vp9", "video/webm", "video/mp4"].find((t) => MediaRecorder.isTypeSupported(t));
+    const type = ["video/webm;codecs=vp8", "video/webm", "video/mp4"].find((t) => MediaRecorder.isTypeSupported(t));
     const chunks = [], made = new MediaRecorder(canvas.captureStream(60), { mimeType: type, videoBitsPerSecond: 8e6 });
     made.addEventListener("dataavailable", ({ data }) => chunks.push(data));
     made.addEventListener("stop", () => save(new Blob(chunks, { type }), `${name()}.${type.includes("mp4") ? "mp4" : "webm"}`));
