@@ -9,7 +9,7 @@ from pathlib import Path
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_text
 
-HEADER = 1 << 20  # bytes; that of 191 joints takes 40 kB
+HEADER = 1 << 18  # bytes; that of 191 joints takes 40 kB
 JOINT = re.compile(r"^\s*(?:ROOT|JOINT)\s+(.*?)\s*\{?\s*$", re.MULTILINE | re.IGNORECASE)
 LINE = re.compile(r"([0-9a-fA-F]{64}) [ *](\S+)\.bvh")
 
