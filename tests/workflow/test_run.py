@@ -98,6 +98,12 @@ def test_editing_a_comment_of_the_page_remakes_only_the_report(copied) -> None:
     assert set(copied.planned(TARGET)) == {"report"}
 
 
+def test_editing_a_script_of_the_page_bundles_again_and_fetches_nothing(copied) -> None:
+    script = copied.own_source() / "report/web/strips.js"
+    script.write_text(script.read_text() + "// a comment\n")
+    assert set(copied.planned(TARGET)) == {"page_bundle", "report"}
+
+
 def test_editing_a_comment_in_the_code_reruns_nothing(copied) -> None:
     module = copied.own_source() / "core/quat.py"
     module.write_text(module.read_text() + "\n# a comment\n")
