@@ -11,7 +11,8 @@ from hobble.report.formats import embedded
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
-LARGEST = 21_000_000  # characters of networks that the page may hold, so that it stays under 25 MB
+LARGEST = 24_850_000  # bytes of the page, which is to stay under 25 MB
+ELSE = 60_000  # of them for words, style and tables
 NAME = "compare"
 
 
@@ -23,7 +24,6 @@ def render_compared(
     compared: compare.json; playables: of `playable.playable` for each configuration that is to be played, of
     which as many are kept as there is room for, in their order; bundle: the scripts, of `bundle.bundle`.
     """
-    kept, left_out = fitting(playables or {}, LARGEST)
     sections: dict[str, dict[str, Any]] = {
         "overview": {"table": tables.configuration_table(compared), "beside": tables.beside_table(compared)},
         "accuracy": {
@@ -39,7 +39,10 @@ def render_compared(
         "stages": {"charts": parts.stage_dots(compared)},
     }
     names = parts.names(compared)
-    data = {"name": NAME, "charts": specs(sections), "playable": kept}
+    charts = specs(sections)
+    room = LARGEST - ELSE - len(bundle.encode()) - len(embedded(charts).encode())
+    kept, left_out = fitting(playables or {}, room)
+    data = {"name": NAME, "charts": charts, "playable": kept}
     return template("compare.html.j2").render(
         name=NAME,
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
