@@ -36,7 +36,7 @@ def lab() -> Iterator[Lab]:
 @pytest.mark.parametrize(
     ("throw", "times"),
     [
-        (throws.kill, 12),
+        (throws.kill, 16),
         (throws.gone, 5),
         (throws.full_disk, 4),
         (throws.no_permission, 4),

@@ -5,12 +5,15 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import signal
 import subprocess
+import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
+from typing import Any
 
 from .damage import DAMAGES, damaged, group_of
 from .lab import NOBODY, Bench, End, Job, Lab
@@ -53,21 +56,49 @@ def refusal(end: End, job: Job, *pieces: str) -> str:
 
 
 def kill(lab: Lab, rng: Random) -> Throw:
-    """SIGKILL at a random moment; older artefacts, there half the time, stay or are replaced whole."""
+    """Killed at a random moment, or in the midst of writing.
+
+    Older artefacts, there half the time, stay or are replaced whole.
+    """
     job = rng.choice(lab.jobs)
     after = rng.uniform(0, 1.1 * lab.seconds[job.name])
+    writing = rng.random() < 0.7
     with lab.bench(job) as bench:
         files = [path for path in job.outputs if (lab.run / path).is_file()]
         older = rng.random() < 0.5
         for path in files if older else ():
             (bench.folder / path).parent.mkdir(parents=True, exist_ok=True)
             (bench.folder / path).write_bytes(OLD)
-        end = bench.run(kill_after=after)
+        if writing:
+            nth, seconds = rng.randint(2, 2 + 2 * len(job.outputs)), 10 ** rng.uniform(-4, -2.7)
+            end = bench.run(before=_die_writing(nth, seconds))
+        else:
+            end = bench.run(kill_after=after)
         torn = [path for path in files if not _old_or_new(bench, path, older)]
-        what = f"SIGKILL of a job at a random moment, {'older' if older else 'no'} artefacts there"
+        moment = "as it writes" if writing else "at a random moment"
+        what = f"a job killed {moment}, {'older' if older else 'no'} artefacts there"
         if torn or _half_a_database(bench):
             return Throw(what, ANY, FAULT, f"{job.name} after {after:.3f} s left half of {torn}")
         return _again(bench, what, ANY, UNHARMED if end.status == 0 else REMADE)
+
+
+def _die_writing(n: int, seconds: float) -> Callable[[], None]:
+    """End this process so soon after it opens the n-th file to write in, by a signal that it does not see."""
+
+    def prepare() -> None:
+        left = n
+
+        def heard(event: str, given: tuple[Any, ...]) -> None:
+            nonlocal left
+            if event == "open" and isinstance(given[2], int) and given[2] & (os.O_WRONLY | os.O_RDWR):
+                left -= 1
+                if left == 0:
+                    signal.setitimer(signal.ITIMER_REAL, seconds)
+
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        sys.addaudithook(heard)
+
+    return prepare
 
 
 def _old_or_new(bench: Bench, path: str, older: bool) -> bool:
@@ -252,7 +283,7 @@ def changing_clip(lab: Lab, rng: Random) -> Throw:
         if record is not None:
             record.unlink()  # it is a user's clip, which nobody vouches for
         new = (lab.run / next(p for p in other.inputs if p.endswith(".bvh"))).read_bytes()
-        delay, pause = rng.uniform(0, lab.seconds[job.name]), rng.uniform(0, 0.05)
+        delay, pause = rng.uniform(0, 0.8 * lab.seconds[job.name]), rng.uniform(0, 0.01)
 
         def change() -> None:
             time.sleep(delay)
