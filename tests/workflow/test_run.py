@@ -69,7 +69,7 @@ def test_two_runs_give_the_same_bytes(finished, workflow) -> None:
     first, second = artefacts(finished.folder), artefacts(workflow.folder)
     assert first.keys() == second.keys()
     assert [name for name in first if first[name] != second[name]] == []
-    for name in ("accuracy", "injury", "responsivity"):
+    for name in ("accuracy", "rollouts", "responsivity", "injury", "recognition"):
         a, b = (
             json.loads((w.folder / f"results/test/evaluation/{name}.json").read_text())
             for w in (finished, workflow)
