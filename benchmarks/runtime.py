@@ -12,7 +12,7 @@ import sys
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 import yaml
@@ -119,9 +119,13 @@ def frames(network: Network, baseline: float) -> None:
             velocity = 2.5 * np.stack([np.sin(angle), np.cos(angle)], axis=1)
             character.next_pose(velocity, gait="walk")
             run = max(60, FRAMES // count)
+            before = process_time()
             times = timed(lambda p, c=character, v=velocity: c.next_pose(v, gait="walk"), run) / count
+            busy = 1000 * (process_time() - before) / run
             note = f"{count} characters" + (
-                f": {np.median(times) * count / 1000:.1f} ms" if count > 1 else ""
+                f": {np.median(times) * count / 1000:.1f} ms, {busy:.1f} ms of the processor"
+                if count > 1
+                else ""
             )
             show(mode, times, baseline, note)
 
