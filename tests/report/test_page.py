@@ -116,7 +116,9 @@ def test_same_input_same_page(
     script: str,
     page: str,
 ) -> None:
-    assert render(material, play, character, compared, script) == page
+    again = render(material, play, character, compared, script)
+    commit = re.compile(r'<td class="hash">[0-9a-f]{40}[^<]*</td>')  # of a checkout that others may work in
+    assert commit.sub("", again) == commit.sub("", page)
 
 
 HOSTILE = "<script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}"
