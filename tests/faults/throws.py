@@ -70,7 +70,7 @@ def kill(lab: Lab, rng: Random) -> Throw:
             (bench.folder / path).parent.mkdir(parents=True, exist_ok=True)
             (bench.folder / path).write_bytes(OLD)
         if writing:
-            nth, seconds = rng.randint(2, 2 + 2 * len(job.outputs)), 10 ** rng.uniform(-4, -2.7)
+            nth, seconds = rng.randint(2, 2 + len(job.outputs)), 10 ** rng.uniform(-4.3, -3)
             end = bench.run(before=_die_writing(nth, seconds))
         else:
             end = bench.run(kill_after=after)
