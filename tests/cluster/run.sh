@@ -75,7 +75,8 @@ cluster=$!
 running+=("$cluster")
 kill_job clips 'results/datasets/tiny/logs/labels/labels_clip/*.log'
 kill_job training 'results/test/logs/training/training.log'
-wait "$cluster" || fail "the run through SLURM failed"
+wait "$cluster"
+[ -e "$folder/cluster/$target" ] || fail "the run through SLURM failed"
 
 restarts=$(grep -c 'Trying to restart' "$log")
 submitted=$(grep -c 'has been submitted with SLURM jobid' "$log")
@@ -83,7 +84,9 @@ say "$submitted jobs submitted, $restarts of them a second time"
 # A third would be one that SLURM killed because it took more than its rule states.
 [ "$restarts" = 2 ] || fail "two jobs were killed, but $restarts started again"
 
-wait "$local_run" || { tail -n 40 "$folder/local.log" >&2; fail "the local run failed"; }
+# By its last file, not by its status, which bash may have forgotten among thousands of processes since.
+wait "$local_run"
+[ -e "$folder/local/$target" ] || { tail -n 40 "$folder/local.log" >&2; fail "the local run failed"; }
 "$python" "$here/same.py" "$folder/local" "$folder/cluster" || fail "the results differ"
 "${through_slurm[@]}" >"$log" 2>&1 && grep -q 'Nothing to be done' "$log" || fail "a second run had something to do"
 say "passed in $SECONDS s"
