@@ -130,17 +130,25 @@ def _again(bench: Bench, what: str, at: str, happened: str) -> Throw:
 
 def harm(lab: Lab, rng: Random, only: str | None = None) -> Throw:
     """Bytes of one input that another job made are cut, flipped, zeroed, ...; its time stays as it was."""
-    jobs = [job for job in lab.jobs if any(p.startswith("results/") for p in job.inputs)]
-    job = rng.choice([job for job in jobs if only in (None, job.rule)])
+    there = [(job, path) for job in lab.jobs for path in _files_read(lab, job) if only in (None, job.rule)]
+    wanted = rng.choice(sorted({kind(path) for _, path in there}))  # each kind of file as often
+    job, path = rng.choice([(job, path) for job, path in there if kind(path) == wanted])
     name = rng.choice(sorted(DAMAGES))
     with lab.bench(job) as bench:
-        target = _some_file(bench, rng)
+        target = bench.folder / path
         whole, times = target.read_bytes(), target.stat()
         if not whole:
             return Throw("bytes " + group_of(name), kind(str(target)), SKIPPED, "an empty file")
         target.write_bytes(damaged(rng, name, whole))
         os.utime(target, ns=(times.st_atime_ns, times.st_mtime_ns))
         return _judged(bench, name, target, rng)
+
+
+def _files_read(lab: Lab, job: Job) -> list[str]:
+    """What a job reads that others made; of folders, the files in them."""
+    roots = [lab.run / path for path in job.inputs if path.startswith("results/")]
+    files = [file for root in roots for file in _files(root) if not file.name.startswith(".")]
+    return sorted(str(file.relative_to(lab.run)) for file in files)
 
 
 def gone(lab: Lab, rng: Random) -> Throw:
