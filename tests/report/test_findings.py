@@ -47,6 +47,8 @@ def test_curve_that_rises_falls_or_rests(material: Material) -> None:
     falling = history([1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3])
     assert any("still falling, by 36 %" in head for head in heads(material, history=falling))
     assert heads(material, history=history([0.3] * 8))["Training has settled."] == "good"
+    noisy = history([0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.28, 0.32])  # the last section is no trend
+    assert heads(material, history=noisy)["Training has settled."] == "good"
 
 
 def test_waypoints_flips_and_links_that_do_nothing(material: Material) -> None:

@@ -156,15 +156,19 @@ def _generalisation(material: Material) -> Iterator[Hint]:
 
 
 def _curve(material: Material) -> Iterator[Hint]:
-    losses = [v for v in material.history.get("held_out_mse", ()) if v is not None]
-    passes = [p for p in material.history.get("pass", ()) if p is not None]
-    if len(losses) < 8 or len(passes) < len(losses):
+    history = material.history
+    curve = zip(history.get("pass", ()), history.get("held_out_mse", ()), strict=False)
+    known = [(p, v) for p, v in curve if p is not None and v is not None]
+    if len(known) < 8:
         return
-    best = int(np.argmin(losses))
-    if losses[-1] > 1.05 * losses[best]:
+    passes, losses = zip(*known, strict=True)
+    # One section's error is noisy; a pass's is what has a trend.
+    means = {p: np.mean([v for q, v in known if q == p]) for p in passes}
+    best = min(means, key=lambda p: means[p])
+    if means[passes[-1]] > 1.05 * means[best]:
         yield Hint(
             "warn",
-            f"The held-out error was lowest in pass {passes[best]:.0f} and has risen since.",
+            f"The held-out error was lowest in pass {best:.0f} and has risen since.",
             "Fewer passes, more dropout or more data would serve the held-out clips better.",
         )
         return
