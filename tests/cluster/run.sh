@@ -18,6 +18,10 @@ finish() {
     local status=$? process
     for process in "${running[@]}"; do kill -KILL -- "-$process" 2>/dev/null; done
     slurm_down
+    # What a killed job had started outlives it: SLURM tracks processes here, it does not contain them.
+    for process in $(grep -las "$folder/" /proc/[0-9]*/cmdline | cut -d/ -f3); do
+        [ "$process" = $$ ] || kill -KILL "$process" 2>/dev/null
+    done
     if [ "$status" = 0 ] || [ "$status" = 77 ]; then
         rm -rf "$folder"
     else
