@@ -11,10 +11,15 @@ from pathlib import Path
 
 import pytest
 import yaml
+from hypothesis import HealthCheck, settings
 
 from hobble.core.skeleton import Skeleton
 
 ROOT = Path(__file__).resolve().parents[1]
+
+# A busy machine is no fault of the code: in a fresh clone the first text drawn takes seconds.
+settings.register_profile("hobble", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("hobble")
 
 
 @pytest.fixture(scope="session")
