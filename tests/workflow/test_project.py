@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from hobble.core.errors import HobbleError
+from hobble.workflow import targets
 from hobble.workflow.project import Project
 
 DATASET = """
@@ -70,6 +71,31 @@ def test_a_data_set_that_cannot_work_is_told(base: Path, text: str, message: str
     (base / "config/datasets/mine.yaml").write_text(text)
     with pytest.raises(HobbleError, match=message):
         Project(base, {}).splits("one")
+
+
+def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
+    (base / "config/datasets/mine.yaml").write_text("skeleton: s\nfolder: mine\nheld_out: [a, b, c]\n")
+    with pytest.raises(HobbleError, match="mine: no clip is left to train on"):
+        Project(base, {}).splits("hurt")
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ("results/one/stimuli", "`injury: false`.*Ask for results/injured/stimuli"),
+        ("results/eyes/stimuli/", "configuration one has `injury: false`"),
+        ("results/hurt/export/cubik.onnx", "export/cubik.onnx: there are constant, linear, cubic"),
+    ],
+)
+def test_what_no_network_could_give_is_told_before_it_is_trained(
+    base: Path, monkeypatch: pytest.MonkeyPatch, target: str, message: str
+) -> None:
+    (base / "config/eyes.yaml").write_text("extends: hurt\nnetwork_of: one\n")
+    monkeypatch.setattr(targets, "_dataset", lambda *_: None)
+    with pytest.raises(HobbleError, match=message):
+        Project(base, {}).check([target])
+    fine = ("results/hurt/stimuli", "results/one/export/pfnn", "results/one/export/cubic.onnx")
+    Project(base, {}).check(fine)
 
 
 def test_a_listed_clip_without_its_file_is_told(base: Path) -> None:

@@ -28,6 +28,7 @@ Share = Annotated[float, Field(ge=0, lt=1)]
 Inside = Annotated[str, AfterValidator(_inside)]
 Ground = Literal["flat", "rocky", "jumpy", "beam"]
 Gait = Literal["stand", "walk", "jog", "crouch", "jump", "bump"]
+PhaseMode = Literal["constant", "linear", "cubic"]
 # What results/compare/ sets side by side where --config compare names nothing else: the published sizes and
 # passes, and the figure that can be hurt.
 COMPARED = ("holden", "holden-xl", "holden-xt", "injured")
@@ -245,7 +246,7 @@ class Training(Section):
 class Runtime(Section):
     """The character."""
 
-    mode: Literal["constant", "linear", "cubic"] = Field("cubic", description="how phase is looked up")
+    mode: PhaseMode = Field("cubic", description="how phase is looked up")
     severity_rate: PositiveFloat = Field(10.0, description="largest change of a severity in a second")
     severity_scale: PositiveFloat = Field(1.0, description="severities are divided by this")
     foot_locking: bool = True
@@ -265,7 +266,7 @@ class Evaluation(Section):
     )
     laps: Positive = 19
     lap_seconds: PositiveFloat = Field(400.0, description="a lap that takes longer is ended there")
-    modes: tuple[Literal["constant", "linear", "cubic"], ...] = Field(
+    modes: tuple[PhaseMode, ...] = Field(
         ("constant", "linear", "cubic"),
         description="phase modes that laps are run in, beside the runtime's own",
     )

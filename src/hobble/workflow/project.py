@@ -20,14 +20,13 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import MOST_TEXT, read_bytes
 from hobble.workflow.fingerprint import fingerprint
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
+from hobble.workflow.targets import COMPARE, check
 
 DATASETS = "results/datasets"
 MIRROR = "_mirror"
 SPEAKABLE = re.compile(r"(?![.\s])[^{}<>\\]*(?<!\s)")  # Snakemake fills in {x} and <x>
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 STAGES = ("synthetic", "motion", "labels", "injury", "terrain", "database")
-COMPARE = "compare"
-PAGE = "page"  # under results/: what all reports share
 RESERVED = (COMPARE, "datasets")  # folders of results/ that belong to no configuration
 # What a comparison reads of each configuration, under results/<configuration>/.
 MEASURED = {
@@ -95,29 +94,7 @@ class Project:
 
         Raises HobbleError, so that a mistake is told before the DAG is built.
         """
-        for target in list(targets) or ["results/holden/report.html"]:
-            _, name, folder, *_ = (*Path(target).parts, "", "")
-            if name == "datasets":
-                self._check_dataset(folder)
-            elif name == COMPARE:
-                for one in self.compared():
-                    self._check_configuration(one)
-            elif name and name != PAGE:
-                self._check_configuration(name)
-
-    def _check_configuration(self, name: str) -> None:
-        model = self.configuration(name)
-        for other in filter(None, (model.network_of, model.training.continues)):
-            if other == name:
-                raise HobbleError(f"configuration {name} cannot go on from itself")
-            self.configuration(other)
-        self._check_dataset(model.dataset)
-
-    def _check_dataset(self, name: str) -> None:
-        self.catalogue.skeleton(self.dataset(name).skeleton)
-        for clip in self.clips(name):
-            self.rig_files(name, clip)
-        self.selected(name, "all")
+        check(self, targets)
 
     def digest(self, configuration: str) -> str:
         """A short name for all that `resolved` says, so that a dry run does not print it."""
@@ -260,7 +237,8 @@ class Project:
             for name in (clip, clip + MIRROR) if model.mirror else (clip,):
                 splits[name] = "held_out" if clip in held_out else "train"
         if "train" not in splits.values():
-            raise HobbleError(f"data set {dataset}: no {selection} clip is left to train on")
+            kind = "healthy clip" if selection == "healthy" else "clip"
+            raise HobbleError(f"data set {dataset}: no {kind} is left to train on")
         return splits
 
     def frames(self, dataset: str, clip: str) -> int:

@@ -1,0 +1,66 @@
+"""What can be told of the targets on a command line before Snakemake plans: mistakes end the run here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, get_args
+
+from hobble.config.sections import PhaseMode
+from hobble.core.errors import HobbleError
+
+if TYPE_CHECKING:
+    from hobble.workflow.project import Project
+
+COMPARE = "compare"
+PAGE = "page"  # under results/: what all reports share
+
+
+def check(project: Project, targets: Iterable[str]) -> None:
+    """Validate every configuration, data set and skeleton that the targets need, and what they ask of them.
+
+    Raises HobbleError.
+    """
+    for target in list(targets) or ["results/holden/report.html"]:
+        _, name, folder, file, *_ = (*Path(target).parts, "", "", "")
+        if name == "datasets":
+            _dataset(project, folder)
+        elif name == COMPARE:
+            for one in project.compared():
+                _configuration(project, one)
+        elif name and name != PAGE:
+            _configuration(project, name)
+            _asked(project, name, folder, file)
+
+
+def _configuration(project: Project, name: str) -> None:
+    model = project.configuration(name)
+    for other in filter(None, (model.network_of, model.training.continues)):
+        if other == name:
+            raise HobbleError(f"configuration {name} cannot go on from itself")
+        project.configuration(other)
+    _dataset(project, model.dataset)
+
+
+def _dataset(project: Project, name: str) -> None:
+    project.catalogue.skeleton(project.dataset(name).skeleton)
+    for clip in project.clips(name):
+        project.rig_files(name, clip)
+    project.selected(name, "all")
+
+
+def _asked(project: Project, name: str, folder: str, file: str) -> None:
+    """What no network of this configuration could give, though it were trained."""
+    owner = project.configuration(name).network_of or name
+    if folder == "stimuli" and not project.configuration(owner).injury:
+        raise HobbleError(
+            f"results/{name}/stimuli: configuration {owner} has `injury: false`, so nothing can hurt its "
+            "character. Ask for results/injured/stimuli, or for those of a configuration of your own with "
+            "`extends: injured`."
+        )
+    stem, _, suffix = file.rpartition(".")
+    if folder == "export" and suffix == "onnx" and stem not in get_args(PhaseMode):
+        raise HobbleError(
+            f"results/{name}/export/{file}: there are {', '.join(get_args(PhaseMode))}, as in "
+            f"results/{name}/export/cubic.onnx"
+        )
