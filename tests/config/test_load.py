@@ -69,6 +69,14 @@ def test_a_training_that_is_not_there_is_told(folder: Path) -> None:
         Catalogue(folder).configuration("like")
 
 
+@pytest.mark.parametrize("text", ["held_out: [02_02]", "held_out: [on]", "clips: {02_01: {gait: walk}}"])
+def test_a_name_that_yaml_takes_for_a_number_belongs_in_quotes(tmp_path: Path, text: str) -> None:
+    (tmp_path / "datasets").mkdir()
+    (tmp_path / "datasets/mine.yaml").write_text(f"skeleton: s\nfolder: mine\n{text}\n")
+    with pytest.raises(HobbleError, match=r"not (130|True|129)\. Put the name in quotes"):
+        Catalogue(tmp_path).dataset("mine")
+
+
 def test_a_circle_of_extends_is_told(folder: Path) -> None:
     (folder / "base.yaml").write_text("extends: child\n")
     with pytest.raises(HobbleError, match=r"child\.yaml: extends itself by way of child -> base"):

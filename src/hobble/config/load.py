@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import re
 from collections.abc import Mapping
+from datetime import date
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,6 +17,8 @@ from hobble.core.errors import HobbleError, InputError
 
 Model = TypeVar("Model", bound=BaseModel)
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")  # so that no name leads out of its folder
+NOT_TEXT = (bool, int, float, date)  # what YAML reads words like 02_01, 1e5, 2020-01-01 and on as
+QUOTES = 'Put the name in quotes, as in "02_01": without them YAML takes it for something else.'
 NAMES = "Names are made of letters, digits, dots, dashes and underscores."
 
 
@@ -89,7 +92,10 @@ def _problem(item: Any, model: type[BaseModel]) -> str:
         allowed = ", ".join(_keys_at(model, item["loc"][:-1])) or "none"
         return f"{key}: there is no such key. Allowed here: {allowed}."
     message = item["msg"].removeprefix("Value error, ")
-    return f"{key}: {message[0].lower()}{message[1:]}, not {item['input']!r:.80}."
+    text = f"{key}: {message[0].lower()}{message[1:]}, not {item['input']!r:.80}."
+    if item["type"] == "string_type" and isinstance(item["input"], NOT_TEXT):
+        text += f" {QUOTES}"
+    return text
 
 
 def _keys_at(model: Any, location: tuple[Any, ...]) -> list[str]:
