@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -93,9 +94,46 @@ def test_a_walk_is_cut_where_it_repeats() -> None:
     assert gap < 1e-6
 
 
+def test_a_walk_is_no_distance_from_itself_however_cut_and_turned(holden31: Skeleton) -> None:
+    time, joints = np.arange(134), len(holden31.joints)
+    swing = 20 * np.sin(2 * np.pi * (time[:, None] / 67 + np.linspace(0, 1, joints)))
+    place = np.stack([0 * swing, 90 + swing, 2.0 * time[:, None] + swing], axis=-1)
+
+    def loop(positions: np.ndarray, way: tuple[float, float, float]) -> stimuli.Loop:
+        return stimuli.Loop(positions, np.zeros((*positions.shape[:2], 4)), np.array(way), 0.0)
+
+    walk = loop(place, (0, 0, 268))
+    turned = loop(np.roll(place, 20, axis=0)[..., [2, 1, 0]] * [1, 1, -1] + [500, 0, 7], (268, 0, 0))
+    assert stimuli.apart(turned, walk) < 1e-9
+    lame = place + np.where(np.arange(joints) == 5, 31.0, 0.0)[:, None] * [1, 0, 0]
+    assert stimuli.apart(loop(lame, (0, 0, 268)), walk) == pytest.approx(31 / joints)
+
+
+def test_stimuli_in_which_nothing_hurts_are_told() -> None:
+    def row(name: str, hurt: str, never: str, cm: float) -> dict:
+        return {
+            "name": name,
+            "severities": dict.fromkeys(hurt.split(), 8.0),
+            "never_hurt": never.split(),
+            "from_healthy_cm": cm,
+        }
+
+    fine = [row("healthy", "", "", 0.0), row("left-foot", "A", "", 1.5)]
+    assert stimuli.doubts(fine) == []
+    same, part, never = stimuli.doubts(
+        [*fine, row("left-arm", "B", "B", 0.0), row("weak", "A", "", 0.05), row("both", "A C", "C", 1.5)]
+    )
+    assert same.startswith("left-arm, weak: no different from the healthy walk")
+    assert part.startswith("both: not all")
+    assert never.startswith("Never hurt in training: B, C.")
+
+
 def test_files_of_a_loop(network: Network, examples: ModuleType, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(stimuli, "STUDY", {"healthy": (), "left-foot": ("left foot",)})
     monkeypatch.setattr(stimuli, "PRESETS", {"Bad back": {"lower back": 8}})
+    x_mean = network.x_mean.copy()
+    x_mean[network.layout.x_injury][network.links.index("LeftFoot-LeftToeBase")] = 0.5
+    network = replace(network, x_mean=x_mean)  # a network that learnt from a hurt left foot, and nothing else
     stimuli.write_stimuli(network, tmp_path / "a", size=64, **examples.RUNTIME)
     names = {"healthy", "left-foot", "preset-bad-back"}
     assert {p.name for p in (tmp_path / "a").iterdir()} == {"stimuli.json"} | {
@@ -103,6 +141,9 @@ def test_files_of_a_loop(network: Network, examples: ModuleType, tmp_path: Path,
     }
     listed = json.loads((tmp_path / "a/stimuli.json").read_text())["stimuli"]
     assert [row["name"] for row in listed] == ["healthy", "left-foot", "preset-bad-back"]
+    assert [row["hurt_in_training"] for row in listed] == [True, True, False]
+    assert [row["never_hurt"] for row in listed] == [[], [], ["Hips-LowerBack"]]
+    assert listed[0]["from_healthy_cm"] == 0 != listed[1]["from_healthy_cm"]
     with Image.open(tmp_path / "a/left-foot.webp") as image:
         frames = len(read_bvh(tmp_path / "a/left-foot.bvh"))
         assert image.n_frames == frames // stimuli.STRIDE

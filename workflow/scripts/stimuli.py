@@ -1,6 +1,6 @@
 """Creates results/<configuration>/stimuli/: loops of the hurt character as animated images and BVH files."""
 
-from hobble.report.stimuli import write_stimuli
+from hobble.report.stimuli import doubts, write_stimuli
 from hobble.runtime.network import load_network
 from hobble.workflow.job import job
 
@@ -8,4 +8,6 @@ with job(snakemake) as log:
     made = write_stimuli(
         load_network(snakemake.input.weights), snakemake.output.folder, **snakemake.params.runtime
     )
+    for doubt in doubts(made):
+        log.warning("%s", doubt)
     log.info("wrote %d loops to %s", len(made), snakemake.output.folder)

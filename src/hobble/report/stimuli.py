@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -44,6 +44,7 @@ SHORTEST, LONGEST = 150, 300  # frames of a loop
 BLEND = 12  # frames over which the end of a loop passes into its beginning
 STRIDE = 2  # frames of the motion to one of the image
 QUALITY = 80
+FELT = 0.1  # cm; a loop nearer to the healthy one shows nothing of what hurts
 
 
 @dataclass(frozen=True)
@@ -62,8 +63,9 @@ def write_stimuli(
 ) -> list[dict[str, Any]]:
     """Write <name>.webp and <name>.bvh of each stimulus and preset into a folder, and stimuli.json.
 
-    The thirteen of the study are grey; `preset-<name>` shows the severities as colours. Raises HobbleError
-    for a network without severities.
+    The thirteen of the study are grey; `preset-<name>` shows the severities as colours. Links that were
+    never hurt in training, and how far each walk is from the healthy one, are listed: see `doubts`. Raises
+    HobbleError for a network without severities.
     """
     if network.skeleton is None or not network.links:
         raise HobbleError("this network has no severities among its inputs; make the stimuli of `injured`")
@@ -72,8 +74,9 @@ def write_stimuli(
     skeleton = network.skeleton
     dressed = body(skeleton.joints, skeleton.parents, skeleton.roles, network.links)
     studio, rows = Studio(dressed), []
+    healthy, trained = walk(network, {}, **runtime), hurt_in_training(network)
     for name, hurt, shown in wanted(network):
-        loop = walk(network, hurt, **runtime)
+        loop = walk(network, hurt, **runtime) if hurt else healthy
         own = skeleton
         if "skeleton" not in network.meta:
             own = fitted_skeleton(skeleton, loop.positions, loop.rotations)
@@ -86,6 +89,9 @@ def write_stimuli(
                 "name": name,
                 "severities": hurt,
                 "coloured": shown,
+                "hurt_in_training": all(link in trained for link in hurt),
+                "never_hurt": [link for link in hurt if link not in trained],
+                "from_healthy_cm": round(apart(loop, healthy), 2),
                 "seconds": seconds,
                 "metres_a_second": round(float(np.linalg.norm(loop.way)) / 100 / seconds, 3),
                 "gap_cm": round(loop.gap, 2),
@@ -93,6 +99,38 @@ def write_stimuli(
         )
     write_json(folder / "stimuli.json", {"severity": SEVERITY, "stimuli": rows})
     return rows
+
+
+def hurt_in_training(network: Network) -> set[str]:
+    """Links whose severity was above 0 somewhere in training, as the mean of the input tells."""
+    means = network.x_mean[network.layout.x_injury]
+    return {link for link, mean in zip(network.links, means, strict=True) if mean > 0}
+
+
+def apart(loop: Loop, other: Loop) -> float:
+    """Mean distance (cm, over joints and poses) of the poses of a loop from the nearest ones of another.
+
+    Both stand over the origin and go the same way. 0 where they are the same walk, wherever it was cut.
+    """
+    ours, theirs = _ahead(loop), _ahead(other)
+    return float(np.mean([np.linalg.norm(theirs - pose, axis=-1).mean(axis=1).min() for pose in ours]))
+
+
+def doubts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What whoever shows the stimuli has to know of them: those that hurt nobody sees. rows: of the above."""
+    same = [row for row in rows if row["severities"] and row["from_healthy_cm"] < FELT]
+    part = [row for row in rows if row["never_hurt"] and row not in same]
+    out = []
+    if same:
+        names = ", ".join(row["name"] for row in same)
+        out.append(
+            f"{names}: no different from the healthy walk (less than {FELT} cm); not for a questionnaire."
+        )
+    if part:
+        out.append(f"{', '.join(row['name'] for row in part)}: not all that is hurt there shows.")
+    if never := sorted({link for row in [*same, *part] for link in row["never_hurt"]}):
+        out.append(f"Never hurt in training: {', '.join(never)}. Train on clips in which they are.")
+    return out
 
 
 def wanted(network: Network) -> list[tuple[str, dict[str, float], bool]]:
@@ -175,6 +213,13 @@ def save_loop(path: Path, pictures: list[NDArray[np.uint8]]) -> None:
     images[0].save(
         path, save_all=True, append_images=images[1:], duration=times, loop=0, quality=QUALITY, method=3
     )
+
+
+def _ahead(loop: Loop) -> Array:
+    """Positions (F, J, 3) of a loop over the origin, turned so that its way is along z."""
+    yaw = np.arctan2(loop.way[0], loop.way[2])
+    turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
+    return (loop.positions - loop.positions[:, :1] * [1, 0, 1]) @ turn.T
 
 
 def _mixed(a: Array, b: Array, share: float) -> Array:
