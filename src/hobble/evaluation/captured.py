@@ -79,13 +79,14 @@ def captured_clips(paths: Iterable[str | Path]) -> Iterator[Captured]:
         yield from captured(load_clip_rows(path))
 
 
-def root_path(velocity: Array, turn: Array) -> Array:
-    """(F, 3) where a root is that moves by velocity (F, 2), seen from itself, then turns.
+def headings(turn: Array) -> Array:
+    """(F,) yaw of a root, 0 at first; turn: (F,) of the world seen from it, so that the root turns back."""
+    return np.concatenate([[0.0], -np.cumsum(turn)[:-1]])
 
-    turn: (F,) of the world seen from the root, so that the root turns by its negative.
-    """
-    yaw = np.concatenate([[0.0], -np.cumsum(turn)[:-1]])
-    steps = turned(velocity, yaw)
+
+def root_path(velocity: Array, turn: Array) -> Array:
+    """(F, 3) where a root is that moves by velocity (F, 2), seen from itself, then turns (see headings)."""
+    steps = turned(velocity, headings(turn))
     out = np.zeros((len(turn), 3))
     out[1:, ::2] = np.cumsum(steps, axis=0)[:-1]
     return out

@@ -10,6 +10,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.database.clip_rows import ClipRows, expanded, load_clip_rows
+from hobble.evaluation.captured import headings, root_path, turned, unbroken
 from hobble.evaluation.predict import predict
 from hobble.report.body import body
 from hobble.report.scenes import FPS, UNIT, pack_positions, packed
@@ -42,7 +43,7 @@ def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[s
 
 
 def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> dict[str, Any]:
-    chosen = longest_run(rows.frame)[:LONGEST]
+    chosen = max(unbroken(rows.frame), key=len)[:LONGEST]
     y_position = network.layout.y_joint_position
     truth, guess = np.zeros((2, len(rows), y_position.stop - y_position.start))
     seen = np.zeros(len(rows), bool)
@@ -58,7 +59,8 @@ def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> 
     error = np.linalg.norm(true - predicted, axis=-1).mean(axis=1)
     lift = rows.mean[rows.first_fit[chosen]][:, None]
     y = rows.y[chosen].astype(float)
-    place, yaw = travelled(y[:, network.layout.y_root_velocity], y[:, network.layout.y_turn][:, 0])
+    turn = y[:, network.layout.y_turn][:, 0]
+    place, yaw = root_path(y[:, network.layout.y_root_velocity], turn), headings(turn)
     stride = round(60 / FPS)
     world = [in_world(p, place, yaw, lift)[::stride] for p in (true, predicted)]
     captured = pack_positions(world[0], keep)
@@ -73,31 +75,12 @@ def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> 
     }
 
 
-def longest_run(frame: np.ndarray) -> np.ndarray:
-    """Rows of the longest stretch without a gap; of the two rows of a frame that two cycles share, the first.
-
-    >>> longest_run(np.array([3, 4, 7, 8, 8, 9])).tolist()
-    [2, 3, 5]
-    """
-    _, first = np.unique(frame, return_index=True)
-    pieces = np.split(first, np.flatnonzero(np.diff(frame[first]) != 1) + 1)
-    return max(pieces, key=len)
-
-
-def travelled(velocity: Array, turn: Array) -> tuple[Array, Array]:
-    """Places (F, 2) and yaws (F,) of a root that moves by `velocity` (F, 2), seen from itself, then turns.
-
-    turn: of the world seen from the root, so that the root turns by its negative.
-    """
-    yaw = np.concatenate([[0.0], -np.cumsum(turn)[:-1]])
-    sin, cos = np.sin(yaw), np.cos(yaw)
-    x, z = velocity.T
-    steps = np.stack([x * cos + z * sin, z * cos - x * sin], axis=1)
-    return np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)[:-1]]), yaw
-
-
 def in_world(points: Array, place: Array, yaw: Array, lift: Array) -> Array:
-    """World positions (F, J, 3) of points in the root frame; lift (F, 1): what was taken off heights."""
-    sin, cos = np.sin(yaw)[:, None], np.cos(yaw)[:, None]
-    x, y, z = np.moveaxis(points, -1, 0)
-    return np.stack([x * cos + z * sin + place[:, :1], y + lift, z * cos - x * sin + place[:, 1:]], axis=-1)
+    """World positions (F, J, 3) of points in the root frame of place (F, 3) and yaw (F,).
+
+    lift: (F, 1), what was taken off heights.
+    """
+    out = points.copy()
+    out[..., ::2] = turned(points[..., ::2], yaw[:, None])
+    out[..., 1] += lift
+    return out + place[:, None]
