@@ -173,6 +173,25 @@ def test_fits_its_window(tab: Any, width: int) -> None:
     tab.size(1280, 900)
 
 
+CUT = """(() => [...document.querySelectorAll('[data-chart]')].flatMap((e) => {
+  const box = (one) => one.getBoundingClientRect(), whole = box(e);
+  const all = [...e.querySelectorAll('.xtick, .ytick, .xtitle, .ytitle, .legendtext')];
+  const texts = all.filter((t) => t.textContent);
+  const cut = texts.filter((t) => box(t).left < whole.left - 1 || box(t).right > whole.right + 1);
+  const on = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+  const title = e.querySelector('.ytitle'), bar = e.querySelector('.modebar-container .modebar');
+  const over = title ? [...e.querySelectorAll('.ytick text')].filter((t) => on(box(t), box(title))) : [];
+  const under = bar ? [...e.querySelectorAll('.legendtext')].filter((t) => on(box(t), box(bar))) : [];
+  return [...cut, ...over, ...under].map((t) => e.dataset.chart + ': ' + t.textContent);
+}))()"""
+
+
+def test_no_text_of_a_chart_is_cut_or_covered(tab: Any) -> None:
+    tab.size(1280, 900)
+    tab.run("Hobble.drawAll()")
+    assert tab.until(f"{CUT}.length === 0"), tab.run(CUT)
+
+
 def test_prints_every_chart_in_light(tab: Any) -> None:
     tab.run("dispatchEvent(new Event('beforeprint'))")
     assert tab.run("getComputedStyle(document.body).backgroundColor") == "rgb(252, 251, 248)"

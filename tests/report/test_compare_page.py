@@ -121,9 +121,32 @@ def test_every_pair_is_in_the_table_and_the_map(compared: dict[str, Any]) -> Non
 
 def test_published_figures_have_ours_beside_them(compared: dict[str, Any]) -> None:
     rows = {(row[0], row[1]): row[2:4] for row in tables.beside_table(compared).rows}
-    assert rows["a frame", "holden"][0] == "0.376 ms"
-    assert rows["a frame", "holden"][1].endswith(" ms")
+    assert rows["a frame, mean", "holden"][0] == "0.376 ms"
+    assert rows["a frame, mean", "holden"][1].endswith(" ms")
     assert rows["relative error, held_out clips", "holden-xl"] == ["0.0448", ""]
+
+
+def test_frame_times_are_medians_and_measures_have_names(
+    compared: dict[str, Any], material: Material
+) -> None:
+    median = material.responsivity["milliseconds"]["spread"]["median"]
+    table = tables.configuration_table(compared)
+    column = [c.label for c in table.columns].index("ms a frame, median")
+    assert [row[column] for row in table.rows] == [median, median]
+    laps, fit = parts.lap_lines(compared), parts.fit_chart(compared)
+    assert laps is not None
+    assert fit is not None
+    first = material.responsivity["laps"][0]["milliseconds"]["spread"]["median"]
+    assert next(iter(laps.options.values()))[0]["y"][0] == first
+    assert fit.traces[0]["y"] == [median, median]
+    summary = {"walk": {"speed_share": 0.8, "after_healing_cm": 0.1}}
+    named = tables.injury_table(
+        {"injury": [{"configuration": "a", "applies": True, "summary": summary}], "recognition": []}
+    )
+    assert named is not None
+    labels = [column.label for column in named.columns]
+    assert labels[2:4] == ["share of the healthy speed at severity 10", "left after healing, cm a joint"]
+    assert named.rows == [["a", "walk", 0.8, 0.1, None]]
 
 
 def test_networks_that_are_too_large_together_are_left_out(

@@ -60,6 +60,34 @@ def test_waypoints_flips_and_links_that_do_nothing(material: Material) -> None:
     assert "1 of 1 link hardly changes the walk at severity 10" in heads(material, injury=deaf)
 
 
+def swept(link: str, trained: bool, pose: float, left: float, rho: float = 1.0) -> dict[str, Any]:
+    measures = {"from_healthy_cm": pose, "after_healing_cm": left, "spearman": {"from_healthy": rho}}
+    return {"gait": "walk", "link": link, "trained": trained, **measures}
+
+
+def test_links_that_were_never_hurt_say_nothing_but_how_the_walk_drifts(material: Material) -> None:
+    drift = swept("never", False, 10.0, 7.0)
+    like_it = {"responses": [drift, swept("hurt", True, 11.0, 6.5, 0.3)]}
+    found = heads(material, injury=like_it)
+    assert found["A walk in which nothing hurts drifts as well, by 10.0 cm a joint."] == "warn"
+    assert "1 of 1 link hardly changes the walk at severity 10" in found
+    assert not [head for head in found if "does not quite come back" in head or "steadily" in head]
+    caught = {"responses": [swept("never", False, 0.1, 0.1), swept("hurt", True, 11.0, 6.5)]}
+    found = heads(material, injury=caught)
+    assert "After healing, the walk does not quite come back for hurt." in found
+    assert any(head.startswith("Every link that was hurt in training") for head in found)
+
+
+def test_one_slow_frame_does_not_decide_the_time_of_a_frame(material: Material) -> None:
+    times = {"predict": 0.17, "total": 0.17, "spread": {"median": 0.025, "p99": 0.163}}
+    slow = replace(material, name="holden", responsivity={**material.responsivity, "milliseconds": times})
+    figure = next(f for f in key_figures(slow) if f.label == "Time for a frame")
+    assert (figure.value, figure.unit) == ("0.025", "ms")
+    assert "667 characters" in figure.beside
+    assert "mean 0.17 ms, published mean 0.376 ms" in figure.beside
+    assert heads(slow)["A frame uses 0.1 % of its time at 60 Hz."] == "good"
+
+
 def test_most_pressing_first(material: Material) -> None:
     kinds = [hint.kind for hint in hints(material)]
     assert kinds == sorted(kinds, key=["warn", "note", "good"].index)
@@ -68,7 +96,7 @@ def test_most_pressing_first(material: Material) -> None:
 def test_key_figures_stand_beside_the_published(material: Material) -> None:
     figures = {f.label: f for f in key_figures(replace(material, name="holden"))}
     assert "HOLDEN was published at 4.39 %" in figures["Error on held-out clips"].beside
-    assert "published 0.376 ms" in figures["Time for a frame"].beside
+    assert "published mean 0.376 ms" in figures["Time for a frame"].beside
     assert figures["Network"].beside.startswith("parameters a phase: 372–16–16–311")
 
 

@@ -17,10 +17,12 @@ from hobble.report import (
     coverage,
     data_section,
     injury_cases,
+    injury_section,
     terrain_section,
     training_section,
 )
 from hobble.report.charts import Chart
+from hobble.report.findings import Figure
 from hobble.report.gather import Material, describe_network, read_history
 from hobble.report.ground_pictures import ground_pictures
 
@@ -127,9 +129,45 @@ def test_steps_of_a_frame_in_their_order(material: Material) -> None:
         "predict",
         "output",
         "update",
+        "median",
     ]
-    total = sum(trace["y"][0] for trace in traces)
-    assert total == pytest.approx(material.responsivity["laps"][0]["milliseconds"]["total"])
+    times = material.responsivity["laps"][0]["milliseconds"]
+    assert sum(trace["y"][0] for trace in traces[:-1]) == pytest.approx(times["total"])
+    assert traces[-1]["y"][0] == times["spread"]["median"]
+
+
+def test_feet_that_hardly_stood_have_no_slide(material: Material) -> None:
+    def slide(steps: int) -> Figure:
+        laps = [{**lap, "steps": steps} for lap in material.responsivity["laps"][:2]]
+        found = {**material.responsivity, "laps": laps, "foot_slide_cm": 0.0}
+        figures = cost_section.track_figures(replace(material, responsivity=found))
+        return next(figure for figure in figures if figure.label == "Foot slide")
+
+    assert (slide(4).value, slide(4).unit) == ("–", "")
+    assert "8 steps" in slide(4).beside
+    assert (slide(5).value, slide(5).unit) == ("0", "cm")
+
+
+def test_links_never_hurt_in_training_are_told_from_the_others(material: Material) -> None:
+    responses = [{**r, "trained": r["link"].startswith("Left")} for r in material.injury["responses"]]
+    rows = [
+        {"link": link, "severity": v, "jog_from_healthy_cm": 0.1 * v}
+        for link in {r["link"]: None for r in responses}
+        for v in (5.0, 10.0)
+    ]
+    injury = {**material.injury, "responses": responses, "into_a_jog": rows}
+    made = injury_section.section(replace(material, injury=injury))
+    never = {r["link"] for r in responses if not r["trained"]}
+    for chart in made["overview"]:
+        hollow = [t for t in chart.traces if t["name"].endswith(", never hurt in training")]
+        assert [set(t["y"]) for t in hollow] == [never, never]
+        assert set(chart.layout["yaxis"]["categoryarray"][: len(never)]) == never
+    marked = [o.endswith("(never hurt in training)") for o in made["curves"].charts[0].options]
+    assert marked == sorted(marked)
+    assert sum(marked) == 2 * len(never)
+    names = [trace["name"] for trace in made["into_a_jog"].traces]
+    assert not never & set(names)
+    assert names[-1] == "never hurt in training"
 
 
 def test_ground_profiles_are_the_centre_heights_of_now(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from hobble.report.accuracy_section import quantiles
 from hobble.report.charts import Chart, Trace, axis, line, log_axis
+from hobble.report.cost_section import log_range
 from hobble.report.formats import duration, size
 
 Compared = Mapping[str, Any]
@@ -146,7 +147,7 @@ def lap_lines(compared: Compared) -> Chart | None:
     options: dict[str, list[Trace]] = {}
     for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] != "cubic"):
         laps = [lap for lap in entry["laps"] if isinstance(lap.get("milliseconds"), dict)]
-        x, y = [lap["lap"] for lap in laps], [lap["milliseconds"]["total"] for lap in laps]
+        x, y = [lap["lap"] for lap in laps], [lap["milliseconds"]["spread"]["median"] for lap in laps]
         colour = colours(compared)[entry["configuration"]]
         one = line(entry["configuration"], x, y, colour, mode="lines+markers")
         options.setdefault(f"{entry['mode']} phase", []).append(one)
@@ -157,15 +158,15 @@ def lap_lines(compared: Compared) -> Chart | None:
             if row["configuration"] in names(compared):
                 most = max((max(t["x"], default=1) for t in traces), default=1)
                 colour = colours(compared)[row["configuration"]]
-                label = f"{row['label']} as published"
+                label = f"{row['label']}: mean as published"
                 traces.append(
                     line(label, [1, most], [row["milliseconds"]] * 2, colour, dash="dot", width=1.2)
                 )
     return Chart(
         "compare-laps",
         "Milliseconds a frame, lap by lap",
-        "All steps of a frame, over the laps of the six-waypoint track. Dotted: the published means, "
-        "measured on another machine.",
+        "All steps of a frame, medians over each lap of the six-waypoint track. Dotted: the published "
+        "means, measured on another machine.",
         layout={"xaxis": axis("lap", dtick=1), "yaxis": axis("ms a frame", rangemode="tozero")},
         choose="Looked up by",
         options=options,
@@ -177,17 +178,20 @@ def fit_chart(compared: Compared) -> Chart | None:
     shown = [
         f
         for f in compared["milliseconds"]["fit"]
-        if f["computations"] == "true" and f["step"] == "total" and f["mode"] in (None, "cubic") and f["x"]
+        if f["computations"] == "true"
+        and f["step"] == ("median" if f["whose"] == "hobble" else "total")
+        and f["mode"] in (None, "cubic")
+        and f["x"]
     ]
     traces: list[Trace] = []
     for fit, colour in zip(shown, ("@accent", "@g2"), strict=False):
-        label = "ours, cubic phase" if fit["whose"] == "hobble" else "as published"
+        label = "ours, cubic phase: medians" if fit["whose"] == "hobble" else "published: means"
         dots = _dots(label, fit["x"], fit["y"], colour, "%{x:,} parameters: %{y:.3f} ms")
         traces.append(dots)
         if fit["slope"] is not None:
             ends = [min(fit["x"]), max(fit["x"])]
             values = [fit["intercept"] + fit["slope"] * x for x in ends]
-            traces.append(line(f"{label}: line", ends, values, colour, width=1.4))
+            traces.append(line(f"{label}, line", ends, values, colour, width=1.4))
     if not traces:
         return None
     layout = {
@@ -240,13 +244,14 @@ def stage_dots(compared: Compared) -> list[Chart]:
         ("seconds", "Time of each stage", "seconds of computing, added up over its jobs", duration),
         ("bytes", "Size of each stage", "bytes on disk", size),
     ):
+        values = [stage.get(key) or 0 for stage in compared["stages"]]
         traces = []
         for name, colour in colours(compared).items():
             rows = [s for s in compared["stages"] if s["configuration"] == name and s.get(key)]
             trace = _dots(name, [s[key] for s in rows], [s["stage"] for s in rows], colour, "%{y}: %{text}")
             traces.append(trace | {"text": [show(s[key]) for s in rows]})
         layout = {
-            "xaxis": axis(label, type="log", tickformat="~s"),
+            "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),
             "yaxis": {"automargin": True, "categoryorder": "array", "categoryarray": order},
         }
         caption = "Stages that two configurations share (the same data set) cost their time once."

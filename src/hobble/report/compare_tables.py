@@ -8,19 +8,40 @@ from hobble.report.compare_sections import Compared
 from hobble.report.formats import duration, number, size
 from hobble.report.tables import Column, Table
 
+# What the measures of the published figures are, where their names alone do not tell.
+MEASURES = {
+    "patches": "patches: pieces of ground cut from height maps (ours: all that the terrain stage writes)",
+    "database": "database, on disk",
+    "weights of 50 phases": "weights of 50 phases, as the original stores them",
+}
+# Measures of the injury summary in words.
+INJURY = {
+    "from_healthy_cm": "pose from healthy at severity 10, cm a joint",
+    "speed_share": "share of the healthy speed at severity 10",
+    "spearman_from_healthy": "ρ of pose and severity",
+    "spearman_speed": "ρ of speed and severity",
+    "spearman_back_from_healthy": "ρ of pose and severity, healing",
+    "settle_seconds": "settles in, s",
+    "heal_seconds": "heals in, s",
+    "after_healing_cm": "left after healing, cm a joint",
+    "way_back_cm": "way back from way there, cm a joint",
+    "acceleration_share": "largest acceleration, of the healthy walk's",
+    "clip_acceleration_share": "largest acceleration, of the captured clips'",
+}
+
 
 def configuration_table(compared: Compared) -> Table:
     """What sets each configuration apart, with its main figures."""
     accuracy = {entry["configuration"]: entry for entry in compared["accuracy"]}
     frames = {
-        entry["configuration"]: entry["milliseconds"]["total"]
+        entry["configuration"]: entry["milliseconds"]["spread"]["median"]
         for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] == "cubic")
     }
     columns = [
         Column("configuration"),
         Column("held-out error", _percent, "n"),
         Column("training error", _percent, "n"),
-        Column.number("ms a frame"),
+        Column.number("ms a frame, median"),
         Column.count("parameters"),
         Column("severities"),
         Column("data set"),
@@ -54,7 +75,7 @@ def difference_table(compared: Compared) -> Table | None:
     """Every pair and what it is over, errors and frame times."""
     keys = ("mean_a", "sd_a", "mean_b", "sd_b", "difference")
     found = [("error", r) for r in compared["difference"]]
-    found += [("ms a frame", r) for r in compared["milliseconds"]["difference"]]
+    found += [("mean ms a frame", r) for r in compared["milliseconds"]["difference"]]
     rows = [
         [r["a"], r["b"], f"{what}, {r['over'].replace('_', ' ')}", *(r[key] for key in keys)]
         for what, r in found
@@ -78,7 +99,9 @@ def beside_table(compared: Compared) -> Table:
         show = shows.get(row["unit"], lambda value: number(value, 3))
         unit = f" {row['unit']}" if row["unit"] and row["unit"] not in shows else ""
         texts = ["" if row[k] is None else f"{show(float(row[k]))}{unit}" for k in ("published", "ours")]
-        rows.append([row["measure"], row["configuration"], *texts, sources.get(row["source"], row["source"])])
+        measure = MEASURES.get(row["measure"], row["measure"])
+        measure += ", mean" if row["unit"] == "ms" else ""
+        rows.append([measure, row["configuration"], *texts, sources.get(row["source"], row["source"])])
     columns = [
         Column("measure"),
         Column("configuration"),
@@ -99,16 +122,17 @@ def injury_table(compared: Compared) -> Table | None:
     ]
     if not rows:
         return None
-    keys = list(dict.fromkeys(key for *_, summary in rows for key in summary))
+    found = {key for *_, summary in rows for key in summary}
+    keys = [*(key for key in INJURY if key in found), *sorted(found - set(INJURY))]
     right = {e["configuration"]: e["generated"] for e in compared["recognition"] if e.get("applies")}
     columns = [Column("configuration"), Column("gait")]
-    columns += [Column.number(key.replace("_", " ")) for key in keys]
-    columns.append(Column("hurt part named right", _percent, "n"))
+    columns += [Column.number(INJURY.get(key, key.replace("_", " "))) for key in keys]
+    columns.append(Column("hurt part named right by a classifier", _percent, "n"))
     table = [
         [name, gait, *(summary.get(key) for key in keys), right.get(name, {}).get("right")]
         for name, gait, summary in rows
     ]
-    return Table("compare-injury", columns, table, "Means over links")
+    return Table("compare-injury", columns, table, "Means over the links that were hurt in training")
 
 
 def _percent(value: Any) -> str:

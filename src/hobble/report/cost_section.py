@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from hobble.report.charts import Chart, Trace, axis, mark
-from hobble.report.findings import Figure, frame_milliseconds, published
+from hobble.report.findings import Figure, frame_mean, frame_milliseconds, published
 from hobble.report.formats import duration, number, size
 from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
@@ -20,6 +20,9 @@ STEPS = {
     "output": "@g2",
     "update": "@muted",
 }
+
+
+FEWEST_STEPS = 10  # under so many, what the feet did says nothing
 
 
 def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
@@ -49,15 +52,15 @@ def lap_chart(material: Material) -> Chart | None:
     shapes, notes = [], []
     theirs = published(material, "responsivity")
     if theirs:
-        shape, note = mark(theirs["milliseconds"], f"{theirs['label']} as published", vertical=False)
+        shape, note = mark(theirs["milliseconds"], f"{theirs['label']}: mean as published", vertical=False)
         shapes, notes = [shape], [note]
     laps = max(len(trace["x"]) for traces in options.values() for trace in traces)
     return Chart(
         "laps",
         "Milliseconds a frame, lap by lap",
-        "Each bar is one lap of the six-waypoint track; its parts are the steps of a frame. The bars should "
-        "be of one height: a slow first lap is warming up, a slow one in between was another program's "
-        "doing. A frame at 60 Hz has 16.7 ms.",
+        "Each bar is one lap of the six-waypoint track; its parts are the steps of a frame, means over the "
+        "lap. Diamonds are medians of the whole frame. A few frames that another program held up raise a "
+        "bar and leave the diamond where it is. A frame at 60 Hz has 16.7 ms.",
         layout={
             "barmode": "stack",
             "xaxis": axis("lap", dtick=1 if laps < 25 else None),
@@ -76,7 +79,7 @@ def _lap_bars(entry: dict[str, Any]) -> list[Trace]:
     if not laps:
         return []
     numbers = [lap.get("lap", i + 1) for i, lap in enumerate(laps)]
-    return [
+    bars: list[Trace] = [
         {
             "type": "bar",
             "name": step,
@@ -87,6 +90,25 @@ def _lap_bars(entry: dict[str, Any]) -> list[Trace]:
         }
         for step in sorted(lap_steps(laps[0]), key=_place)
     ]
+    medians = [lap_median(lap) for lap in laps]
+    if all(value is None for value in medians):
+        return bars
+    dots: Trace = {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "median",
+        "x": numbers,
+        "y": medians,
+        "marker": {"symbol": "diamond", "size": 8, "color": "@ink"},
+        "hovertemplate": "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>",
+    }
+    return [*bars, dots]
+
+
+def lap_median(lap: dict[str, Any]) -> float | None:
+    """The median of the milliseconds a frame of a lap, all steps together."""
+    value = lap.get("milliseconds")
+    return (value.get("spread") or {}).get("median") if isinstance(value, dict) else None
 
 
 def lap_table(material: Material) -> Table | None:
@@ -97,10 +119,20 @@ def lap_table(material: Material) -> Table | None:
     plain = [k for k, v in laps[0].items() if k != "milliseconds" and isinstance(v, (int, float, str))]
     steps = sorted(lap_steps(laps[0]), key=_place)
     columns = [Column.number(k.replace("_", " "), 4) for k in plain] + [
-        Column.number(f"{s}, ms") for s in steps
+        Column.number(f"{s}, mean ms") for s in steps
     ]
-    rows = [[lap.get(k) for k in plain] + [lap_steps(lap).get(s) for s in steps] for lap in laps]
+    columns.append(Column.number("all, median ms"))
+    rows = [
+        [None if k == "foot_slide_cm" and _few(lap.get("steps")) else lap.get(k) for k in plain]
+        + [lap_steps(lap).get(s) for s in steps]
+        + [lap_median(lap)]
+        for lap in laps
+    ]
     return Table(f"{material.name}-responsivity", columns, rows)
+
+
+def _few(steps: int | None) -> bool:
+    return steps is not None and steps < FEWEST_STEPS
 
 
 def track_figures(material: Material) -> list[Figure]:
@@ -110,11 +142,14 @@ def track_figures(material: Material) -> list[Figure]:
         return []
     spread = (found.get("milliseconds") or {}).get("spread") or {}
     reached = f"{found.get('waypoints_reached')} of {found.get('waypoints')}"
+    steps = sum(lap.get("steps") or 0 for lap in found["laps"])
+    slide = None if _few(steps) else found.get("foot_slide_cm")
+    measured = f"of the toe in a stance, on average; {steps:,} steps were measured"
     laps = f"{found.get('laps_finished')} of {len(found['laps'])} laps finished"
     return [
         Figure("Waypoints reached", reached, "", laps),
         Figure("Furthest off the path", number(found.get("path_overshoot_cm")), "cm", "at the turns"),
-        Figure("Foot slide", number(found.get("foot_slide_cm")), "cm", "of the toe in a stance, on average"),
+        Figure("Foot slide", number(slide), "cm" if slide is not None else "", measured),
         Figure(
             "Largest turn of a joint",
             number(found.get("largest_turn_degrees")),
@@ -126,22 +161,37 @@ def track_figures(material: Material) -> list[Figure]:
 
 
 def speed_published(material: Material) -> Table | None:
-    """Our milliseconds with the published ones under them."""
+    """Our milliseconds with the published means under them."""
     ours = frame_milliseconds(material)
     if ours is None:
         return None
     sources = material.published["sources"]
     mode = material.responsivity.get("mode")
     rows: list[list[Any]] = [
-        [f"{material.name}, {mode} phase" if mode else material.name, ours, "this report"]
+        [
+            f"{material.name}, {mode} phase" if mode else material.name,
+            ours,
+            frame_mean(material),
+            "this report",
+        ]
     ]
     for entry in material.published["responsivity"]:
-        rows.append([entry["label"], entry["milliseconds"], sources[entry["source"]]])
+        rows.append([entry["label"], None, entry["milliseconds"], sources[entry["source"]]])
     for entry in material.published["modes"]:
         rows.append(
-            [f"prediction alone, {entry['mode']} phase", entry["milliseconds"], sources[entry["source"]]]
+            [
+                f"prediction alone, {entry['mode']} phase",
+                None,
+                entry["milliseconds"],
+                sources[entry["source"]],
+            ]
         )
-    columns = [Column("network"), Column.number("ms a frame"), Column("source", kind="long")]
+    columns = [
+        Column("network"),
+        Column.number("median, ms a frame"),
+        Column.number("mean, ms a frame"),
+        Column("source", kind="long"),
+    ]
     return Table(f"{material.name}-published-speed", columns, rows, "Beside the published figures")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from hobble.report.charts import Chart, Trace, axis, line
@@ -136,29 +136,36 @@ def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
     )
 
 
-def jog_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
-    """How much of an injury is left when a walk becomes a jog."""
+def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()) -> Chart | None:
+    """How much of an injury is left when a walk becomes a jog; one line for all `untrained` links."""
     links = [link for link in dict.fromkeys(row["link"] for row in rows) if link is not None]
+    hurt = [link for link in links if link not in untrained]
     traces: list[Trace] = []
-    for link, colour in zip(links, _cycled(len(links)), strict=True):
+    for i, link in enumerate(hurt):
         some = [row for row in rows if row["link"] == link]
         x, y = [row["severity"] for row in some], [row.get("jog_from_healthy_cm") for row in some]
-        traces.append(line(link, x, y, colour, mode="lines", width=1.4))
+        dash = "solid" if i < len(COLOURS) else "dash"
+        traces.append(line(link, x, y, COLOURS[i % len(COLOURS)], dash=dash, mode="lines+markers", width=1.4))
+    found: dict[float, list[float]] = {}
+    for row in rows:
+        if row["link"] in untrained and row.get("jog_from_healthy_cm") is not None:
+            found.setdefault(row["severity"], []).append(row["jog_from_healthy_cm"])
+    if found:
+        means = [sum(values) / len(values) for values in found.values()]
+        traces.append(line("never hurt in training", list(found), means, "@muted", dash="dot", width=1.4))
     if not traces:
         return None
     return Chart(
         "into-a-jog",
         "From a hurt walk into a jog",
-        "How far the jog that follows is from the healthy jog. A line at 0 is an injury that is forgotten "
-        "when the figure begins to jog.",
+        "How far the jog that follows is from the healthy jog. Links that were never hurt in training share "
+        "the dotted line, their mean: so far two unhurt jogs differ. A line that is no higher is an injury "
+        "that is forgotten when the figure begins to jog.",
         traces,
         {
             "xaxis": axis("severity", dtick=2),
             "yaxis": axis("cm a joint", rangemode="tozero"),
-            "showlegend": False,
+            "showlegend": True,
         },
+        height=420,
     )
-
-
-def _cycled(count: int) -> list[str]:
-    return [COLOURS[i % len(COLOURS)] for i in range(count)]

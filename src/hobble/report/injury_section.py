@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from hobble.report import injury_cases as cases
@@ -10,7 +10,9 @@ from hobble.report.charts import Chart, Family, Trace, axis, line
 from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
 
+UNTRAINED = "never hurt in training"
 GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
+HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
 SIDES = (("left", "@accent"), ("right", "@g2"))
 # Small charts: name, title, unit, lines as (column, label, colour), the least that the axis spans.
 PANELS: tuple[tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool], ...] = (
@@ -53,25 +55,38 @@ def section(material: Material) -> dict[str, Any]:
     if not injury.get("applies"):
         return {"applies": False}
     rows, responses = injury.get("rows") or [], injury.get("responses") or []
+    untrained = {r["link"] for r in responses if not r.get("trained", True)}
     return {
         "applies": True,
         "overview": overview(responses),
-        "curves": curves(rows, injury.get("back") or ()) if rows else None,
+        "curves": curves(rows, injury.get("back") or (), untrained) if rows else None,
         "recognition": cases.recognition_chart(material.recognition),
         "second": cases.second_chart(injury.get("second") or ()),
         "second_table": cases.second_table(material.name, injury.get("second") or ()),
         "divided": cases.divided_chart(injury.get("divided") or ()),
-        "into_a_jog": cases.jog_chart(injury.get("into_a_jog") or ()),
+        "into_a_jog": cases.jog_chart(injury.get("into_a_jog") or (), untrained),
         "responses": response_table(material.name, responses),
         "rows": sweep_table(material.name, rows),
     }
 
 
-def curves(rows: Sequence[Mapping[str, Any]], back: Sequence[Mapping[str, Any]] = ()) -> Family:
-    """A small chart for each measure over severity, for a chosen gait and link; dotted: on the way back."""
+def curves(
+    rows: Sequence[Mapping[str, Any]],
+    back: Sequence[Mapping[str, Any]] = (),
+    untrained: Collection[str] = (),
+) -> Family:
+    """A small chart for each measure over severity, for a chosen gait and link; dotted: on the way back.
+
+    Links that are `untrained` come last, and say so.
+    """
+
+    def label_of(row: Mapping[str, Any]) -> str:
+        never = f" ({UNTRAINED})" if row["link"] in untrained else ""
+        return f"{row['link']}, {row['gait']}{never}"
+
     sweeps: dict[str, list[Mapping[str, Any]]] = {}
-    for row in rows:
-        sweeps.setdefault(f"{row['link']}, {row['gait']}", []).append(row)
+    for row in sorted(rows, key=lambda row: row["link"] in untrained):
+        sweeps.setdefault(label_of(row), []).append(row)
     charts = []
     for name, title, unit, lines, span, from_zero in PANELS:
         options: dict[str, list[Trace]] = {}
@@ -82,7 +97,7 @@ def curves(rows: Sequence[Mapping[str, Any]], back: Sequence[Mapping[str, Any]] 
                 | {"marker": {"size": 5}}
                 for column, label, colour in lines
             ]
-            healing = [row for row in back if f"{row['link']}, {row['gait']}" == sweep]
+            healing = [row for row in back if label_of(row) == sweep]
             for column, label, colour in lines if healing else ():
                 x, y = [row["severity"] for row in healing], [row.get(column) for row in healing]
                 traces.append(
@@ -117,7 +132,8 @@ def curves(rows: Sequence[Mapping[str, Any]], back: Sequence[Mapping[str, Any]] 
         "Every point is a walk of its own, healthy for a quarter and measured over its last half. Look for "
         "lines that bend smoothly from left to right (a gradient), for left and right that part (a limp), "
         "and for jumps between neighbours (the network switches between two gaits it knows). Pose distances "
-        "are means over joints at the same phase. Dotted: on the way back to 0.",
+        "are means over joints at the same phase. Dotted: on the way back to 0. A link that was never hurt "
+        "in training shows how much an unhurt walk changes by itself.",
         charts,
         "Link and gait",
     )
@@ -143,41 +159,52 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
             "injury-pose",
             "from_healthy_cm",
             "How far the pose goes",
-            "cm from healthy at severity 10",
+            "cm at severity 10",
             2.0,
-            "Mean distance over joints, at the same phase, from the healthy walk. A dot at 0 is a link the "
-            "network does not feel.",
+            "Mean distance over joints, at the same phase, from the healthy walk. Hollow dots are links that "
+            "were never hurt in training: their severity does nothing, and they show how far an unhurt walk "
+            "drifts in the meantime. A link whose dot lies no further out is not felt.",
         ),
         (
             "injury-speed",
             "speed_share",
             "What is left of the speed",
-            "share of the healthy speed at severity 10",
+            "share of the healthy speed",
             1.0,
-            "1 means that the hurt character is as fast as the healthy one.",
+            "At severity 10; 1 means that the hurt character is as fast as the healthy one. Hollow: links "
+            "that were never hurt in training.",
         ),
     ):
         traces: list[Trace] = []
         for gait, colour in GAIT_COLOURS.items():
-            some = [r for r in responses if r["gait"] == gait and r.get(key) is not None][::-1]
-            if some:
-                traces.append(
-                    {
-                        "type": "scatter",
-                        "mode": "markers",
-                        "name": gait,
-                        "y": [r["link"] for r in some],
-                        "x": [r[key] for r in some],
-                        "marker": {"color": colour, "size": 9},
-                        "hovertemplate": "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>",
-                    }
-                )
-        links = len({r["link"] for r in responses})
+            for hurt in (True, False):
+                some = [
+                    r
+                    for r in responses[::-1]
+                    if r["gait"] == gait and r.get("trained", True) is hurt and r.get(key) is not None
+                ]
+                if some:
+                    marker = {"color": colour, "size": 9} if hurt else HOLLOW | {"color": colour}
+                    traces.append(
+                        {
+                            "type": "scatter",
+                            "mode": "markers",
+                            "name": gait if hurt else f"{gait}, {UNTRAINED}",
+                            "y": [r["link"] for r in some],
+                            "x": [r[key] for r in some],
+                            "marker": marker,
+                            "hovertemplate": "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>",
+                        }
+                    )
+        # What was hurt in training stands on top; plotly counts from below.
+        downwards = sorted(responses, key=lambda r: not r.get("trained", True))
+        links = list(dict.fromkeys(r["link"] for r in downwards))[::-1]
         furthest = max((r[key] for r in responses if r.get(key) is not None), default=0.0)
         across = axis(label, range=[0, 1.08 * max(least, furthest)])
-        layout = {"xaxis": across, "yaxis": {"automargin": True, "type": "category"}}
+        rows = {"categoryorder": "array", "categoryarray": links, "automargin": True, "type": "category"}
         if traces:
-            charts.append(Chart(name, title, caption, traces, layout, 130 + 21 * links))
+            layout = {"xaxis": across, "yaxis": rows}
+            charts.append(Chart(name, title, caption, traces, layout, 150 + 21 * len(links)))
     return charts
 
 

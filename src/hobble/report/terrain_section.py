@@ -120,7 +120,11 @@ def distances(found: list[Fits]) -> Chart:
         "Mean distance of a standing foot from the fitted ground, over cycles and fits, after the residual "
         "is taken out. Under a centimetre cannot be seen.",
         traces,
-        {"xaxis": axis("cm", rangemode="tozero"), "showlegend": False},
+        {
+            "xaxis": axis("cm", rangemode="tozero"),
+            "yaxis": {"type": "category", "automargin": True},
+            "showlegend": False,
+        },
         height=110 + 26 * len(found),
     )
 

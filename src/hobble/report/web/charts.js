@@ -28,13 +28,13 @@ export let drawAll;
   });
   const layout = (spec, narrow) => resolve(merge({
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", autosize: true,
-    modebar: { bgcolor: "rgba(0,0,0,0)", color: "@faint", activecolor: "@accent" },
+    modebar: { orientation: "v", bgcolor: "rgba(0,0,0,0)", color: "@faint", activecolor: "@accent" },
     font: { family: getComputedStyle(document.body).fontFamily, size: 12.5, color: "@ink" },
-    margin: { l: narrow ? 40 : 56, r: narrow ? 12 : 24, t: 30, b: 48 },
+    margin: { l: narrow ? 40 : 56, r: narrow ? 12 : 44, t: 30, b: 48 },
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 12, color: "@soft" } },
     hoverlabel: { bgcolor: "@raised", bordercolor: "@line", font: { color: "@ink" } },
     colorway: ["@accent", "@muted"], dragmode: narrow ? false : "zoom", bargap: 0.3,
-    xaxis: axis(), yaxis: axis(),
+    xaxis: axis(), yaxis: { ...axis(), automargin: true },
   }, spec.layout));
   const drawn = new Map();
 
