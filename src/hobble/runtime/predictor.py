@@ -113,7 +113,10 @@ def _standardise(x: Any, mean: Any, inverse: Any, z: Any) -> None:
             z[c, i] = (x[c, i] - mean[i]) * inverse[i]
 
 
-@njit
+# Only the functions called from outside are kept on disk, and what they call is forced into them: into
+# functions of their own the compiler may look the first time and not when they come from disk, and then
+# rounds sums in another order.
+@njit(forceinline=True)
 def _phase(phase: float, kind: int, points: int, index: Any, share: Any) -> None:
     """Fill the `kind` points that phase blends and their coefficients."""
     # A phase of exactly 1 is the end of the cycle, not its start: in constant mode the two have different
@@ -137,9 +140,7 @@ def _phase(phase: float, kind: int, points: int, index: Any, share: Any) -> None
         share[3] = 0.5 * (-t * t + t * t * t)
 
 
-# What the functions below call is compiled along with them, never taken from disk alone: the compiler could
-# not look into it then, and might round sums in another order.
-@njit(fastmath=True)
+@njit(fastmath=True, forceinline=True)
 def _layer1(w: Any, s: Any, b: Any, x: Any, y: Any) -> None:
     for r in range(w.shape[0]):
         a = np.float32(0)
@@ -148,7 +149,7 @@ def _layer1(w: Any, s: Any, b: Any, x: Any, y: Any) -> None:
         y[r] = a * s[r] + b[r]
 
 
-@njit(fastmath=True)
+@njit(fastmath=True, forceinline=True)
 def _layer2(w: Any, s: Any, b: Any, k: Any, share: Any, x: Any, y: Any) -> None:
     i, j = k[0], k[1]
     for r in range(w.shape[1]):
@@ -159,7 +160,7 @@ def _layer2(w: Any, s: Any, b: Any, k: Any, share: Any, x: Any, y: Any) -> None:
         y[r] = share[0] * (a0 * s[i, r] + b[i, r]) + share[1] * (a1 * s[j, r] + b[j, r])
 
 
-@njit(fastmath=True)
+@njit(fastmath=True, forceinline=True)
 def _layer4(w: Any, s: Any, b: Any, k: Any, share: Any, x: Any, y: Any) -> None:
     i, j, m, n = k[0], k[1], k[2], k[3]
     for r in range(w.shape[1]):
@@ -213,7 +214,7 @@ def _evaluate(
             out[c, r] = h[r] * std[r] + mean[r]
 
 
-@njit(fastmath=True)
+@njit(fastmath=True, forceinline=True)
 def _block(w: Any, s: Any, b: Any, x: Any, y: Any) -> None:
     """y (4, out) = W x + b for four characters at once; x: (4, in).
 
@@ -243,7 +244,7 @@ def _block(w: Any, s: Any, b: Any, x: Any, y: Any) -> None:
                 y[n, r + k] = sums[k, n] * s[r + k] + b[r + k]
 
 
-@njit(fastmath=True)
+@njit(fastmath=True, forceinline=True)
 def _layer_crowd(w: Any, s: Any, b: Any, index: Any, share: Any, x: Any, y: Any) -> None:
     """y (C, out) of x (C, in): point by point, the characters that blend it in blocks of four."""
     block_x, block_y = np.zeros((BLOCK, w.shape[2]), np.float32), np.zeros((BLOCK, w.shape[1]), np.float32)
