@@ -8,7 +8,7 @@ Weights are cold where it says so: 64 MB are read between two predictions, more 
 
 from __future__ import annotations
 
-import sys
+import argparse
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -131,8 +131,14 @@ def frames(network: Network, baseline: float) -> None:
 
 
 def main() -> None:
-    skeleton = load_skeleton(Path(sys.argv[2]) if len(sys.argv) > 2 else SKELETON)
-    network = load_network(sys.argv[1], skeleton) if len(sys.argv) > 1 else random_network(skeleton)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("network", nargs="?", help="weights.npz, a folder that holds one, or the original's")
+    parser.add_argument("skeleton", nargs="?", type=Path, default=SKELETON, help="for networks without one")
+    asked = parser.parse_args()
+    skeleton = load_skeleton(asked.skeleton)
+    network = load_network(asked.network, skeleton) if asked.network else random_network(skeleton)
     print(f"{'-'.join(map(str, network.sizes))}, microseconds, one core; ratio: numpy's blend over this")
     network = replace(network, skeleton=network.skeleton or skeleton)
     frames(network, predictions(network))
