@@ -144,9 +144,11 @@ def test_frame_times_are_medians_and_measures_have_names(
         {"injury": [{"configuration": "a", "applies": True, "summary": summary}], "recognition": []}
     )
     assert named is not None
-    labels = [column.label for column in named.columns]
-    assert labels[2:4] == ["share of the healthy speed at severity 10", "left after healing, cm a joint"]
-    assert named.rows == [["a", "walk", 0.8, 0.1, None]]
+    assert [column.label for column in named.columns] == ["measure", "a, walk"]
+    assert named.rows == [
+        ["share of the healthy speed at severity 10", 0.8],
+        ["left after healing, cm a joint", 0.1],
+    ]
 
 
 def test_networks_that_are_too_large_together_are_left_out(

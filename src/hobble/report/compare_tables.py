@@ -124,14 +124,14 @@ def injury_table(compared: Compared) -> Table | None:
         return None
     found = {key for *_, summary in rows for key in summary}
     keys = [*(key for key in INJURY if key in found), *sorted(found - set(INJURY))]
-    right = {e["configuration"]: e["generated"] for e in compared["recognition"] if e.get("applies")}
-    columns = [Column("configuration"), Column("gait")]
-    columns += [Column.number(INJURY.get(key, key.replace("_", " "))) for key in keys]
-    columns.append(Column("hurt part named right by a classifier", _percent, "n"))
-    table = [
-        [name, gait, *(summary.get(key) for key in keys), right.get(name, {}).get("right")]
-        for name, gait, summary in rows
+    columns = [Column("measure"), *(Column.number(f"{name}, {gait}") for name, gait, _ in rows)]
+    table: list[list[Any]] = [
+        [INJURY.get(key, key.replace("_", " ")), *(summary.get(key) for *_, summary in rows)] for key in keys
     ]
+    right = {e["configuration"]: e["generated"]["right"] for e in compared["recognition"] if e.get("applies")}
+    if right:
+        row = ["share of hurt parts that a classifier names right", *(right.get(name) for name, *_ in rows)]
+        table.append(row)
     return Table("compare-injury", columns, table, "Means over the links that were hurt in training")
 
 

@@ -163,7 +163,7 @@ def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()
         "that is forgotten when the figure begins to jog.",
         traces,
         {
-            "xaxis": axis("severity", dtick=2),
+            "xaxis": axis("severity", dtick=1),
             "yaxis": axis("cm a joint", rangemode="tozero"),
             "showlegend": True,
         },

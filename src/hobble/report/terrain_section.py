@@ -125,7 +125,7 @@ def distances(found: list[Fits]) -> Chart:
             "yaxis": {"type": "category", "automargin": True},
             "showlegend": False,
         },
-        height=110 + 26 * len(found),
+        height=max(260, 110 + 26 * len(found)),
     )
 
 
