@@ -7,7 +7,7 @@ Without a file, a random network of the published size with 30 severities is use
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Callable
 from pathlib import Path
 from time import process_time
@@ -70,10 +70,12 @@ def roll_outs(network: Network) -> tuple[float, float]:
 
 
 def main() -> None:
-    if len(sys.argv) > 1:
-        network = load_network(Path(sys.argv[1]))
-    else:
-        network = random_network(load_skeleton(SKELETON))
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("network", nargs="?", type=Path, help="weights.npz, or a folder that holds one")
+    asked = parser.parse_args().network
+    network = load_network(asked) if asked else random_network(load_skeleton(SKELETON))
     print("microseconds of CPU a frame       at once  one by one  ratio")
     for name, (together, apart) in (("injury sweep", sweep(network)), ("roll-outs", roll_outs(network))):
         print(f"{name:32}{together:9.0f}{apart:12.0f}{apart / together:7.1f}")

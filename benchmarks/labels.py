@@ -7,7 +7,7 @@ Without a folder, one synthetic minute of a limping walk is labelled.
 
 from __future__ import annotations
 
-import sys
+import argparse
 import tempfile
 import time
 from pathlib import Path
@@ -50,7 +50,13 @@ def best_of(count: int, work) -> float:
 
 
 def main() -> None:
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "folder", nargs="?", type=Path, help="motion clips: results/datasets/<dataset>/motion"
+    )
+    folder = parser.parse_args().folder
     clips = [load_clip(p) for p in sorted(folder.glob("*.npz"))] if folder else [synthetic_minute()]
     options = Labels().model_dump(mode="json")
     speeds = options["heel_speed"], options["toe_speed"], options["valley_factor"]
