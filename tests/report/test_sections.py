@@ -25,6 +25,7 @@ from hobble.report.charts import Chart
 from hobble.report.findings import Figure
 from hobble.report.gather import Material, describe_network, read_history
 from hobble.report.ground_pictures import ground_pictures
+from hobble.report.injury_cases import second_chart
 
 
 def test_sections_end_where_their_pass_does(material: Material) -> None:
@@ -237,3 +238,16 @@ def test_a_second_injury_has_a_line_for_each_link_over_each_first() -> None:
     assert list(chart.options) == ["a at 7", "b at 7"]
     assert [(t["name"], t["y"][-1]) for t in chart.options["a at 7"]] == [("c", 0.0), ("d", 1.0)]
     assert injury_cases.second_chart([]) is None
+
+
+def test_every_pair_of_injuries_is_drawn_as_it_is_measured() -> None:
+    rows = [
+        {"first": "a-b", "second": "c-d", "from_first_cm": 2.0, "share": 0.5, "from_second_cm": 1.0},
+        {"first": "c-d", "second": "a-b", "from_first_cm": 0.0, "share": None, "from_second_cm": 0.0},
+    ]
+    chart = second_chart(rows)
+    assert chart is not None
+    far, share = (traces[0] for traces in chart.options.values())
+    assert (far["y"], far["x"], far["z"]) == (["a-b", "c-d"], ["c-d", "a-b"], [[2.0, None], [None, 0.0]])
+    assert share["z"] == [[0.5, None], [None, None]]
+    assert second_chart([]) is None

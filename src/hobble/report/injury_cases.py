@@ -71,30 +71,41 @@ def recognition_chart(found: Mapping[str, Any]) -> Chart | None:
 
 
 def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
-    """What a second injury adds to a first one."""
-    options: dict[str, list[Trace]] = {}
-    for row in rows:
-        options.setdefault(f"{row['first']} at 7", [])
-    for first, traces in options.items():
-        some = [row for row in rows if f"{row['first']} at 7" == first]
-        for i, second in enumerate(dict.fromkeys(row["second"] for row in some)):
-            points = [(r["severity"], r.get("from_first_cm")) for r in some if r["second"] == second]
-            x, y = zip(*points, strict=True)
-            dash = "solid" if i < len(COLOURS) else "dot"
-            traces.append(line(second, x, y, COLOURS[i % len(COLOURS)], dash=dash, mode="lines+markers"))
-    if not options:
+    """What a second injury adds to a first one: every pair, as injury.json has them under `second`."""
+    if not rows:
         return None
+    firsts, seconds = (list(dict.fromkeys(row[key] for row in rows)) for key in ("first", "second"))
+    by_pair = {(row["first"], row["second"]): row for row in rows}
+    shown = {"centimetres a joint": ("from_first_cm", ".1f"), "share of what it does alone": ("share", ".0%")}
+    options: dict[str, list[Trace]] = {}
+    for label, (key, form) in shown.items():
+        options[label] = [
+            {
+                "type": "heatmap",
+                "x": seconds,
+                "y": firsts,
+                "z": [[by_pair.get((a, b), {}).get(key) for b in seconds] for a in firsts],
+                "colorscale": [[0, "@sunken"], [1, "@accent"]],
+                "zmin": 0,
+                "xgap": 2,
+                "ygap": 2,
+                "texttemplate": f"%{{z:{form}}}",
+                "showscale": False,
+                "hovertemplate": f"%{{x}} over %{{y}}: %{{z:{form}}}<extra></extra>",
+            }
+        ]
     return Chart(
         "second-injury",
         "A second injury over a first",
-        "How far the pose goes from that of the first injury alone as a second link hurts more and more. A "
-        "line that stays at 0 is a second injury that the first one hides.",
+        "Down: the first injury, at severity 7; across: the second, at 10. How far the second takes the walk "
+        "from that of the first alone, and how much that is of what it does to a healthy body. Pale is a "
+        "second injury that the first one hides.",
         layout={
-            "xaxis": axis("severity of the second", dtick=2, range=[-0.3, 10.3]),
-            "yaxis": axis("cm a joint", rangemode="tozero"),
+            "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
+            "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
         },
-        height=400,
-        choose="First",
+        height=max(300, 190 + 24 * len(firsts)),
+        choose="In",
         options=options,
     )
 
