@@ -25,7 +25,6 @@ from hobble.report.charts import Chart
 from hobble.report.findings import Figure
 from hobble.report.gather import Material, describe_network, read_history
 from hobble.report.ground_pictures import ground_pictures
-from hobble.report.injury_cases import second_chart
 
 
 def test_sections_end_where_their_pass_does(material: Material) -> None:
@@ -226,28 +225,14 @@ def test_confusions_are_shares_of_what_hurts_and_name_how_often_it_was_right() -
     assert injury_cases.recognition_chart({"applies": False}) is None
 
 
-def test_a_second_injury_has_a_line_for_each_link_over_each_first() -> None:
-    rows = [
-        {"first": f, "second": s, "severity": v, "from_first_cm": 0.1 * v * k}
-        for f in ("a", "b")
-        for k, s in enumerate(("c", "d"))
-        for v in (0.0, 5.0, 10.0)
-    ]
-    chart = injury_cases.second_chart(rows)
-    assert chart is not None
-    assert list(chart.options) == ["a at 7", "b at 7"]
-    assert [(t["name"], t["y"][-1]) for t in chart.options["a at 7"]] == [("c", 0.0), ("d", 1.0)]
-    assert injury_cases.second_chart([]) is None
-
-
 def test_every_pair_of_injuries_is_drawn_as_it_is_measured() -> None:
     rows = [
         {"first": "a-b", "second": "c-d", "from_first_cm": 2.0, "share": 0.5, "from_second_cm": 1.0},
         {"first": "c-d", "second": "a-b", "from_first_cm": 0.0, "share": None, "from_second_cm": 0.0},
     ]
-    chart = second_chart(rows)
+    chart = injury_cases.second_chart(rows)
     assert chart is not None
     far, share = (traces[0] for traces in chart.options.values())
     assert (far["y"], far["x"], far["z"]) == (["a-b", "c-d"], ["c-d", "a-b"], [[2.0, None], [None, 0.0]])
     assert share["z"] == [[0.5, None], [None, None]]
-    assert second_chart([]) is None
+    assert injury_cases.second_chart([]) is None
