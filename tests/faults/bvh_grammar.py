@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from random import Random
 
-from .grammar import NUMBERS, Mutation, number_at, on_line
+from .grammar import NUMBERS, Mutation, numbers, on_line
 
 KEYWORDS = (
     "HIERARCHY",
@@ -77,16 +77,6 @@ def _edits() -> dict[str, Mutation]:
         out[f"{word} in small letters"] = on_line(line, lambda s, w=word: s.replace(w, w.lower(), 1)), "any"
         out[f"{word} with more behind it"] = on_line(line, lambda s: s + " \x7f 7 {"), "any"
     return {name: Mutation(name, change, then) for name, (change, then) in out.items()}
-
-
-def _numbers() -> dict[str, Mutation]:
-    out = {}
-    for place, (find, special) in PLACES.items():
-        for word, (text, usual) in NUMBERS.items():
-            then = EXCEPT.get((place, word)) or special.get(word) or usual
-            name = f"{word} as {place}"
-            out[name] = Mutation(name, number_at(find, text), then, placed=then == "refused")
-    return out
 
 
 def _bytes_lost(rng: Random, text: str) -> str:
@@ -195,6 +185,6 @@ WHOLE = {
 
 MUTATIONS: dict[str, Mutation] = {
     **_edits(),
-    **_numbers(),
+    **numbers(PLACES, EXCEPT),
     **{name: Mutation(name, change, then) for name, (change, then) in WHOLE.items()},
 }

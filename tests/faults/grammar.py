@@ -13,6 +13,7 @@ from random import Random
 
 from hypothesis import strategies as st
 
+Find = Callable[[Random, str], tuple[int, int]]
 Change = Callable[[Random, str], str]
 
 # What can stand where a number should, and whether it still is one.
@@ -62,7 +63,7 @@ class Case:
     placed: bool
 
 
-def number_at(find: Callable[[Random, str], tuple[int, int]], word: str) -> Change:
+def number_at(find: Find, word: str) -> Change:
     """Put `word` where `find` says that a number stands."""
 
     def change(rng: Random, text: str) -> str:
@@ -70,6 +71,19 @@ def number_at(find: Callable[[Random, str], tuple[int, int]], word: str) -> Chan
         return text[:start] + word + text[end:]
 
     return change
+
+
+def numbers(
+    places: Mapping[str, tuple[Find, Mapping[str, str]]], exceptions: Mapping[tuple[str, str], str]
+) -> dict[str, Mutation]:
+    """Every word of NUMBERS in every place; a place, and then a pair, may expect otherwise than usual."""
+    out = {}
+    for place, (find, special) in places.items():
+        for word, (text, usual) in NUMBERS.items():
+            then = exceptions.get((place, word)) or special.get(word) or usual
+            name = f"{word} as {place}"
+            out[name] = Mutation(name, number_at(find, text), then, placed=then == "refused")
+    return out
 
 
 def on_line(choose: Callable[[Random, list[str]], int], edit: Callable[[str], str]) -> Change:

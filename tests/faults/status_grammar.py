@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from random import Random
 
-from .grammar import NUMBERS, Mutation, number_at, on_line
+from .grammar import Mutation, numbers, on_line
 
 BASE = (
     "frames:300\n"
@@ -44,16 +44,6 @@ PLACES = {
 }
 # float() reads an underscore; the grammar of a severity leaves that to it.
 EXCEPT = {("a severity", "an underscore"): "any"}
-
-
-def _numbers() -> dict[str, Mutation]:
-    out = {}
-    for place, (find, special) in PLACES.items():
-        for word, (text, usual) in NUMBERS.items():
-            then = EXCEPT.get((place, word)) or special.get(word) or usual
-            name = f"{word} as {place}"
-            out[name] = Mutation(name, number_at(find, text), then, placed=then == "refused")
-    return out
 
 
 def _swapped(rng: Random, text: str) -> str:
@@ -119,6 +109,6 @@ WHOLE = {
 }
 
 MUTATIONS: dict[str, Mutation] = {
-    **_numbers(),
+    **numbers(PLACES, EXCEPT),
     **{name: Mutation(name, change, then) for name, (change, then) in WHOLE.items()},
 }

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
+from hobble.config.sections import Motion
 from hobble.core.errors import InputError
 from hobble.injury.severity import odd_ranges, severity_matrix
 from hobble.injury.status import read_status
@@ -21,18 +22,7 @@ from .grammar import Case, cases
 from .lab import ROOT
 
 SKELETON = ROOT / "config/skeletons/holden31.yaml"
-OPTIONS = {
-    "fps": 60.0,
-    "source_fps": None,
-    "unit": "auto",
-    "up": "auto",
-    "handedness": "auto",
-    "facing": None,
-    "proportions": "skeleton",
-    "defects": "repair",
-    "loops": 1,
-    "heading": None,
-}
+OPTIONS = Motion().model_dump()
 
 Arrays = dict[str, np.ndarray]
 Reader = Callable[[Path], Arrays]

@@ -10,24 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hobble.config.sections import Motion
 from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.ik import aim, two_bone_knee
 from hobble.core.skeleton import Skeleton, local_rotations
 
-OPTIONS: dict[str, Any] = {
-    "fps": 60.0,
-    "source_fps": None,
-    "unit": "auto",
-    "up": "auto",
-    "handedness": "auto",
-    "facing": None,
-    "proportions": "skeleton",
-    "defects": "repair",
-    "loops": 1,
-    "heading": None,
-}
+OPTIONS: dict[str, Any] = Motion().model_dump()
 
 
 def make_walk(skeleton: Skeleton, frames: int, fps: float, name: str = "walk") -> Clip:
