@@ -87,7 +87,7 @@ def training() -> dict[str, object]:
         "l1": 0.01,
         "schedule": "constant",
         "warm_up": 0.0,
-        "feedback": 0.0,
+        "rollout": 1,
         "seed": 1,
         "memory_mb": 64,
         "continues": None,

@@ -26,7 +26,7 @@ from hobble.training.start import recipe_hash
 from hobble.training.train import train
 
 Settings = dict[str, Any]
-HURRIED = {"schedule": "cosine", "warm_up": 0.3, "feedback": 1.0, "batch": 256}
+HURRIED = {"schedule": "cosine", "warm_up": 0.3, "rollout": 4, "batch": 256}
 
 PROCESS = """
 import json, sys

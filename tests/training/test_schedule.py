@@ -1,4 +1,4 @@
-"""The learning rate goes as the configuration says, and errors are fed back where they belong."""
+"""The learning rate goes as the configuration says."""
 
 from __future__ import annotations
 
@@ -13,16 +13,12 @@ import torch
 from hobble.config.sections import Training
 from hobble.database.reader import Database
 from hobble.training.batches import HostRows
-from hobble.training.feedback import Feedback
-from hobble.training.fused import FusedStep
-from hobble.training.network import initialise
 from hobble.training.optimiser import Adam
 from hobble.training.schedule import share
-from hobble.training.step import Step
 from hobble.training.train import train
 
 Settings = dict[str, Any]
-FAST = {"schedule": "cosine", "warm_up": 0.5, "feedback": 1.0, "batch": 300}
+FAST = {"schedule": "cosine", "warm_up": 0.5, "rollout": 4, "batch": 300}
 
 
 def test_a_cosine_falls_from_one_to_nothing() -> None:
@@ -101,39 +97,6 @@ def _stopping_at(turn: int) -> Any:
             yield batch
 
     return stopping
-
-
-def test_errors_are_fed_back_into_the_pose_alone_in_centimetres(data: Database) -> None:
-    feedback = Feedback(data, 2.0, torch.device("cpu"))
-    layout, s = data.layout, data.statistics
-    x = torch.zeros(5, layout.x_size)
-    feedback.begin()
-    feedback.add(x)
-    assert torch.count_nonzero(x) == 0
-    error = torch.randn(4, layout.y_size, generator=torch.Generator().manual_seed(1))
-    feedback.remember(error)
-    feedback.add(x)
-    for of_x, of_y in (
-        (layout.x_joint_position, layout.y_joint_position),
-        (layout.x_joint_velocity, layout.y_joint_velocity),
-    ):
-        centimetres = x[:4, of_x].numpy() * s.x_std[of_x]
-        assert centimetres == pytest.approx(2 * error[:, of_y].numpy() * s.y_std[of_y], rel=1e-5)
-    assert torch.count_nonzero(x[4]) == 0
-    x[:, layout.x_joint_position.start : layout.x_joint_velocity.stop] = 0
-    assert torch.count_nonzero(x) == 0
-
-
-@pytest.mark.parametrize("kind", [Step, FusedStep])
-def test_a_step_keeps_its_errors(kind: type[Step]) -> None:
-    network = initialise((6, 5, 4), 4, 1)
-    generator = torch.Generator().manual_seed(1)
-    x, y = (torch.randn(7, n, generator=generator) for n in (6, 4))
-    p = torch.rand(7, generator=generator)
-    step = kind(network, 0.0)
-    loss = step(x, y, p, step.masks(7))
-    assert torch.allclose(step.error, network(x, p) - y, atol=1e-5)
-    assert float(loss) == pytest.approx(float(step.error.square().mean()), rel=1e-6)
 
 
 def test_a_rate_that_ends_at_nothing_cannot_be_gone_on_from() -> None:

@@ -26,7 +26,10 @@ class Graph:
         assert isinstance(generator, torch.Generator)
 
     def replay(self) -> None:
+        of_step = self.update.step.error
         self.update.loss.copy_(self.update._once())
+        self.update.error.copy_(self.update.step.error)
+        self.update.step.error = of_step
 
 
 class Stream:
@@ -74,6 +77,8 @@ def test_a_captured_update_is_the_plain_one() -> None:
         x, y = (torch.randn(rows, n, generator=generator) for n in (8, 5))
         p = torch.rand(rows, generator=generator)
         losses.append([update(x.clone(), y.clone(), p, share) for update in (plain, captured)])
+        errors = [update.step.error for update in (plain, captured)]
+        assert torch.allclose(*errors, rtol=1e-4, atol=1e-5)
     for mine, theirs in losses:  # looked at afterwards, as the watch does
         assert float(mine) == pytest.approx(float(theirs), rel=1e-5)
     assert plain.adam.steps == captured.adam.steps == 4

@@ -219,8 +219,8 @@ class Training(Section):
     beta2: Share = 0.999
     dropout: Share = Field(0.3, description="share of units dropped before each layer, the input included")
     l1: Annotated[float, Field(ge=0)] = Field(0.01, description="weight of the mean absolute weights")
-    feedback: Annotated[float, Field(ge=0)] = Field(
-        0.0, description="how many times its last errors are added to the pose that the network is given"
+    rollout: Positive = Field(
+        1, description="frames over which errors of the network stay in the pose that it is given; 1: none"
     )
     seed: int = 1
     memory_mb: Positive = Field(512, description="largest part of the database held in memory")

@@ -15,9 +15,9 @@ from hobble.database.reader import Database
 from hobble.training.batches import TRAIN, Watch
 from hobble.training.checkpoint import Saver, State, pack
 from hobble.training.device_rows import rows_for
-from hobble.training.feedback import Feedback
 from hobble.training.held_out import HeldOut
 from hobble.training.history import duration
+from hobble.training.rollout import RollOut
 from hobble.training.schedule import share
 from hobble.training.start import begin, recipe_hash, step_for, use_threads
 from hobble.training.update import update_for
@@ -59,7 +59,7 @@ def _run(state: State, database: Database, training: Mapping[str, Any], saver: S
     update = update_for(step, state.adam, training["batch"])
     rows = rows_for(database, device)
     held_out = HeldOut(database, device, database.pairs(TRAIN) // sections)
-    feedback = Feedback(database, training["feedback"], device)
+    roll_out = RollOut(database, training["rollout"], training["batch"], device)
     pairs = database.pairs(TRAIN)
     progress = Progress(state, passes * pairs)
     for turn in range(state.sections, passes * sections):
@@ -67,12 +67,12 @@ def _run(state: State, database: Database, training: Mapping[str, Any], saver: S
         where = f"pass {pass_index + 1} of {passes}, section {section + 1} of {sections}"
         watch = Watch(where, database.clips)
         step.seed(section_seed(seed, turn))
-        feedback.begin()
+        roll_out.begin()
         for batch in rows.batches(pass_index, section, sections, seed, training["batch"]):
-            feedback.add(batch.x)
+            roll_out.add(batch.x)
             rate = share(training, (state.samples + watch.seen) / pairs)
             watch.add(update(*batch[:3], rate), batch)
-            feedback.remember(step.error)
+            roll_out.remember(step.error)
             progress.bar.update(len(batch.p))
         train_mse = watch.mean()
         state.sections, state.samples = turn + 1, state.samples + watch.samples

@@ -50,6 +50,7 @@ class CapturedUpdate(Update):
         torch.cuda.current_stream().wait_stream(beside)
         with torch.cuda.graph(self.graph):
             self.loss = self._once()
+        self.error = step.error
         for tensor, value in zip((flat, adam.first, adam.second), before, strict=True):
             tensor.copy_(value)
 
@@ -68,6 +69,7 @@ class CapturedUpdate(Update):
         self.adam.steps += 1
         self.numbers.copy_(torch.tensor(self.adam.numbers(share)), non_blocking=True)
         self.graph.replay()
+        self.step.error = self.error  # a batch that went the plain way left another
         return self.loss.clone()
 
 

@@ -1,0 +1,119 @@
+"""The poses that the network is given in training are those that a character of its would be in."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from hobble.database.reader import Database
+from hobble.evaluation.rollouts import Inputs, roll_out
+from hobble.training.fused import FusedStep
+from hobble.training.network import initialise
+from hobble.training.rollout import RollOut
+from hobble.training.step import Step
+
+CPU = torch.device("cpu")
+FRAMES, STARTS = 5, 9
+
+
+class Mixer:
+    """Stands for a predictor: Y is a fixed mixture of X, wherever that comes from."""
+
+    def __init__(self, data: Database) -> None:
+        self.network = SimpleNamespace(layout=data.layout)
+        shape = (data.layout.x_size, data.layout.y_size)
+        self.mixture = np.random.default_rng(1).normal(0, 0.02, shape)
+        self.mixture[:, data.layout.y_phase_change] = 0
+
+    def predict(self, x: Any, phase: Any) -> Any:
+        return x @ self.mixture
+
+
+def straight(data: Database) -> Inputs:
+    """A clip whose joints are where their velocities carry them; its root stands, on level ground."""
+    layout, rng, rows = data.layout, np.random.default_rng(2), STARTS + FRAMES
+    x, y = rng.normal(0, 5, (rows, layout.x_size)), rng.normal(0, 5, (rows, layout.y_size))
+    for row in range(rows):
+        if row:
+            x[row, layout.x_joint_position] = y[row - 1, layout.y_joint_position]
+            x[row, layout.x_joint_velocity] = y[row - 1, layout.y_joint_velocity]
+        carried = x[row, layout.x_joint_position] + y[row, layout.y_joint_velocity]
+        y[row, layout.y_joint_position] = carried
+    still = np.zeros(rows)
+    return Inputs(x, y, still, still, still, np.zeros((rows, 2)), still)
+
+
+def test_poses_carry_the_errors_of_a_character(data: Database) -> None:
+    """Rows that do follow each other give what the evaluation's roll-out makes of the same clip."""
+    layout, s = data.layout, data.statistics
+    asked, predictor = straight(data), Mixer(data)
+    starts = np.arange(STARTS)
+    made, _ = roll_out(predictor, asked, starts, FRAMES)  # type: ignore[arg-type]
+    carried = RollOut(data, 2 * STARTS, STARTS, CPU)
+    carried.begin()
+    whole = slice(FRAMES, None)  # places whose roll-out does not end meanwhile
+    pose = slice(layout.x_joint_position.start, layout.x_joint_velocity.stop)
+    for age in range(FRAMES):
+        at = starts + age
+        added = torch.zeros(STARTS, layout.x_size)
+        carried.add(added)
+        off = added.numpy() * s.x_std
+        if age:
+            truth = asked.y[at - 1][:, layout.y_joint_position]
+            expected = (made[age - 1].reshape(STARTS, -1) - truth)[whole]
+            assert off[whole, layout.x_joint_position] == pytest.approx(expected, rel=1e-3, abs=1e-3)
+            assert np.abs(expected).max() > 1
+        off[:, pose] = 0
+        assert np.all(off == 0)
+        error = predictor.predict(asked.x[at] + added.numpy() * s.x_std, None) - asked.y[at]
+        carried.remember(torch.from_numpy(error / s.y_std).float())
+
+
+def test_each_place_begins_anew_after_its_frames(data: Database) -> None:
+    """And a fifth of them at every batch, so that ages are mixed; one frame is the recorded pose alone."""
+    frames, rows = 5, 10
+    for length in (frames, 1):
+        carried = RollOut(data, length, rows, CPU)
+        carried.begin()
+        zero = []
+        for _ in range(3 * frames):
+            x = torch.zeros(rows, data.layout.x_size)
+            carried.add(x)
+            zero.append((torch.count_nonzero(x, dim=1) == 0).numpy())
+            carried.remember(torch.ones(rows, data.layout.y_size))
+        if length == 1:
+            assert np.all(zero)
+            continue
+        assert zero[0].all()
+        counts = np.sum(zero[frames:], axis=1)
+        assert set(counts) == {rows // frames}
+        assert set(np.sum(zero[frames : 2 * frames], axis=0)) == {1}
+
+
+def test_sections_do_not_depend_on_each_other_and_a_short_batch_is_one(data: Database) -> None:
+    carried = RollOut(data, 4, 6, CPU)
+    carried.begin()
+    carried.remember(torch.ones(6, data.layout.y_size))
+    x = torch.zeros(2, data.layout.x_size)
+    carried.add(x)
+    assert torch.count_nonzero(x) > 0
+    carried.begin()
+    x = torch.zeros(6, data.layout.x_size)
+    carried.add(x)
+    assert torch.count_nonzero(x) == 0
+
+
+@pytest.mark.parametrize("kind", [Step, FusedStep])
+def test_a_step_keeps_its_errors(kind: type[Step]) -> None:
+    network = initialise((6, 5, 4), 4, 1)
+    generator = torch.Generator().manual_seed(1)
+    x, y = (torch.randn(7, n, generator=generator) for n in (6, 4))
+    p = torch.rand(7, generator=generator)
+    step = kind(network, 0.0)
+    loss = step(x, y, p, step.masks(7))
+    assert torch.allclose(step.error, network(x, p) - y, atol=1e-5)
+    assert float(loss) == pytest.approx(float(step.error.square().mean()), rel=1e-6)
