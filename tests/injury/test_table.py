@@ -68,6 +68,37 @@ def test_refuses_other_columns(tmp_path):
         read_table(tmp_path / "table.csv", LINKS)
 
 
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_lines_end_as_on_any_machine(folder, end):
+    path = folder / "table.csv"
+    path.write_bytes(
+        (HEADER + "walk,LowerBack-Spine,3,2,4\nrun,LowerBack-Spine,1,,\n").replace("\n", end).encode()
+    )
+    assert [(row.clip, row.line) for row in read_table(path, LINKS)] == [("walk", 2), ("run", 3)]
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [("walk,LowerBack-Spine,3,,\n" + "x" * 200_000 + ",,,,\n", 3), ('walk,"' + "x\n" * 99_999, None)],
+)
+def test_what_is_no_csv_is_refused_in_one_message(folder, root, capsys, text, line):
+    with pytest.raises(InputError, match=r"not CSV: field larger.*Look for a quotation mark") as caught:
+        read_table(table(folder, text), LINKS)
+    assert caught.value.line == line or line is None
+    assert (
+        main(
+            [
+                str(folder / "table.csv"),
+                str(folder),
+                "--skeleton",
+                str(root / "config/skeletons/holden31.yaml"),
+            ]
+        )
+        == 1
+    )
+    assert len(capsys.readouterr().err) < 300 + len(str(folder))
+
+
 def test_statuses_need_no_files(folder):
     rows = read_table(table(folder, "walk,LowerBack-Spine,3,2,4\n"), LINKS)
     assert statuses(rows, {"walk": 10})["walk"].spells[0].links == (("LowerBack-Spine", 3.0),)

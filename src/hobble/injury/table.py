@@ -39,14 +39,21 @@ class Row:
 
 
 def read_table(path: str | Path, links: Sequence[str]) -> list[Row]:
-    """Read a table. Raises InputError with the line for whatever a status file would refuse."""
+    """Read a table. Raises InputError with the line for no CSV and for what a status file would refuse."""
     path = Path(path)
-    reader = csv.DictReader(io.StringIO(read_text(path)), skipinitialspace=True, restkey="more")
-    names = [name.strip() for name in reader.fieldnames or ()]
-    if sorted(names) != sorted(COLUMNS):
-        raise InputError(path, f"has columns {', '.join(names) or 'none'}, not {', '.join(COLUMNS)}", line=1)
-    reader.fieldnames = names
-    return [_row(path, reader.line_num, values, links) for values in reader]
+    lines = io.StringIO(read_text(path), newline=None)  # an old Macintosh's lines end in \r
+    reader = csv.DictReader(lines, skipinitialspace=True, restkey="more")
+    try:
+        names = [name.strip() for name in reader.fieldnames or ()]
+        if sorted(names) != sorted(COLUMNS):
+            shown = f"{', '.join(names) or 'none':.200}"
+            raise InputError(path, f"has columns {shown}, not {', '.join(COLUMNS)}", line=1)
+        reader.fieldnames = names
+        return [_row(path, reader.line_num, values, links) for values in reader]
+    except csv.Error as error:
+        raise InputError(
+            path, f"not CSV: {error}", line=reader.reader.line_num, fix="Look for a quotation mark left open."
+        ) from None
 
 
 def statuses(
