@@ -44,6 +44,20 @@ def test_files_go_before_motion(walker, options, write):
     assert (labels.gait.argmax(axis=1)[60:] == 1).all()
 
 
+def test_files_beside_a_cycle_that_is_repeated_are_left_out_and_said(walker, options, write):
+    clip = walker()
+    files = [write("w_footsteps.txt", FOOTSTEPS), write("w_gait.txt", "1 jog\n")]
+    labels, report = label_clip(clip, files, {**MOTION, "loops": 2}, "walk", "rocky", options)
+    assert (report.phase_source, report.gait_source) == ("automatic", "automatic")
+    assert report.warnings == (
+        "w_footsteps.txt, w_gait.txt left out: the frames counted there are those of one cycle, and the clip "
+        "repeats it",
+    )
+    unread = label_clip(clip, files, {**MOTION, "loops": 2}, "walk", "rocky", {**options, "files": False})
+    assert unread[1].warnings == ()
+    np.testing.assert_array_equal(unread[0].phase, labels.phase)
+
+
 def test_a_phase_file_goes_before_footsteps_and_a_gait_file_before_keys(walker, options, write):
     clip = walker()
     phase = np.linspace(0, 20, 1200) % 1.0

@@ -45,10 +45,12 @@ def label_clip(
     it mostly shows, if that is known. ground: "flat", ... options: the section `labels` of the data set.
     Raises InputError for a file that cannot be used.
     """
-    # Files beside a cycle that was repeated count the frames of one cycle only.
-    given = _by_kind(files) if options["files"] and motion.get("loops", 1) == 1 else {}
-    time = SourceTime(motion["source_frames"], motion["source_fps"], motion.get("source_start", 0))
+    given = _by_kind(files) if options["files"] else {}
     warnings: list[str] = []
+    if given and motion.get("loops", 1) > 1:
+        warnings.append(_left_out(given))
+        given = {}
+    time = SourceTime(motion["source_frames"], motion["source_fps"], motion.get("source_start", 0))
     swings = find_swings(clip, options["heel_speed"], options["toe_speed"], options["valley_factor"])
     phase, known, footsteps = _phase(clip, given, time, swings, options["shortest_step"])
     shares = _gait(clip, given, time, swings, gait)
@@ -77,6 +79,11 @@ def label_clip(
         warnings=tuple(warnings),
     )
     return labels, report
+
+
+def _left_out(given: Mapping[str, Path]) -> str:
+    names = ", ".join(path.name for path in given.values())
+    return f"{names} left out: the frames counted there are those of one cycle, and the clip repeats it"
 
 
 def _no_cycle(margins: str) -> str:
