@@ -110,6 +110,19 @@ def test_every_second_row_of_a_phase_file_is_exact(write):
     assert (read_phase(path, AT_120, 120) == rows[::2]).all()
 
 
+def test_a_clip_that_begins_within_its_source_begins_within_its_files(write):
+    whole, late = SourceTime(240, 120.0), SourceTime(240, 120.0, first=7)
+    rows = np.round(np.linspace(0, 0.9, 240), 5)
+    phase = write("a.phase", "\n".join(f"{r:.5f}" for r in rows))
+    assert read_phase(phase, late, 100).tolist() == rows[7:207:2].tolist()
+    shares = np.outer(rows, np.eye(8)[1])
+    gait = write("a.gait", "\n".join(" ".join(map(str, row)) for row in shares))
+    assert read_gait(gait, late, 100)[:, 1].tolist() == rows[7:207:2].tolist()
+    keys = read_gait_keys(write("late_gait.txt", "11 stand\n52 walk\n"), late, 100)
+    moved = read_gait_keys(write("whole_gait.txt", "4 stand\n45 walk\n"), whole, 100)
+    np.testing.assert_allclose(keys, moved)
+
+
 def test_phase_between_rows_goes_the_short_way_round(write):
     path = write("a.phase", "0.8\n0.9\n0.1\n0.2\n")
     phase = read_phase(path, SourceTime(4, 30.0), 7)

@@ -40,6 +40,15 @@ def test_bouncing_hips_and_feet_in_the_air_are_a_jog(walker):
     assert (automatic(jog)[60:-60].argmax(axis=1) == g.JOG).all()
 
 
+def test_what_the_clip_is_said_to_show_tips_the_balance(walker):
+    clip = walker(half=20, swing=26, stride=160.0)
+    root = clip.root.copy()
+    root[:, 1] += 1.5 * np.cos(2 * np.pi * np.arange(len(clip)) / 20)
+    between = replace(clip, root=root)
+    assert (automatic(between, "walk")[60:-60].argmax(axis=1) == g.WALK).all()
+    assert (automatic(between, "jog")[60:-60].argmax(axis=1) == g.JOG).all()
+
+
 def test_low_head_and_hips_are_a_crouch_and_a_bow_is_not(walker):
     clip = walker()
     low = clip.root - np.array([0.0, 38.0, 0.0])

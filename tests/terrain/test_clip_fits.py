@@ -13,7 +13,7 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.motion.root import RootFrames, root_frames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
-from hobble.terrain.feet import HEEL, feet_of, heel_above_toe
+from hobble.terrain.feet import HEEL, Feet, feet_of, heel_above_toe, held_up
 from hobble.terrain.ground import fit_cycle
 from hobble.terrain.heightmaps import heightmaps
 from hobble.terrain.patches import Patches, draw_patches
@@ -157,6 +157,14 @@ def test_a_heel_held_up_over_its_standing_toe_is_not_on_a_flat_floor(
     fits = clip_fits(clip, walk.labels, patches, "flat", made.options(), made.database())
     assert np.all(fits.heights == 0)
     assert fits.foot_error.max() < 0.01
+
+
+def test_a_heel_is_held_up_only_over_a_toe_that_stands() -> None:
+    soles = np.zeros((2, 4, 3))
+    soles[:, 0, 1] = 5.0
+    contacts = np.array([[True, True, True, True], [True, False, True, True]])
+    up = held_up(Feet(soles, contacts, 0.0, 0.0), 2.0)
+    assert up.tolist() == [[True, False, False, False], [False] * 4]
 
 
 def test_flat_ground_may_lie_where_the_feet_are_as_in_the_original(
