@@ -24,6 +24,7 @@ from hobble.injury.severity import (
     write_report,
 )
 from hobble.injury.status import Spell, Status, read_status
+from hobble.motion.resample import sample_times
 
 THIGH, ARM = "LeftUpLeg-LeftLeg", "LeftArm-LeftForeArm"
 
@@ -94,6 +95,14 @@ def test_odd_ranges_are_told_with_their_lines():
 )
 def test_each_frame_has_the_source_frame_that_shows_then(fps, start, expected):
     assert source_rows(4, 100, motion(100, fps, start)).tolist() == expected
+
+
+@pytest.mark.parametrize("fps", [120.0, 1 / 0.00833, 1 / 0.01667, 23.976])
+def test_after_ten_minutes_each_frame_still_has_the_source_frame_of_its_moment(fps):
+    """A rate that is nearly whole is resampled as it stands, so severities are looked up as it stands."""
+    times = sample_times(72_000, fps, 60.0)
+    rows = source_rows(len(times), 72_000, motion(72_000, fps))
+    np.testing.assert_array_equal(rows, np.floor(times + 1e-6))
 
 
 def test_source_rows_stay_in_the_file():

@@ -21,10 +21,18 @@ def _inside(path: str) -> str:
     return path
 
 
+def _sixty(fps: float) -> float:
+    """The rate in which all that follows counts: windows, speeds, thresholds, the character's own frames."""
+    if fps != 60.0:
+        raise ValueError("clips are made at 60 frames a second, whatever the rate of their files")
+    return fps
+
+
 # Upper bounds keep a mistyped or a stranger's configuration from asking for more memory than machines have.
 Positive = Annotated[int, Field(gt=0, le=1_000_000)]
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, lt=1)]
+SixtyHz = Annotated[float, AfterValidator(_sixty)]
 Inside = Annotated[str, AfterValidator(_inside)]
 Ground = Literal["flat", "rocky", "jumpy", "beam"]
 Gait = Literal["stand", "walk", "jog", "crouch", "jump", "bump"]
@@ -77,7 +85,7 @@ class Download(Section):
 class Motion(Section):
     """How BVH files are read and checked. `auto` is found from the rig; anything else overrules it."""
 
-    fps: PositiveFloat = Field(60.0, description="frames a second of the clips made")
+    fps: SixtyHz = Field(60.0, description="frames a second of the clips made: what follows counts in 60ths")
     source_fps: PositiveFloat | None = Field(None, description="overrules the files' Frame Time")
     unit: Literal["auto"] | PositiveFloat = Field("auto", description="centimetres per unit of the file")
     up: Literal["auto", "Y", "Z"] = "auto"

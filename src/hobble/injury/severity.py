@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,8 @@ from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz, write_json
 from hobble.core.quat import Array
 from hobble.injury.status import Spell, Status, parse_links, read_status
+
+FPS = 60.0  # of every clip
 
 
 def severity_matrix(status: Status, links: Sequence[str]) -> Array:
@@ -93,11 +94,8 @@ def clip_severity(
 
 def source_rows(frames: int, rows: int, motion: Mapping[str, Any]) -> Array:
     """(frames,) for each frame of a clip the row, from 0, of the source frame that shows at its moment."""
-    fps = motion["source_fps"]
-    whole = round(fps)
-    ratio = (whole if math.isclose(fps, whole, rel_tol=5e-4) else fps) / 60.0
     once = np.arange(frames) % motion.get("cycle_frames", frames)  # a looped clip comes back to its beginning
-    at = once * ratio + motion.get("source_start", 0)
+    at = once * (motion["source_fps"] / FPS) + motion.get("source_start", 0)
     return np.clip(np.floor(at + 1e-6).astype(int), 0, rows - 1)
 
 

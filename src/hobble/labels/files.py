@@ -35,9 +35,8 @@ class SourceTime:
 
     @property
     def ratio(self) -> float:
-        """Source frames per 60 Hz frame; a Frame Time written with few digits is taken for the whole rate."""
-        whole = round(self.fps)
-        return (whole if abs(self.fps - whole) < 5e-4 * whole else self.fps) / 60.0
+        """Source frames per 60 Hz frame, at the rate by which the clip was resampled."""
+        return self.fps / 60.0
 
     def to_clip(self, number: float) -> float:
         """Frame of the clip, not rounded, of a source frame counted from 1."""
