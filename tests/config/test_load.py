@@ -111,7 +111,7 @@ def test_every_problem_is_told_at_once() -> None:
         ({"skeleton": "s", "synthetic": {}}, "lists its clips"),
         ({"skeleton": "s", "folder": "f", "clips": {"a": None}, "held_out": ["b"]}, "not in `clips`: b"),
         ({"skeleton": "s", "folder": "f", "database": {"window": 55}}, "multiple of step"),
-        ({"skeleton": "s", "folder": "f", "motion": {"fps": 30}}, r"motion\.fps: clips are made at 60 .*not 30"),
+        ({"skeleton": "s", "folder": "f", "motion": {"fps": 30}}, r"motion\.fps: clips are made at 60"),
         ({"skeleton": "../s", "folder": "f"}, "skeleton: string should match"),
     ],
 )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import yaml
@@ -12,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from hobble.config.load import Catalogue
 from hobble.core import quat
+from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton, forward_kinematics, local_rotations, other_side
 
 NAMES = ("holden31", "ava191", "mixamo55", "rig22")
@@ -69,6 +73,44 @@ def test_mirroring_joints_twice_is_nothing(skeleton):
     swap = skeleton.mirror_joints
     np.testing.assert_array_equal(swap[swap], np.arange(len(swap)))
     assert skeleton.joints[swap[skeleton.role("left_toe")]] == skeleton.roles["right_toe"]
+
+
+def renamed(skeleton, left, right):
+    """The skeleton with LeftLeg, LHipJoint and so on called `left` and `right`, with Leg in them."""
+
+    def name(joint):
+        match = re.fullmatch("(Left|L(?=[HT])|Right|R(?=[HT]))(.*)", joint)
+        return (left if match[1][0] == "L" else right).format(match[2]) if match else joint
+
+    return replace(
+        skeleton,
+        joints=tuple(name(joint) for joint in skeleton.joints),
+        roles={role: name(joint) for role, joint in skeleton.roles.items()},
+        links=tuple((name(a), name(b)) for a, b in skeleton.links),
+    )
+
+
+@pytest.mark.parametrize(
+    ("left", "right"),
+    [("L_{}", "R_{}"), ("{}_L", "{}_R"), ("{}.L", "{}.R"), ("{}_l", "{}_r"), ("l{}", "r{}"), ("L{}", "R{}"),
+     ("LEFT_{}", "RIGHT_{}"), ("Bip01 L {}", "Bip01 R {}"), ("CC_Base_L_{}", "CC_Base_R_{}")],
+)  # fmt: skip
+def test_sides_are_known_by_the_common_ways_to_name_them(holden31, left, right):
+    other = renamed(holden31, left, right)
+    np.testing.assert_array_equal(other.mirror_joints, holden31.mirror_joints)
+    np.testing.assert_array_equal(other.mirror_links, holden31.mirror_links)
+
+
+def test_a_skeleton_whose_sides_its_names_do_not_tell_is_not_mirrored(holden31):
+    for swap in ("mirror_joints", "mirror_links"):
+        with pytest.raises(HobbleError, match="1Arm is the left shoulder and 2Arm the right"):
+            getattr(renamed(holden31, "1{}", "2{}"), swap)
+
+
+def test_a_link_that_can_hurt_on_one_side_alone_is_not_mirrored(holden31):
+    links = tuple(link for link in holden31.links if link != ("RightLeg", "RightFoot"))
+    with pytest.raises(HobbleError, match="hold LeftLeg-LeftFoot and not RightLeg-RightFoot"):
+        _ = replace(holden31, links=links).mirror_links
 
 
 def test_links_of_the_31_joints(holden31):
@@ -148,7 +190,8 @@ def test_turning_the_root_turns_everything(holden31, angles):
 @pytest.mark.parametrize(
     ("name", "other"),
     [("LeftArm", "RightArm"), ("RHipJoint", "LHipJoint"), ("LThumb", "RThumb"), ("Hips", "Hips"),
-     ("Hand_L", "Hand_R"), ("UpperLeg.R", "UpperLeg.L"), ("fLeftEye", "fRightEye"), ("Spine", "Spine")],
+     ("Hand_L", "Hand_R"), ("UpperLeg.R", "UpperLeg.L"), ("fLeftEye", "fRightEye"), ("Spine", "Spine"),
+     ("Root", "Root"), ("lowerback", "lowerback"), ("RibCage", "RibCage"), ("rShin", "lShin")],
 )  # fmt: skip
 def test_other_sides(name, other):
     assert other_side(name) == other

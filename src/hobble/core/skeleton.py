@@ -10,9 +10,14 @@ from typing import Any
 import numpy as np
 
 from hobble.core import quat
+from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 
-SIDES = (("Left", "Right"), ("left", "right"), ("LHip", "RHip"), ("LThumb", "RThumb"))
+SIDES = (("Left", "Right"), ("left", "right"), ("LEFT", "RIGHT"))
+# L_Leg, leg.r and Bip01 L Leg; LLeg and rLeg
+LETTER = re.compile(r"(?<![^_. -])[LRlr](?![^_. -])|^[LRlr](?=[A-Z])")
+ACROSS = str.maketrans("LRlr", "RLrl")
+NAMED = "alike but for Left and Right, or L and R, as in LeftLeg, L_Leg, Leg.L, LLeg"
 
 
 def other_side(name: str) -> str:
@@ -26,8 +31,7 @@ def other_side(name: str) -> str:
             return name.replace(left, right)
         if right in name:
             return name.replace(right, left)
-    match = re.fullmatch(r"(.*[_.])([LR])", name)
-    return match[1] + ("R" if match[2] == "L" else "L") if match else name
+    return LETTER.sub(lambda match: match[0].translate(ACROSS), name, count=1)
 
 
 @dataclass(frozen=True)
@@ -100,15 +104,38 @@ class Skeleton:
 
     @property
     def mirror_joints(self) -> np.ndarray:
-        """(J,) index of each joint's counterpart on the other side."""
-        return np.array([self._counterpart(name) for name in self.joints])
+        """(J,) index of each joint's counterpart on the other side, by their names.
+
+        Raises HobbleError where the names do not pair the joints that play a role on both sides.
+        """
+        swap = np.array([self._counterpart(name) for name in self.joints])
+        for role, left in self.roles.items():
+            right = self.roles.get(role.replace("left_", "right_", 1))
+            if right not in (None, left) and self.joints[swap[self.index(left)]] != right:
+                raise self._lopsided(
+                    f"{left} is the {role.replace('_', ' ')} and {right} the right one, but their names do not "
+                    f"say so. Name the joints of both sides {NAMED}."
+                )
+        return swap
 
     @property
     def mirror_links(self) -> np.ndarray:
-        """(L,) index of each link's counterpart on the other side."""
-        names = self.link_names
-        mirrored = [f"{other_side(a)}-{other_side(b)}" for a, b in self.links]
-        return np.array([names.index(m) if m in names else i for i, m in enumerate(mirrored)], int)
+        """(L,) index of each link's counterpart on the other side.
+
+        Raises HobbleError like `mirror_joints`, and for a link without a counterpart, whose injury would stay
+        where it is while the body is mirrored.
+        """
+        swap = self.mirror_joints
+        across = [tuple(self.joints[swap[self.index(joint)]] for joint in link) for link in self.links]
+        for link, other in zip(self.links, across, strict=True):
+            if other not in self.links:
+                raise self._lopsided(
+                    f"its links hold {'-'.join(link)} and not {'-'.join(other)}. Add that link."
+                )
+        return np.array([self.links.index(other) for other in across], int)
+
+    def _lopsided(self, why: str) -> HobbleError:
+        return HobbleError(f"skeleton {self.name} cannot be mirrored: {why}")
 
     def _counterpart(self, name: str) -> int:
         other = other_side(name)
