@@ -11,7 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError
+from hobble.injury.status import read_status
+from hobble.synthetic.clip import ENOUGH, SHORTEST, write_clip
 from hobble.synthetic.files import footsteps_text, gait_text, status_text
+from hobble.synthetic.injury import LINKS
 from hobble.synthetic.path import gait_keys
 from hobble.synthetic.recipes import Segment
 
@@ -51,8 +54,6 @@ def test_frames_rate_and_number_are_as_asked(written):
 
 
 def test_same_arguments_same_bytes_and_another_seed_or_name_another_walk(written, tmp_path, holden31):
-    from hobble.synthetic.clip import write_clip
-
     def write(name, seed):
         paths = {key: tmp_path / f"{name}{seed}{key}" for key in ("bvh", "footsteps", "gait", "status")}
         write_clip(
@@ -119,6 +120,11 @@ def test_footstep_lines_pair_each_right_with_the_next_left(gaps, left_first):
     assert all(n - 1 in left for n in numbers[1::2])
 
 
+def test_feet_that_land_once_or_never_make_no_line():
+    assert footsteps_text([], [4]) == footsteps_text([4], []) == footsteps_text([], []) == ""
+    assert footsteps_text([4], [9]) == "5 10\n"
+
+
 def test_status_lines_cover_what_hurts_and_nothing_else():
     assert status_text(90, None, [(0, 0)]) == "frames:90\n"
     text = status_text(90, "A-B", [(0, 0), (20, 3), (50, 10)])
@@ -138,3 +144,23 @@ def test_a_clip_hurts_at_every_severity_from_footstep_to_footstep(written):
     for start, _, _ in ranges:
         assert np.abs(landings - start).min() <= 2
     assert written("healthy", recipe="jog").text("_injuries.txt") == "frames:1200\n"
+
+
+@pytest.mark.parametrize("link", LINKS)
+@pytest.mark.parametrize("fps", [60, 120])
+def test_the_shortest_clip_that_hurts_has_a_status_file_that_can_be_read(written, holden31, link, fps):
+    clip = written("short", injured=link, frames=SHORTEST, fps=fps)
+    status = read_status(clip.folder / "short_injuries.txt", holden31.link_names)
+    assert status.frames == SHORTEST * fps // 60
+    assert status.spells[-1].links == ((link, 10.0),)
+    enough = written("enough", injured=link, frames=ENOUGH, fps=fps)
+    assert len(read_status(enough.folder / "enough_injuries.txt", holden31.link_names).spells) == 4
+
+
+def test_a_clip_too_short_for_a_step_says_how_many_frames_are_enough(holden31, tmp_path):
+    paths = {key: tmp_path / key for key in ("bvh", "footsteps", "gait", "status")}
+    options = {"frames": 600, "fps": 120, "seed": 1}
+    said = r"clip a: 16 frames at 60 Hz are too short for a step. Set synthetic.frames to 4875 or more"
+    with pytest.raises(HobbleError, match=said):
+        write_clip("a", holden31.to_dict(), 16, "walk", None, options, **paths)
+    assert not list(tmp_path.iterdir())

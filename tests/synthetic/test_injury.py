@@ -179,3 +179,9 @@ def test_every_severity_has_its_stretch_and_moves_to_a_footstep():
     assert moved[0] == stretches[0]
     assert all(frame % 37 == 0 for frame, _ in moved[1:])
     assert max(abs(a - b) for (a, _), (b, _) in zip(moved, stretches, strict=True)) <= 18
+
+
+def test_stretches_that_would_begin_in_the_same_frame_are_one():
+    stretches = [(0, 0), (40, 3), (80, 5), (120, 7), (160, 10)]
+    assert at_footsteps(stretches, [50, 130]) == [(0, 0), (50, 5), (130, 10)]
+    assert at_footsteps([(0, 0), (10, 3), (80, 10)], [0, 90]) == [(0, 3), (90, 10)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pathlib
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
+from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
 from hobble.core.skeleton import Skeleton
 from hobble.synthetic import files, injury
@@ -20,6 +22,9 @@ from hobble.synthetic.ground import Ground, make_ground
 from hobble.synthetic.path import Path, gait_keys, margin, walk_path
 from hobble.synthetic.pose import pose
 from hobble.synthetic.recipes import GROUND, INJURED, Segment, generator, plan
+
+SHORTEST = 60  # frames at 60 Hz in which some foot lands, so that pain can begin; no clip is shorter
+ENOUGH = 130  # frames at 60 Hz in which every severity has its own landing
 
 
 @dataclass(frozen=True)
@@ -121,8 +126,14 @@ def write_clip(
 ) -> None:
     """Generate a clip and write it as a user's folder would hold it. skeleton: as `Skeleton.to_dict`.
 
-    options: `fps` of the files and `seed`. Raises HobbleError for what cannot be walked.
+    options: the section `synthetic`. Raises HobbleError for what cannot be walked, and for too few frames.
     """
+    if frames < SHORTEST:
+        enough = math.ceil(options["frames"] * ENOUGH / max(frames, 1))
+        raise HobbleError(
+            f"clip {clip}: {frames} frames at 60 Hz are too short for a step. "
+            f"Set synthetic.frames to {enough} or more, or give the clip a larger share."
+        )
     rig = Skeleton.from_dict(skeleton)
     walk = generate(clip, rig, frames, recipe, injured, options["fps"], options["seed"])
     write_bvh(bvh, walk.clip)

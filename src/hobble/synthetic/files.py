@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,9 +12,9 @@ def footsteps_text(right: Sequence[int], left: Sequence[int]) -> str:
     """Lines `a b`: the right foot lands, then the left; frames from 0 in, from 1 in the file."""
     lines = []
     lefts = np.asarray(left)
-    for a, following in zip(right, [*right[1:], None], strict=True):
+    for a, following in itertools.pairwise([*right, np.inf]):
         between = lefts[lefts > a]
-        if len(between) and (following is None or between[0] < following):
+        if len(between) and between[0] < following:
             lines.append(f"{a + 1} {between[0] + 1}")
     return "".join(f"{line}\n" for line in lines)
 

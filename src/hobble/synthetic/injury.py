@@ -95,9 +95,15 @@ def schedule(frames: int) -> list[tuple[int, int]]:
 
 
 def at_footsteps(changes: Sequence[tuple[int, int]], landings: Sequence[int]) -> list[tuple[int, int]]:
-    """The same stretches, each but the first moved to the nearest frame in which a foot lands."""
+    """The same stretches, each but the first moved to the nearest frame in which a foot lands.
+
+    Of those that so begin in the same frame, as they do in a short clip, the last is left.
+    """
     frames = np.asarray(landings)
-    return [changes[0]] + [(int(frames[np.argmin(np.abs(frames - start))]), s) for start, s in changes[1:]]
+    moved = dict(changes[:1])
+    for start, severity in changes[1:]:
+        moved[int(frames[np.argmin(np.abs(frames - start))])] = severity
+    return list(moved.items())
 
 
 def smoothed(changes: Sequence[tuple[int, int]], frames: int, first: int, fps: float) -> Array:
