@@ -17,7 +17,7 @@ from hobble.core.skeleton import forward_kinematics
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
 from hobble.runtime import Pose, ProceduralAnimation
 from hobble.runtime.axes import MATRICES, Axes
-from hobble.runtime.ground import Heightmap
+from hobble.runtime.ground import CELL, Heightmap
 from hobble.runtime.network import load_network
 from hobble.runtime.waypoints import Waypoint
 
@@ -179,6 +179,8 @@ def test_gaits(network) -> None:
     assert shares((0, 7.0)) == {"jog": 1}
     assert shares((0, 7.0), "crouch") == {"crouch": 1}
     assert shares((0, 2.5), np.array([0, 0.5, 0.5, 0, 0, 0])) == {"walk": 0.5, "jog": 0.5}
+    for listed in ([0, 0, 1, 0, 0, 0], (0, 0, 1.0, 0, 0, 0), np.eye(6, dtype=int)[2], [[0, 0, 1, 0, 0, 0]]):
+        assert shares((0, 2.5), listed) == {"jog": 1}
     with pytest.raises(KeyError, match=r"no gait 'moonwalk'; did you mean walk\?"):
         character.next_pose((0, 1), gait="moonwalk")
     with pytest.raises(KeyError, match="no gait 'swim': there are stand, walk, jog"):
@@ -224,7 +226,7 @@ def test_wishes_that_make_no_sense(network) -> None:
         character.next_pose((0, 1, 2, 3))
     with pytest.raises(ValueError, match=r"terrain gave heights of shape \(2,\) for 72 places"):
         character.next_pose((0, 1), terrain=lambda x, z: np.zeros(2))
-    for shares in (np.ones(5), np.array([-1.0, 0, 0, 0, 0, 0]), np.ones((3, 6))):
+    for shares in (np.ones(5), [-1, 0, 0, 0, 0, 0], np.ones((3, 6), int), [np.inf, 0, 0, 0, 0, 0]):
         with pytest.raises(ValueError, match=r"shares of gaits are \(6,\) or \(2, 6\) .* order: stand, walk"):
             character.next_pose((0, 1), gait=shares)
     with pytest.raises(ValueError, match="heights that are not finite"):
@@ -302,6 +304,33 @@ def test_terrain_as_function_heightmap_and_array(network) -> None:
         ProceduralAnimation(network).next_pose((0, 1), terrain="hill")
     with pytest.raises(ValueError, match="2 x 2"):
         Heightmap(np.zeros((1, 5)))
+
+
+@pytest.mark.parametrize("unit", ["cm", "m"])
+@pytest.mark.parametrize(("handed", "up"), MATRICES)
+def test_a_heightmap_is_in_the_callers_axes_and_unit(network, handed: str, up: str, unit: str) -> None:
+    """A map in the caller's coordinates is the same ground as its function, on the same side."""
+    axes = Axes(handed, up, unit)
+
+    def terrain(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        rise = 50 * np.tanh(first / axes.scale / 40) + 20 * np.tanh(second / axes.scale / 90)
+        return rise * axes.scale
+
+    def root(ground) -> np.ndarray:
+        wish = axes.points_out(np.array([0.5, 0, 2.0]))
+        made = walk(ProceduralAnimation(network, axes=axes), 30, target_velocity=wish, terrain=ground)
+        return made[-1].root / axes.scale
+
+    def sampled(cell: float, centre: tuple[float, float] = (0, 0)) -> np.ndarray:
+        along = (np.arange(401) - 200) * cell
+        return terrain(along[None, :] + centre[0], along[:, None] + centre[1])
+
+    asked = root(terrain)
+    cell, centre = 4.0 * axes.scale, (30 * axes.scale, -50 * axes.scale)
+    np.testing.assert_allclose(root(Heightmap(sampled(cell, centre), cell, centre)), asked, atol=0.5)
+    np.testing.assert_allclose(root(sampled(CELL * axes.scale)), asked, atol=0.5)
+    level = root(np.full((8, 8), 1.0))["XYZ".index(up)]
+    assert level == pytest.approx(1 / axes.scale, abs=1e-3)
 
 
 def test_heightmap_is_bilinear_and_goes_on_outside() -> None:

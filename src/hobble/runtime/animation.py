@@ -178,7 +178,8 @@ class ProceduralAnimation:
         or None to choose by speed; below 0.1 cm a frame the figure stands, whatever the gait. injury: link
         -> severity 0..10 (or (C,) severities), or (L,) or (C, L); links not named heal; None leaves all as
         they were. terrain: None for flat at zero, a function of two ground coordinates (arrays) to heights, a
-        `ground.Heightmap` or a 2D array; give the same object every frame.
+        `ground.Heightmap` or a 2D array around the origin, all in your axes and unit; give the same object
+        every frame.
         Raises UnknownName (a KeyError) for a link or gait that the network does not have, ValueError for
         severities out of range and for what is not finite or of another shape.
         """
@@ -247,13 +248,15 @@ class ProceduralAnimation:
         """Shares (C, 6) of each gait that the wish amounts to."""
         shares = self._wish_gait
         speed = np.hypot(velocity[:, 0], velocity[:, 1])
-        if isinstance(gait, np.ndarray) and gait.dtype.kind == "f":
-            if gait.shape not in (shares.shape, shares.shape[1:]) or not (gait >= 0).all():
+        given = np.asarray(gait)
+        if given.dtype.kind in "biuf":
+            known = (given >= 0) & (given < np.inf)
+            if given.shape not in (shares.shape, shares.shape[1:]) or not known.all():
                 raise ValueError(
                     f"shares of gaits are {shares.shape[1:]} or {shares.shape} numbers of 0 or more, not "
-                    f"{gait.tolist()}; their order: {', '.join(self._gaits)}"
+                    f"{given.tolist()}; their order: {', '.join(self._gaits)}"
                 )
-            shares[:] = gait
+            shares[:] = given
             return shares
         names = [gait] * self.characters if gait is None or isinstance(gait, str) else gait
         if len(names) != self.characters:

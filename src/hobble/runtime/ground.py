@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,13 +17,14 @@ CELL = 3.937007874  # centimetres a cell of the heightmaps of Holden et al. 2017
 
 @dataclass(frozen=True)
 class Heightmap:
-    """Heights (rows, columns) in cm: columns along +X, rows along +Z, `cell` cm apart, about `centre` (x, z).
+    """Heights (rows, columns), `cell` apart, about `centre`: of a character, in its caller's axes and unit.
 
-    Outside, the border goes on.
+    Columns run along the first of the two ground coordinates and rows along the second: +X and +Z, or +X and
+    +Y where Z is up. Without `cell`, cells are 3.937 cm, whatever the unit. Outside, the border goes on.
     """
 
     heights: Array = field(repr=False)
-    cell: float = CELL
+    cell: float | None = None
     centre: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
@@ -33,32 +34,37 @@ class Heightmap:
         object.__setattr__(self, "heights", heights)
 
     def __call__(self, x: Array, z: Array) -> Array:
-        """Heights (N,) at world x, z (N,), bilinear."""
-        return _bilinear(self.heights, self.cell, self.centre[0], self.centre[1], x, z)
+        """Heights (N,) at the ground coordinates x, z (N,), bilinear."""
+        cell = CELL if self.cell is None else self.cell
+        return _bilinear(self.heights, cell, self.centre[0], self.centre[1], x, z)
 
 
 def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | None:
     """A function of our x, z (N,) to our heights (N,) from what the caller gave in the axes given.
 
     terrain: None (flat at zero), a function of the caller's two ground coordinates (arrays) to heights, a
-    Heightmap, or a 2D array of heights (a Heightmap around the origin; in cm, whatever the unit).
+    Heightmap, or a 2D array of heights (a Heightmap around the origin), all in the caller's axes and unit.
+    Raises TypeError for anything else, ValueError for an array that is no heightmap.
     """
-    if terrain is None or isinstance(terrain, Heightmap):
-        return terrain
+    if terrain is None:
+        return None
     if isinstance(terrain, np.ndarray):
-        return Heightmap(terrain)
+        terrain = Heightmap(terrain)
     if not callable(terrain):
         raise TypeError(
             f"terrain is a function, a Heightmap, a 2D array or None, not {type(terrain).__name__}"
         )
     if axes.native:
         return terrain  # type: ignore[no-any-return]
+    if isinstance(terrain, Heightmap) and terrain.cell is None:
+        terrain = replace(terrain, cell=CELL * axes.scale)
     up = "XYZ".index(axes.up)
     level = [k for k in range(3) if k != up]
 
     def converted(x: Array, z: Array) -> Array:
         points = axes.points_out(np.stack([x, np.zeros_like(x), z], axis=-1))
-        return np.asarray(terrain(points[:, level[0]], points[:, level[1]])) / axes.scale
+        first, second = np.ascontiguousarray(points[:, level].T)
+        return np.asarray(terrain(first, second)) / axes.scale
 
     return converted
 
