@@ -38,6 +38,28 @@ def test_adds_up_jobs_rules_and_bytes(tmp_path: Path) -> None:
     assert (found["total_seconds"], found["total_bytes"], found["missing"]) == (5.5, 105, [])
 
 
+@pytest.mark.parametrize(("seen", "took"), [(3.3, 733.6), (750.0, 750.0)])
+def test_a_resumed_training_took_all_its_calls(tmp_path: Path, seen: float, took: float) -> None:
+    """Snakemake's benchmark is of the last call, which may have found nothing left to train."""
+    benchmark(tmp_path / "benchmarks" / "training.tsv", seen)
+    benchmark(tmp_path / "other" / "accuracy.tsv", 10.0)
+    (tmp_path / "network").mkdir()
+    (tmp_path / "network" / "history.csv").write_text(
+        "pass,section,samples,seconds,train_mse,held_out_mse\n1,1,9,12.5,.1,\n2,1,18,733.6,.1,\n"
+    )
+    stages = {
+        "training": {"benchmarks": [str(tmp_path / "benchmarks")], "files": [str(tmp_path / "network")]},
+        "evaluation": {"benchmarks": [str(tmp_path / "other")], "files": []},
+    }
+    found = summarise("c", stages)
+    training, evaluation = found["stages"]
+    assert (training["seconds"], training["longest"], training["jobs"]) == (took, took, 1)
+    assert training["rules"][0]["seconds"] == took
+    assert training["cpu_seconds"] == seen / 2
+    assert evaluation["seconds"] == 10.0
+    assert found["total_seconds"] == took + 10.0
+
+
 def test_lists_what_is_missing(tmp_path: Path) -> None:
     nowhere = str(tmp_path / "nowhere")
     found = summarise("c", {"training": {"benchmarks": [nowhere], "files": [f"{nowhere}.npz"]}})

@@ -12,6 +12,7 @@ from hobble.core.errors import InputError
 from hobble.database.manifest import FILE as MANIFEST
 from hobble.database.manifest import Manifest
 from hobble.database.sizes import sizes
+from hobble.report.gather import read_history
 from hobble.report.provenance import machine, versions
 
 
@@ -20,18 +21,22 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
 
     stages: in the order of the pipeline, stage -> {"benchmarks": tsv files or folders of them, "files":
     artefacts or folders of them}. What is not there is listed under `missing`, not refused: a stage may have
-    been copied from another machine without its benchmarks. Returns `stages` (one entry each: jobs, seconds
-    and longest in seconds, max_rss_mb, cpu_seconds, files, bytes, and the same for each rule),
+    been copied from another machine without its benchmarks. A training that was interrupted, or goes on from
+    another, took what its history says: Snakemake saw the last call only. Returns `stages` (one entry each:
+    jobs, seconds and longest in seconds, max_rss_mb, cpu_seconds, files, bytes, and the same for each rule),
     `total_seconds`, `total_bytes`, `database` (see `hobble.database.sizes`; none where there is none),
-    `missing`, `machine`, `versions`.
+    `missing`, `machine`, `versions`. Raises InputError for a benchmark or a history that is none.
     """
     missing: list[str] = []
     entries = []
     for stage, paths in stages.items():
         jobs = _jobs(paths.get("benchmarks", ()), missing)
+        trained = _trained(paths.get("files", ()))
         sizes = _sizes(paths.get("files", ()), missing)
         by_rule: dict[str, list[dict[str, float]]] = defaultdict(list)
         for rule, row in jobs:
+            if rule == "training":
+                row["s"] = max(row.get("s", 0.0), trained)
             by_rule[rule].append(row)
         entries.append(
             {
@@ -104,6 +109,15 @@ def _sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
         else:
             missing.append(str(root))
     return sizes
+
+
+def _trained(paths: Iterable[str]) -> float:
+    """Seconds of training up to the last section, all calls together, by the history among the artefacts."""
+    for path in map(Path, paths):
+        if (path / "history.csv").is_file():
+            seconds = read_history(path / "history.csv").get("seconds", [])
+            return max((s for s in seconds if s is not None), default=0.0)
+    return 0.0
 
 
 def _database(paths: Iterable[str]) -> dict[str, Any] | None:
