@@ -75,7 +75,13 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
         "rollouts": {"lengths": [{"length": n, **ROLLED, "clips": []} for n in (1, 60)]},
         "injury": {"applies": False, "reason": "none"},
         "recognition": RECOGNISED if name == "ava" else {"applies": False, "reason": "none"},
-        "pipeline": {"stages": [{"stage": "training", "seconds": 60.0, "bytes": 9, "rules": []}]},
+        "pipeline": {
+            "stages": [
+                {"stage": "training", "seconds": 60.0, "bytes": 9, "rules": []},
+                {"stage": "database", "seconds": 7.0, "bytes": 500, "rules": []},
+            ],
+            "database": {"bytes": 300},
+        },
     }
     folder = folder / name
     folder.mkdir()
@@ -189,6 +195,18 @@ def test_published_clips_stand_beside_ours_of_the_same_name(tmp_path, published)
         ("segerstedt", 0.0448, 0.03),
         ("release", 0.0396, 0.03),
     ]
+
+
+def test_published_times_and_sizes_stand_beside_what_they_are_of(compared) -> None:
+    """The database is what training reads; its stage has the rows of each clip too, and takes time."""
+    ours = {(r["measure"], r["configuration"]): r["ours"] for r in compared["beside"]}
+    assert ours["database", "holden"] == 300
+    times = {
+        (r["measure"], r["configuration"]): (r["ours"], r["unit"]) for r in compared["milliseconds"]["beside"]
+    }
+    assert times["database, time", "holden"] == (7.0, "s")
+    assert times["training, time", "ava"] == (60.0, "s")
+    assert "database" not in {measure for measure, _ in times}
 
 
 def test_one_configuration_alone(tmp_path, published) -> None:

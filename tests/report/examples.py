@@ -286,6 +286,7 @@ def costs() -> dict[str, Any]:
         "stages": stages,
         "total_seconds": sum(seconds),
         "total_bytes": int(sum(sizes)),
+        "database": {"bytes": 29_957_048},
         "missing": ["results/example/benchmarks/runtime"],
         "machine": {"system": "Linux x86_64", "processor": "a processor", "cores": 2, "memory_gb": 24.0},
         "versions": {"python": "3.11.2"},

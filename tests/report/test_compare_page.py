@@ -124,6 +124,10 @@ def test_published_figures_have_ours_beside_them(compared: dict[str, Any]) -> No
     assert rows["a frame, mean", "holden"][0] == "0.376 ms"
     assert rows["a frame, mean", "holden"][1].endswith(" ms")
     assert rows["relative error, held_out clips", "holden-xl"] == ["0.0448", ""]
+    assert rows["database, on disk", "holden"] == ["7.12 GB", "30 MB"]
+    assert rows["database, time", "holden"] == ["1 h 30 min", "21 s"]
+    of_clips = {row[0] for row in tables.beside_table(compared).rows if "80 clips" in row[4]}
+    assert of_clips == {"relative error, train clips", "relative error, held_out clips"}
 
 
 def test_frame_times_are_medians_and_measures_have_names(

@@ -51,6 +51,15 @@ def test_curve_that_rises_falls_or_rests(material: Material) -> None:
     assert heads(material, history=noisy)["Training has settled."] == "good"
 
 
+@pytest.mark.parametrize("losses", [[0.3] * 8, [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3]])
+def test_what_more_passes_would_do_is_said_once(material: Material, losses: list[float]) -> None:
+    """By the curve, which shows it; a small gap to the held-out clips tells of the network's size only."""
+    found = hints(replace(material, accuracy=accuracy(material, 0.041), history=history(losses)))
+    said = [hint.text for hint in found if "passes" in hint.text]
+    assert len(said) == 1
+    assert said[0].startswith("More passes ")
+
+
 def test_waypoints_flips_and_links_that_do_nothing(material: Material) -> None:
     missed = {**material.responsivity, "largest_turn_degrees": 175.0}
     found = heads(material, responsivity=missed)

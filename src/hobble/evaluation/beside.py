@@ -37,7 +37,7 @@ def beside(all_measured: Sequence[Measured], published: Mapping[str, Any]) -> li
         ours = describe(m)["weights_bytes"]["constant"] if m else None
         out.append(_row("weights of 50 phases", row, row["weights"], ours, "bytes"))
         if "database" in row:
-            ours = of_stage(m, "database", "bytes") if m else None
+            ours = (m.pipeline.get("database") or {}).get("bytes") if m else None
             out.append(_row("database", row, row["database"], ours, "bytes"))
     for row in published["stages"]:
         for m in all_measured if row["stage"] == "terrain" else ():
@@ -75,7 +75,8 @@ def beside_times(all_measured: Sequence[Measured], published: Mapping[str, Any])
     for row in published["stages"]:
         for m in all_measured:
             named = {**row, "configuration": m.name}
-            out.append(_row(row["stage"], named, row["seconds"], of_stage(m, row["stage"], "seconds"), "s"))
+            seconds = of_stage(m, row["stage"], "seconds")
+            out.append(_row(f"{row['stage']}, time", named, row["seconds"], seconds, "s"))
     return out
 
 

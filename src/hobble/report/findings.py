@@ -156,7 +156,7 @@ def _generalisation(material: Material) -> Iterator[Hint]:
         yield Hint(
             "good",
             f"Held-out clips are predicted about as well as training clips ({ratio:.2f} times the error).",
-            "There is room for a larger network or more passes.",
+            "There is room for a larger network.",
         )
     else:
         yield Hint(
