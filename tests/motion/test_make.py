@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -237,6 +238,40 @@ def test_six_channels_of_zeros_add_nothing(walk, bvh, make):
     clip, report = make(bvh(zeros))
     assert "zero and were dropped" in report["repairs"][0]
     np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
+
+
+def test_zeros_on_some_joints_only_are_added_to_their_offsets_and_said(walk, bvh, make):
+    legs = [j for j, name in enumerate(walk.skeleton.joints) if "Leg" in name or "Foot" in name]
+    mixed = np.tile(walk.skeleton.offsets, (len(walk), 1, 1))
+    mixed[:, legs] = 0.0
+    path = bvh(replace(walk, translations=mixed))
+    for proportions in ("skeleton", "clip"):
+        clip, report = make(path, proportions=proportions)
+        assert "The position channels of LeftUpLeg, LeftLeg, LeftFoot," in report["repairs"][0]
+        assert "were added to them" in report["repairs"][0]
+        assert clip.translations is None
+        np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
+
+
+def test_channels_that_add_motion_to_an_offset_move_the_joint_about_it(walk, bvh, make):
+    added = np.zeros((len(walk), 31, 3))
+    arm = walk.skeleton.index("LeftForeArm")
+    added[:, arm, 0] = 0.3 + np.sin(np.arange(len(walk)) / 9)
+    clip, report = make(bvh(replace(walk, translations=added)), proportions="clip")
+    assert (
+        "1 of 30 joints with position channels really move in their parents (LeftForeArm)"
+        in report["repairs"][1]
+    )
+    np.testing.assert_allclose(clip.translations, (walk.skeleton.offsets + added)[::2], atol=1e-5)
+
+
+@pytest.mark.parametrize("proportions", ["skeleton", "clip"])
+def test_a_leg_without_length_is_refused(walk, bvh, make, proportions):
+    path = bvh(walk, edit=lambda s: re.sub(r"(JOINT RightLeg\s*\{\s*OFFSET).*", r"\1 0 0 0", s))
+    with pytest.raises(
+        InputError, match=r"walk.bvh: the bone from RightUpLeg to RightLeg has no length. Check"
+    ):
+        make(path, proportions=proportions)
 
 
 def test_prefixes_of_names_do_not_matter(walk, bvh, make):

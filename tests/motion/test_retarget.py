@@ -126,6 +126,18 @@ def test_a_figure_whose_legs_nothing_moves_is_refused(walk, rigs):
         plan(walk.skeleton, rigs["holden31"].skeleton, pairs)
 
 
+def test_a_leg_without_length_can_neither_lead_nor_follow(walk, rigs):
+    own = rigs["holden31"].skeleton
+    offsets = own.offsets.copy()
+    offsets[own.index("RightFoot")] = 0.0
+    lame, pairs = replace(own, offsets=offsets), {n: n for n in own.joints}
+    for source, target in ((lame, own), (own, lame)):
+        with pytest.raises(
+            HobbleError, match="the bone from RightLeg to RightFoot of holden31 has no length"
+        ):
+            plan(source, target, pairs)
+
+
 def test_there_and_back_again(walk, rigs):
     """By way of the larger rig and back: the same walk but for what the legs' proportions cost."""
     back = onto(onto(walk, rigs["holden31"], rigs["mixamo55"]), rigs["mixamo55"], rigs["holden31"])

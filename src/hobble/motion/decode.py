@@ -55,8 +55,8 @@ def decode(bvh: Bvh, still: float) -> Decoded:
     """Rotations and positions of a BVH file.
 
     A position channel replaces that component of the joint's OFFSET, as every current program writes it;
-    where all joints below the root carry zeros against offsets that are not, the channels are added to them
-    instead. `still`: a joint whose position stays this close to its offset (file units) only repeats it.
+    where a joint below the root carries zeros against an offset that is not, they are added to it instead.
+    `still`: a joint whose position stays this close to its offset (file units) only repeats it.
     """
     frames, joints = len(bvh), len(bvh.names)
     rotations = np.broadcast_to(quat.IDENTITY, (frames, joints, 4)).copy()
@@ -106,26 +106,38 @@ def _positions(bvh: Bvh, starts: Array, still: float) -> tuple[Array, Array, Arr
     if not below:
         return root, bvh.offsets, None, []
     local = np.broadcast_to(bvh.offsets, (len(bvh), *bvh.offsets.shape)).copy()
+    given = np.zeros(bvh.offsets.shape, bool)
     for j, places in below:
         for axis, column in places.items():
             local[:, j, "XYZ".index(axis)] = bvh.values[:, column]
-    return root, *_judged(bvh, local, [j for j, _ in below], still)
+            given[j, "XYZ".index(axis)] = True
+    return root, *_judged(bvh, local, given, still)
 
 
-def _judged(bvh: Bvh, local: Array, joints: list[int], still: float) -> tuple[Array, Array | None, list[str]]:
-    """Which position channels carry motion, which only repeat an offset, and which contradict it."""
-    if np.abs(local[:, joints]).max() <= still < np.abs(bvh.offsets[joints]).max():
-        return (
-            bvh.offsets,
-            None,
-            [f"The position channels of {len(joints)} joints are zero and were dropped."],
-        )
+def _judged(bvh: Bvh, local: Array, given: Array, still: float) -> tuple[Array, Array | None, list[str]]:
+    """Which position channels carry motion, which only repeat an offset, and which contradict it.
+
+    local: (F, J, 3) the positions; those that are increments become sums here. given: (J, 3) bool, which of
+    them come from channels.
+    """
+    joints = np.flatnonzero(given.any(axis=1)).tolist()
     middle = np.median(local, axis=0)
+    added = _increments(bvh.offsets, middle, given, still)
+    notes = []
+    if added:
+        if np.abs(local[:, joints] * given[joints]).max() <= still:
+            dropped = f"The position channels of {len(joints)} joints are zero and were dropped."
+            return bvh.offsets, None, [dropped]
+        for values in (local, middle):
+            values[..., added, :] += bvh.offsets[added] * given[added]
+        notes.append(
+            f"The position channels of {_some(bvh, added)} lie about zero, unlike their OFFSETs, and were "
+            "added to them."
+        )
     moving = [j for j in joints if np.abs(local[:, j] - middle[j]).max() > still]
     wrong = [j for j in joints if j not in moving and np.abs(middle[j] - bvh.offsets[j]).max() > still]
     offsets = bvh.offsets.copy()
     offsets[wrong] = middle[wrong]
-    notes = []
     if wrong:
         notes.append(
             f"The OFFSET of {_some(bvh, wrong)} contradicts its position channels, which never change; their "
@@ -142,6 +154,17 @@ def _judged(bvh: Bvh, local: Array, joints: list[int], still: float) -> tuple[Ar
             "were dropped."
         )
     return offsets, (local if moving else None), notes
+
+
+def _increments(offsets: Array, middle: Array, given: Array, still: float) -> list[int]:
+    """Joints whose channels lie about zero where their offsets do not, so that they can only add to them.
+
+    middle: (J, 3) the median position. A bone as short as a tenth of its offset is none.
+    """
+    apart = np.linalg.norm(middle * given, axis=1)
+    length = np.linalg.norm(offsets * given, axis=1)
+    about_zero = apart <= np.clip(0.1 * length, still, 10 * still)
+    return np.flatnonzero((length > still) & about_zero).tolist()
 
 
 def _some(bvh: Bvh, joints: list[int]) -> str:

@@ -29,6 +29,7 @@ from hobble.motion.rig import (
     leg_length,
     load_skeleton,
     match_rig,
+    missing_bone,
     unit_of,
 )
 from hobble.motion.root import facing
@@ -137,6 +138,12 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[st
     repairs += decoded.repairs
     fps = options["source_fps"] or frame_rate(file.frame_time, file.frame_time_text)
     clip = _scaled(file.path.stem, rig, decoded, fps, unit)
+    if bone := missing_bone(clip.skeleton):
+        raise InputError(
+            file.path,
+            f"the bone from {bone} has no length",
+            fix="Check its OFFSET and its position channels, and export the clip again.",
+        )
     clip, axes = straighten(clip, options["up"], options["handedness"])
     repaired = repair(clip)
     if repaired.sentences and options["defects"] == "refuse":

@@ -23,7 +23,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.motion.axes import rest_frame, rest_positions
 from hobble.motion.feet import level_heels
-from hobble.motion.rig import leg_length
+from hobble.motion.rig import leg_length, missing_bone
 
 # Joints that point along a limb: role -> the role at the other end of the bone.
 LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "heel"}
@@ -68,7 +68,7 @@ def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Reta
     """Work out how `target` follows `source`; sources: the target's joint -> the joint it follows.
 
     Both need the roles hips, head and, of both sides, shoulder, hip, knee, heel and toe. Raises HobbleError
-    where the target's hips or legs follow nothing.
+    where the target's hips or legs follow nothing, or a bone of a leg has no length.
     """
     pairs = sorted((target.index(mine), source.index(theirs)) for mine, theirs in sources.items())
     joints, follows = (np.array(side) for side in zip(*pairs, strict=True))
@@ -77,6 +77,9 @@ def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Reta
             raise HobbleError(
                 f"no joint of {source.name} moves {target.roles[role]} ({role}) of {target.name}"
             )
+    for skeleton in (source, target):
+        if bone := missing_bone(skeleton):
+            raise HobbleError(f"the bone from {bone} of {skeleton.name} has no length")
     from_source, to_target = rest_frame(source), quat.inv(rest_frame(target))
     turns = np.broadcast_to(quat.mul(from_source, to_target), (len(pairs), 4)).copy()
     bones = _limb_bones(source, target, from_source, to_target)

@@ -196,6 +196,16 @@ def leg_length(skeleton: Skeleton, roles: Mapping[str, str] | None = None) -> fl
     return float(np.linalg.norm(skeleton.offsets[bones], axis=-1).sum() / 2)
 
 
+def missing_bone(skeleton: Skeleton) -> str | None:
+    """The bone of a leg that has no length, such as "LeftUpLeg to LeftLeg"; None where all have one."""
+    for side in ("left", "right"):
+        for start, end in (("hip", "knee"), ("knee", "heel")):
+            a, b = (skeleton.roles[f"{side}_{part}"] for part in (start, end))
+            if np.linalg.norm(skeleton.offsets[skeleton.index(b)]) < 1e-6:
+                return f"{a} to {b}"
+    return None
+
+
 def unit_of(leg: float) -> tuple[float, str] | None:
     """Centimetres per unit and its name that make a leg of length `leg` an adult's; None where none does."""
     if leg <= 0:
