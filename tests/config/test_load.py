@@ -90,6 +90,11 @@ def test_a_circle_of_extends_is_told(folder: Path) -> None:
         ({"training": {"lr": 1}}, r"training\.lr: there is no such key\. Allowed here: passes, sections"),
         ({"training": {"learning_rate": -1}}, r"training\.learning_rate: .*greater than 0, not -1"),
         ({"training": {"batch": "many"}}, r"training\.batch: .*integer.*not 'many'"),
+        (
+            {"evaluation": {"rollouts": []}},
+            r"evaluation\.rollouts: .*at least one number of frames, not \[\]",
+        ),
+        ({"evaluation": {"lap_seconds": 0.01}}, r"evaluation\.lap_seconds: .*equal to 1, not 0\.01"),
         ({"runtime": {"mode": "quartic"}}, r"runtime\.mode: .*'constant', 'linear' or 'cubic'"),
     ],
 )

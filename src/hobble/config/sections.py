@@ -28,6 +28,13 @@ def _sixty(fps: float) -> float:
     return fps
 
 
+def _some(lengths: tuple[int, ...]) -> tuple[int, ...]:
+    """At least one length: of none there is nothing to measure."""
+    if not lengths:
+        raise ValueError("must name at least one number of frames")
+    return lengths
+
+
 # Upper bounds keep a mistyped or a stranger's configuration from asking for more memory than machines have.
 Positive = Annotated[int, Field(gt=0, le=1_000_000)]
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -269,11 +276,13 @@ class Evaluation(Section):
     joints: Literal["all", "equivalent"] = Field(
         "all", description="`equivalent`: only the joints that the 31-joint skeleton has too"
     )
-    rollouts: tuple[Positive, ...] = Field(
+    rollouts: Annotated[tuple[Positive, ...], AfterValidator(_some)] = Field(
         (1, 10, 60, 300), description="frames for which the network is fed its own pose"
     )
     laps: Positive = 19
-    lap_seconds: PositiveFloat = Field(400.0, description="a lap that takes longer is ended there")
+    lap_seconds: Annotated[float, Field(ge=1, allow_inf_nan=False)] = Field(
+        400.0, description="a lap that takes longer is ended there"
+    )
     modes: tuple[PhaseMode, ...] = Field(
         ("constant", "linear", "cubic"),
         description="phase modes that laps are run in, beside the runtime's own",
