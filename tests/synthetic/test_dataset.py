@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from hobble.synthetic.injury import LINKS
+from hobble.synthetic.links import LINKS
 from hobble.synthetic.path import GAITS
 from hobble.synthetic.recipes import GROUND, RECIPES, plan
 

@@ -14,7 +14,7 @@ from hobble.core.errors import HobbleError
 from hobble.injury.status import read_status
 from hobble.synthetic.clip import ENOUGH, SHORTEST, write_clip
 from hobble.synthetic.files import footsteps_text, gait_text, status_text
-from hobble.synthetic.injury import LINKS
+from hobble.synthetic.links import LINKS
 from hobble.synthetic.path import gait_keys
 from hobble.synthetic.recipes import Segment
 

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from hobble.core.skeleton import other_side
 from hobble.synthetic.clip import walk
-from hobble.synthetic.gait import LEFT, RIGHT, healthy_style
-from hobble.synthetic.injury import LINKS, SEVERITIES, at_footsteps, hurt, schedule, slowing
+from hobble.synthetic.gait import healthy_style
+from hobble.synthetic.injury import SEVERITIES, at_footsteps, hurt, schedule, slowing
+from hobble.synthetic.links import LEFT, LINKS, RIGHT
 from hobble.synthetic.path import walk_path
 from hobble.synthetic.recipes import Segment
 

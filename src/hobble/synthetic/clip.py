@@ -17,8 +17,9 @@ from hobble.core.skeleton import Skeleton
 from hobble.synthetic import files, injury
 from hobble.synthetic.feet import move_foot
 from hobble.synthetic.footsteps import landings, phase_curve, stances
-from hobble.synthetic.gait import LEFT, RIGHT, Style, healthy_style
+from hobble.synthetic.gait import Style, healthy_style
 from hobble.synthetic.ground import Ground, make_ground
+from hobble.synthetic.links import LEFT, RIGHT, check_link
 from hobble.synthetic.path import Path, gait_keys, margin, walk_path
 from hobble.synthetic.pose import pose
 from hobble.synthetic.recipes import GROUND, INJURED, Segment, generator, plan
@@ -76,7 +77,7 @@ def walk(
     """Walk a plan for `total` frames at `fps`, on a kind of ground that `make_ground` knows."""
     status = [(0, 0)]
     if injured:
-        injury.check_link(injured, clip)
+        check_link(injured, f"clip {clip}")
         status = injury.schedule(total)
     for _ in range(3 if injured else 1):
         # Severity changes as a foot lands, which depends on severity: the landings settle in a round or two.

@@ -8,8 +8,9 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.synthetic.gait import LEFT, RIGHT, SIGN, Style
+from hobble.synthetic.gait import SIGN, Style
 from hobble.synthetic.ground import Ground
+from hobble.synthetic.links import LEFT, RIGHT
 from hobble.synthetic.path import Path
 
 ANKLE_HEIGHT = 7.0  # of the ankle joint over the sole; the toe joint is 4.5 cm lower on the skeleton

@@ -53,7 +53,6 @@ SIDED: tuple[str, ...] = (
     "arm_swing",
 )
 SIDED += ("arm_mean", "elbow", "elbow_swing", "abduction")
-LEFT, RIGHT = 0, 1
 SPIN = 0.6  # a quicker cadence, share of it at a radian a second and more
 SIGN = (1.0, -1.0)  # +X is the figure's left
 

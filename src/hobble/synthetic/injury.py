@@ -7,25 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
-from hobble.synthetic.gait import LEFT, RIGHT, Style
+from hobble.synthetic.gait import Style
+from hobble.synthetic.links import LEFT, LINKS, RIGHT
 
 SEVERITIES = (0, 3, 5, 7, 10)
 LENGTHS = (0.7, 1.0, 1.0, 1.0, 1.1)  # of the stretches, relative
-LINKS = {
-    "LeftUpLeg-LeftLeg": ("thigh", LEFT),
-    "RightUpLeg-RightLeg": ("thigh", RIGHT),
-    "LeftLeg-LeftFoot": ("shank", LEFT),
-    "RightLeg-RightFoot": ("shank", RIGHT),
-    "LeftFoot-LeftToeBase": ("foot", LEFT),
-    "RightFoot-RightToeBase": ("foot", RIGHT),
-    "LowerBack-Spine": ("back", LEFT),
-    "LeftArm-LeftForeArm": ("upper arm", LEFT),
-    "RightArm-RightForeArm": ("upper arm", RIGHT),
-    "LeftForeArm-LeftHand": ("forearm", LEFT),
-    "RightForeArm-RightHand": ("forearm", RIGHT),
-}
 
 # At severity 10. A factor multiplies, `+` adds, `=` is what the value becomes; all in proportion to severity.
 # A sided value is that of the hurt side, unless its name ends in _sound (the other side) or _all (both).
@@ -73,14 +60,6 @@ EFFECTS: dict[str, dict[str, tuple[str, float]]] = {
     },
 }
 SPEED = {"thigh": 0.50, "shank": 0.52, "foot": 0.66, "back": 0.62, "upper arm": 0.86, "forearm": 0.90}
-
-
-def check_link(link: str, clip: str) -> None:
-    """Raise HobbleError for a link that the walker does not know how to hurt."""
-    if link not in LINKS:
-        raise HobbleError(
-            f"clip {clip}: injured: the walker cannot hurt {link!r}. It can: {', '.join(LINKS)}."
-        )
 
 
 def slowing(severity: Array, link: str) -> Array:

@@ -10,8 +10,9 @@ from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.synthetic.feet import Foot, smooth_above
-from hobble.synthetic.gait import LEFT, RIGHT, SIGN, Style
+from hobble.synthetic.gait import SIGN, Style
 from hobble.synthetic.ground import Ground, flat
+from hobble.synthetic.links import LEFT, RIGHT
 from hobble.synthetic.path import Path
 
 X, Y, Z = np.eye(3)
