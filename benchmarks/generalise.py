@@ -4,7 +4,7 @@
 
 DATABASE is results/datasets/<dataset>/database/healthy, beside the `clips` it was made from. Each line of the
 input is one recipe, in keys of the training section: `passes: 2, batch: 256, dropout: 0.1`. For each, the
-mean squared error of the last section of its training (with dropout and feedback) and of every held-out row;
+mean squared error of the last section of its training (with dropout and roll-outs) and of every held-out row;
 and how far joints are from the recorded ones over roll-outs of 1, 10 and 60 frames, cm, as the evaluation
 stage measures it.
 """

@@ -109,7 +109,7 @@ def test_killed_before_or_after_any_write_it_ends_at_the_same_bits(
 
 def _numbers(state: State) -> dict[str, bytes]:
     """All that a run ends with but how long it took."""
-    arrays = pack(state, "")
+    arrays = pack(state)
     arrays["history"][:, 3] = 0
     return {name: array.tobytes() for name, array in arrays.items() if name != "seconds"}
 
@@ -189,6 +189,60 @@ def test_one_configuration_continues_another_as_if_it_were_one(
     assert [f["steps"] for f in _checkpoints(tmp_path)] == [288, 144, 288]
 
 
+def test_another_start_is_another_run(
+    data: Database, network: Settings, training: Settings, tmp_path: Path
+) -> None:
+    """With a recipe of its own, a run that goes on from something else does not find what it made before."""
+
+    def start(seed: int) -> Path:
+        state = train(
+            data, network=network, training=training | {"seed": seed}, checkpoints=tmp_path / f"start {seed}"
+        )
+        path = tmp_path / f"start {seed}.npz"
+        save_npz(path, **pack(state))
+        return path
+
+    def go(folder: str, begun: Path | None) -> torch.Tensor:
+        settings = training | {"passes": 3, "learning_rate": 5e-4}
+        folders = {"checkpoints": tmp_path / folder, "start": begun}
+        return train(data, network=network, training=settings, **folders).network.flat  # type: ignore[arg-type]
+
+    first, second = start(1), start(2)
+    one = go("run", first)
+    assert torch.equal(go("run", second), go("fresh", second))
+    assert torch.equal(go("run", None), go("scratch", None))
+    assert torch.equal(go("run", first), one)
+    assert not torch.equal(go("run", second), one)
+    assert len(list((tmp_path / "run").iterdir())) == 3
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"passes": 4, "sections": 2}, "was trained in 3 sections a pass, and is to go on in 2"),
+        ({"passes": 1}, "stands after 2 passes, and is to go on to 1"),
+    ],
+)
+def test_a_start_that_cannot_be_gone_on_from_is_refused(
+    data: Database,
+    network: Settings,
+    training: Settings,
+    tmp_path: Path,
+    settings: Settings,
+    message: str,
+) -> None:
+    state = train(data, network=network, training=training, checkpoints=tmp_path / "a")
+    save_npz(tmp_path / "start.npz", **pack(state))
+    with pytest.raises(InputError, match=rf"start\.npz: {message}"):
+        train(
+            data,
+            network=network,
+            training=training | settings,
+            checkpoints=tmp_path / "b",
+            start=tmp_path / "start.npz",
+        )
+
+
 def _checkpoints(folder: Path) -> list[dict[str, np.ndarray]]:
     return [load_npz(folder / name / "checkpoint.npz") for name in ("holden-xt", "holden", "scratch")]
 
@@ -227,7 +281,7 @@ def test_a_checkpoint_of_another_network_is_refused(
     data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
     state = train(data, network=network, training=training, checkpoints=tmp_path / "a", threads=2)
-    save_npz(tmp_path / "other.npz", **pack(state, "x"))
+    save_npz(tmp_path / "other.npz", **pack(state))
     with pytest.raises(
         InputError, match=r"other\.npz: holds a network of \d+-24-24-\d+ units.* not of .*-30-30-"
     ):

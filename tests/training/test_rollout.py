@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,10 +12,13 @@ import torch
 
 from hobble.database.reader import Database
 from hobble.evaluation.rollouts import Inputs, roll_out
+from hobble.training.batches import HostRows
 from hobble.training.fused import FusedStep
 from hobble.training.network import initialise
 from hobble.training.rollout import RollOut
 from hobble.training.step import Step
+from hobble.training.train import train
+from hobble.training.update import Update
 
 CPU = torch.device("cpu")
 FRAMES, STARTS = 5, 9
@@ -105,6 +109,41 @@ def test_sections_do_not_depend_on_each_other_and_a_short_batch_is_one(data: Dat
     x = torch.zeros(6, data.layout.x_size)
     carried.add(x)
     assert torch.count_nonzero(x) == 0
+
+
+def test_the_training_goes_by_them(
+    data: Database,
+    network: dict[str, Any],
+    training: dict[str, Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each batch has the errors of those before it in this section, and of no other."""
+    settings = training | {"rollout": 4, "passes": 1, "sections": 2, "batch": 300}
+    given: list[torch.Tensor] = []
+    errors: list[torch.Tensor] = []
+
+    def noted(self: Update, x: torch.Tensor, *rest: Any) -> torch.Tensor:
+        given.append(x.clone())
+        loss = plain(self, x, *rest)
+        errors.append(self.step.error.clone())
+        return loss
+
+    plain = Update.__call__
+    monkeypatch.setattr(Update, "__call__", noted)
+    train(data, network=network, training=settings, checkpoints=tmp_path)
+    carried = RollOut(data, 4, 300, CPU)
+    number = 0
+    for section in range(2):
+        carried.begin()
+        for batch in HostRows(data, CPU).batches(0, section, 2, settings["seed"], 300):
+            x = batch.x.clone()
+            carried.add(x)
+            assert torch.equal(x, given[number])
+            assert torch.equal(x, batch.x) == (number % 4 == 0)
+            carried.remember(errors[number])
+            number += 1
+    assert number == len(given) == 8
 
 
 @pytest.mark.parametrize("kind", [Step, FusedStep])

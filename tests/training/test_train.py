@@ -19,7 +19,7 @@ from hobble.database.reader import Block, Database
 from hobble.training import checkpoint, start, train
 from hobble.training.batches import HostRows
 from hobble.training.checkpoint import State
-from hobble.training.device_rows import DeviceRows, rows_for
+from hobble.training.device_rows import DeviceRows, fits_on, rows_for
 from hobble.training.held_out import HeldOut
 from hobble.training.history import columns, write_history
 from hobble.training.network import initialise
@@ -201,6 +201,49 @@ def test_cuda_where_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert start.device("auto").type == "cpu"
     with pytest.raises(HobbleError, match=r"training\.device is cuda"):
         start.device("cuda")
+
+
+def test_more_sections_than_samples_are_refused(run: Run) -> None:
+    with pytest.raises(HobbleError, match=r"2300 samples .* fewer than training\.sections, 3000"):
+        run(sections=3000)
+
+
+@pytest.mark.parametrize(
+    ("precision", "tf32"), [("auto", True), ("tf32", True), ("float32", False), ("bfloat16", False)]
+)
+def test_products_on_cuda_sum_in_float32(run: Run, precision: str, tf32: bool) -> None:
+    """PyTorch's own setting lets those of bfloat16 add up parts in bfloat16."""
+    settings = torch.backends.cuda.matmul
+    run(passes=1, precision=precision)
+    assert settings.allow_tf32 is tf32
+    assert settings.allow_bf16_reduced_precision_reduction is False
+
+
+@pytest.mark.parametrize(("major", "half"), [(7, False), (8, True)])
+def test_bfloat16_is_chosen_where_a_device_has_it(
+    data: Database, training: Settings, monkeypatch: pytest.MonkeyPatch, major: int, half: bool
+) -> None:
+    """PyTorch calls bfloat16 supported too where it is emulated."""
+
+    def supported(including_emulation: bool = True) -> bool:
+        return including_emulation or major >= 8
+
+    monkeypatch.setattr(torch.cuda, "is_bf16_supported", supported)
+    network = initialise((4, 3, 2), 4, 1).to("meta")
+    monkeypatch.setattr(start, "Step", lambda network, dropout, half: half)
+    assert start.step_for(network, training | {"batch": 256}) is half
+
+
+def test_where_the_rows_lie_does_not_depend_on_what_is_free(
+    data: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The order of rows depends on where they lie, and a run may be gone on with beside other work."""
+    device = torch.device("cuda")
+    for free in (0, 1 << 34):
+        monkeypatch.setattr(torch.cuda, "mem_get_info", lambda _, free=free: (free, 1 << 34))
+        assert fits_on(device, data.manifest)
+    monkeypatch.setattr(torch.cuda, "mem_get_info", lambda _: (1 << 18, 1 << 18))
+    assert not fits_on(device, data.manifest)
 
 
 def test_each_section_is_logged_with_speed_and_time_left(run: Run, caplog: pytest.LogCaptureFixture) -> None:

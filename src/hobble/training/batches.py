@@ -13,7 +13,7 @@ from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
 
 TRAIN = "train"
-LOOK_EVERY = 2048  # samples between looks at the losses: an accelerator is not waited for at each batch
+LOOK_EVERY = 2048  # samples between looks at the losses: an accelerator is not waited for at each small batch
 DIVERGED = 100.0  # predicting nothing but the mean has an error of 1
 NAMED = 8  # clips that a message names
 

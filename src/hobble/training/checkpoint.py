@@ -20,6 +20,7 @@ from hobble.training.optimiser import Adam
 class State:
     """Where a training stands after `sections` whole sections, counted from its very start.
 
+    recipe: names what determined it (`hobble.training.start.run_name`).
     samples, seconds: seen and spent so far. best, best_mse: flat weights of the lowest held-out error so far.
     history: a row of numbers for each section, in the order of `hobble.training.history.columns`. Random
     choices (order of the rows, dropout) are seeded by pass and section, so the position is their state.
@@ -33,6 +34,7 @@ class State:
     best_mse: float = float("inf")
     best: torch.Tensor | None = None
     history: list[list[float]] = field(default_factory=list)
+    recipe: str = ""
 
     def keep_best(self, held_out_mse: float) -> None:
         """Remember the present weights if their held-out error is the lowest so far."""
@@ -40,7 +42,7 @@ class State:
             self.best_mse, self.best = held_out_mse, self.network.flat.clone()
 
 
-def pack(state: State, recipe: str) -> dict[str, np.ndarray]:
+def pack(state: State) -> dict[str, np.ndarray]:
     """Copies of everything in `state`, as arrays for one npz."""
     best = state.network.flat if state.best is None else state.best
     return {
@@ -56,7 +58,7 @@ def pack(state: State, recipe: str) -> dict[str, np.ndarray]:
         "history": np.array(state.history, float),
         "sizes": np.array(state.network.sizes),
         "control_points": np.array(state.network.control_points),
-        "recipe": np.array(recipe),
+        "recipe": np.array(state.recipe),
     }
 
 
@@ -95,8 +97,8 @@ def _copied(flat: torch.Tensor) -> np.ndarray:
 class Saver:
     """Writes checkpoints behind the training's back, one at a time, each whole before it takes its name."""
 
-    def __init__(self, path: Path, recipe: str) -> None:
-        self.path, self.recipe = path, recipe
+    def __init__(self, path: Path) -> None:
+        self.path = path
         for left_by_a_kill in path.parent.glob(f".{path.name}.*.part"):
             left_by_a_kill.unlink()
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="checkpoint")

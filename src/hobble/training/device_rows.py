@@ -17,7 +17,7 @@ from hobble.database.reader import Database
 from hobble.training.batches import TRAIN, Batch, HostRows
 
 AT_ONCE = 4096  # rows composed in one go: few launches, 10 MB
-OF_MEMORY = 0.6  # of what is free on the device; the rest is for the network and its buffers
+OF_MEMORY = 0.6  # of the device's; the rest is for the network and its buffers
 
 
 class DeviceRows:
@@ -115,6 +115,10 @@ def rows_for(database: Database, device: torch.device) -> HostRows | DeviceRows:
 
 
 def fits_on(device: torch.device, manifest: Manifest) -> bool:
-    """Whether the training rows have room on an accelerator beside what the training itself needs."""
+    """Whether the training rows have room on an accelerator beside what the training itself needs.
+
+    By all its memory, not by what is free: the order of the rows depends on it, and a run that goes on has to
+    take them in the same.
+    """
     needed = sum(chunk.bytes for chunk in manifest.chunks[TRAIN])
-    return needed < OF_MEMORY * torch.cuda.mem_get_info(device)[0]
+    return needed < OF_MEMORY * torch.cuda.mem_get_info(device)[1]

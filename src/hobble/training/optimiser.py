@@ -48,7 +48,8 @@ class Adam:
         if self.network.flat.device.type == "cpu":
             self._sweep(gradients, *self.numbers(share))
         else:
-            self.move(gradients, torch.tensor(self.numbers(share), device=self.network.flat.device))
+            numbers = torch.tensor(self.numbers(share))
+            self.move(gradients, numbers.to(self.network.flat.device, non_blocking=True))
 
     def numbers(self, share: float) -> tuple[float, float]:
         """What changes from step to step: (rate, root).

@@ -12,7 +12,6 @@ from hobble.database.reader import Database
 from hobble.training.checkpoint import pack
 from hobble.training.held_out import HeldOut
 from hobble.training.history import write_history
-from hobble.training.start import recipe_hash
 from hobble.training.train import train
 from hobble.training.weights import write_weights
 
@@ -61,4 +60,4 @@ def run(
         facts["held_out_mse"] = whole[0]
     write_weights(weights, state.network, data, configuration, facts)
     write_history(history, blocks, state.history)
-    save_npz(checkpoint, **pack(state, recipe_hash(network, training, data, code)))
+    save_npz(checkpoint, **pack(state))

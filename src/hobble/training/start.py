@@ -12,7 +12,7 @@ from typing import Any
 import numba
 import torch
 
-from hobble.core.errors import HobbleError
+from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import load_npz
 from hobble.database.manifest import FILE
 from hobble.database.reader import Database
@@ -28,6 +28,7 @@ log = logging.getLogger("hobble.training")
 
 NOT_IN_THE_NAME = ("continues", "device")
 OF_ADAM = ("learning_rate", "beta1", "beta2", "l1")
+OF_A_START = ("weights", "first", "second", "steps", "sections")  # what it gives to the run that goes on
 HALF_FROM = 256  # batch from which the products take most of the time
 
 
@@ -37,6 +38,8 @@ def use_threads(threads: int) -> None:
     torch.set_num_threads(threads)
     numba.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)
+    # Nothing is read before it is written, so nothing has to be filled first.
+    torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
 
 
 def recipe_hash(
@@ -55,34 +58,72 @@ def recipe_hash(
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+def run_name(recipe: str, start: Path | None) -> str:
+    """The recipe, and with it what a run starts from where that was made by another recipe.
+
+    A start of the same recipe is where the run itself would have come by.
+    """
+    if start is None:
+        return recipe
+    data = load_npz(start)
+    if str(data.get("recipe")) == recipe:
+        return recipe
+    name = hashlib.sha256(recipe.encode())
+    for part in OF_A_START:
+        name.update(data[part].tobytes() if part in data else b"")
+    return name.hexdigest()[:16]
+
+
 def begin(
     database: Database,
     network: Mapping[str, Any],
     training: Mapping[str, Any],
-    recipe: str,
+    name: str,
     own: Path,
     start: Path | None,
 ) -> State:
     """The run's own checkpoint, else the one it is to start from, else a new network.
 
-    A checkpoint of its own that is past the passes wanted (they were lowered) is left aside. Raises
-    InputError where a checkpoint is damaged or of a network of another shape.
+    name: as of `run_name`. A checkpoint of its own that is past the passes wanted (they were lowered) is left
+    aside. Raises InputError where a checkpoint is damaged or of a network of another shape, and where a start
+    is past the passes wanted or of other sections.
     """
     state = fresh(database, network, training)
+    state.recipe = name
     goal = training["passes"] * training["sections"]
-    for path in (own, start):
-        if path is None or not path.exists():
-            continue
-        data = load_npz(path)
-        if int(data.get("sections", 0)) > goal:
-            log.warning("%s is past %d passes; starting anew", path, training["passes"])
-            continue
-        unpack(data, state, path)
-        if str(data.get("recipe")) != recipe:
-            log.warning("%s was made with other settings, data or code; going on from it all the same", path)
-        log.info("going on from %s, after section %d of %d", path, state.sections, goal)
-        break
+    if own.exists():
+        data = load_npz(own)
+        if int(data.get("sections", 0)) <= goal:
+            unpack(data, state, own)
+            log.info("going on from %s, after section %d of %d", own, state.sections, goal)
+            return state
+        log.warning("%s is past %d passes; starting anew", own, training["passes"])
+    if start is not None:
+        data = load_npz(start)
+        unpack(data, state, start)
+        _check_start(state, training, start)
+        if str(data.get("recipe")) != name:
+            log.warning("%s was made with other settings, data or code; going on from it all the same", start)
+        log.info("going on from %s, after section %d of %d", start, state.sections, goal)
     return state
+
+
+def _check_start(state: State, training: Mapping[str, Any], path: Path) -> None:
+    """Where a training stands is counted in sections, so those of the start have to be its own."""
+    sections = int(max(row[1] for row in state.history)) if state.history else training["sections"]
+    if sections != training["sections"]:
+        raise InputError(
+            path,
+            f"was trained in {sections} sections a pass, and is to go on in {training['sections']}",
+            fix=f"Give training.sections {sections}, or leave out training.continues.",
+        )
+    passes = state.sections // sections
+    if passes > training["passes"]:
+        raise InputError(
+            path,
+            f"stands after {passes} passes, and is to go on to {training['passes']}",
+            fix=f"Give training.passes more than {passes}, or leave out training.continues.",
+        )
 
 
 def fresh(database: Database, network: Mapping[str, Any], training: Mapping[str, Any]) -> State:
@@ -110,6 +151,7 @@ def step_for(network: Network, training: Mapping[str, Any]) -> Step:
     precision = training["precision"]
     half = precision == "bfloat16"
     if precision == "auto" and training["batch"] >= HALF_FROM:
-        half = bfloat16_is_fast() if on_cpu else torch.cuda.is_bf16_supported()
+        half = bfloat16_is_fast() if on_cpu else torch.cuda.is_bf16_supported(including_emulation=False)
     torch.backends.cuda.matmul.allow_tf32 = precision in ("auto", "tf32")
+    torch.backends.cuda.matmul.allow_bf16_reduced_precision_reduction = False
     return (FusedStep if on_cpu else Step)(network, training["dropout"], half)

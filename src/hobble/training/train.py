@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
 from hobble.training.batches import TRAIN, Watch
 from hobble.training.checkpoint import Saver, State, pack
@@ -19,7 +20,7 @@ from hobble.training.held_out import HeldOut
 from hobble.training.history import duration
 from hobble.training.rollout import RollOut
 from hobble.training.schedule import share
-from hobble.training.start import begin, recipe_hash, step_for, use_threads
+from hobble.training.start import begin, recipe_hash, run_name, step_for, use_threads
 from hobble.training.update import update_for
 
 log = logging.getLogger("hobble.training")
@@ -39,15 +40,19 @@ def train(
 
     network, training: the sections of a configuration. checkpoints: a folder in which the run keeps its
     state, by the hash of all that determines it; a run that finds its own there goes on from it. start: a
-    checkpoint to begin from where there is none yet. The result depends on the arguments and the number of
-    threads, never on interruptions. Raises HobbleError where an error is no finite number, naming the batch;
-    the last checkpoint stays.
+    checkpoint to begin from where there is none yet; a run from another start is another run. The result
+    depends on the arguments and the number of threads, never on interruptions. Raises HobbleError where an
+    error is no finite number, naming the batch (the last checkpoint stays), and where there are fewer samples
+    than sections.
     """
     use_threads(threads)
-    recipe = recipe_hash(network, training, database, code)
-    path = Path(checkpoints) / recipe / "checkpoint.npz"
-    state = begin(database, network, training, recipe, path, start)
-    with Saver(path, recipe) as saver:
+    pairs, sections = database.pairs(TRAIN), training["sections"]
+    if pairs < sections:
+        raise HobbleError(f"{pairs} samples to train on are fewer than training.sections, {sections}")
+    name = run_name(recipe_hash(network, training, database, code), start)
+    path = Path(checkpoints) / name / "checkpoint.npz"
+    state = begin(database, network, training, name, path, start)
+    with Saver(path) as saver:
         _run(state, database, training, saver)
     return state
 
@@ -80,7 +85,7 @@ def _run(state: State, database: Database, training: Mapping[str, Any], saver: S
         errors = held_out.errors(state.network)
         state.keep_best(errors[0])
         state.history.append([pass_index + 1, section + 1, state.samples, state.seconds, train_mse, *errors])
-        saver.save(pack(state, recipe=saver.recipe))
+        saver.save(pack(state))
         progress.report(where, state)
     progress.bar.close()
     saver.wait()
