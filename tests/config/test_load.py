@@ -117,6 +117,13 @@ def test_every_problem_is_told_at_once() -> None:
         ({"skeleton": "s", "folder": "f", "clips": {"a": None}, "held_out": ["b"]}, "not in `clips`: b"),
         ({"skeleton": "s", "folder": "f", "database": {"window": 55}}, "multiple of step"),
         ({"skeleton": "s", "folder": "f", "motion": {"fps": 30}}, r"motion\.fps: clips are made at 60"),
+        (
+            {"skeleton": "s", "folder": "f", "terrain": {"patches": 5}},
+            "`patches` .5. are fewer than the `fits`",
+        ),
+        ({"skeleton": "s", "folder": "f", "terrain": {"heightmaps": []}}, "`heightmaps` names none"),
+        ({"skeleton": "s", "folder": "f", "terrain": {"sole": float("nan")}}, r"terrain\.sole: .*finite"),
+        ({"skeleton": "s", "folder": "f", "held_out": ["../a"]}, "a clip's name has no .*slashes"),
         ({"skeleton": "../s", "folder": "f"}, "skeleton: string should match"),
     ],
 )
@@ -125,10 +132,45 @@ def test_a_data_set_that_cannot_be_is_refused(values: dict, message: str) -> Non
         validate(Dataset, values, "d.yaml")
 
 
-def test_an_inline_status_must_read() -> None:
-    assert ClipEntry(status="RightUpLeg-RightLeg[8];RightLeg-RightFoot[8]").is_injured
-    with pytest.raises(ValueError, match="does not read"):
-        ClipEntry(status="right knee 8")
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        (
+            {"injured": "A-B"},
+            r"clips\.a\.injured: only clips of a `synthetic` data set .*did you mean `status`\?",
+        ),
+        ({"recipe": "walk"}, r"clips\.a\.recipe: only clips of a `synthetic` data set"),
+        ({"share": 4}, r"clips\.a\.share: only clips of a `synthetic` data set"),
+    ],
+)
+def test_what_only_the_walker_reads_is_refused_of_other_clips(entry: dict, message: str) -> None:
+    values = {"skeleton": "s", "clips": {"a": entry, "b": None}}
+    assert validate(Dataset, {**values, "synthetic": {}}, "d.yaml").clips["a"] == ClipEntry(**entry)
+    with pytest.raises(HobbleError, match=message):
+        validate(Dataset, {**values, "folder": "f"}, "d.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "first"),
+    [
+        ("held_out: [a]\nmirror: true\nheld_out: []\n", 3, 1),
+        ("clips:\n  a: {gait: walk}\n  b:\n  a: {gait: jog}\n", 4, 2),
+        ("terrain:\n  heightmaps:\n  - {kind: hills, seed: 1, seed: 2}\n", 3, 3),
+    ],
+)
+def test_a_key_given_twice_is_refused_with_its_lines(
+    tmp_path: Path, text: str, line: int, first: int
+) -> None:
+    (tmp_path / "x.yaml").write_text(text)
+    with pytest.raises(
+        HobbleError, match=rf"x\.yaml, line {line}: the key .* twice, first in line {first}\."
+    ):
+        read_yaml(tmp_path / "x.yaml")
+
+
+def test_a_key_may_stand_in_several_places_and_over_what_is_merged(tmp_path: Path) -> None:
+    (tmp_path / "x.yaml").write_text("a: &a {x: 1, y: 2}\nb: *a\nc: {<<: *a, x: 3}\n")
+    assert read_yaml(tmp_path / "x.yaml")["c"] == {"x": 3, "y": 2}
 
 
 def test_broken_yaml_names_its_line(tmp_path: Path) -> None:

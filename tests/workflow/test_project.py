@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -58,12 +59,36 @@ def test_a_status_in_the_configuration_takes_the_place_of_the_file(base: Path) -
     assert Project(base, {}).status_files("mine", "c") == []
 
 
+def test_severities_of_0_hurt_nobody(base: Path) -> None:
+    (base / "data/mine/a_injuries.txt").write_text(
+        "frames:9\n1-9 LeftLeg-LeftFoot[0];LeftArm-LeftForeArm[0.0];\n"
+    )
+    (base / "data/mine/c_injuries.txt").write_text(
+        "frames:9\n1-4 LeftLeg-LeftFoot[0];\n5-9 LeftLeg-LeftFoot[.5];\n"
+    )
+    assert [Project(base, {}).is_injured("mine", clip) for clip in "abc"] == [False, False, True]
+    text = DATASET + "clips: {a: {status: 'LeftLeg-LeftFoot[2]'}, b: {status: 'LeftLeg-LeftFoot[0]'}, c: }\n"
+    (base / "config/datasets/mine.yaml").write_text(text)
+    assert [Project(base, {}).is_injured("mine", clip) for clip in "abc"] == [True, False, True]
+
+
+@pytest.mark.parametrize("name", ["Walk Forward", "walk, slow (2)", "gå+走"])
+def test_a_clip_can_be_configured_whatever_its_file_is_called(base: Path, name: str) -> None:
+    (base / f"data/mine/{name}.bvh").write_text("")
+    text = f"{DATASET.replace('[b]', json.dumps([name]))}clips: {{a: , {json.dumps(name)}: {{gait: jog}}}}\n"
+    (base / "config/datasets/mine.yaml").write_text(text)
+    project = Project(base, {})
+    assert project.entry("mine", name).gait == "jog"
+    assert project.splits("hurt")[name + "_mirror"] == "held_out"
+    assert project.source("mine", name) == str(base / f"data/mine/{name}.bvh")
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (DATASET + "clips: {b: , a_mirror: }\n", "a_mirror: a mirror is made from its original"),
-        ("skeleton: s\nfolder: mine\nheld_out: [z]\n", "held_out names no clip: z"),
-        ("skeleton: s\nfolder: mine\nheld_out: [a, b, c]\n", "no healthy clip is left to train on"),
+        (DATASET + "clips: {b: , a_mirror: }\n", "a_mirror: only a mirror is called so"),
+        (DATASET.replace("[b]", "[z]"), "held_out names no clip: z"),
+        (DATASET.replace("[b]", "[a, b, c]"), "no healthy clip is left to train on"),
         ("skeleton: s\nfolder: empty\n", "empty: no such folder"),
     ],
 )
@@ -74,7 +99,7 @@ def test_a_data_set_that_cannot_work_is_told(base: Path, text: str, message: str
 
 
 def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
-    (base / "config/datasets/mine.yaml").write_text("skeleton: s\nfolder: mine\nheld_out: [a, b, c]\n")
+    (base / "config/datasets/mine.yaml").write_text(DATASET.replace("[b]", "[a, b, c]"))
     with pytest.raises(HobbleError, match="mine: no clip is left to train on"):
         Project(base, {}).splits("hurt")
 
@@ -123,6 +148,57 @@ def complete(base: Path, root: Path) -> Path:
     (base / "config/skeletons").mkdir()
     shutil.copy(root / "config/skeletons/holden31.yaml", base / "config/skeletons/s.yaml")
     return base
+
+
+LISTED = "skeleton: s\nfolder: mine\nclips: {a: , b: {%s}}\n"
+WALKER = "skeleton: s\nsynthetic: {frames: 600}\nclips: {b: {%s}}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            LISTED % "status: 'LeftLeg-LeftFoot[11]'",
+            "clips.b.status: severity 11 of LeftLeg-LeftFoot is not in 0",
+        ),
+        (
+            LISTED % "status: 'LeftLeg-NoSuch[4]'",
+            "no such link: LeftLeg-NoSuch. Did you mean LeftLeg-LeftFoot",
+        ),
+        (LISTED % "status: 'left knee 8'", "'left knee 8' does not read as Joint-Joint"),
+        (LISTED % "status: ''", "clips.b.status: names no link"),
+        (WALKER % "recipe: wlak", "clips.b.recipe: no such recipe: wlak. There are walk-straight, walk, "),
+        (
+            WALKER % "injured: LeftUpLeg-LeftLg",
+            "clips.b: injured: the walker cannot hurt .* It can: LeftUpLeg-LeftLeg",
+        ),
+    ],
+)
+def test_what_a_clip_names_wrongly_is_told_before_anything_runs(
+    complete: Path, text: str, message: str
+) -> None:
+    (complete / "config/datasets/mine.yaml").write_text(text)
+    with pytest.raises(HobbleError, match=f"data set mine: .*{message}"):
+        Project(complete, {}).check(["results/one/report.html"])
+
+
+def test_a_skeleton_without_a_mirror_image_is_told_before_anything_runs(complete: Path) -> None:
+    rig = complete / "config/skeletons/s.yaml"
+    rig.write_text(rig.read_text().replace("RightFoot", "OtherFoot"))
+    for mirror in (False, True):
+        text = DATASET.replace("mirror: true", f"mirror: {str(mirror).lower()}") + "clips: {a: , b: }\n"
+        (complete / "config/datasets/mine.yaml").write_text(text)
+        if not mirror:
+            Project(complete, {}).check(["results/one/report.html"])
+    with pytest.raises(
+        HobbleError, match="skeleton s cannot be mirrored: LeftFoot is the left heel and OtherF"
+    ):
+        Project(complete, {}).check(["results/one/report.html"])
+
+
+def test_every_shipped_data_set_passes(root: Path) -> None:
+    project = Project(root, {"mocap": "nowhere"})
+    project.check(f"results/datasets/{name}/x" for name in ("synthetic", "synthetic-ava", "tiny", "cmu"))
 
 
 def test_what_is_compared(complete: Path) -> None:
@@ -177,6 +253,33 @@ def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(bas
     assert project.source("mine", "d") == str(below / "d.BVH")
     assert project.label_files("mine", "d") == [str(below / "d_gait.txt")]
     assert project.status_files("mine", "d") == [str(below / "d_injuries.txt")]
+
+
+def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path) -> None:
+    """As a collection kept elsewhere is linked into the data folder, though one link lead back."""
+    kept = base / "kept/day 1"
+    kept.mkdir(parents=True)
+    (kept / "d.bvh").write_text("")
+    (kept / "d_injuries.txt").write_text("frames:9\n")
+    (kept / "back").symlink_to(base / "data/mine")
+    for name in ("first", "second"):
+        (base / f"data/mine/{name}").symlink_to(base / "kept")
+    (base / "data/mine/gone").symlink_to(base / "nowhere")
+    project = Project(base, {})
+    assert list(project.clips("mine")) == ["a", "b", "c", "d"]
+    assert project.source("mine", "d") == str(base / "data/mine/first/day 1/d.bvh")
+    assert project.status_files("mine", "d") == [str(base / "data/mine/first/day 1/d_injuries.txt")]
+
+
+@pytest.mark.parametrize("mirror", [True, False])
+def test_a_mirror_is_left_out_only_where_it_is_made_anew(base: Path, mirror: bool) -> None:
+    text = DATASET.replace("mirror: true", f"mirror: {str(mirror).lower()}")
+    (base / "config/datasets/mine.yaml").write_text(text)
+    if mirror:
+        assert list(Project(base, {}).clips("mine")) == ["a", "b", "c"]
+        (base / "data/mine/a_mirror.bvh").rename(base / "data/mine/z_mirror.bvh")
+    with pytest.raises(HobbleError, match="_mirror: only a mirror is called so, which `mirror: true` makes"):
+        Project(base, {}).clips("mine")
 
 
 def test_two_files_of_one_clip_are_refused_with_both(base: Path) -> None:

@@ -5,12 +5,28 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from hobble.config import sections as s
+from hobble.core.clip_files import NAMES, can_be_called
+
+
+def _clip_name(name: str) -> str:
+    if not can_be_called(name):
+        raise ValueError(f"a clip's name has {NAMES}")
+    return name
+
+
+def hurts(text: str) -> bool:
+    """Whether a status (`A-B[4];`), or the text of a status file, has a severity other than 0."""
+    return any(NOTHING.fullmatch(severity) is None for severity in re.findall(r"\[([^\]]*)", text))
+
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+ClipName = Annotated[str, AfterValidator(_clip_name)]
 Link = Annotated[str, Field(min_length=3)]
+NOTHING = re.compile(r"\s*0+(\.0*)?\s*")
+SYNTHETIC = ("injured", "recipe", "share")  # keys of a clip that only the walker reads
 
 
 class ClipEntry(s.Section):
@@ -24,18 +40,12 @@ class ClipEntry(s.Section):
     share: s.PositiveFloat = Field(1.0, description="synthetic: length relative to the other clips")
     source_fps: s.PositiveFloat | None = Field(None, description="overrules the file's Frame Time")
     loops: s.Positive | None = Field(None, description="overrules motion.loops")
-    heading: float | None = Field(None, description="overrules motion.heading")
-
-    @model_validator(mode="after")
-    def _status_reads(self) -> ClipEntry:
-        if self.status and not re.fullmatch(r"([\w:.]+-[\w:.]+\[\d+(\.\d+)?\];?)+", self.status):
-            raise ValueError(f"status {self.status!r} does not read as Joint-Joint[0..10];...")
-        return self
+    heading: s.Finite | None = Field(None, description="overrules motion.heading")
 
     @property
     def is_injured(self) -> bool:
         """Whether the configuration says that something hurts."""
-        return bool(self.status or self.injured)
+        return bool(self.injured) or hurts(self.status or "")
 
 
 class Dataset(s.Section):
@@ -46,10 +56,10 @@ class Dataset(s.Section):
     source: Name | None = Field(None, description="a data set whose source files this one reads")
     folder: s.Inside | None = Field(None, description="where the BVH files lie, inside the mocap folder")
     download: s.Download | None = Field(None, description="where clips come from that the folder lacks")
-    clips: dict[Name, ClipEntry | None] = Field(
+    clips: dict[ClipName, ClipEntry | None] = Field(
         default_factory=dict, description="clips by name; none: every .bvh in the folder and those below it"
     )
-    held_out: tuple[Name, ...] = Field((), description="clips kept from training, with their mirrors")
+    held_out: tuple[ClipName, ...] = Field((), description="clips kept from training, with their mirrors")
     mirror: bool = False
     synthetic: s.Synthetic | None = None
     motion: s.Motion = s.Motion()
@@ -65,10 +75,21 @@ class Dataset(s.Section):
             raise ValueError("a synthetic data set lists its clips")
         if self.download is not None and not (self.folder and self.clips):
             raise ValueError("a data set that downloads its clips lists them and names a `folder`")
+        if self.synthetic is None:
+            self._without_the_walker()
         unknown = [c for c in self.held_out if self.clips and c not in self.clips]
         if unknown:
             raise ValueError(f"held_out names clips that are not in `clips`: {', '.join(unknown)}")
         return self
+
+    def _without_the_walker(self) -> None:
+        for clip, entry in self.clips.items():
+            for key in SYNTHETIC:
+                if entry and getattr(entry, key) != ClipEntry.model_fields[key].default:
+                    hint = "; did you mean `status`?" if key == "injured" else ""
+                    raise ValueError(
+                        f"clips.{clip}.{key}: only clips of a `synthetic` data set have it{hint}"
+                    )
 
 
 class Configuration(s.Section):

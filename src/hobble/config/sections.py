@@ -38,6 +38,7 @@ def _some(lengths: tuple[int, ...]) -> tuple[int, ...]:
 # Upper bounds keep a mistyped or a stranger's configuration from asking for more memory than machines have.
 Positive = Annotated[int, Field(gt=0, le=1_000_000)]
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, lt=1)]
 SixtyHz = Annotated[float, AfterValidator(_sixty)]
 Inside = Annotated[str, AfterValidator(_inside)]
@@ -99,7 +100,7 @@ class Motion(Section):
     handedness: Literal["auto", "right", "left"] = Field(
         "auto", description="of the file's coordinates; a left-handed file has x negated"
     )
-    facing: float | None = Field(
+    facing: Finite | None = Field(
         None, description="where the figure faces first, degrees from +Z towards +X; else as in the file"
     )
     proportions: Literal["skeleton", "clip"] = Field(
@@ -109,7 +110,7 @@ class Motion(Section):
         "repair", description="what to do with frames that are plainly broken; repairs are reported"
     )
     loops: Positive = Field(1, description="how often a clip that is one short cycle is repeated")
-    heading: float | None = Field(
+    heading: Finite | None = Field(
         None, description="where a looped clip leads, degrees from +Z towards +X; as in the file by default"
     )
 
@@ -147,11 +148,11 @@ class Terrain(Section):
     height_scale: PositiveFloat = 3.0
     highest: PositiveFloat = Field(50.0, description="a patch that goes further from its mean is dropped")
     smoothing: Annotated[float, Field(ge=0)] = Field(0.1, description="regularisation of the residual's RBF")
-    heel_height: Literal["auto"] | float = Field(
+    heel_height: Literal["auto"] | Finite = Field(
         "auto", description="of the heel joint above its sole, cm; the original has 5, `auto` asks the clip"
     )
-    toe_height: Literal["auto"] | float = Field("auto", description="likewise; the original has 4")
-    sole: float = Field(4.0, description="`auto` on ground that is not flat: below the toe joint, cm")
+    toe_height: Literal["auto"] | Finite = Field("auto", description="likewise; the original has 4")
+    sole: Finite = Field(4.0, description="`auto` on ground that is not flat: below the toe joint, cm")
     deepest: PositiveFloat | None = Field(
         1.0, description="no foot goes further below the ground, cm; null as in the original: not looked at"
     )
@@ -169,6 +170,14 @@ class Terrain(Section):
         "as in the original: not looked at",
     )
     seed: int = 1
+
+    @model_validator(mode="after")
+    def _enough_patches(self) -> Terrain:
+        if not self.heightmaps:
+            raise ValueError("`heightmaps` names none, so that there is no ground to draw patches from")
+        if self.patches < self.fits:
+            raise ValueError(f"`patches` ({self.patches}) are fewer than the `fits` of a cycle ({self.fits})")
+        return self
 
 
 class Heightmap(Section):

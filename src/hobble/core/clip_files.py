@@ -3,24 +3,41 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 from hobble.core.errors import InputError
 
 SUFFIX = ".bvh"
+SPEAKABLE = re.compile(r"(?![.\s])[^{}<>\\/]+(?<!\s)")  # Snakemake fills in {x} and <x>
+NAMES = (
+    "no control characters, braces, angle brackets, slashes or backslashes, no dot or space first and no "
+    "space last"
+)
+
+
+def can_be_called(clip: str) -> bool:
+    """Whether a clip's name can stand in a path, a line of a log and a wildcard of Snakemake; see NAMES."""
+    return clip.isprintable() and SPEAKABLE.fullmatch(clip) is not None
 
 
 def find_clips(folder: Path) -> dict[str, list[Path]]:
     """Clip -> its BVH files in a folder and those below it, whether they end in .bvh or .BVH, sorted.
 
-    Hidden folders are left out. Raises InputError where a folder cannot be read.
+    Links are followed, to one folder once however many lead there; hidden folders are left out. Raises
+    InputError where a folder cannot be read.
     """
 
     def refuse(error: OSError) -> None:
         raise InputError(error.filename or folder, f"cannot be read: {error.strerror}") from None
 
     found: dict[str, list[Path]] = {}
-    for here, folders, files in os.walk(folder, onerror=refuse):
+    seen: set[str] = set()
+    for here, folders, files in os.walk(folder, onerror=refuse, followlinks=True):
+        if (real := os.path.realpath(here)) in seen:
+            folders.clear()
+            continue
+        seen.add(real)
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(files):
             stem, suffix = os.path.splitext(name)

@@ -113,8 +113,8 @@ class Skeleton:
             right = self.roles.get(role.replace("left_", "right_", 1))
             if right not in (None, left) and self.joints[swap[self.index(left)]] != right:
                 raise self._lopsided(
-                    f"{left} is the {role.replace('_', ' ')} and {right} the right one, but their names do not "
-                    f"say so. Name the joints of both sides {NAMED}."
+                    f"{left} is the {role.replace('_', ' ')} and {right} the right one, but their names do "
+                    f"not say so. Name the joints of both sides {NAMED}."
                 )
         return swap
 

@@ -55,7 +55,7 @@ def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
 def read_yaml(path: str | Path) -> Any:
     """What a YAML file says, as plain data: no tag of it makes an object, no alias in it a mountain.
 
-    Raises InputError, with the line where there is one.
+    Raises InputError, with the line where there is one; for a key that stands twice in one place too.
     """
     import yaml  # not needed by most jobs, which are many and short
 
@@ -69,6 +69,7 @@ def read_yaml(path: str | Path) -> Any:
             return None
         if _written_out(node, {}, set()) > MOST_NODES:
             raise InputError(path, f"its aliases stand for more than {MOST_NODES} values")
+        _check_keys(path, node)
         return loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else None
@@ -92,6 +93,32 @@ def _check_depth(events: Iterable[yaml.Event]) -> None:
             raise RecursionError
 
 
+def _check_keys(path: str | Path, top: yaml.Node) -> None:
+    """Raise InputError for a key that a mapping has twice: the loader would take the last and say nothing."""
+    todo, seen = [top], set()
+    while todo:
+        node = todo.pop()
+        if id(node) in seen or not isinstance(node.value, list):
+            continue
+        seen.add(id(node))
+        todo += _children(node)
+        lines: dict[tuple[str, str], int] = {}
+        for key in (child[0] for child in node.value if isinstance(child, tuple)):
+            if not isinstance(key.value, str):
+                continue  # no key at all, as the loader will say
+            name, line = (key.tag, key.value), key.start_mark.line + 1
+            if name in lines:
+                problem = f"the key {key.value:.80} is given twice, first in line {lines[name]}"
+                raise InputError(path, problem, line=line, fix="Keep one of them.")
+            lines[name] = line
+
+
+def _children(node: yaml.Node) -> list[yaml.Node]:
+    """The values of a sequence, or the keys and values of a mapping."""
+    pairs = (child if isinstance(child, tuple) else (child,) for child in node.value)
+    return [part for pair in pairs for part in pair]
+
+
 def _written_out(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
     """Values that a node stands for when every alias is replaced by what it names."""
     if not isinstance(node.value, list):
@@ -100,8 +127,6 @@ def _written_out(node: yaml.Node, known: dict[int, int], above: set[int]) -> int
         raise RecursionError
     if id(node) not in known:
         above.add(id(node))
-        pairs = (child if isinstance(child, tuple) else (child,) for child in node.value)
-        children = [part for pair in pairs for part in pair]
-        known[id(node)] = 1 + sum(_written_out(child, known, above) for child in children)
+        known[id(node)] = 1 + sum(_written_out(child, known, above) for child in _children(node))
         above.remove(id(node))
     return known[id(node)]

@@ -6,16 +6,15 @@ import functools
 import hashlib
 import json
 import os
-import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from hobble.config.load import Catalogue
-from hobble.config.models import ClipEntry, Configuration, Dataset
+from hobble.config.models import ClipEntry, Configuration, Dataset, hurts
 from hobble.config.sections import COMPARED
-from hobble.core.clip_files import find_clips, the_file
+from hobble.core.clip_files import NAMES, can_be_called, find_clips, the_file
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import MOST_TEXT, read_bytes
 from hobble.workflow.fingerprint import fingerprint
@@ -24,7 +23,6 @@ from hobble.workflow.targets import COMPARE, check
 
 DATASETS = "results/datasets"
 MIRROR = "_mirror"
-SPEAKABLE = re.compile(r"(?![.\s])[^{}<>\\]*(?<!\s)")  # Snakemake fills in {x} and <x>
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 STAGES = ("synthetic", "motion", "labels", "injury", "terrain", "database")
 RESERVED = (COMPARE, "datasets")  # folders of results/ that belong to no configuration
@@ -106,23 +104,24 @@ class Project:
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def clips(self, dataset: str) -> dict[str, ClipEntry]:
         """The clips of a data set by name, without mirrors. Raises HobbleError where there are none."""
-        model = self.dataset(dataset)
-        if model.clips:
-            found = {name: entry or ClipEntry() for name, entry in model.clips.items()}
-        else:
-            folder, files = self.folder(dataset), self._files(dataset)
-            for name in sorted(files):
-                _check_name(folder, name)
-                the_file(name, files[name])
-            found = {name: ClipEntry() for name in sorted(files) if not name.endswith(MIRROR)}
-            if not found:
-                raise InputError(folder, "no .bvh files here", fix="Put clips there.")
-        made = [name for name in found if name.endswith(MIRROR)]
-        if made:
+        listed = self.dataset(dataset).clips or dict.fromkeys(self._scanned(dataset))
+        if odd := [name for name in listed if name.endswith(MIRROR)]:
             raise HobbleError(
-                f"data set {dataset}: {', '.join(made)}: a mirror is made from its original by `mirror: true`"
+                f"data set {dataset}: {', '.join(odd)}: only a mirror is called so, which `mirror: true` "
+                "makes from its original. Take it out, or rename its file."
             )
-        return found
+        return {name: entry or ClipEntry() for name, entry in listed.items()}
+
+    def _scanned(self, dataset: str) -> list[str]:
+        """The clips in the user's folder, but for mirrors that are made anew from originals beside them."""
+        folder, files = self.folder(dataset), self._files(dataset)
+        for name in sorted(files):
+            _check_name(folder, name)
+            the_file(name, files[name])
+        if not files:
+            raise InputError(folder, "no .bvh files here", fix="Put clips there.")
+        made = {name + MIRROR for name in files} if self.dataset(dataset).mirror else set()
+        return sorted(set(files) - made)
 
     def folder(self, dataset: str) -> Path:
         """Where the data set's own source files lie.
@@ -221,7 +220,9 @@ class Project:
             return True
         if self.dataset(dataset).synthetic is not None:
             return False
-        return any(b"[" in read_bytes(file, MOST_TEXT) for file in self.status_files(dataset, clip))
+        return any(
+            hurts(read_bytes(file, MOST_TEXT).decode("latin-1")) for file in self.status_files(dataset, clip)
+        )
 
     def selected(self, dataset: str, selection: str) -> dict[str, str]:
         """Clip -> "train" or "held_out", of the `healthy` or of `all` clips; mirrors go with originals."""
@@ -369,11 +370,5 @@ class Project:
 
 
 def _check_name(folder: Path, clip: str) -> None:
-    """Clips may be called anything that can stand in a path, a line of a log and a wildcard of Snakemake."""
-    if not clip.isprintable() or not SPEAKABLE.fullmatch(clip):
-        raise InputError(
-            folder,
-            f"a clip is called {clip!a:.80}",
-            fix="Rename it: no control characters, braces, angle brackets or backslashes, no dot or space "
-            "first and no space last.",
-        )
+    if not can_be_called(clip):
+        raise InputError(folder, f"a clip is called {clip!a:.80}", fix=f"Rename it: {NAMES}.")

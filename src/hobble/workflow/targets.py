@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from hobble.config.sections import PhaseMode
-from hobble.core.errors import HobbleError
+from hobble.core.errors import HobbleError, InputError
+from hobble.synthetic.links import check_link
 
 if TYPE_CHECKING:
+    from hobble.config.models import ClipEntry, SkeletonFile
     from hobble.workflow.project import Project
 
 COMPARE = "compare"
@@ -43,10 +45,44 @@ def _configuration(project: Project, name: str) -> None:
 
 
 def _dataset(project: Project, name: str) -> None:
-    project.catalogue.skeleton(project.dataset(name).skeleton)
-    for clip in project.clips(name):
+    model = project.dataset(name)
+    skeleton = project.catalogue.skeleton(model.skeleton)
+    for clip, entry in project.clips(name).items():
         project.rig_files(name, clip)
+        _entry(f"data set {name}: clips.{clip}", entry, [f"{a}-{b}" for a, b in skeleton.links])
     project.selected(name, "all")
+    if model.mirror:
+        _mirrored(model.skeleton, skeleton)
+
+
+def _entry(where: str, entry: ClipEntry, links: Sequence[str]) -> None:
+    """What a clip's entry names: links that there are, severities from 0 to 10, what the walker can do."""
+    # Imported where there is something to check: they bring numpy, which takes longer than all else here.
+    if entry.status is not None:
+        from hobble.injury.status import parse_links
+
+        parse_links(entry.status, links, f"{where}.status")
+    if entry.injured is not None:
+        check_link(entry.injured, where)
+    if entry.recipe is not None:
+        from hobble.synthetic.recipes import RECIPES
+
+        if entry.recipe not in RECIPES:
+            raise InputError(
+                f"{where}.recipe",
+                f"no such recipe: {entry.recipe:.80}",
+                fix=f"There are {', '.join(RECIPES)}.",
+            )
+
+
+def _mirrored(name: str, skeleton: SkeletonFile) -> None:
+    """Raise HobbleError for a skeleton that has no mirror image."""
+    from hobble.core.skeleton import Skeleton
+    from hobble.motion.mirror import mirror_skeleton
+
+    rig = Skeleton.from_dict({"name": name, **skeleton.model_dump(exclude={"maps"})})
+    mirror_skeleton(rig)
+    _ = rig.mirror_links
 
 
 def _asked(project: Project, name: str, folder: str, file: str) -> None:
