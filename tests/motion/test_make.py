@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core import quat
+from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.motion.decode import frame_rate
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
@@ -95,6 +96,55 @@ def test_axes_are_found_said_and_put_right(walk, bvh, make, change, said):
     assert {key: report[key] for key in said} == said
     np.testing.assert_allclose(clip.positions, walk.positions[::2], atol=1e-4)
     assert quat.angle(clip.rotations, walk.rotations[::2]).max() < 1e-5
+
+
+def crawl(skeleton, heading, seconds=3):
+    """On all fours at 36 cm/s, degrees from +Z towards +X."""
+    time = np.arange(60 * seconds + 1) / 60
+    swing = 0.26 * np.sin(2 * np.pi * time)[:, None]
+    rotations = np.tile(quat.IDENTITY, (len(time), len(skeleton.joints), 1))
+    rotations[:, 0] = quat.mul(quat.yaw(np.radians(heading)), quat.from_euler(np.full_like(swing, 1.31), "X"))
+    for side, sign in (("left", 1), ("right", -1)):
+        rotations[:, skeleton.role(f"{side}_hip")] = quat.from_euler(sign * swing - 1.31, "X")
+        rotations[:, skeleton.role(f"{side}_knee")] = quat.from_euler(1.57 - sign * swing, "X")
+    way = np.stack(
+        [36 * time * np.sin(np.radians(heading)), 50 + 0 * time, 36 * time * np.cos(np.radians(heading))], 1
+    )
+    return Clip("crawl", skeleton, 60.0, rotations, way)
+
+
+@pytest.mark.parametrize("heading", [0.0, 50.0, 90.0, 200.0])
+def test_a_figure_that_crawls_is_not_stood_on_end(holden31, bvh, make, heading):
+    crawling = crawl(holden31, heading)
+    for change, up in ((lambda clip: clip, "+Y"), (z_up, "+Z")):
+        clip, report = make(bvh(change(crawling)))
+        assert report["up"] == up
+        np.testing.assert_allclose(clip.positions, crawling.positions, atol=1e-4)
+        (note,) = report["notes"]
+        assert f"its rest pose along {up}; since it goes that way, as in a crawl, {up} was taken" in note
+    assert make(bvh(crawling), up="Y")[1]["notes"] == []
+
+
+def turned_upright(clip):
+    """In a world with Z up, on a rig whose rest pose stands along Y."""
+    turn = quat.from_axis_angle(np.array([1.0, 0, 0]), np.pi / 2)
+    rotations = clip.rotations.copy()
+    rotations[:, 0] = quat.mul(turn, rotations[:, 0])
+    return replace(clip, rotations=rotations, root=quat.rotate(turn, clip.root))
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.6])
+def test_a_rest_pose_that_lies_in_its_world_does_not_lay_the_figure_down(walk, bvh, make, rise):
+    """Even on stairs, or where it jumps."""
+    time = np.arange(len(walk)) / walk.fps
+    up = np.stack([0 * time, rise * walk.root[:, 2] + 40 * np.abs(np.sin(4 * time)), 0 * time], axis=1)
+    climbing = replace(walk, root=walk.root + up)
+    clip, report = make(bvh(turned_upright(climbing)))
+    assert report["up"] == "+Z"
+    assert (
+        "The body lies along +Z and its rest pose along +Y; since it moves so, +Z was" in report["notes"][0]
+    )
+    np.testing.assert_allclose(clip.positions, climbing.positions[::2], atol=1e-4)
 
 
 def test_axes_can_be_overruled(walk, bvh, make):

@@ -17,6 +17,7 @@ from hobble.core.skeleton import Skeleton
 
 FLIP = np.array([-1.0, 1.0, 1.0])
 MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
+CLIMB = 20.0  # cm between the lower and the higher half of a clip's lowest points from which on it climbs
 UPRIGHT = np.cos(np.radians(20.0))
 DIRECTIONS = {
     sign + axis: np.eye(3)["XYZ".index(axis)] * (1 if sign == "+" else -1) for sign in "+-" for axis in "XYZ"
@@ -75,13 +76,14 @@ def rest_frame(skeleton: Skeleton) -> Array:
     return quat.from_matrix(axes)
 
 
-def straighten(clip: Clip, up: str, handedness: str) -> tuple[Clip, Axes]:
+def straighten(clip: Clip, up: str, handedness: str) -> tuple[Clip, Axes, list[str]]:
     """The clip right-handed with Y up, its rest pose facing +Z where that is a matter of whole axes.
 
     up: "auto", "Y" or "Z". handedness: "auto", "right" or "left". What is `auto` is read off the motion: up
-    goes from the hips to the head and from the feet to the hips, and the feet point forward.
+    goes from the hips to the head and from the feet to the hips, unless the figure crawls, and the feet point
+    forward. Returns notes, too: a sentence where motion and rest pose do not agree on what is up.
     """
-    name = _up_of(clip) if up == "auto" else f"+{up}"
+    name, notes = _up_of(clip) if up == "auto" else (f"+{up}", [])
     if handedness == "auto":
         handedness = _hand_of(clip)
     if handedness == "left":
@@ -91,17 +93,41 @@ def straighten(clip: Clip, up: str, handedness: str) -> tuple[Clip, Axes]:
     rest = rest_frame(clip.skeleton)
     facing, near = nearest_axis(quat.rotate(rest, np.array([0.0, 0.0, 1.0])))
     turn = quat.inv(rest) if near > 1 - 1e-9 else quat.IDENTITY
-    return _turned(clip, world, turn), Axes(name, handedness, facing if near > 1 - 1e-9 else "oblique")
+    axes = Axes(name, handedness, facing if near > 1 - 1e-9 else "oblique")
+    return _turned(clip, world, turn), axes, notes
 
 
-def _up_of(clip: Clip) -> str:
-    at = {
-        role: clip.positions[:, clip.skeleton.role(role)]
-        for role in ("head", "hips", "left_toe", "right_toe")
-    }
-    trunk = _unit(at["head"] - at["hips"]).mean(axis=0)
-    legs = _unit(at["hips"] - 0.5 * (at["left_toe"] + at["right_toe"])).mean(axis=0)
-    return nearest_axis(trunk + legs)[0]
+def _up_of(clip: Clip) -> tuple[str, list[str]]:
+    """The axis that is up, and a sentence where the rest pose stands along another than the motion."""
+    body, rest = (
+        nearest_axis(_along_body(clip.skeleton, positions).mean(axis=0))[0]
+        for positions in (clip.positions, rest_positions(clip.skeleton)[None])
+    )
+    if body == rest:
+        return body, []
+    up, why = (rest, "it goes that way, as in a crawl") if _crawls(clip, body) else (body, "it moves so")
+    return up, [
+        f"The body lies along {body} and its rest pose along {rest}; since {why}, {up} was taken for up "
+        "(motion.up overrules it)."
+    ]
+
+
+def _along_body(skeleton: Skeleton, positions: Array) -> Array:
+    """(F, 3) from the feet over the hips to the head, both parts of equal weight; positions (F, J, 3)."""
+    names = ("head", "hips", "left_toe", "right_toe")
+    head, hips, left, right = (positions[:, skeleton.role(name)] for name in names)
+    return _unit(head - hips) + _unit(hips - 0.5 * (left + right))
+
+
+def _crawls(clip: Clip, axis: str) -> bool:
+    """Whether the body travels the way it lies: no figure on its feet climbs further than it goes.
+
+    Its lowest point tells it from a jump, which comes down where it began.
+    """
+    along = clip.positions @ DIRECTIONS[axis]
+    early, late = np.percentile(along.min(axis=1), [25, 75])
+    travel = np.ptp(clip.root, axis=0)
+    return bool(late - early > CLIMB and travel @ np.abs(DIRECTIONS[axis]) >= 0.9 * travel.max())
 
 
 def _hand_of(clip: Clip) -> str:

@@ -144,12 +144,12 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[st
             f"the bone from {bone} has no length",
             fix="Check its OFFSET and its position channels, and export the clip again.",
         )
-    clip, axes = straighten(clip, options["up"], options["handedness"])
+    clip, axes, unsure = straighten(clip, options["up"], options["handedness"])
     repaired = repair(clip)
     if repaired.sentences and options["defects"] == "refuse":
         raise InputError(file.path, repaired.sentences[0], fix="Set motion.defects: repair to mend it so.")
     repairs += repaired.sentences
-    notes = decoded.notes + flips(repaired.clip, repaired.first)
+    notes = decoded.notes + unsure + flips(repaired.clip, repaired.first)
     return Source(repaired.clip, match, unit, unit_name, axes, repaired.first, repairs, notes)
 
 
