@@ -137,7 +137,7 @@ def test_a_data_set_that_cannot_be_is_refused(values: dict, message: str) -> Non
     [
         (
             {"injured": "A-B"},
-            r"clips\.a\.injured: only clips of a `synthetic` data set .*did you mean `status`\?",
+            r"^d\.yaml: clips\.a\.injured: only clips of a `synthetic` data set have it; use `status`\.$",
         ),
         ({"recipe": "walk"}, r"clips\.a\.recipe: only clips of a `synthetic` data set"),
         ({"share": 4}, r"clips\.a\.share: only clips of a `synthetic` data set"),

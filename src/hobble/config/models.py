@@ -86,7 +86,7 @@ class Dataset(s.Section):
         for clip, entry in self.clips.items():
             for key in SYNTHETIC:
                 if entry and getattr(entry, key) != ClipEntry.model_fields[key].default:
-                    hint = "; did you mean `status`?" if key == "injured" else ""
+                    hint = "; use `status`" if key == "injured" else ""
                     raise ValueError(
                         f"clips.{clip}.{key}: only clips of a `synthetic` data set have it{hint}"
                     )
