@@ -15,6 +15,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.motion.decode import frame_rate
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
+from hobble.motion.rig import load_skeleton
 
 
 def test_a_clip_on_the_skeleton_passes_through_untouched(walk, bvh, make):
@@ -137,7 +138,7 @@ def turned_upright(clip):
 def test_a_rest_pose_that_lies_in_its_world_does_not_lay_the_figure_down(walk, bvh, make, rise):
     """Even on stairs, or where it jumps."""
     time = np.arange(len(walk)) / walk.fps
-    up = np.stack([0 * time, rise * walk.root[:, 2] + 40 * np.abs(np.sin(4 * time)), 0 * time], axis=1)
+    up = np.stack([0 * time, rise * walk.root[:, 2] + 40 * np.maximum(np.sin(4 * time), 0), 0 * time], axis=1)
     climbing = replace(walk, root=walk.root + up)
     clip, report = make(bvh(turned_upright(climbing)))
     assert report["up"] == "+Z"
@@ -153,6 +154,41 @@ def test_axes_can_be_overruled(walk, bvh, make):
     np.testing.assert_allclose(clip.positions * [-1, 1, 1], walk.positions[::2], atol=1e-4)
     clip, report = make(bvh(walk), up="Z", proportions="clip")
     np.testing.assert_allclose(clip.positions[..., 1], walk.positions[::2, :, 2], atol=1e-4)
+
+
+def raised(clip, height):
+    return replace(clip, root=clip.root + np.multiply.outer(height, [0.0, 1.0, 0.0]))
+
+
+@pytest.mark.parametrize("height", [-93.0, -20.0, 20.0, 120.0])
+@pytest.mark.parametrize("rig", ["holden31", "rig22"])
+def test_a_floor_that_is_not_at_zero_is_put_there_and_said(walker, bvh, make, root, height, rig):
+    clip = walker(load_skeleton(root / f"config/skeletons/{rig}.yaml").skeleton, 121, 60.0)
+    path = bvh(raised(clip, height))
+    moved, report = make(path)
+    np.testing.assert_allclose(moved.positions, make(bvh(clip, name="level"))[0].positions, atol=1.5)
+    assert [s for s in report["repairs"] if "The floor lies at" in s and s.endswith("so that it lies at 0.")]
+    with pytest.raises(InputError, match=r"walk.bvh: The floor lies at -?\d+ cm.*defects: repair"):
+        make(path, defects="refuse")
+
+
+@pytest.mark.parametrize("height", [-12.0, 12.0])
+def test_a_floor_near_zero_stays_where_it_is(walk, bvh, make, height):
+    clip, report = make(bvh(raised(walk, height)), defects="refuse")
+    assert report["repairs"] == report["notes"] == []
+    np.testing.assert_allclose(clip.root[:, 1], walk.root[::2, 1] + height, atol=1e-6)
+
+
+def test_uneven_ground_stays_where_it_is(walk, bvh, make):
+    stairs = raised(walk, np.interp(walk.root[:, 2], [80, 120], [20, 60]))
+    clip, report = make(bvh(stairs))
+    assert "which no flat ground is: say `ground: rocky` of this clip" in report["notes"][0]
+    assert report["repairs"] == []
+    np.testing.assert_allclose(clip.root, stairs.root[::2], atol=1e-6)
+    beam = bvh(raised(walk, 40.0), name="beam")
+    clip, report = make(beam, ground="beam", defects="refuse")
+    assert report["repairs"] == report["notes"] == []
+    np.testing.assert_allclose(clip.root[:, 1], walk.root[::2, 1] + 40, atol=1e-6)
 
 
 def test_where_the_figure_faces_can_be_overruled(walk, bvh, make):
@@ -346,8 +382,6 @@ def carried(clip, turn, place):
 @pytest.mark.parametrize("moves", [False, True])
 @pytest.mark.parametrize("rig", ["holden31", "mixamo55"])
 def test_a_joint_above_the_hips_is_folded_into_them_and_said(walker, bvh, make, root, rig, moves):
-    from hobble.motion.rig import load_skeleton
-
     clip = walker(load_skeleton(root / f"config/skeletons/{rig}.yaml").skeleton, 121, 60.0)
     time = moves * np.linspace(0, 1, len(clip))
     turn = quat.mul(quat.yaw(2 * time), quat.from_axis_angle(np.array([1.0, 0, 0]), -np.pi / 2 + 0 * time))

@@ -390,3 +390,9 @@ def test_the_plan_and_the_job_agree_on_the_rig(root: Path, shared: Path) -> None
         file = read_bvh(project.source("ferre", clip))
         rig = load_source(file, target, root / "config/skeletons", options).match.rig
         assert [Path(f).stem for f in project.rig_files("ferre", clip)] == [rig] * (rig != "holden31")
+
+
+def test_motion_knows_what_the_clip_s_entry_says_of_it(root):
+    project = Project(root, {})
+    assert project.motion_options("cmu", "03_01")["ground"] == "rocky"
+    assert project.motion_options("cmu", "02_01") == {**project.options("cmu", "motion"), "ground": "flat"}

@@ -16,6 +16,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import Axes, straighten, turned
 from hobble.motion.decode import Decoded, frame_rate
 from hobble.motion.defects import flips, repair
+from hobble.motion.floor import on_floor
 from hobble.motion.fold import below_hips, decode_below
 from hobble.motion.loop import loop_clip
 from hobble.motion.read import MOST_POSES, Bvh, read_bvh
@@ -67,7 +68,7 @@ def make_clip(
 
     skeleton: the target's file. maps: the folder of the skeleton files. clip: the name of the clip made.
     options: the `motion` section of a data set (fps, source_fps, unit, up, handedness, facing,
-    proportions, defects, loops, heading).
+    proportions, defects, loops, heading), and the clip's `ground`, flat where it is not there.
     Returns the clip and its report: `motion/<clip>.json` of docs/artefacts.md.
     Raises InputError for a file that cannot be read, for another skeleton, and for what is broken beyond
     repair or, with defects: refuse, broken at all.
@@ -146,11 +147,13 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[st
         )
     clip, axes, unsure = straighten(clip, options["up"], options["handedness"])
     repaired = repair(clip)
-    if repaired.sentences and options["defects"] == "refuse":
-        raise InputError(file.path, repaired.sentences[0], fix="Set motion.defects: repair to mend it so.")
-    repairs += repaired.sentences
-    notes = decoded.notes + unsure + flips(repaired.clip, repaired.first)
-    return Source(repaired.clip, match, unit, unit_name, axes, repaired.first, repairs, notes)
+    flat = options.get("ground", "flat") == "flat"
+    clip, moved, uneven = on_floor(repaired.clip) if flat else (repaired.clip, [], [])
+    mended = repaired.sentences + moved
+    if mended and options["defects"] == "refuse":
+        raise InputError(file.path, mended[0], fix="Set motion.defects: repair to mend it so.")
+    notes = decoded.notes + unsure + uneven + flips(clip, repaired.first)
+    return Source(clip, match, unit, unit_name, axes, repaired.first, repairs + mended, notes)
 
 
 def _rig(file: Bvh) -> Skeleton:

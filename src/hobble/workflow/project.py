@@ -250,8 +250,8 @@ class Project:
         return round(synthetic.frames * self.entry(dataset, clip).share / total)
 
     def motion_options(self, dataset: str, clip: str) -> dict[str, Any]:
-        """The motion section, with what the clip's entry overrules."""
-        keys = {"source_fps", "loops", "heading"}
+        """The motion section, with what the clip's entry overrules, and the ground that the clip is on."""
+        keys = {"source_fps", "loops", "heading", "ground"}
         entry = self.entry(dataset, clip).model_dump(include=keys, exclude_none=True)
         return {**self.options(dataset, "motion"), **entry}
 
