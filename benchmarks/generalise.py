@@ -1,12 +1,14 @@
-"""What recipes of training give on clips they never saw: one frame ahead, and fed their own poses.
+"""What recipes of training give on clips they never saw, and whether their character goes where it is sent.
 
     python benchmarks/generalise.py DATABASE < recipes
 
 DATABASE is results/datasets/<dataset>/database/healthy, beside the `clips` it was made from. Each line of the
 input is one recipe, in keys of the training section: `passes: 2, batch: 256, dropout: 0.1`. For each, the
 mean squared error of the last section of its training (with dropout and roll-outs) and of every held-out row;
-and how far joints are from the recorded ones over roll-outs of 1, 10 and 60 frames, cm, as the evaluation
-stage measures it.
+how far joints are from the recorded ones over roll-outs of 1, 10 and 60 frames, cm, as the evaluation stage
+measures it; and of a lap of the track the waypoints reached, the seconds, how far off the path the character
+came (cm) and its largest turn of a joint in a frame (degrees). Roll-outs take the path from the clip: a
+network that is good at them may still stand and turn in a place where a character of its own brought it.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ import yaml
 
 from hobble.config.sections import Network, Training
 from hobble.database.reader import Database
+from hobble.evaluation.responsivity import responsivity
 from hobble.evaluation.rollouts import measure_roll_outs
+from hobble.runtime.network import load_network
 from hobble.training.held_out import HeldOut
 from hobble.training.train import train
 from hobble.training.weights import write_weights
@@ -42,9 +46,12 @@ def measured(database: Database, recipe: dict, threads: int) -> str:
         state = train(database, network=network, training=training, checkpoints=Path(folder), threads=threads)
         write_weights(weights, state.network, database, "benchmark", {})
         rolled = measure_roll_outs(weights, files, clips, "benchmark", lengths=LENGTHS)
+    lap = responsivity(load_network(weights), configuration="", runtime={}, laps=1, lap_seconds=400, modes=())
     whole = HeldOut(database, torch.device("cpu"), 0).whole(state.network)[0]
     strayed = " ".join(f"{entry['held_out']['position_error_cm']:5.2f}" for entry in rolled["lengths"])
-    return f"{state.history[-1][4]:7.4f} {whole:9.4f}  {strayed}"
+    laps = f"{lap['waypoints_reached']}/{lap['waypoints']} {lap['laps'][0]['seconds']:4.0f}"
+    laps += f" {lap['path_overshoot_cm']:5.0f} {lap['largest_turn_degrees']:4.0f}"
+    return f"{state.history[-1][4]:7.4f} {whole:9.4f}  {strayed}  {laps}"
 
 
 def main() -> None:
@@ -53,7 +60,8 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     options = parser.parse_args()
     database = Database.open(options.database, Training().memory_mb)
-    print(f"  train  held out  cm over {', '.join(map(str, LENGTHS))} frames", flush=True)
+    lengths = ", ".join(map(str, LENGTHS))
+    print(f"  train  held out  cm over {lengths} frames; lap: reached, s, cm, degrees", flush=True)
     for line in sys.stdin:
         recipe = yaml.safe_load("{" + line + "}")
         print(f"{measured(database, recipe, options.threads)}  {line.strip()}", flush=True)

@@ -196,6 +196,29 @@ def test_a_skeleton_without_a_mirror_image_is_told_before_anything_runs(complete
         Project(complete, {}).check(["results/one/report.html"])
 
 
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("injury: true", "its injury has to be False, not True"),
+        ("network: {units: 9}", "its network has to be .*512.*, not .*9"),
+        ("training: {sections: 5}", r"its training\.sections has to be 10, not 5"),
+        ("training: {passes: 19}", r"which ends after 20 passes, to training\.passes: 19; give more"),
+        ("training: {learning_rate: 1.0e-3, batch: 64}", None),
+        ("", None),
+    ],
+)
+def test_what_cannot_be_gone_on_from_is_told_before_anything_runs(
+    complete: Path, text: str, message: str | None
+) -> None:
+    (complete / "config/more.yaml").write_text("extends: one\ntraining: {passes: 40, continues: one}\n")
+    (complete / "config/other.yaml").write_text(f"extends: more\n{text}\n")
+    project = Project(complete, {})
+    if message is None:
+        return project.check(["results/other/report.html"])
+    with pytest.raises(HobbleError, match=f"configuration other goes on from one, .*{message}"):
+        project.check(["results/other/report.html"])
+
+
 def test_every_shipped_data_set_passes(root: Path) -> None:
     project = Project(root, {"mocap": "nowhere"})
     project.check(f"results/datasets/{name}/x" for name in ("synthetic", "synthetic-ava", "tiny", "cmu"))

@@ -11,7 +11,7 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.synthetic.links import check_link
 
 if TYPE_CHECKING:
-    from hobble.config.models import ClipEntry, SkeletonFile
+    from hobble.config.models import ClipEntry, Configuration, SkeletonFile
     from hobble.workflow.project import Project
 
 COMPARE = "compare"
@@ -41,7 +41,29 @@ def _configuration(project: Project, name: str) -> None:
         if other == name:
             raise HobbleError(f"configuration {name} cannot go on from itself")
         project.configuration(other)
+    if model.training.continues:
+        _goes_on(name, model, project.configuration(model.training.continues))
     _dataset(project, model.dataset)
+
+
+def _goes_on(name: str, model: Configuration, start: Configuration) -> None:
+    """A training goes on with the network and the rows it began with, and counts passes in its sections."""
+    begun = model.training.continues
+    for key, mine, of_start in (
+        ("dataset", model.dataset, start.dataset),
+        ("injury", model.injury, start.injury),
+        ("network", model.network.model_dump(), start.network.model_dump()),
+        ("training.sections", model.training.sections, start.training.sections),
+    ):
+        if mine != of_start:
+            raise HobbleError(
+                f"configuration {name} goes on from {begun}, so its {key} has to be {of_start}, not {mine}"
+            )
+    if model.training.passes < start.training.passes:
+        raise HobbleError(
+            f"configuration {name} goes on from {begun}, which ends after {start.training.passes} passes, to "
+            f"training.passes: {model.training.passes}; give more"
+        )
 
 
 def _dataset(project: Project, name: str) -> None:
