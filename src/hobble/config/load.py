@@ -92,9 +92,8 @@ def _problem(item: Any, model: type[BaseModel]) -> str:
         allowed = ", ".join(_keys_at(model, item["loc"][:-1])) or "none"
         return f"{key}: there is no such key. Allowed here: {allowed}."
     message = item["msg"].removeprefix("Value error, ")
-    if item["type"] == "value_error" and isinstance(
-        item["input"], Mapping
-    ):  # which says itself what is wrong
+    of_a_section = isinstance(item["input"], Mapping)
+    if item["type"] == "value_error" and of_a_section:  # the message says it all
         return f"{key}: {message}." if item["loc"] else f"{message}."
     text = f"{key}: {message[0].lower()}{message[1:]}, not {item['input']!r:.80}."
     if item["type"] == "string_type" and isinstance(item["input"], NOT_TEXT):

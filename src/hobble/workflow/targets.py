@@ -47,10 +47,9 @@ def _configuration(project: Project, name: str) -> None:
 
 
 def _goes_on(name: str, model: Configuration, start: Configuration) -> None:
-    """A training goes on with the network and the rows it began with, and counts passes in its sections."""
+    """A training goes on with a network of the same shape, and counts its passes in sections."""
     begun = model.training.continues
     for key, mine, of_start in (
-        ("dataset", model.dataset, start.dataset),
         ("injury", model.injury, start.injury),
         ("network", model.network.model_dump(), start.network.model_dump()),
         ("training.sections", model.training.sections, start.training.sections),
