@@ -47,6 +47,13 @@ def test_curve_that_rises_falls_or_rests(material: Material) -> None:
     falling = history([1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3])
     assert any("still falling, by 36 %" in head for head in heads(material, history=falling))
     assert heads(material, history=history([0.3] * 8))["Training has settled."] == "good"
+    with_the_rate = {"configuration": {"training": {"schedule": "cosine"}}}
+    for losses in (falling, history([0.3] * 8)):  # a rate at its end leaves nothing to fall
+        found = heads(material, history=losses, resolved=with_the_rate)
+        assert not any("still falling" in head or "settled" in head for head in found)
+    assert "The held-out error was lowest in pass 2 and has risen since." in heads(
+        material, history=rising, resolved=with_the_rate
+    )
     noisy = history([0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.28, 0.32])  # the last section is no trend
     assert heads(material, history=noisy)["Training has settled."] == "good"
 

@@ -184,6 +184,9 @@ def _curve(material: Material) -> Iterator[Hint]:
     quarter = max(1, len(losses) // 4)
     before, after = np.mean(losses[-2 * quarter : -quarter]), np.mean(losses[-quarter:])
     fall = 1 - after / before
+    training = (material.resolved.get("configuration") or {}).get("training") or {}
+    if training.get("schedule", "constant") != "constant":
+        return  # it fell with the learning rate, which has come to its end
     if fall > 0.03:
         yield Hint(
             "note",
