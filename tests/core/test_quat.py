@@ -55,6 +55,13 @@ def test_euler_angles_are_intrinsic_and_lead_back(order, angles):
     assert abs(quat.to_euler(q, order)[1]) <= np.pi / 2 + 1e-9
 
 
+@pytest.mark.parametrize("order", ["ZYX", "XYZ", "YZX"])
+@pytest.mark.filterwarnings("error")
+def test_with_the_middle_angle_upright_any_angles_lead_back(order: str) -> None:
+    q = quat.from_euler(np.array([0.4, np.pi / 2, -1.1]), order)
+    assert same(quat.from_euler(quat.to_euler(q, order), order), q, 1e-5)
+
+
 def test_fewer_angles_than_three_are_a_rotation_too():
     q = quat.from_euler(np.array([[0.3, -0.2]]), "ZX")
     expected = Rotation.from_euler("ZX", [[0.3, -0.2]]).as_quat(scalar_first=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -93,7 +95,10 @@ def to_euler(q: ArrayLike, order: str = "ZYX") -> Array:
 
     q = np.asarray(q, float)
     flat = Rotation.from_quat(q.reshape(-1, 4), scalar_first=True)
-    return flat.as_euler(order.upper()).reshape(*q.shape[:-1], 3)
+    with warnings.catch_warnings():
+        # With the middle angle at 90 degrees many triples mean the same rotation, and any of them will do.
+        warnings.filterwarnings("ignore", "Gimbal lock")
+        return flat.as_euler(order.upper()).reshape(*q.shape[:-1], 3)
 
 
 def to_matrix(q: ArrayLike) -> Array:
