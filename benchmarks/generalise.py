@@ -46,7 +46,8 @@ def measured(database: Database, recipe: dict, threads: int) -> str:
         state = train(database, network=network, training=training, checkpoints=Path(folder), threads=threads)
         write_weights(weights, state.network, database, "benchmark", {})
         rolled = measure_roll_outs(weights, files, clips, "benchmark", lengths=LENGTHS)
-    lap = responsivity(load_network(weights), configuration="", runtime={}, laps=1, lap_seconds=400, modes=())
+        character = load_network(weights)
+    lap = responsivity(character, configuration="", runtime={}, laps=1, lap_seconds=400, modes=())
     whole = HeldOut(database, torch.device("cpu"), 0).whole(state.network)[0]
     strayed = " ".join(f"{entry['held_out']['position_error_cm']:5.2f}" for entry in rolled["lengths"])
     laps = f"{lap['waypoints_reached']}/{lap['waypoints']} {lap['laps'][0]['seconds']:4.0f}"
