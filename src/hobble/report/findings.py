@@ -39,13 +39,17 @@ def published(material: Material, what: str) -> dict | None:
     return next((row for row in rows if row["configuration"] == material.name), None)
 
 
+def _recipe(material: Material) -> Mapping[str, Any]:
+    """The training section of the configuration; empty where that is not known."""
+    return (material.resolved.get("configuration") or {}).get("training") or {}
+
+
 def lead(material: Material) -> str:
     """What was trained on what, in a sentence or two."""
-    training = (material.resolved.get("configuration") or {}).get("training") or {}
     clips = [report["clip"] for report in material.motion]
     kept = sum(material.split(clip) == "held_out" for clip in clips)
     frames = sum(report.get("frames", 0) for report in material.motion)
-    passes = training.get("passes")
+    passes = _recipe(material).get("passes")
     network = material.network
     text = (
         f"A phase-functioned network of {len(network['sizes']) - 2} hidden layers and "
@@ -184,8 +188,7 @@ def _curve(material: Material) -> Iterator[Hint]:
     quarter = max(1, len(losses) // 4)
     before, after = np.mean(losses[-2 * quarter : -quarter]), np.mean(losses[-quarter:])
     fall = 1 - after / before
-    training = (material.resolved.get("configuration") or {}).get("training") or {}
-    if training.get("schedule", "constant") != "constant":
+    if _recipe(material).get("schedule", "constant") != "constant":
         return  # it fell with the learning rate, which has come to its end
     if fall > 0.03:
         yield Hint(

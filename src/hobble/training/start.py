@@ -13,7 +13,7 @@ import numba
 import torch
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import load_npz
+from hobble.core.files import Arrays, load_npz
 from hobble.database.manifest import FILE
 from hobble.database.reader import Database
 from hobble.training.checkpoint import State, unpack
@@ -58,19 +58,16 @@ def recipe_hash(
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def run_name(recipe: str, start: Path | None) -> str:
+def run_name(recipe: str, start: Arrays | None) -> str:
     """The recipe, and with it what a run starts from where that was made by another recipe.
 
     A start of the same recipe is where the run itself would have come by.
     """
-    if start is None:
-        return recipe
-    data = load_npz(start)
-    if str(data.get("recipe")) == recipe:
+    if start is None or str(start.get("recipe")) == recipe:
         return recipe
     name = hashlib.sha256(recipe.encode())
     for part in OF_A_START:
-        name.update(data[part].tobytes() if part in data else b"")
+        name.update(start[part].tobytes())
     return name.hexdigest()[:16]
 
 
@@ -78,34 +75,35 @@ def begin(
     database: Database,
     network: Mapping[str, Any],
     training: Mapping[str, Any],
-    name: str,
-    own: Path,
+    recipe: str,
+    checkpoints: Path,
     start: Path | None,
-) -> State:
-    """The run's own checkpoint, else the one it is to start from, else a new network.
+) -> tuple[State, Path]:
+    """The run's own checkpoint, else the one it is to start from, else a new network; and where its own lies.
 
-    name: as of `run_name`. A checkpoint of its own that is past the passes wanted (they were lowered) is left
-    aside. Raises InputError where a checkpoint is damaged or of a network of another shape, and where a start
-    is past the passes wanted or of other sections.
+    A checkpoint of its own that is past the passes wanted (they were lowered) is left aside. Raises
+    InputError where a checkpoint is damaged or of a network of another shape, and where a start is past the
+    passes wanted or of other sections.
     """
+    begun = None if start is None else load_npz(start)
     state = fresh(database, network, training)
-    state.recipe = name
+    state.recipe = run_name(recipe, begun)
+    own = checkpoints / state.recipe / "checkpoint.npz"
     goal = training["passes"] * training["sections"]
     if own.exists():
         data = load_npz(own)
         if int(data.get("sections", 0)) <= goal:
             unpack(data, state, own)
             log.info("going on from %s, after section %d of %d", own, state.sections, goal)
-            return state
+            return state, own
         log.warning("%s is past %d passes; starting anew", own, training["passes"])
-    if start is not None:
-        data = load_npz(start)
-        unpack(data, state, start)
+    if start is not None and begun is not None:
+        unpack(begun, state, start)
         _check_start(state, training, start)
-        if str(data.get("recipe")) != name:
+        if state.recipe != recipe:
             log.warning("%s was made with other settings, data or code; going on from it all the same", start)
         log.info("going on from %s, after section %d of %d", start, state.sections, goal)
-    return state
+    return state, own
 
 
 def _check_start(state: State, training: Mapping[str, Any], path: Path) -> None:

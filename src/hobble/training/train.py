@@ -20,7 +20,7 @@ from hobble.training.held_out import HeldOut
 from hobble.training.history import duration
 from hobble.training.rollout import RollOut
 from hobble.training.schedule import share
-from hobble.training.start import begin, recipe_hash, run_name, step_for, use_threads
+from hobble.training.start import begin, recipe_hash, step_for, use_threads
 from hobble.training.update import update_for
 
 log = logging.getLogger("hobble.training")
@@ -49,9 +49,8 @@ def train(
     pairs, sections = database.pairs(TRAIN), training["sections"]
     if pairs < sections:
         raise HobbleError(f"{pairs} samples to train on are fewer than training.sections, {sections}")
-    name = run_name(recipe_hash(network, training, database, code), start)
-    path = Path(checkpoints) / name / "checkpoint.npz"
-    state = begin(database, network, training, name, path, start)
+    recipe = recipe_hash(network, training, database, code)
+    state, path = begin(database, network, training, recipe, Path(checkpoints), start)
     with Saver(path) as saver:
         _run(state, database, training, saver)
     return state
