@@ -32,12 +32,12 @@ GAIN: dict[str, float] = {"pelvis": 1.6, "hip": 1.9, "thigh": 1.25, "shank": 1.0
 # movement of trunk and head in themselves. forward, side, list, nod: degrees, of the trunk forward and to the
 # hurt side, of the pelvis up on the hurt side while that leg swings, of the head forward.
 OWN: dict[str, dict[str, float]] = {
-    "pelvis": {"speed": 0.74, "push": 0.65, "back": 0.6, "lift": 0.8, "list": 2.0},
-    "hip": {"speed": 0.66, "push": 0.6, "lift": 0.75, "forward": 2.0, "out": 0.02},
-    "thigh": {"speed": 0.62, "push": 0.2, "lift": 0.1, "out": 0.07, "strike": 0.4, "list": 5.0},
-    "shank": {"speed": 0.62, "push": 0.05, "lift": 0.08, "strike": 0.0, "crouch": 10.0, "toe_out": 4.0},
-    "foot": {"speed": 0.66, "push": 0.05, "lift": 0.85, "strike": 0.9, "toe_out": 14.0},
-    "back": {"speed": 0.68, "push": 0.6, "push_sound": 0.6, "forward": 13.0, "back": 0.3, "arms": 0.4, "nod": -5.0},
+    "pelvis": {"speed": 0.74, "stride": 1.15, "push": 0.65, "back": 0.6, "lift": 0.8, "list": 2.0},
+    "hip": {"speed": 0.66, "stride": 1.2, "push": 0.6, "lift": 0.75, "forward": 2.0, "out": 0.02},
+    "thigh": {"speed": 0.62, "stride": 1.04, "push": 0.3, "lift": 0.1, "out": 0.07, "strike": 0.4, "list": 5.0},
+    "shank": {"speed": 0.62, "stride": 1.02, "push": 0.25, "lift": 0.08, "strike": 0.0, "crouch": 10.0, "toe_out": 4.0},
+    "foot": {"speed": 0.66, "stride": 1.03, "push": 0.3, "lift": 0.7, "strike": 0.9, "toe_out": 14.0},
+    "back": {"speed": 0.68, "push": 0.6, "push_sound": 0.6, "stride": 1.12, "forward": 17.0, "back": 0.3, "arms": 0.4, "nod": -5.0},
     "neck": {"speed": 0.85, "head": 0.25, "back": 0.6, "forward": 3.0, "nod": 8.0, "arms": 0.6},
     "shoulder": {"speed": 0.88, "side": 2.5, "forward": 2.0, "back": 0.8},
     "upper arm": {"speed": 0.88, "side": 2.0, "forward": 3.0},
@@ -80,7 +80,7 @@ def _of_people(part: str, mix: dict[str, float], own: dict[str, float]) -> tuple
         # A back that hurts is no side's: people's lurch, its size halved on either side, without its lean.
         return {"stride": mean("stride") ** 0.5, **own}, {"curves": np.zeros_like(curves)}
     speed = own["speed"]
-    slower = speed * mean("stride")  # of the length of a stride
+    slower = speed * own.get("stride", mean("stride"))  # of the length of a stride
     step = STEP.get(part, mean("step_hurt"))
     return {**ratios, **own}, {
         "curves": curves,

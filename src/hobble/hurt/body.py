@@ -15,6 +15,7 @@ from hobble.hurt.people import HARMONICS
 from hobble.hurt.source import Source
 
 X, Y, Z = np.eye(3)
+PELVIS = 0.35  # share of the trunk's lean that the pelvis tilts
 MEAN = 0.5  # seconds, of the Gaussian that leaves of a joint's turns its mean posture
 LOOK = {"neck": 0.5, "head": 0.85}  # share of the trunk's lean that neck and head take back
 MOST_GUARD = 0.93  # of an arm's own movement that holding it takes away
@@ -101,7 +102,7 @@ def _turns(source: Source, effects: Effects) -> tuple[Array, Array, Array]:
     forward = forward + effects.whole["forward"]
     left = left + side[:, LEFT] - side[:, RIGHT]
     left_up = left_up + hike[:, LEFT] - hike[:, RIGHT]
-    pelvis = _lean(source, turn, left_up * 1.0, 0.3 * forward)
+    pelvis = _lean(source, turn, left_up, PELVIS * forward)
     chest = _lean(source, shoulders, -left, forward)
     calm = 1 - LOOK["head"]
     head = _lean(source, calm * shoulders, -calm * left, calm * forward + effects.whole["nod"])

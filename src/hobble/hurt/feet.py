@@ -21,6 +21,7 @@ LEVEL = np.radians(8.0)  # of pitch over which the foot's pivot goes from the an
 SHORT = 12.0  # cm: a swing that goes less far is shared out by its time, not by its way
 CLEARANCE = 1.3  # cm of a swinging toe joint over its height in stance, or as little as in the source
 EVEN = 4.0  # cm of height between two stances that leaves the swing as high as it was
+JOGGING = 0.65  # share of what steps differ that a jog does not take on
 ENDS = 0.3  # share of the swing over which its lower height sets in and goes
 
 
@@ -132,7 +133,7 @@ def _moved(place: Array, when: float, source: Source, effects: Effects, path: Pa
     frames = np.arange(len(source))
     at = min(int(round(when)), len(source) - 1)
     speed = np.gradient(source.path, axis=0)[at] if len(source) > 1 else np.zeros(2)
-    step = effects.sided["step"]
+    step = effects.sided["step"] * (1 - JOGGING * source.jog)[:, None]
     ahead = np.interp(when, frames, step[:, side] - step[:, 1 - side]) / 2 * speed * source.cycle[at] / 2
     width = np.interp(when, frames, effects.sided["width"].max(axis=1)) * source.leg / 2
     outward = quat.rotate(source.heading[at], np.array([SIGN[side] * width, 0.0, 0.0]))

@@ -22,13 +22,13 @@ STRETCH = (0.985, 0.9985)  # of the leg's length: never held below, never above
 
 @dataclass(frozen=True)
 class Leg:
-    """What the source's leg does, over F frames. reach: (F,) cm from hip to ankle. knee: (F, 3) where the knee
-    points, in the pelvis's frame. thigh, shank: (F, 4) in the pelvis's frame; upper, lower: bone lengths."""
+    """What the source's leg does, over F frames. reach: (F,) cm from hip to ankle. thigh, shank: (F, 4)
+    and hinge: (F, 3), the axis about which the knee bends, in the pelvis's frame. upper, lower: bone lengths."""
 
     reach: Array = field(repr=False)
     thigh: Array = field(repr=False)
     shank: Array = field(repr=False)
-    points: Array = field(repr=False)
+    hinge: Array = field(repr=False)
     upper: float
     lower: float
 
@@ -63,7 +63,7 @@ def read_leg(clip: Clip, side: int) -> Leg:
         reach,
         quat.mul(pelvis, thigh),
         quat.mul(pelvis, clip.global_rotations[:, knee]),
-        quat.rotate(pelvis, points),
+        quat.rotate(pelvis, np.cross(points, unit)),
         upper,
         lower,
     )
@@ -117,20 +117,20 @@ def place_leg(
     """
     bones = [skeleton.offsets[skeleton.role(f"{SIDES[side]}_{r}")] for r in ("knee", "heel")]
     thigh, shank = (quat.mul(pelvis, turns_at(own, when)) for own in (leg.thigh, leg.shank))
-    points = quat.rotate(pelvis, at_frames(leg.points, when))
-    knee, end = two_bone_knee(hip, ankle, points, leg.upper, leg.lower)
-    return _turned(thigh, points, bones[0], knee - hip), _turned(shank, points, bones[1], end - knee)
+    hinge = quat.rotate(pelvis, at_frames(leg.hinge, when))
+    knee, end = two_bone_knee(hip, ankle, np.cross(ankle - hip, hinge), leg.upper, leg.lower)
+    return _turned(thigh, hinge, bones[0], knee - hip), _turned(shank, hinge, bones[1], end - knee)
 
 
-def _turned(world: Array, points: Array, bone: Array, along: Array) -> Array:
-    """World rotations (N, 4) turned so that the local `bone` lies `along`, the knee's direction kept."""
-    turn = quat.from_matrix(_frame(along, points) @ np.swapaxes(_frame(quat.rotate(world, bone), points), -1, -2))
-    return quat.mul(turn, world)
+def _turned(world: Array, hinge: Array, bone: Array, along: Array) -> Array:
+    """World rotations (N, 4) turned so that the local `bone` lies `along`, the knee's axis kept."""
+    turn = _frame(along, hinge) @ np.swapaxes(_frame(quat.rotate(world, bone), hinge), -1, -2)
+    return quat.mul(quat.from_matrix(turn), world)
 
 
-def _frame(along: Array, points: Array) -> Array:
-    """(N, 3, 3) columns: along a bone, where the knee points across it, and the hinge."""
+def _frame(along: Array, hinge: Array) -> Array:
+    """(N, 3, 3) columns: the hinge as far as it is across a bone, along the bone, and across both."""
     y = along / np.linalg.norm(along, axis=-1, keepdims=True)
-    z = points - y * np.sum(points * y, axis=-1, keepdims=True)
-    z = z / np.maximum(np.linalg.norm(z, axis=-1, keepdims=True), 1e-9)
-    return np.stack([np.cross(y, z), y, z], axis=-1)
+    x = hinge - y * np.sum(hinge * y, axis=-1, keepdims=True)
+    x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-9)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
