@@ -62,6 +62,7 @@ def test_no_job_depends_on_the_configuration_models(root: Path) -> None:
 
 def test_no_stage_imports_from_below(root: Path) -> None:
     order = [*OF_DATASET, "training", "runtime", "evaluation", "report"]
+    order[order.index("injury")] = "channels"  # injury's folder is one of channels/
     for rank, stage in enumerate(order):
         for module in (root / "src/hobble" / stage).rglob("*.py"):
             for path in fp._imports(module, root / "src"):

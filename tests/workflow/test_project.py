@@ -432,6 +432,6 @@ def test_a_mocap_folder_that_is_none_is_told(base: Path, asked: object) -> None:
 
 def test_sections_may_be_asked_for_some_of_their_keys(root: Path) -> None:
     project = Project(root, {})
-    assert project.datasets.options("tiny", "database", "window", "step") == {"window": 120, "step": 10}
+    assert project.datasets.options("tiny", "database", "window", "step") == {"window": 60, "step": 10}
     with pytest.raises(KeyError):
         project.configurations.section("test", "training", "passes", "learning_rat")

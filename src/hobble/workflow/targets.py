@@ -80,7 +80,7 @@ def _entry(where: str, entry: ClipEntry, links: Sequence[str]) -> None:
     """What a clip's entry names: links that there are, severities from 0 to 10, what the walker can do."""
     # Imported where there is something to check: they bring numpy, which takes longer than all else here.
     if entry.status is not None:
-        from hobble.injury.status import parse_links
+        from hobble.channels.injury.status import parse_links
 
         parse_links(entry.status, links, f"{where}.status")
     if entry.injured is not None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
-from hobble.injury.status import Spell, Status, format_status, read_status, write_status
+from hobble.channels.injury.status import Spell, Status, format_status, read_status, write_status
 
 LINKS = ("Hips-LHipJoint", "LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg", "LeftShoulder-LeftArm")
 
