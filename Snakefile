@@ -29,6 +29,10 @@ package = project.package
 demands = Demands(project)
 
 
+# A clip that a data set lists or its folder holds: no mirror, no hurt version.
+OWN = r"[^/]+(?<!_mirror)(?<!_hurt[1-9])"
+
+
 wildcard_constraints:
     configuration="|".join(catalogue.names()),
     dataset=r"[^/]+",
@@ -54,6 +58,7 @@ include: "workflow/rules/synthetic.smk"
 include: "workflow/rules/motion.smk"
 include: "workflow/rules/labels.smk"
 include: "workflow/rules/injury.smk"
+include: "workflow/rules/hurt.smk"
 include: "workflow/rules/terrain.smk"
 include: "workflow/rules/database.smk"
 include: "workflow/rules/training.smk"

@@ -126,10 +126,12 @@ def _guard(source: Source, effects: Effects, world: Array, side: int) -> None:
     held = MOST_GUARD * np.max(list(weights.values()), axis=0)
     if not held.any():
         return
-    total = np.maximum(np.sum(list(weights.values()), axis=0), 1e-9)
+    total = np.sum(list(weights.values()), axis=0)
+    weights["carry"] = np.where(total > 1e-9, weights["carry"], 1.0)  # a direction where nothing is held, too
+    total = np.maximum(total, 1e-9) + (total <= 1e-9)
     sign = np.array([1.0 if side == LEFT else -1.0, 1.0, 1.0])
     shoulder, elbow, wrist = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("shoulder", "elbow", "wrist"))
-    for bone, (joint, end, stop) in enumerate(((shoulder, elbow, elbow), (elbow, wrist, None))):
+    for bone, (joint, end) in enumerate(((shoulder, elbow), (elbow, wrist))):
         goal = np.zeros((len(source), 3))
         for name, dirs in GUARDS.items():
             ahead, out, up = dirs[bone]

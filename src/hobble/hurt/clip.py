@@ -37,18 +37,27 @@ class HurtClip:
 
 
 def hurt_clip(
-    clip: Clip, labels: Labels, severity: Array, name: str | None = None, flat: bool = True, zero: str = "right", margins: str = "extend"
+    clip: Clip,
+    labels: Labels,
+    severity: Array,
+    name: str | None = None,
+    flat: bool = True,
+    zero: str = "right",
+    margins: str = "extend",
 ) -> HurtClip:
     """The clip as it would have been walked with these severities (F, L), 0 to 10, of the skeleton's links.
 
     It takes longer where the cadence falls; its path keeps its shape and is shortened where steps are. Where
-    nothing hurts at all the clip comes back as it is. labels: of the clip. flat: whether its ground is flat; on
-    other ground rises shrink with the steps. zero, margins: as in the section `labels`.
-    Raises HobbleError for severities of another shape or range, and for joints that are moved, not turned.
+    nothing hurts at all the clip comes back as it is. labels: of the clip. flat: whether its ground is flat;
+    on other ground rises shrink with the steps. zero, margins: as in the section `labels`. Raises HobbleError
+    for severities of another shape or range, and for joints that are moved, not turned.
     """
     severity = np.asarray(severity, float)
     if severity.shape != (len(clip), len(clip.skeleton.links)):
-        raise HobbleError(f"clip {clip.name}: severities {severity.shape} for {len(clip)} frames of {len(clip.skeleton.links)} links")
+        raise HobbleError(
+            f"clip {clip.name}: severities {severity.shape} for {len(clip)} frames and "
+            f"{len(clip.skeleton.links)} links"
+        )
     if not np.isfinite(severity).all() or severity.min(initial=0) < 0 or severity.max(initial=0) > HIGHEST:
         raise HobbleError(f"clip {clip.name}: a severity is not in 0..10")
     name = clip.name if name is None else name
@@ -72,27 +81,38 @@ def _ground(source: Source, feet: list[Foot]) -> Array:
     heights = []
     for side in (LEFT, RIGHT):
         stances = source.stances[side]
-        heights.append([(s.middle, float(p[1])) for s, p in zip(stances, places(feet[side], stances), strict=True)])
+        heights.append(
+            [(s.middle, float(p[1])) for s, p in zip(stances, places(feet[side], stances), strict=True)]
+        )
     return ground_below(source, heights)
 
 
-def _assembled(source: Source, changes: Effects, timing: Timing, path: Path, feet: list[Foot], name: str) -> Clip:
+def _assembled(
+    source: Source, changes: Effects, timing: Timing, path: Path, feet: list[Foot], name: str
+) -> Clip:
     """Body, hips and legs at the new frames."""
     clip, skeleton = source.clip, source.clip.skeleton
     world = turns_at(change_body(source, changes), timing.body)
-    shift = np.stack([path.new[:, 0] - path.old[:, 0], path.new_ground - path.old_ground, path.new[:, 1] - path.old[:, 1]], axis=1)
+    shift = np.stack(
+        [path.new[:, 0] - path.old[:, 0], path.new_ground - path.old_ground, path.new[:, 1] - path.old[:, 1]],
+        axis=1,
+    )
     root = at_frames(clip.root + shift, timing.body)
     legs = [read_leg(clip, side) for side in (LEFT, RIGHT)]
     pelvis = world[:, skeleton.role("hips")]
     hips = [_from_root(source, world, side) for side in (LEFT, RIGHT)]
     ankles = [at_frames(feet[side].ankle, timing.legs[:, side]) for side in (LEFT, RIGHT)]
-    stands = [at_frames(gaussian(1.0 - source.up[:, side], 2.0), timing.legs[:, side]) for side in (LEFT, RIGHT)]
+    stands = [
+        at_frames(gaussian(1.0 - source.up[:, side], 2.0), timing.legs[:, side]) for side in (LEFT, RIGHT)
+    ]
     reaches = [_reach(legs[side], changes, source, timing, side) for side in (LEFT, RIGHT)]
     root[:, 1] = hips_height(root, hips, ankles, reaches, stands, [leg.longest for leg in legs])
     for side in (LEFT, RIGHT):
         thigh, knee, heel, toe = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("hip", "knee", "heel", "toe"))
         when = timing.legs[:, side]
-        world[:, thigh], world[:, knee] = place_leg(skeleton, side, legs[side], when, pelvis, root + hips[side], ankles[side])
+        world[:, thigh], world[:, knee] = place_leg(
+            skeleton, side, legs[side], when, pelvis, root + hips[side], ankles[side]
+        )
         world[:, heel] = turns_at(feet[side].turn, when)
         world[:, toe] = quat.mul(world[:, heel], turns_at(feet[side].toes, when))
     return Clip(name, skeleton, clip.fps, local_rotations(skeleton, world), root)
@@ -109,7 +129,9 @@ def _from_root(source: Source, world: Array, side: int) -> Array:
 
 
 def _reach(leg: Leg, changes: Effects, source: Source, timing: Timing, side: int) -> Array:
-    """(N,) cm from hip to ankle that the leg has while it stands, its knee bent as much more as it is spared."""
+    """(N,) cm from hip to ankle of a leg that stands, its knee bent more where it is spared."""
     crouch = np.radians(changes.sided["crouch"][:, side]) * (1 - source.swing[:, side])
     bent = knee_flexion(leg.reach, leg.upper, leg.lower) + crouch
-    return at_frames(np.where(crouch > 0, reach_of(bent, leg.upper, leg.lower), leg.reach), timing.legs[:, side])
+    return at_frames(
+        np.where(crouch > 0, reach_of(bent, leg.upper, leg.lower), leg.reach), timing.legs[:, side]
+    )

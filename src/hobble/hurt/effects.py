@@ -18,7 +18,21 @@ SETTLING = 0.3  # seconds, of the Gaussian over which a change of severity sets 
 TOGETHER = 3.0  # how two injuries add: 1 would be their sum, infinity the worse one
 WHOLE = ("speed", "stride", "back", "head", "forward", "nod")  # of the body, not of a side
 SIDED = (
-    *("land", "off", "step", "push", "lift", "strike", "out", "width", "toe_out", "crouch", "arm", "side", "list"),
+    *(
+        "land",
+        "off",
+        "step",
+        "push",
+        "lift",
+        "strike",
+        "out",
+        "width",
+        "toe_out",
+        "crouch",
+        "arm",
+        "side",
+        "list",
+    ),
     *("upper", "fore", "carry"),
 )
 OTHER = "_sound"
@@ -31,8 +45,8 @@ GUARD = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore", "hand": "
 class Effects:
     """What changes in each of F frames of a clip, in the terms of `hobble.hurt.amounts`.
 
-    whole: (F,) by name. sided: (F, 2), left and right, by name. curves: (F, 5, 5). strength: (F,) of the worst
-    link, 0 to 1.
+    whole: (F,) by name. sided: (F, 2), left and right, by name. curves: (F, 5, 5). strength: (F,) of the
+    worst link, 0 to 1.
     """
 
     whole: dict[str, Array] = field(repr=False)
@@ -48,7 +62,8 @@ class Effects:
 def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
     """The effects of severities (F, L), 0 to 10, of the skeleton's links.
 
-    Where links are hurt together the effect of each kind is at least that of the worst, and less than the sum.
+    Where links are hurt together the effect of each kind is at least that of the worst, and less than the
+    sum.
     """
     frames = len(severity)
     strength = gaussian((np.clip(severity, 0, HIGHEST) / HIGHEST) ** POWER, SETTLING * fps)
@@ -57,9 +72,9 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
     curves = _Sum(np.zeros((frames, 5, 5)))
     parts: dict[tuple[str, int | None], Array] = {}
     for link, column in zip(skeleton.links, strength.T, strict=True):
-        part = part_of_link(skeleton, link)
+        where = part_of_link(skeleton, link)
         # Links of one part, fingers say, hurt it once, as much as the worst.
-        key = (part.name, part.side)
+        key = (where.name, where.side)
         parts[key] = np.maximum(parts.get(key, 0.0), column)
     for (part, side), own in parts.items():
         if not own.any():

@@ -1,7 +1,10 @@
-"""Where each foot goes, on the source's frames: shorter steps, less roll over the toe, a lower or wider swing."""
+"""Where each foot goes, on the source's frames: shorter steps, less roll over the toe, a lower or wider
+swing.
+"""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +20,9 @@ from hobble.hurt.sampling import smoothstep
 from hobble.hurt.source import UP, Source, Stance
 
 SIGN = (1.0, -1.0)  # +X is the figure's left
-LEVEL = np.radians(8.0)  # of pitch over which the foot's pivot goes from the ankle to the toe joint
+LEVEL = np.radians(
+    8.0
+)  # of pitch over which what is left of it goes from the heel strike's share to the push's
 SHORT = 12.0  # cm: a swing that goes less far is shared out by its time, not by its way
 CLEARANCE = 1.3  # cm of a swinging toe joint over its height in stance, or as little as in the source
 EVEN = 4.0  # cm of height between two stances that leaves the swing as high as it was
@@ -27,8 +32,9 @@ ENDS = 0.3  # share of the swing over which its lower height sets in and goes
 
 @dataclass(frozen=True)
 class Foot:
-    """One foot over F source frames. ankle, ball: (F, 3) of heel and toe joint; turn: (F, 4) of the foot in the
-    world; toes: (F, 4) local, of the toe joint."""
+    """One foot over F source frames. ankle, ball: (F, 3) of heel and toe joint; turn: (F, 4) of the foot in
+    the world; toes: (F, 4) local, of the toe joint.
+    """
 
     ankle: Array = field(repr=False)
     ball: Array = field(repr=False)
@@ -37,7 +43,7 @@ class Foot:
 
 
 def rolled_foot(source: Source, effects: Effects, side: int) -> Foot:
-    """The source's foot with less pitch: it turns about its ball while its heel is up, else about its ankle."""
+    """The source's foot with less pitch: turned about its ball while its heel is up, else about its ankle."""
     clip, skeleton = source.clip, source.clip.skeleton
     heel, toe = (skeleton.role(f"{SIDES[side]}_{role}") for role in ("heel", "toe"))
     ankle, ball, turn = clip.positions[:, heel], clip.positions[:, toe], clip.global_rotations[:, heel]
@@ -54,14 +60,14 @@ def rolled_foot(source: Source, effects: Effects, side: int) -> Foot:
     share = strike + (push - strike) * heel_up
     tilt = quat.from_axis_angle(axis, raised * (share - 1))
     new_along = quat.rotate(tilt, along)
-    ankle = ankle + (along - new_along) * heel_up[:, None]
+    ankle = ankle + np.where(raised < 0, 1.0, 0.0)[:, None] * (along - new_along)
     rest = quat.normalize(gaussian(quat.continuous(clip.rotations[:, toe]), 0.5 * clip.fps))
     toes = quat.slerp(rest, clip.rotations[:, toe], share)
     return Foot(ankle, ankle + new_along, quat.mul(tilt, turn), toes)
 
 
 def _hinge(turn: Array, along: Array, stands: np.ndarray) -> Array:
-    """(F, 3) the axis about which the foot is pitched, + toe up: level and across the foot where it stands."""
+    """(F, 3) the axis about which the foot is pitched, + toe up: level and across a standing foot."""
     across = np.cross(along, UP)
     size = np.linalg.norm(across, axis=1)
     own = quat.rotate(quat.inv(turn), across)[stands & (size > 0.3 * np.linalg.norm(along, axis=1))]
@@ -84,7 +90,9 @@ def move_foot(source: Source, effects: Effects, path: Path, foot: Foot, side: in
     """The foot's way where the body takes the new path."""
     stances = source.stances[side]
     old = places(foot, stances)
-    new = [_moved(place, s.middle, source, effects, path, side) for place, s in zip(old, stances, strict=True)]
+    new = [
+        _moved(place, s.middle, source, effects, path, side) for place, s in zip(old, stances, strict=True)
+    ]
     yaw = quat.yaw(np.radians(SIGN[side] * effects.sided["toe_out"][:, side]))
     ankle, least = np.empty_like(foot.ankle), np.empty(len(source))
     ball = source.clip.positions[:, source.clip.skeleton.role(f"{SIDES[side]}_toe"), 1]
@@ -99,7 +107,7 @@ def move_foot(source: Source, effects: Effects, path: Path, foot: Foot, side: in
     lift = effects.ratio("lift")[:, side]
     out = effects.sided["out"][:, side] * source.leg * SIGN[side]
     outward = quat.rotate(source.heading, np.array([1.0, 0.0, 0.0])) * out[:, None]
-    for i, ((_, off), (land, _)) in enumerate(zip(spans, spans[1:], strict=False)):
+    for i, ((_, off), (land, _)) in enumerate(itertools.pairwise(spans)):
         if land - off < 2:
             continue
         part = slice(off, land + 1)
@@ -111,10 +119,10 @@ def move_foot(source: Source, effects: Effects, path: Path, foot: Foot, side: in
         even = np.exp(-abs(foot.ankle[land, 1] - foot.ankle[off, 1]) / EVEN)
         moved[:, 1] -= (1 - lift[part]) * even * edge * (foot.ankle[part, 1] - line[:, 1])
         moved += outward[part] * (np.sin(np.pi * u) ** 2)[:, None]
-        sole = soles[i] + (soles[i + 1] - soles[i]) * way[:, 0]
-        rise = rises[i] + (rises[i + 1] - rises[i]) * way[:, 0]
-        own = ball[part] - sole
-        least[part] = sole + rise + np.minimum(own, CLEARANCE * np.sin(np.pi * u))
+        under = soles[i] + (soles[i + 1] - soles[i]) * way[:, 0]
+        up = rises[i] + (rises[i + 1] - rises[i]) * way[:, 0]
+        own = ball[part] - under
+        least[part] = under + up + np.minimum(own, CLEARANCE * np.sin(np.pi * u))
         ankle[part] = moved
     ankle[:, 1] += smooth_above(np.maximum(least - ankle[:, 1] - along[:, 1], 0.0), 1)
     return Foot(ankle, ankle + along, quat.mul(yaw, foot.turn), foot.toes)
@@ -129,9 +137,9 @@ def _way(ankle: Array) -> Array:
 
 
 def _moved(place: Array, when: float, source: Source, effects: Effects, path: Path, side: int) -> Array:
-    """A footprint in the new world: carried along with the body, the hurt foot's less far ahead, both wider."""
+    """A footprint in the new world: carried along with the body, the hurt one less far ahead, both wider."""
     frames = np.arange(len(source))
-    at = min(int(round(when)), len(source) - 1)
+    at = min(round(when), len(source) - 1)
     speed = np.gradient(source.path, axis=0)[at] if len(source) > 1 else np.zeros(2)
     step = effects.sided["step"] * (1 - JOGGING * source.jog)[:, None]
     ahead = np.interp(when, frames, step[:, side] - step[:, 1 - side]) / 2 * speed * source.cycle[at] / 2

@@ -1,4 +1,4 @@
-"""The hips' height and the legs: hips so high that the standing leg keeps its bend, feet placed by two bones."""
+"""The hips' height, so that the standing leg keeps its bend, and legs that put the feet in their places."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ STRETCH = (0.985, 0.9985)  # of the leg's length: never held below, never above
 
 @dataclass(frozen=True)
 class Leg:
-    """What the source's leg does, over F frames. reach: (F,) cm from hip to ankle. thigh, shank: (F, 4)
-    and hinge: (F, 3), the axis about which the knee bends, in the pelvis's frame. upper, lower: bone lengths."""
+    """What the source's leg does, over F frames. reach: (F,) cm from hip to ankle. thigh, shank: (F, 4) and
+    hinge: (F, 3), the axis about which the knee bends, in the pelvis's frame. upper, lower: bone lengths.
+    """
 
     reach: Array = field(repr=False)
     thigh: Array = field(repr=False)
@@ -40,7 +41,7 @@ class Leg:
 
 
 def read_leg(clip: Clip, side: int) -> Leg:
-    """The source's leg; where it is nearly straight, its knee points where the thigh has it at other times."""
+    """The source's leg; where it is nearly straight, its knee points where the thigh usually has it."""
     skeleton = clip.skeleton
     hip, knee, heel = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("hip", "knee", "heel"))
     at = clip.positions
@@ -87,10 +88,16 @@ def reach_of(flexion: Array, upper: float, lower: float) -> Array:
 
 
 def hips_height(
-    root: Array, hips: list[Array], ankles: list[Array], reaches: list[Array], stands: list[Array], longest: list[float]
+    root: Array,
+    hips: list[Array],
+    ankles: list[Array],
+    reaches: list[Array],
+    stands: list[Array],
+    longest: list[float],
 ) -> Array:
-    """(N,) heights of the root. root: (N, 3) as it would be. hips: (N, 3) of each leg from the root. ankles: (N, 3).
-    reaches: (N,) cm that hip and ankle of a standing leg should be apart. stands: (N,) 0 to 1."""
+    """(N,) heights of the root. root: (N, 3) as it would be. hips: (N, 3) of each leg from the root. ankles:
+    (N, 3). reaches: (N,) cm that hip and ankle of a standing leg should be apart. stands: (N,) 0 to 1.
+    """
     needed = np.zeros(len(root))
     weight = np.full(len(root), 1e-9)
     for hip, ankle, reach, stand in zip(hips, ankles, reaches, stands, strict=True):

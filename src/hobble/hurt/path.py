@@ -16,8 +16,9 @@ SLOPE = 0.3  # seconds, of the Gaussian over the heights of the ground under the
 
 @dataclass(frozen=True)
 class Path:
-    """Old and new level path (F, 2) and height of the ground (F,) at each source frame. The ground of a clip on
-    flat ground is 0 and stays so; on other ground its rises shrink as the way does, so that slopes stay."""
+    """Old and new level path (F, 2) and height of the ground (F,) at each source frame. The ground of a clip
+    on flat ground is 0 and stays so; on other ground its rises shrink as the way does, so that slopes stay.
+    """
 
     old: Array = field(repr=False)
     new: Array = field(repr=False)
@@ -28,7 +29,9 @@ class Path:
         """(3,) a point of the old world that belongs to source frame `when`, in the new world."""
         frames = np.arange(len(self.old))
         shift = [np.interp(when, frames, self.new[:, i] - self.old[:, i]) for i in (0, 1)]
-        return point + np.array([shift[0], np.interp(when, frames, self.new_ground - self.old_ground), shift[1]])
+        return point + np.array(
+            [shift[0], np.interp(when, frames, self.new_ground - self.old_ground), shift[1]]
+        )
 
 
 def shorten(source: Source, effects: Effects, slower: Array, ground: Array | None) -> Path:
@@ -47,7 +50,8 @@ def shorten(source: Source, effects: Effects, slower: Array, ground: Array | Non
 
 
 def ground_below(source: Source, heights: list[list[tuple[float, float]]]) -> Array:
-    """(F,) cm, the ground below the body by the feet that stand; heights: (middle, height) of each foot's stances.
+    """(F,) cm, the ground below the body by the feet that stand; heights: (middle, height) of each foot's
+    stances.
 
     Each foot's height is counted from its median, so that legs of two lengths make no waves.
     """

@@ -1,8 +1,8 @@
 """What real impaired walks differ in from the same people's normal walk: the profiles beside this module.
 
-`people.json` was derived, by `python -m hobble.hurt IMPAIRED_WALKS.npz`, from the recordings of Jun et al. 2020
-("Pathological gait classification using Kinect v2 and gated recurrent neural networks", IEEE Access 8): ten
-people, each walking normally and with five impairments of the right leg. Only means over people are kept.
+`people.json` was derived, by `python -m hobble.hurt IMPAIRED_WALKS.npz`, from the recordings of Jun et al.
+2020 ("Pathological gait classification using Kinect v2 and gated recurrent neural networks", IEEE Access 8):
+ten people, each walking normally and with five impairments of the right leg. Only means over people are kept.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ FILE = Path(__file__).with_name("people.json")
 CURVES = ("trunk_forward", "trunk_left", "pelvis_left_up", "pelvis_turn_left", "shoulders_turn_left")
 HARMONICS = 2
 NORMAL = "normal"
-SOURCE = "Jun et al. 2020, IEEE Access 8: ten people, five imitated impairments of the right leg; means over people"
+SOURCE = "Jun et al. 2020, IEEE Access 8: means over ten people who imitated impairments of the right leg"
 
 
 @dataclass(frozen=True)
 class Profile:
     """An impairment of the right leg, relative to the same people's normal walk.
 
-    speed, stride, step_hurt, step_sound, knee, arm_hurt, arm_sound: ratios, of the speed, the stride's time, the
-    step onto either foot, the range of the hurt knee, the swing of the arms. strike: cycles by which the sound
-    foot lands later. stance_hurt, stance_sound: cycles by which a stance is longer. width: leg lengths by which
-    steps are wider. curves: for each of CURVES degrees as a mean and, per harmonic of the cycle from the hurt
-    foot's landing, the factors of cosine and sine; half a cycle on, the sound foot lands.
+    speed, stride, step_hurt, step_sound, knee, arm_hurt, arm_sound: ratios, of the speed, the stride's time,
+    the step onto either foot, the range of the hurt knee, the swing of the arms. strike: cycles by which the
+    sound foot lands later. stance_hurt, stance_sound: cycles by which a stance is longer. width: leg lengths
+    by which steps are wider. curves: for each of CURVES degrees as a mean and, per harmonic of the cycle from
+    the hurt foot's landing, the factors of cosine and sine; half a cycle on, the sound foot lands.
     """
 
     speed: float
@@ -62,12 +62,14 @@ def profiles() -> dict[str, Profile]:
 def derive(walks: str | Path, path: str | Path = FILE) -> None:
     """Write the profiles of a file of impaired walks.
 
-    walks: npz with `gaits`, `curves` and `scalars` (names), `curve` (gaits, people, curves, 50) over a cycle from
-    the right landing, and `scalar` (gaits, people, scalars). Raises InputError where one is missing.
+    walks: npz with `gaits`, `curves` and `scalars` (names), `curve` (gaits, people, curves, 50) over a cycle
+    from the right landing, and `scalar` (gaits, people, scalars). Raises InputError where one is missing.
     """
     data = load_npz(walks)
     gaits = [str(name) for name in data["gaits"]]
-    own = {gait: asdict(_profile(data, i, gaits.index(NORMAL))) for i, gait in enumerate(gaits) if gait != NORMAL}
+    own = {
+        gait: asdict(_profile(data, i, gaits.index(NORMAL))) for i, gait in enumerate(gaits) if gait != NORMAL
+    }
     for profile in own.values():
         for name, value in profile.items():
             profile[name] = _rounded(value)
@@ -101,7 +103,10 @@ def _profile(data: Any, gait: int, normal: int) -> Profile:
         arm_hurt=swing("arm_forward_R"),
         arm_sound=swing("arm_forward_L"),
         curves={
-            name: _harmonics(curves[name][gait], strike[gait]) - _harmonics(curves[name][normal], strike[normal])
+            name: list(
+                _harmonics(curves[name][gait], strike[gait])
+                - _harmonics(curves[name][normal], strike[normal])
+            )
             for name in CURVES
         },
     )

@@ -1,4 +1,6 @@
-"""When everything happens: how the hurt clip's frames look back at the source's, for the body and for each leg."""
+"""When everything happens: how the hurt clip's frames look back at the source's, for the body and for each
+leg.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,7 @@ def retime(source: Source, effects: Effects) -> Timing:
     stride = np.exp(effects.whole["stride"] * (1 - (1 - JOG_STRIDE) * source.jog))
     begins = np.concatenate([[0.0], np.cumsum((stride[1:] + stride[:-1]) / 2)])
     unit = source.cycle * stride
-    new = np.arange(int(begins[-1] + 1e-6) + 1)
+    new = np.arange(int(begins[-1] + 1e-6) + 1, dtype=float)
     legs = []
     landings: list[tuple[float, float]] = []
     for side in (LEFT, RIGHT):
