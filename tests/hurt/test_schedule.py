@@ -1,4 +1,4 @@
-"""What hurts when: every link in a clip that is trained on, the same whenever it is asked, within the options."""
+"""What hurts when: every link in a clip that is trained on, always the same, within the options."""
 
 from __future__ import annotations
 
