@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 from hobble.core.errors import HobbleError
+from hobble.workflow import lifetime
 from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
 from hobble.workflow.project import Project
@@ -19,6 +20,9 @@ try:
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 
+lifetime.announce()
+lifetime.clear_stale_lock()
+
 # What the rules ask; each part is a module of hobble.workflow.
 catalogue = project.catalogue
 clips = project.clips
@@ -27,6 +31,12 @@ configurations = project.configurations
 comparison = project.comparison
 package = project.package
 demands = Demands(project)
+
+
+onstart:
+    if workflow.is_main_process:
+        lifetime.own_lock()
+        lifetime.end_jobs_with_run()
 
 
 wildcard_constraints:

@@ -49,7 +49,8 @@ def _following(lab: Lab, jobs: list[Job]) -> set[str]:
 def _start(lab: Lab, folder: Path, said: Path) -> subprocess.Popen[bytes]:
     with open(said, "wb") as out:
         return subprocess.Popen(
-            lab.command(folder, "-c2", *lab.targets),
+            lab.command("-c2", *lab.targets),
+            cwd=folder,
             env=lab.environment(),
             stdout=out,
             stderr=subprocess.STDOUT,
@@ -95,13 +96,6 @@ def kill_run(lab: Lab, rng: Random) -> Throw:
             return _rerun(lab, folder, what, at, UNHARMED)
         if victim == "a job" and (wrong := _unsaid(process.returncode, said.read_text(errors="replace"))):
             return Throw(what, at, FAULT, wrong)
-        if victim != "a job":
-            again = lab.snakemake(folder, "-c2", *lab.targets)
-            if again.status == 0 and "Nothing to be done" not in again.said and LOCKED not in again.said:
-                pass  # it was killed before it had taken the lock
-            elif again.status and LOCKED not in again.said:
-                return Throw(what, at, FAULT, f"neither done nor locked: {again.said[-1500:]}")
-            lab.snakemake(folder, "--unlock", *lab.targets)
         return _rerun(lab, folder, what, at, REMADE)
 
 

@@ -24,7 +24,7 @@ def demands(root: Path) -> Demands:
 
 
 def profile(root: Path, name: str) -> dict:
-    return yaml.safe_load((root / f"workflow/profiles/{name}/config.v9+.yaml").read_text())
+    return yaml.safe_load((root / f"profiles/{name}/config.v9+.yaml").read_text())
 
 
 def bvh(path: Path, rows: int, promised: int, frame_time: str = "0.01") -> Path:

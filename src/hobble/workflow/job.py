@@ -12,6 +12,7 @@ from typing import Any
 
 from hobble.core.errors import HobbleError
 from hobble.workflow import checksums
+from hobble.workflow.lifetime import ends_with_run
 from hobble.workflow.usage import peak_memory_mb
 
 BUG = "This is a fault of Hobble, not of your data; please report it with the log."
@@ -41,11 +42,12 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
     inputs, outputs = getattr(snakemake, "input", ()), getattr(snakemake, "output", ())
     try:
         checksums.forget(outputs)
-        before = checksums.stamps(inputs)
-        checksums.verify(inputs)
-        yield logger
-        checksums.check_unchanged(before)
-        checksums.record(outputs)
+        with ends_with_run():
+            before = checksums.stamps(inputs)
+            checksums.verify(inputs)
+            yield logger
+            checksums.check_unchanged(before)
+            checksums.record(outputs)
         logger.info("took %.0f MB of memory at most", peak_memory_mb())
     except HobbleError as error:
         logger.error("%s", error)
