@@ -64,7 +64,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush a folder to disk, so that a rename in it outlasts a loss of power; not where it cannot be done."""
+    """Flush a folder to disk where that can be done, so that a rename in it outlasts a loss of power."""
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:

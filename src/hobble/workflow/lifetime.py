@@ -66,7 +66,7 @@ def clear_stale_lock(locks: Path = LOCKS) -> bool:
 
 
 def end_jobs_with_run() -> None:
-    """On SIGINT or SIGTERM end the jobs that run, and then Snakemake as it ends by Ctrl-C: with no lock left."""
+    """On SIGINT or SIGTERM end the jobs that run, and then Snakemake as by Ctrl-C: with no lock left."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)
 
@@ -79,7 +79,7 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 
 def end_below(pid: int, grace: float = GRACE) -> None:
-    """End every process below one: SIGTERM, and SIGKILL for those that are still there after `grace` seconds."""
+    """End every process below one: SIGTERM, and SIGKILL for those still there after `grace` seconds."""
     import psutil  # which Snakemake needs too; it takes longer to import than all of a job's frame
 
     with contextlib.suppress(psutil.NoSuchProcess):
@@ -105,7 +105,7 @@ def _runs(process: Any) -> bool:
 
 @contextlib.contextmanager
 def ends_with_run() -> Iterator[None]:
-    """While it lasts, this job ends tidily on SIGINT and SIGTERM, and within a second or two of its run's end."""
+    """While it lasts, this job ends tidily on SIGINT and SIGTERM, and soon after its run."""
     before = {}
     with contextlib.suppress(ValueError):  # not in the main thread, as in a test
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -126,7 +126,7 @@ def _leave(number: int, frame: FrameType | None) -> None:
 
 
 def _watch(run: str, done: threading.Event) -> None:
-    """End this process when its run is no more; compiled code that does not look at signals ends by SIGKILL."""
+    """End this process when its run is no more; by SIGKILL where compiled code lets no signal through."""
     pid, _, began = run.partition(" ")
     while not done.wait(LOOK):
         if not _lives(int(pid), began):
