@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from hobble.core.errors import InputError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.untrusted import read_text
+from hobble.terrain import options
 from hobble.terrain.generate import generate
 
 MOST_CELLS = 1 << 26  # of a map: 8192 squared, half a gigabyte; 322 m a side at 3.9 cm a cell
@@ -42,28 +42,28 @@ class Heightmap:
 
 
 def heightmaps(
-    entries: Sequence[Mapping[str, Any]], files: Sequence[str | Path], *, cell: float, height_scale: float
+    entries: Sequence[options.Heightmap], files: Sequence[str | Path], *, cell: float, height_scale: float
 ) -> list[Heightmap]:
     """The heightmaps that a data set lists.
 
-    entries: `kind`, `seed`, and `cell` and `height_scale` where they differ from the general ones. files:
-    those of the entries of kind `file`, in their order. cell: cm a cell. height_scale: what the heights of
-    files are multiplied by to make them cm. Raises InputError for a file that cannot be used.
+    entries: with `cell` and `height_scale` where they differ from the general ones. files: those of the
+    entries of kind `file`, in their order. cell: cm a cell. height_scale: what the heights of files are
+    multiplied by to make them cm. Raises InputError for a file that cannot be used.
     """
     given = iter(files)
     out = []
     for entry in entries:
-        width = entry.get("cell") or cell
-        scale = entry.get("height_scale")
-        if entry["kind"] == "file":
+        width = entry.cell or cell
+        scale = entry.height_scale
+        if entry.kind == "file":
             path = next(given)
             heights = read_heights(path) * (scale or height_scale)
             out.append(Heightmap(str(path), heights, width))
-        elif entry["kind"] == "elevation":
+        elif entry.kind == "elevation":
             out.append(Heightmap("elevation", elevation(width) * (scale or 1.0), width))
         else:
-            name = f"{entry['kind']} (seed {entry['seed']})"
-            heights = generate(entry["kind"], entry["seed"], width) * (scale or 1.0)
+            name = f"{entry.kind} (seed {entry.seed})"
+            heights = generate(entry.kind, entry.seed, width) * (scale or 1.0)
             out.append(Heightmap(name, heights, width))
     return out
 

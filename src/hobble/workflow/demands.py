@@ -13,6 +13,7 @@ import os
 import re
 from pathlib import Path
 
+from hobble.database.layout import RowLayout
 from hobble.workflow.clips import MIRROR
 from hobble.workflow.project import Project
 
@@ -86,11 +87,20 @@ class Demands:
         return self._frames(dataset, clip.removesuffix(MIRROR)) / 1e3 * self._joints(dataset) / JOINTS
 
     def weights(self, configuration: str) -> float:
-        """Weights of the network, of all its control points, by the sizes of the rows of a figure."""
+        """Weights of the network, of all its control points, by the layout of its rows."""
         network = self.project.configurations.section(configuration, "network")
-        joints = self._joints(self.project.configurations.dataset(configuration))
-        inputs, outputs, units = 156 + 7 * joints, 32 + 9 * joints, network["units"]
-        return network["control_points"] * units * (inputs + (network["hidden_layers"] - 1) * units + outputs)
+        layout, units = self.layout(configuration), network["units"]
+        between = (network["hidden_layers"] - 1) * units
+        return network["control_points"] * units * (layout.x_size + between + layout.y_size)
+
+    def layout(self, configuration: str) -> RowLayout:
+        """The columns of a configuration's rows."""
+        dataset = self.project.configurations.dataset(configuration)
+        model = self.project.catalogue.configuration(configuration)
+        skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(dataset).skeleton)
+        of_rows = self.project.datasets.options(dataset, "database", "window", "step")
+        links = len(skeleton.links) if model.injury else 0
+        return RowLayout(joints=len(skeleton.joints), links=links, **of_rows)
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
     def all_thousands(self, dataset: str) -> float:
