@@ -94,7 +94,7 @@ def test_a_training_ends_soon_after_the_snakemake_that_was_killed(finished, copi
 def test_killed_in_the_merge_the_plain_command_goes_on(finished, copied) -> None:
     shutil.rmtree(copied.folder / DATABASE)
     there = copied.folder / DATABASE / "all"
-    process = started(copied, "-c2", WEIGHTS, until=there.exists)
+    process = started(copied, "-c2", f"{DATABASE}/all", until=there.exists)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
     assert list(copied.folder.glob(".snakemake/incomplete/*"))
@@ -106,9 +106,13 @@ def test_killed_in_the_merge_the_plain_command_goes_on(finished, copied) -> None
 
 def test_a_second_run_beside_a_living_one_is_refused(copied) -> None:
     process = started(copied, "-c2", WEIGHTS, until=without_network(copied))
+    jobs = jobs_of(process)
+    for job in jobs:
+        job.suspend()
     assert "cannot be locked" in copied.run("-c2", WEIGHTS, ok=False)
     os.kill(process.pid, signal.SIGTERM)
-    process.wait()
+    assert process.wait(timeout=5) == 1  # jobs that are deaf to SIGTERM are killed
+    assert not running(jobs)
 
 
 def test_after_touch_of_every_file_nothing_runs_again(copied) -> None:

@@ -29,6 +29,7 @@ ESRI_HEADER = {
     "cellsize",
     "nodata_value",
 }
+IMAGES = {".png": ("PNG",), ".tif": ("TIFF",), ".tiff": ("TIFF",)}  # a suffix, and what the file must be
 GDAL_NODATA = 42113  # the tag of a TIFF in which GDAL says, as text, what stands for no data
 
 
@@ -98,7 +99,7 @@ def read_heights(path: str | Path) -> Array:
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no such heightmap", fix="See terrain.heightmaps of the data set.")
-    readers = {".npz": _npz, ".npy": _npy, ".png": _image, ".tif": _image, ".tiff": _image}
+    readers = {".npz": _npz, ".npy": _npy, **dict.fromkeys(IMAGES, _image)}
     heights = np.asarray(readers.get(path.suffix.lower(), _text)(path))
     if heights.ndim != 2 or min(heights.shape) < 2:
         raise InputError(path, f"a heightmap has rows and columns, this has shape {heights.shape}")
@@ -138,7 +139,7 @@ def _text(path: Path) -> Array:
 def _npy(path: Path) -> Array:
     try:
         # Mapped, so that a header that promises more than the file holds takes no memory.
-        heights = np.load(path, mmap_mode="r", allow_pickle=False)
+        heights = np.lib.format.open_memmap(path, mode="r")  # never a pickle or an archive
         if heights.size > MOST_CELLS:
             raise InputError(path, f"{heights.size} heights, more than {MOST_CELLS}")
         return np.array(heights)
@@ -162,7 +163,8 @@ def _image(path: Path) -> Array:
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(path) as image:
+        # Of the other formats some run programs: Ghostscript for what begins as PostScript does.
+        with Image.open(path, formats=IMAGES[path.suffix.lower()]) as image:
             if image.width * image.height > MOST_CELLS:
                 raise InputError(path, f"{image.width} x {image.height} cells, more than {MOST_CELLS}")
             grey = image if image.mode in ("L", "I", "F", "I;16", "I;16B", "1") else image.convert("L")
