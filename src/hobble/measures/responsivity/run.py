@@ -11,9 +11,12 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
+from hobble.measures.given import Given, Outcome
+from hobble.measures.responsivity import Options
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.controller import STEPS
-from hobble.runtime.network import Network
+from hobble.runtime.network import Network, load_network
+from hobble.runtime.options import Runtime
 from hobble.runtime.predictor import MODES
 from hobble.runtime.waypoints import TRACK, Waypoint
 
@@ -25,7 +28,7 @@ def responsivity(
     network: Network,
     *,
     configuration: str,
-    runtime: Mapping[str, Any],
+    runtime: Runtime,
     laps: int,
     lap_seconds: float,
     modes: Sequence[str] = tuple(MODES),
@@ -33,15 +36,15 @@ def responsivity(
 ) -> dict[str, Any]:
     """Run `laps` laps of the track of Segerstedt 2021 in each of `modes` and in the runtime's own.
 
-    runtime: options of ProceduralAnimation. A lap that takes longer than `lap_seconds` of simulated time is
+    A lap that takes longer than `lap_seconds` of simulated time is
     ended there, its remaining waypoints not reached, and the next one starts from the beginning of the track.
     `modes` holds the laps of each mode and what they come to; those of the runtime's own mode stand at the
     top too. Measured times stand under "milliseconds" only, each with the steps' means, their `total`, and
     `spread`: sd, median and 99th percentile of the total, and the mean of a whole call.
     """
-    own = str(runtime.get("mode", "cubic"))
+    own = runtime.mode
     found = {
-        mode: _laps(network, {**runtime, "mode": mode}, track, laps, lap_seconds)
+        mode: _laps(network, runtime.model_copy(update={"mode": mode}), track, laps, lap_seconds)
         for mode in dict.fromkeys((*modes, own))
     }
     return {
@@ -59,10 +62,10 @@ def responsivity(
 
 
 def _laps(
-    network: Network, runtime: Mapping[str, Any], track: Sequence[Waypoint], laps: int, lap_seconds: float
+    network: Network, runtime: Runtime, track: Sequence[Waypoint], laps: int, lap_seconds: float
 ) -> dict[str, Any]:
     """All laps of one mode."""
-    animation = ProceduralAnimation(network, waypoints=track, **runtime)
+    animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
     for _ in range(WARM_UP):
         animation.next_pose()
     animation.reset()
@@ -74,7 +77,7 @@ def _laps(
         if not lap["finished"]:
             animation.reset()
     return {
-        "mode": runtime["mode"],
+        "mode": runtime.mode,
         "laps": results,
         "laps_finished": sum(lap["finished"] for lap in results),
         "waypoints_reached": sum(lap["waypoints_reached"] for lap in results),
@@ -115,6 +118,20 @@ def lap_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
             row |= {f"milliseconds_{key}_sd": v for key, v in times["sd"].items()}
             rows.append(row | {f"milliseconds_{key}": v for key, v in times["spread"].items()})
     return rows
+
+
+def run(given: Given, options: Options) -> Outcome:
+    """responsivity.json, and its laps as a table."""
+    result = responsivity(
+        load_network(given.weights),
+        configuration=given.configuration,
+        runtime=given.runtime,
+        laps=options.laps,
+        lap_seconds=options.lap_seconds,
+        modes=options.modes,
+    )
+    says = [f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]]
+    return Outcome(result, {"laps": lap_rows(result)}, "; ".join(says))
 
 
 def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[dict[str, Any], Array]:

@@ -20,8 +20,16 @@ from hobble.core.quat import Array
 from hobble.database.clip_rows import ClipRows, load_clip_rows
 from hobble.database.layout import GAITS
 from hobble.database.statistics import Moments
-from hobble.evaluation.accuracy import SPLITS, check_layout, joint_indices, relative_and_distance
 from hobble.evaluation.captured import turned, unbroken
+from hobble.measures.accuracy.run import (
+    SPLITS,
+    check_layout,
+    chosen_joints,
+    joint_indices,
+    relative_and_distance,
+)
+from hobble.measures.given import Given, Outcome
+from hobble.measures.rollouts import Options
 from hobble.runtime.network import load_network
 from hobble.runtime.predictor import Predictor
 
@@ -247,3 +255,17 @@ def roll_out_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
             rows.append({"length": entry["length"], "clip": None, "split": split, **entry[split]})
         rows += [{"length": entry["length"], **clip} for clip in entry["clips"]]
     return rows
+
+
+def run(given: Given, options: Options) -> Outcome:
+    """rollouts.json, and its rows as a table."""
+    result = measure_roll_outs(
+        given.weights,
+        given.clips,
+        given.splits,
+        given.configuration,
+        chosen_joints(given, options),
+        options.rollouts,
+        given.runtime.mode,
+    )
+    return Outcome(result, {"lengths": roll_out_rows(result)})

@@ -17,6 +17,7 @@ from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import apart, mean_cycle, period, settling
 from hobble.evaluation.spearman import spearman
 from hobble.runtime.network import Network
+from hobble.runtime.options import Runtime
 
 SEVERITIES = np.arange(11.0)
 WALK_IN = 0.75  # stretches until a figure that stood is up to speed
@@ -29,7 +30,7 @@ class Sweep:
     """The walks of one gait, a figure for each of `links`; `seconds` at each severity."""
 
     def __init__(
-        self, network: Network, links: Sequence[str], gait: str, seconds: float, runtime: Mapping[str, Any]
+        self, network: Network, links: Sequence[str], gait: str, seconds: float, runtime: Runtime
     ) -> None:
         assert network.skeleton is not None
         self.skeleton, self.links, self.gait = network.skeleton, list(links), gait

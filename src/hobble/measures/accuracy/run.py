@@ -7,8 +7,6 @@ of every frame.
 
 from __future__ import annotations
 
-import csv
-import io
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,6 +21,8 @@ from hobble.database.clip_rows import ClipRows, expanded, load_clip_rows
 from hobble.database.layout import RowLayout
 from hobble.database.statistics import Moments
 from hobble.evaluation.predict import predict
+from hobble.measures.given import Given, Outcome
+from hobble.measures.joints import Joints
 from hobble.runtime.network import Network, load_network
 
 LEAST = 1e-3  # cm; below this a joint stands at the root itself and a relative error says nothing
@@ -135,6 +135,11 @@ def equivalent_joints(skeleton: Mapping[str, Any], of: str = REFERENCE) -> list[
     return None if counterparts is None else list(counterparts)
 
 
+def chosen_joints(given: Given, options: Joints) -> list[str] | None:
+    """Names of the joints that the options ask for; None where that is all."""
+    return equivalent_joints(given.skeleton) if options.joints == "equivalent" else None
+
+
 def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[int]:
     """Indices of the joints to measure, in their order: those of `names`, all of them by default."""
     if names is None:
@@ -159,10 +164,14 @@ def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
         raise InputError(where, f"its rows ({rows.layout}) are not those the network has learnt ({layout})")
 
 
-def to_csv(result: Mapping[str, Any]) -> str:
-    """The clips' entries as CSV."""
-    text = io.StringIO()
-    table = csv.DictWriter(text, COLUMNS, lineterminator="\n")
-    table.writeheader()
-    table.writerows(result["clips"])
-    return text.getvalue()
+def clip_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The clips' entries as rows of equal keys."""
+    return [{key: clip.get(key) for key in COLUMNS} for clip in result["clips"]]
+
+
+def run(given: Given, options: Joints) -> Outcome:
+    """accuracy.json, and its `clips` as a table."""
+    result = measure(
+        given.weights, given.clips, given.splits, given.configuration, chosen_joints(given, options)
+    )
+    return Outcome(result, {"clips": clip_rows(result)})

@@ -7,11 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from hobble.evaluation.captured import Captured
+from hobble.channels.injury.response import Options
+from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
+from hobble.channels.injury.response.sweep import SEVERITIES, Sweep
+from hobble.evaluation.captured import Captured, captured_clips
 from hobble.evaluation.crowd import SPEEDS
-from hobble.evaluation.injury_cases import divided_severities, into_a_jog, second_injuries
-from hobble.evaluation.sweep import SEVERITIES, Sweep
-from hobble.runtime.network import Network
+from hobble.measures.given import Given, Outcome
+from hobble.runtime.network import Network, load_network
+from hobble.runtime.options import Runtime
 
 GAITS = tuple(SPEEDS)
 REASON = "this network has no severity inputs"
@@ -32,14 +35,13 @@ def injury_response(
     motion: Iterable[Captured] = (),
     *,
     configuration: str,
-    runtime: Mapping[str, Any],
+    runtime: Runtime,
     seconds: float,
     links: Sequence[str] | None = None,
 ) -> dict[str, Any]:
     """Sweep each of `links` (default: all).
 
-    motion: the captured clips, whose largest accelerations ours stand against. runtime: options of
-    ProceduralAnimation; seconds: at each severity. Returns `rows`, one for each gait, link and severity on
+    motion: the captured clips, whose largest accelerations ours stand against. seconds: at each severity. Returns `rows`, one for each gait, link and severity on
     the way up, `back` for the way back, `responses` for each gait and link (see `Sweep.response`),
     `second`, `into_a_jog` and `divided` (see `injury_cases`), and `summary`: means over the links that were
     hurt in training (`trained`) and, apart, over those that were not. `applies` is false for a network
@@ -77,7 +79,7 @@ def injury_response(
     return {
         "configuration": configuration,
         "applies": True,
-        "mode": runtime.get("mode"),
+        "mode": runtime.mode,
         "seconds": seconds,
         "severities": SEVERITIES.tolist(),
         "links": links,
@@ -129,3 +131,17 @@ def _summary(responses: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def _mean(values: Sequence[float | None]) -> float | None:
     known = [v for v in values if v is not None]
     return round(float(np.mean(known)), 5) if known else None
+
+
+def run(given: Given, options: Options) -> Outcome:
+    """injury.json, and its sweeps as tables."""
+    result = injury_response(
+        load_network(given.weights),
+        captured_clips(given.clips.values()),
+        configuration=given.configuration,
+        runtime=given.runtime,
+        seconds=options.seconds,
+    )
+    tables = {name: result.get(name, []) for name in ("second", "into_a_jog", "divided")}
+    tables["sweep"] = [*result.get("rows", []), *result.get("back", [])]
+    return Outcome(result, tables, str(result.get("summary", result.get("reason"))))

@@ -16,11 +16,15 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.captured import Captured
-from hobble.evaluation.crowd import FPS, Stretch, run, severities
+from hobble.evaluation.captured import Captured, captured_clips
+from hobble.evaluation.crowd import FPS, Stretch, severities
+from hobble.evaluation.crowd import run as walk
 from hobble.evaluation.discriminant import Discriminant, learn
 from hobble.evaluation.gait_features import features
-from hobble.runtime.network import Network
+from hobble.core.section import Section
+from hobble.measures.given import Given, Outcome
+from hobble.runtime.network import Network, load_network
+from hobble.runtime.options import Runtime
 
 HEALTHY = "healthy"
 WINDOW = 60  # frames, about a cycle; captured motion that was left out is named less well by 75 or 90
@@ -52,7 +56,7 @@ def recognition(
     splits: Mapping[str, str],
     *,
     configuration: str,
-    runtime: Mapping[str, Any],
+    runtime: Runtime,
     people: float,
 ) -> dict[str, Any]:
     """recognition.json: what a classifier of the captured clips `motion` makes of generated walks.
@@ -110,7 +114,7 @@ def walking_windows(clip: Captured, network: Network) -> list[Window]:
 
 
 def generated(
-    network: Network, classes: Sequence[str], healthy: bool, runtime: Mapping[str, Any]
+    network: Network, classes: Sequence[str], healthy: bool, runtime: Runtime
 ) -> list[Window]:
     """Windows of generated walks, each class at each severity and speed."""
     assert network.skeleton is not None
@@ -120,7 +124,7 @@ def generated(
     script = Stretch(
         WALKED_IN + SHOWN, ["walk"] * len(asked), severities(network, hurt), [v for *_, v in asked]
     )
-    walks = run(network, [script], runtime)
+    walks = walk(network, [script], runtime)
     out = []
     for i, (name, severity, speed) in enumerate(asked):
         for start in range(WALKED_IN, WALKED_IN + SHOWN - WINDOW + 1, STEP):
@@ -148,6 +152,20 @@ def rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
         for hurt, row in found["confusion"].items()
         for named, count in row.items()
     ]
+
+
+def run(given: Given, options: Section) -> Outcome:
+    """recognition.json, and its confusion tables as one."""
+    result = recognition(
+        load_network(given.weights),
+        captured_clips(given.clips.values()),
+        given.splits,
+        configuration=given.configuration,
+        runtime=given.runtime,
+        people=given.published["recognition"]["share"],
+    )
+    right = f"named right: {result['generated']['right']} of generated windows" if result["applies"] else ""
+    return Outcome(result, {"confusion": rows(result)}, right or result["reason"])
 
 
 def _values(skeleton: Skeleton, local: Array, contacts: Array, root: Array, span: slice) -> dict[str, float]:

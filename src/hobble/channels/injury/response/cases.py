@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
 import numpy as np
 
+from hobble.channels.injury.response.sweep import WALK_IN
 from hobble.core.quat import Array
 from hobble.evaluation.crowd import FPS, Stretch, Walks, run, severities
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import apart, mean_cycle
 from hobble.evaluation.spearman import spearman
-from hobble.evaluation.sweep import WALK_IN
 from hobble.runtime.network import Network
+from hobble.runtime.options import Runtime
 
 FIRST = 7.0  # severity of the injury that stays while a second one comes
 SECOND = (0.0, 2.5, 5.0, 7.5, 10.0)
@@ -45,7 +46,7 @@ def _speed(network: Network, walks: Walks, stretch: int, figure: int) -> float:
 
 
 def second_injuries(
-    network: Network, links: Sequence[str], seconds: float, runtime: Mapping[str, Any]
+    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> list[dict[str, Any]]:
     """Every second link hurt more and more over every first one at severity 7, while walking.
 
@@ -89,7 +90,7 @@ def second_injuries(
 
 
 def into_a_jog(
-    network: Network, links: Sequence[str], seconds: float, runtime: Mapping[str, Any]
+    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> list[dict[str, Any]]:
     """From walking to jogging with each link at severities 0, 5 and 10.
 
@@ -132,7 +133,7 @@ def into_a_jog(
 
 
 def divided_severities(
-    network: Network, links: Sequence[str], seconds: float, runtime: Mapping[str, Any]
+    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> list[dict[str, Any]]:
     """The walk with severities divided by 1, 2 and 5: what is left of each link's effect."""
     gait = ["walk"] * len(links)
@@ -142,7 +143,7 @@ def divided_severities(
     ]
     out = []
     for scale in SCALES:
-        walks = run(network, script, {**runtime, "severity_scale": scale})
+        walks = run(network, script, runtime.model_copy(update={"severity_scale": scale}))
         for i, link in enumerate(links):
             healthy = _cycle(walks, 1, i)
             own, speed = _from(walks, 1, i, healthy), _speed(network, walks, 1, i)
