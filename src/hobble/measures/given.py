@@ -30,7 +30,7 @@ class Given:
     files: Mapping[str, Path] = field(default_factory=dict, repr=False)
     clips: Mapping[str, Path] = field(default_factory=dict, repr=False)
     splits: Mapping[str, str] = field(default_factory=dict, repr=False)
-    runtime: Runtime = Runtime()
+    runtime: Runtime = field(default_factory=Runtime)
 
     def file(self, name: str) -> Path:
         """The file of the input `name`. Raises HobbleError where the measurement did not ask for it."""

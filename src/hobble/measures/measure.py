@@ -1,12 +1,12 @@
 """What a measurement says of itself, before anything of it is run.
 
-A measurement is a package. Its `__init__` holds `MEASURE`, a `Measure`, and imports nothing heavy: Snakemake reads
-it before it plans. Beside it lie, each found by its name:
+A measurement is a package. Its `__init__` holds `MEASURE`, a `Measure`, and imports nothing heavy: Snakemake
+reads it before it plans. Beside it lie, each found by its name:
 
 - `run.py`: `run(given, options) -> Outcome`, the measuring itself (see `given`);
 - `page.py`: what the report shows of it (see `hobble.report.measured`), if anything;
-- `comparison.py`: what it says of several configurations side by side (see `hobble.evaluation.compare`), if anything;
-- `comparison_page.py`: what the page of a comparison shows of that (see `hobble.report.measured`), if anything.
+- `comparison.py`: what it says of configurations side by side (see `hobble.evaluation.compare`), if anything;
+- `comparison_page.py`: what the comparison's page shows of that (see `hobble.report.measured`), if anything.
 """
 
 from __future__ import annotations

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
+from hobble.core.section import Section
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured, captured_clips
 from hobble.evaluation.crowd import FPS, Stretch, severities
-from hobble.evaluation.crowd import run as walk
+from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.discriminant import Discriminant, learn
 from hobble.evaluation.gait_features import features
-from hobble.core.section import Section
 from hobble.measures.given import Given, Outcome
 from hobble.runtime.network import Network, load_network
 from hobble.runtime.options import Runtime
@@ -113,9 +113,7 @@ def walking_windows(clip: Captured, network: Network) -> list[Window]:
     return out
 
 
-def generated(
-    network: Network, classes: Sequence[str], healthy: bool, runtime: Runtime
-) -> list[Window]:
+def generated(network: Network, classes: Sequence[str], healthy: bool, runtime: Runtime) -> list[Window]:
     """Windows of generated walks, each class at each severity and speed."""
     assert network.skeleton is not None
     asked = [(name, s, v) for name, s, v in product(classes, GENERATED, SPEEDS)]
@@ -124,7 +122,7 @@ def generated(
     script = Stretch(
         WALKED_IN + SHOWN, ["walk"] * len(asked), severities(network, hurt), [v for *_, v in asked]
     )
-    walks = walk(network, [script], runtime)
+    walks = run_walks(network, [script], runtime)
     out = []
     for i, (name, severity, speed) in enumerate(asked):
         for start in range(WALKED_IN, WALKED_IN + SHOWN - WINDOW + 1, STEP):

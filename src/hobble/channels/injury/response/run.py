@@ -41,11 +41,11 @@ def injury_response(
 ) -> dict[str, Any]:
     """Sweep each of `links` (default: all).
 
-    motion: the captured clips, whose largest accelerations ours stand against. seconds: at each severity. Returns `rows`, one for each gait, link and severity on
-    the way up, `back` for the way back, `responses` for each gait and link (see `Sweep.response`),
-    `second`, `into_a_jog` and `divided` (see `injury_cases`), and `summary`: means over the links that were
-    hurt in training (`trained`) and, apart, over those that were not. `applies` is false for a network
-    without severities.
+    motion: the captured clips, whose largest accelerations ours stand against. seconds: at each severity.
+    Returns `rows`, one for each gait, link and severity on the way up, `back` for the way back, `responses`
+    for each gait and link (see `Sweep.response`), `second`, `into_a_jog` and `divided` (see `cases`), and
+    `summary`: means over the links that were hurt in training (`trained`) and, apart, over those that were
+    not. `applies` is false for a network without severities.
     """
     if not network.links:
         return {"configuration": configuration, "applies": False, "reason": REASON}

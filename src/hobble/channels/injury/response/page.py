@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
-from hobble.report import injury_cases as cases
+from markupsafe import Markup
+
+from hobble.channels.injury.response import page_cases as cases
+from hobble.channels.injury.response.hints import injury_hints
+from hobble.measures.given import Json
 from hobble.report.charts import Chart, Family, Trace, axis, line
 from hobble.report.gather import Material
+from hobble.report.parts import Pair, Part, Section, Words
+from hobble.report.summary import Hint, placed
 from hobble.report.tables import Column, Table
 
+NOTHING = Markup(
+    "This network has no severities among its inputs, so nothing can hurt it. The configuration "
+    "<code>injured</code> has."
+)
 UNTRAINED = "never hurt in training"
 GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
 HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
@@ -49,25 +59,37 @@ PANELS: tuple[tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool
 )
 
 
-def section(material: Material) -> dict[str, Any]:
-    """Charts and tables; `applies` is false for a network without severities."""
-    injury = material.injury
-    if not injury.get("applies"):
-        return {"applies": False}
-    rows, responses = injury.get("rows") or [], injury.get("responses") or []
+def section(found: Json, material: Material) -> Section:
+    """Charts and tables, or that there are none for a network without severities."""
+    parts = _parts(found, material.name) if found.get("applies") else [Part(0, Words(NOTHING, empty=True))]
+    return Section("injury", parts, title="Injury response", at=20)
+
+
+def hints(found: Json, material: Material) -> Iterator[Hint]:
+    """What the response suggests."""
+    return placed(70, injury_hints(found))
+
+
+def _parts(found: Json, name: str) -> list[Part]:
+    rows, responses, second = (found.get(key) or [] for key in ("rows", "responses", "second"))
     untrained = {r["link"] for r in responses if not r.get("trained", True)}
-    return {
-        "applies": True,
-        "overview": overview(responses),
-        "curves": curves(rows, injury.get("back") or (), untrained) if rows else None,
-        "recognition": cases.recognition_chart(material.recognition),
-        "second": cases.second_chart(injury.get("second") or ()),
-        "second_table": cases.second_table(material.name, injury.get("second") or ()),
-        "divided": cases.divided_chart(injury.get("divided") or ()),
-        "into_a_jog": cases.jog_chart(injury.get("into_a_jog") or (), untrained),
-        "responses": response_table(material.name, responses),
-        "rows": sweep_table(material.name, rows),
-    }
+    return [
+        Part(0, Pair(overview(responses))),
+        Part(10, response_table(name, responses)),
+        Part(20, curves(rows, found.get("back") or (), untrained) if rows else None),
+        Part(40, cases.second_chart(second)),
+        Part(50, cases.second_table(name, second)),
+        Part(
+            60,
+            Pair(
+                [
+                    cases.divided_chart(found.get("divided") or ()),
+                    cases.jog_chart(found.get("into_a_jog") or (), untrained),
+                ]
+            ),
+        ),
+        Part(70, sweep_table(name, rows)),
+    ]
 
 
 def curves(

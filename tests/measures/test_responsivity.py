@@ -8,19 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.evaluation import responsivity as module
-from hobble.evaluation.responsivity import lap_rows, parameter_counts, responsivity
 from hobble.evaluation.tables import write_csv
+from hobble.measures.responsivity import run as module
+from hobble.measures.responsivity.run import lap_rows, parameter_counts, responsivity
 from hobble.runtime.controller import STEPS
+from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import Waypoint
 
-RUNTIME = {
-    "mode": "cubic",
-    "severity_rate": 10.0,
-    "severity_scale": 1.0,
-    "foot_locking": True,
-    "steering": 1.0,
-}
+RUNTIME = Runtime(steering=1.0)
 # So near to each other that standing in their midst is arriving at each.
 NEAR = tuple(Waypoint((x, 0.0), "walk", 2.5) for x in (0.0, 30.0, 60.0))
 # Straight ahead of the start, 4 m away, where a figure that glides straight on comes by; then the start.
@@ -87,7 +82,7 @@ def test_each_mode_runs_its_own_laps(network) -> None:
     result = run(network, AHEAD, laps=1, seconds=3.0)
     modes = {entry["mode"]: entry for entry in result["modes"]}
     assert list(modes) == ["constant", "linear", "cubic"]
-    assert result["mode"] == RUNTIME["mode"] == "cubic"
+    assert result["mode"] == RUNTIME.mode == "cubic"
     assert all(result[key] == value for key, value in modes["cubic"].items())
     # Weights looked up otherwise move the figure a little otherwise.
     ways = {mode: entry["laps"][0]["path_distance_cm"] for mode, entry in modes.items()}
@@ -95,7 +90,7 @@ def test_each_mode_runs_its_own_laps(network) -> None:
     some = responsivity(
         network,
         configuration="x",
-        runtime={**RUNTIME, "mode": "linear"},
+        runtime=RUNTIME.model_copy(update={"mode": "linear"}),
         laps=1,
         lap_seconds=3.0,
         modes=(),

@@ -12,21 +12,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
+from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
+from hobble.channels.injury.response.run import GAITS, injury_response, largest_accelerations
+from hobble.channels.injury.response.sweep import SEVERITIES, Sweep
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import SPEEDS, Stretch, run, severities
-from hobble.evaluation.injury import GAITS, injury_response, largest_accelerations
-from hobble.evaluation.injury_cases import divided_severities, into_a_jog, second_injuries
 from hobble.evaluation.pose_distance import mean_cycle, settling
 from hobble.evaluation.spearman import spearman
-from hobble.evaluation.sweep import SEVERITIES, Sweep
+from hobble.runtime.options import Runtime
 
-RUNTIME = {
-    "mode": "cubic",
-    "severity_rate": 10.0,
-    "severity_scale": 1.0,
-    "foot_locking": True,
-    "steering": 1.0,
-}
+RUNTIME = Runtime(steering=1.0)
 KNEE = "LeftUpLeg-LeftLeg"
 
 

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
-from hobble.report.charts import Chart, axis, line, log_axis, mark
-from hobble.report.findings import published
+import numpy as np
+
+from hobble.measures.given import Json
+from hobble.report.charts import Chart, axis, mark
+from hobble.report.formats import number
 from hobble.report.gather import Material
+from hobble.report.parts import Fragment, Part, Section, Words
+from hobble.report.summary import Figure, Hint, placed
 from hobble.report.tables import Column, Table
 
+INTRODUCTION = "One step ahead from the true input, on every frame that lies in a locomotion cycle."
 COLOURS = {"train": "@muted", "held_out": "@accent"}
 NAMES = {"train": "training", "held_out": "held out"}
 QUANTILES = ("p05", "p25", "p50", "p75", "p95")
 
 
-def _rows(material: Material) -> list[dict[str, Any]]:
-    rows = [row for row in material.accuracy.get("clips", ()) if row.get("mean") is not None]
+def _rows(found: Json) -> list[dict[str, Any]]:
+    rows = [row for row in found.get("clips", ()) if row.get("mean") is not None]
     return sorted(rows, key=lambda row: (row["split"] != "held_out", row["mean"]))
 
 
@@ -23,9 +30,9 @@ def _height(count: int) -> int:
     return max(260, 110 + 21 * count)
 
 
-def clip_bars(material: Material) -> Chart | None:
+def clip_bars(found: Json, material: Material) -> Chart | None:
     """Mean relative error of each clip, whiskers of one standard deviation, published means as lines."""
-    rows = _rows(material)[::-1]
+    rows = _rows(found)[::-1]
     if not rows:
         return None
     traces = []
@@ -52,7 +59,7 @@ def clip_bars(material: Material) -> Chart | None:
             }
         )
     shapes, notes = [], []
-    theirs = published(material, "accuracy")
+    theirs = material.beside("accuracy")
     if theirs:
         shape, note = mark(100 * theirs["mean"], f"{theirs['label']} as published")
         shapes, notes = [shape], [note]
@@ -76,9 +83,9 @@ def clip_bars(material: Material) -> Chart | None:
     )
 
 
-def clip_boxes(material: Material) -> Chart | None:
+def clip_boxes(found: Json) -> Chart | None:
     """Quantiles of the error within each clip, where the evaluation gives them."""
-    rows = [row for row in _rows(material)[::-1] if quantiles(row)]
+    rows = [row for row in _rows(found)[::-1] if quantiles(row)]
     if not rows:
         return None
     traces = []
@@ -125,41 +132,13 @@ def clip_boxes(material: Material) -> Chart | None:
     )
 
 
-def rollout_chart(material: Material) -> Chart | None:
-    """How the error grows when the figure is fed its own pose."""
-    traces = []
-    for split in ("held_out", "train"):
-        rows = [
-            (entry["length"], entry[split]["position_error_cm"])
-            for entry in material.rollouts.get("lengths", ())
-            if (entry.get(split) or {}).get("position_error_cm") is not None
-        ]
-        if rows:
-            x, y = zip(*rows, strict=True)
-            traces.append(line(NAMES[split], x, y, COLOURS[split], mode="lines+markers"))
-    if not traces:
-        return None
-    return Chart(
-        "rollouts",
-        "Fed its own pose",
-        "Mean distance of a joint from the captured one when the network goes on from what it predicted "
-        "itself, as at run time, over roll-outs of so many frames. A line that flattens is a figure that "
-        "keeps to its feet; 60 frames are a second.",
-        traces,
-        {
-            "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),
-            "yaxis": axis("cm a joint", rangemode="tozero"),
-        },
-    )
-
-
 def quantiles(row: dict[str, Any]) -> list[float] | None:
     """The 5th, 25th, 50th, 75th and 95th percentile of a clip's error, or None."""
     found = [row[key] for key in QUANTILES if row.get(key) is not None]
     return found if len(found) == len(QUANTILES) else None
 
 
-def accuracy_table(material: Material) -> Table:
+def accuracy_table(found: Json, name: str) -> Table:
     """A row per clip."""
     columns = [
         Column("clip"),
@@ -171,16 +150,16 @@ def accuracy_table(material: Material) -> Table:
     ]
     rows = [
         [r["clip"], r["split"], r.get("frames"), r["mean"], r.get("sd"), r.get("position_error_cm")]
-        for r in _rows(material)
+        for r in _rows(found)
     ]
-    return Table(f"{material.name}-accuracy", columns, rows)
+    return Table(f"{name}-accuracy", columns, rows)
 
 
-def beside_published(material: Material) -> Table:
+def beside_published(found: Json, material: Material) -> Table:
     """Our two splits with the published means under them."""
     rows: list[list[Any]] = []
     for split in ("held_out", "train"):
-        part = material.accuracy.get(split) or {}
+        part = found.get(split) or {}
         if part.get("mean") is not None:
             what = f"{material.name}, {NAMES[split]} clips"
             rows.append([what, part["mean"], part.get("sd"), part.get("position_error_cm"), "this report"])
@@ -195,3 +174,89 @@ def beside_published(material: Material) -> Table:
         Column("source", kind="long"),
     ]
     return Table(f"{material.name}-published", columns, rows, "Beside the published figures")
+
+
+def section(found: Json, material: Material) -> Section:
+    """The charts and tables; the figure beside the captured one is drawn by the page."""
+    return Section(
+        "accuracy",
+        [
+            Part(0, Words(INTRODUCTION)),
+            Part(10, beside_published(found, material), open=True, short=True),
+            Part(20, clip_bars(found, material), tall=True),
+            Part(30, clip_boxes(found), tall=True),
+            Part(60, accuracy_table(found, material.name)),
+            Part(90, Fragment("captured.html.j2")),
+        ],
+        title="Accuracy",
+        at=10,
+        long=True,
+    )
+
+
+def figures(found: Json, material: Material) -> Iterator[Figure]:
+    """The error of each split."""
+    for at, split, label in (
+        (10, "held_out", "Error on held-out clips"),
+        (11, "train", "Error on training clips"),
+    ):
+        part = found.get(split)
+        if part and part.get("mean") is not None:
+            error = part.get("position_error_cm")
+            beside = f"{number(error)} cm a joint on average" if error is not None else ""
+            theirs = material.beside("accuracy") if split == "held_out" else None
+            if theirs:
+                beside += f"; {theirs['label']} was published at {100 * theirs['mean']:.2f} %"
+            yield Figure(label, f"{100 * part['mean']:.2f}", "%", beside, at)
+
+
+def hints(found: Json, material: Material) -> Iterator[Hint]:
+    """How far it generalises, and which clip is hard."""
+    yield from placed(10, _generalisation(found))
+    yield from placed(30, _worst_clips(found))
+
+
+def _generalisation(found: Json) -> Iterator[Hint]:
+    train, held_out = (found.get(split) or {} for split in ("train", "held_out"))
+    if held_out.get("mean") is None:
+        yield Hint(
+            "warn",
+            "Nothing was held out.",
+            "The accuracy below says how well the clips were memorised. Name a few under held_out in the "
+            "data set.",
+        )
+        return
+    ratio = held_out["mean"] / train["mean"] if train.get("mean") else float("nan")
+    if ratio > 1.5:
+        yield Hint(
+            "warn",
+            f"Held-out clips are predicted {ratio:.1f} times worse than training clips.",
+            "The network has learnt these clips more than motion as such: add clips that differ "
+            "(speeds, turns, performers) before adding units or passes.",
+        )
+    elif ratio < 1.2:
+        yield Hint(
+            "good",
+            f"Held-out clips are predicted about as well as training clips ({ratio:.2f} times the error).",
+            "There is room for a larger network.",
+        )
+    else:
+        yield Hint(
+            "note", f"Held-out clips have {ratio:.2f} times the error of training clips.", "That is usual."
+        )
+
+
+def _worst_clips(found: Json) -> Iterator[Hint]:
+    rows = [row for row in found.get("clips", ()) if row.get("mean") is not None]
+    if len(rows) < 4:
+        return
+    median = float(np.median([row["mean"] for row in rows]))
+    worst = max(rows, key=lambda row: row["mean"])
+    if worst["mean"] > 1.8 * median:
+        yield Hint(
+            "note",
+            f"{worst['clip']} is the hardest clip,",
+            f"with {worst['mean'] / median:.1f} times the error of the middle one. "
+            "See in its label strip whether the labels are right, and among the repairs whether its frames "
+            "are whole.",
+        )

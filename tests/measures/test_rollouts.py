@@ -14,7 +14,7 @@ from hobble.core.errors import InputError
 from hobble.database.clip_rows import ClipRows, save_clip_rows
 from hobble.database.layout import RowLayout
 from hobble.evaluation.motion_measures import in_root_frame
-from hobble.evaluation.rollouts import (
+from hobble.measures.rollouts.run import (
     Inputs,
     clip_roll_outs,
     inputs,
@@ -173,7 +173,7 @@ def test_splits_add_up_and_come_out_the_same(hurtable: Network, tmp_path: Path, 
     assert rows[0]["clip"] is None
     json.dumps(result, allow_nan=False)
     # However many go side by side.
-    monkeypatch.setattr("hobble.evaluation.rollouts.BATCH", 7)
+    monkeypatch.setattr("hobble.measures.rollouts.run.BATCH", 7)
     again = measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30))
     for one, other in zip(rows, roll_out_rows(again), strict=True):
         assert [one[k] for k in one if one[k] is None] == [other[k] for k in one if one[k] is None]

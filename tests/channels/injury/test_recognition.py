@@ -9,21 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hobble.channels.injury.recognition import run as module
+from hobble.channels.injury.recognition.run import HEALTHY, Window, recognition, rows, walking_windows
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.evaluation import recognition as module
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.discriminant import learn
 from hobble.evaluation.gait_features import features
-from hobble.evaluation.recognition import HEALTHY, Window, recognition, rows, walking_windows
+from hobble.runtime.options import Runtime
 
-RUNTIME = {
-    "mode": "cubic",
-    "severity_rate": 10.0,
-    "severity_scale": 1.0,
-    "foot_locking": True,
-    "steering": 1.0,
-}
+RUNTIME = Runtime(steering=1.0)
 KNEE, ARM = "LeftUpLeg-LeftLeg", "RightArm-RightForeArm"
 
 

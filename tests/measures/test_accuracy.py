@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import json
 from dataclasses import replace
 from itertools import pairwise
@@ -15,17 +14,18 @@ import pytest
 from hobble.core.errors import HobbleError, InputError
 from hobble.database.clip_rows import ClipRows, expanded, save_clip_rows
 from hobble.database.layout import RowLayout
-from hobble.evaluation.accuracy import (
+from hobble.evaluation.predict import phase_shares, predict
+from hobble.evaluation.tables import write_csv
+from hobble.measures.accuracy.run import (
     QUANTILES,
     Errors,
     clip_errors,
+    clip_rows,
     equivalent_joints,
     joint_errors,
     joint_indices,
     measure,
-    to_csv,
 )
-from hobble.evaluation.predict import phase_shares, predict
 from hobble.runtime.network import Network, load_network, weights_at
 
 LAYOUT = RowLayout(3, links=1)
@@ -158,7 +158,7 @@ def test_batches_do_not_show(weights, monkeypatch):
     network, rows = load_network(weights), make_rows("a", 50, 10, 5)
     whole = clip_errors(network, rows, [0, 1, 2]).to_dict()
     monkeypatch.setattr(
-        "hobble.evaluation.accuracy.expanded", lambda rows, links: expanded(rows, links, batch=7)
+        "hobble.measures.accuracy.run.expanded", lambda rows, links: expanded(rows, links, batch=7)
     )
     assert clip_errors(network, rows, [0, 1, 2]).to_dict() == pytest.approx(whole)
 
@@ -183,7 +183,9 @@ def test_accuracy_per_clip_and_split(weights, tmp_path):
     }
     assert by_name["none"]["mean"] is None
     json.dumps(result, allow_nan=False)
-    table = list(csv.DictReader(io.StringIO(to_csv(result))))
+    write_csv(tmp_path / "clips.csv", clip_rows(result))
+    with open(tmp_path / "clips.csv", newline="") as file:
+        table = list(csv.DictReader(file))
     assert [row["clip"] for row in table] == ["a", "b", "c", "none"]
     assert float(table[2]["mean"]) == c["mean"]
     assert result == measure(weights, clips, splits, "injured")
