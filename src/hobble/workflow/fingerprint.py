@@ -10,7 +10,7 @@ from __future__ import annotations
 import ast
 import functools
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,12 +28,15 @@ LEVELS = {"debug", "info", "warning", "error", "exception", "critical", "warn"}
 WORDLESS = {"__future__", "collections.abc", "logging", "typing", "warnings"}
 
 
-def fingerprint(script: Path, source: Path) -> str:
-    """Hash `script` and its import closure among the packages under `source`."""
-    modules = [_module(path, source) for path in (script, *sorted(closure(script, source)))]
-    used = frozenset().union(*(module.names for module in modules))
+def fingerprint(script: Path, source: Path, modules: Iterable[str] = ()) -> str:
+    """Hash `script` and its import closure among the packages under `source`.
+
+    modules: full names of modules that the script imports by a name it is told.
+    """
+    files = [_module(path, source) for path in (script, *sorted(closure(script, source, modules)))]
+    used = frozenset().union(*(file.names for file in files))
     digest = hashlib.sha256()
-    for module in modules:
+    for module in files:
         digest.update(module.digest)
         for name, text in module.texts:
             if name in used:  # else it stands in messages only
@@ -41,10 +44,13 @@ def fingerprint(script: Path, source: Path) -> str:
     return digest.hexdigest()[:16]
 
 
-def closure(script: Path, source: Path) -> set[Path]:
-    """The project files that `script` imports, directly or through others, but for the infrastructure."""
-    found: set[Path] = set()
-    waiting = [script]
+def closure(script: Path, source: Path, modules: Iterable[str] = ()) -> set[Path]:
+    """The project files that `script` imports, directly or through others, and `modules` with theirs.
+
+    Without the infrastructure.
+    """
+    found = {path for module in modules for path in _files_of(module, source)}
+    waiting = [script, *found]
     while waiting:
         new = set(_module(waiting.pop(), source).imports) - found
         found |= new
