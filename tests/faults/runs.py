@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -17,6 +18,7 @@ from .lab import End, Job, Lab
 from .same import same
 from .throws import FAULT, REFUSED, REMADE, TRACEBACK, UNHARMED, Throw
 
+FAILED = re.compile(r"^\d+ of \d+ jobs done in .*, \d+ failed:$", re.M)
 LOCKED = "cannot be locked"  # Snakemake's own words
 
 
@@ -101,9 +103,10 @@ def kill_run(lab: Lab, rng: Random) -> Throw:
 
 def _unsaid(status: int, said: str) -> str:
     """What is wrong with how Snakemake ends when one of its jobs is killed."""
+    failed = FAILED.search(said)
     if status == 0:
-        return "" if "Error in rule" not in said else "status 0 in spite of an error"
-    if "Error in rule" not in said or TRACEBACK in said:
+        return "status 0 in spite of an error" if failed else ""
+    if not failed or TRACEBACK in said:
         return f"no message but {said[-1500:]}"
     return ""
 

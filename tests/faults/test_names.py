@@ -54,7 +54,7 @@ def test_no_name_reaches_a_shell(lab: Lab, tiny_bvh: str) -> None:
 
 def test_a_name_that_cannot_be_one_ends_before_the_first_job(lab: Lab, tiny_bvh: str) -> None:
     (lab.run / "mocap/mine/a\ntouch pwned\n.bvh").write_text(tiny_bvh)
-    status, said = run(lab, "-n", "results/datasets/mine/database/all")
+    status, said = run(lab, "-np", "results/datasets/mine/database/all")
     assert status == 1
     assert "mocap/mine: a clip is called" in said
     assert "Building DAG" not in said
@@ -63,7 +63,7 @@ def test_a_name_that_cannot_be_one_ends_before_the_first_job(lab: Lab, tiny_bvh:
 def test_a_configuration_makes_no_objects(lab: Lab) -> None:
     text = "extends: test\nreport:\n  title: !!python/object/apply:os.system ['touch pwned']\n"
     (lab.run / "config/mine.yaml").write_text(text)
-    status, said = run(lab, "-n", "results/mine/report.html")
+    status, said = run(lab, "-np", "results/mine/report.html")
     assert status == 1
     assert "mine.yaml, line 3: not valid YAML" in said
 

@@ -150,6 +150,6 @@ def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> Non
 
 
 def test_no_job_took_more_than_its_rule_asks_of_a_cluster(finished) -> None:
-    jobs = list(measured(planned(finished.run("-n", "-F", TARGET)), finished.folder))
+    jobs = list(measured(planned(finished.run("-np", "-F", TARGET)), finished.folder))
     assert {"motion_clip", "terrain_fits", "training", "report"} <= {job.rule for job in jobs if job.took_mb}
     assert [(job.log, job.memory, job.time) for job in jobs if max(job.memory, job.time) >= 1] == []

@@ -36,7 +36,9 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
     to_file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     to_terminal = logging.StreamHandler(sys.stderr)
     to_terminal.setLevel(logging.WARNING)
-    to_terminal.setFormatter(logging.Formatter(f"{snakemake.rule}: %(message)s"))
+    # On a terminal the line of progress gives way.
+    wiped = "\r\x1b[K" if sys.stderr.isatty() else ""
+    to_terminal.setFormatter(logging.Formatter(f"{wiped}{snakemake.rule}: %(message)s"))
     logger.handlers = [to_file, to_terminal]
     logging.captureWarnings(True)
     inputs, outputs = getattr(snakemake, "input", ()), getattr(snakemake, "output", ())
