@@ -49,10 +49,8 @@ def test_a_rig_whose_zero_pose_is_a_line_comes_out_upright(shared, make, name):
     clip, report = make(path)
     assert report["stance"].startswith("its motion, since in its zero pose")
     same_bends(path, clip, report["roles"])
-    rolls = (
-        clip.positions[:, clip.skeleton.role("left_hip")] - clip.positions[:, clip.skeleton.role("right_hip")]
-    )
-    assert np.ptp(left - right) < 6.5
+    left, right = (clip.positions[:, clip.skeleton.role(f"{side}_hip"), 1] for side in ("left", "right"))
+    assert np.ptp(left - right) < 8
 
 
 @pytest.mark.shared

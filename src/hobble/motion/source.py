@@ -116,6 +116,7 @@ def _unknown(
     clip = _scaled(file, rig, decoded, unit, options)
     standing = stands(body, rest_positions(rig)) is None
     clip, axes, unsure = straighten(clip, options["up"], options["handedness"], standing)
+    axes = axes if standing else replace(axes, facing="+Z")
     told = upright(clip, body)
     theirs = body_of(target.skeleton.parents, {r: target.skeleton.role(r) for r in target.skeleton.roles})
     match = Match(
