@@ -135,7 +135,7 @@ def test_a_whole_run_takes_few_lines(workflow) -> None:
     assert len(dry.splitlines()) < 20
     text = workflow.run("-c2", target)
     lines = [line for line in text.splitlines() if not line.startswith("Using workflow specific profile")]
-    assert lines[0] == "3 jobs: 1 injury_clip, 1 motion_clip, 1 synthetic_clip"
+    assert lines[0] == "3 jobs: 1 synthetic_clip, 1 motion_clip, 1 injury_clip"
     assert re.fullmatch(r"3 of 3 jobs done in .*\.", lines[-1])
     assert len(lines) <= 4
     assert "Error in rule" not in text
