@@ -28,12 +28,12 @@ import hobble.training  # noqa: F401 - first, since it says how threads wait
 import torch
 from torch import Tensor
 
-from hobble.training.fused import FusedStep
-from hobble.training.network import coefficients, initialise
+from hobble.models.pfnn.fused import FusedStep
+from hobble.models.pfnn.step import Step
+from hobble.models.pfnn.trainable import coefficients, initialise
+from hobble.models.products import bfloat16_is_fast, product
 from hobble.training.optimiser import Adam
-from hobble.training.products import bfloat16_is_fast, product
 from hobble.training.start import use_threads
-from hobble.training.step import Step
 
 KEEP, L1, RATE, POINTS = 0.7, 0.01, 1e-4, 4
 PART = 64

@@ -28,10 +28,10 @@ from hobble.core.untrusted import read_bytes, read_yaml
 from hobble.injury.status import read_status
 from hobble.injury.table import write_statuses
 from hobble.labels.files import SourceTime, read_gait_keys
+from hobble.models.load import load_network
 from hobble.motion import read as bvh
 from hobble.motion.make import make_clip
 from hobble.motion.rig import load_skeleton
-from hobble.runtime.network import load_network
 from hobble.terrain.heightmaps import read_heights
 from hobble.workflow.project import Project
 

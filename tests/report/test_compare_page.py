@@ -12,12 +12,12 @@ import yaml
 
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.compare import Measured, compare
+from hobble.models.load import load_network
 from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
 from hobble.report.compare_page import render_compared
 from hobble.report.gather import PUBLISHED, Material
 from hobble.report.playable import playable
-from hobble.runtime.network import load_network
 
 
 @pytest.fixture(scope="module")

@@ -15,13 +15,14 @@ import pytest
 import yaml
 
 from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.motion.decode import decode, frame_rate
 from hobble.motion.read import read_bvh
 from hobble.report.formats import embedded
 from hobble.report.loft import vertices
 from hobble.report.playable import PARTS, body_parts, playable
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.network import Network, load_network
 
 FRAMES = 120
 

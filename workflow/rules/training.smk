@@ -20,6 +20,9 @@ rule training:
         configuration=lambda w: w.configuration,
         network=lambda w: project.section(w.configuration, "network"),
         training=lambda w: project.section(w.configuration, "training"),
+        terrain_side=lambda w: project.options(
+            project.configuration(w.configuration).dataset, "database"
+        )["terrain_side"],
         checkpoints="results/{configuration}/checkpoints",
         code=project.code("training"),
     script:

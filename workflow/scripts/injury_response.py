@@ -4,7 +4,7 @@ from hobble.core.files import write_json
 from hobble.evaluation.captured import captured_clips
 from hobble.evaluation.injury import injury_response
 from hobble.evaluation.tables import write_csv
-from hobble.runtime.network import load_network
+from hobble.models.load import load_network
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

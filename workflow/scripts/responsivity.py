@@ -3,7 +3,7 @@
 from hobble.core.files import write_json
 from hobble.evaluation.responsivity import lap_rows, responsivity
 from hobble.evaluation.tables import write_csv
-from hobble.runtime.network import load_network
+from hobble.models.load import load_network
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

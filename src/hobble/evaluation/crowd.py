@@ -10,8 +10,8 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import in_root_frame
+from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.network import Network
 
 FPS = 60
 SPEEDS = {"walk": 2.5, "jog": 7.0}  # cm a frame asked for

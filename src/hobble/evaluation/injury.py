@@ -11,7 +11,7 @@ from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import SPEEDS
 from hobble.evaluation.injury_cases import divided_severities, into_a_jog, second_injuries
 from hobble.evaluation.sweep import SEVERITIES, Sweep
-from hobble.runtime.network import Network
+from hobble.models.network import Network
 
 GAITS = tuple(SPEEDS)
 REASON = "this network has no severity inputs"

@@ -14,7 +14,7 @@ from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import apart, mean_cycle
 from hobble.evaluation.spearman import spearman
 from hobble.evaluation.sweep import WALK_IN
-from hobble.runtime.network import Network
+from hobble.models.network import Network
 
 FIRST = 7.0  # severity of the injury that stays while a second one comes
 SECOND = (0.0, 2.5, 5.0, 7.5, 10.0)

@@ -20,7 +20,7 @@ from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import FPS, Stretch, run, severities
 from hobble.evaluation.discriminant import Discriminant, learn
 from hobble.evaluation.gait_features import features
-from hobble.runtime.network import Network
+from hobble.models.network import Network
 
 HEALTHY = "healthy"
 WINDOW = 60  # frames, about a cycle; captured motion that was left out is named less well by 75 or 90

@@ -11,10 +11,9 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
+from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.controller import STEPS
-from hobble.runtime.network import Network
-from hobble.runtime.predictor import MODES
 from hobble.runtime.waypoints import TRACK, Waypoint
 
 FPS = 60
@@ -28,21 +27,22 @@ def responsivity(
     runtime: Mapping[str, Any],
     laps: int,
     lap_seconds: float,
-    modes: Sequence[str] = tuple(MODES),
+    modes: Sequence[str] | None = None,
     track: Sequence[Waypoint] = TRACK,
 ) -> dict[str, Any]:
     """Run `laps` laps of the track of Segerstedt 2021 in each of `modes` and in the runtime's own.
 
+    modes: by default all that the network has.
     runtime: options of ProceduralAnimation. A lap that takes longer than `lap_seconds` of simulated time is
     ended there, its remaining waypoints not reached, and the next one starts from the beginning of the track.
     `modes` holds the laps of each mode and what they come to; those of the runtime's own mode stand at the
     top too. Measured times stand under "milliseconds" only, each with the steps' means, their `total`, and
     `spread`: sd, median and 99th percentile of the total, and the mean of a whole call.
     """
-    own = str(runtime.get("mode", "cubic"))
+    own = network.mode(runtime.get("mode"))
     found = {
         mode: _laps(network, {**runtime, "mode": mode}, track, laps, lap_seconds)
-        for mode in dict.fromkeys((*modes, own))
+        for mode in dict.fromkeys((*(network.modes if modes is None else modes), own))
     }
     return {
         "configuration": configuration,

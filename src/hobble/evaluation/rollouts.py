@@ -22,8 +22,8 @@ from hobble.database.layout import GAITS
 from hobble.database.statistics import Moments
 from hobble.evaluation.accuracy import SPLITS, check_layout, joint_indices, relative_and_distance
 from hobble.evaluation.captured import turned, unbroken
-from hobble.runtime.network import load_network
-from hobble.runtime.predictor import Predictor
+from hobble.models.load import load_network
+from hobble.models.network import Predictor
 
 LENGTHS = (1, 10, 60, 300)  # frames
 OVERLAP = 10  # roll-outs of one length that every frame lies in
@@ -213,7 +213,7 @@ def measure_roll_outs(
     how phase is looked up. Raises InputError where rows and network differ.
     """
     network = load_network(weights)
-    predictor = Predictor(network, mode)
+    predictor = network.predictor(mode)
     joints = joint_indices(network, equivalents)
     total = {length: dict.fromkeys(SPLITS, Strayed()) for length in lengths}
     entries: dict[int, list[dict[str, Any]]] = {length: [] for length in lengths}

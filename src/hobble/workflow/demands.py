@@ -13,6 +13,8 @@ import os
 import re
 from pathlib import Path
 
+from hobble.database.layout import RowLayout
+from hobble.models import model
 from hobble.workflow.project import MIRROR, Project
 
 ENGINE_MB = 400  # Snakemake, twice in a cluster's job: as the step that SLURM starts, and beside the script
@@ -85,11 +87,13 @@ class Demands:
         return self._frames(dataset, clip.removesuffix(MIRROR)) / 1e3 * self._joints(dataset) / JOINTS
 
     def weights(self, configuration: str) -> float:
-        """Weights of the network, of all its control points, by the sizes of the rows of a figure."""
-        network = self.project.section(configuration, "network")
-        joints = self._joints(self.project.configuration(configuration).dataset)
-        inputs, outputs, units = 156 + 7 * joints, 32 + 9 * joints, network["units"]
-        return network["control_points"] * units * (inputs + (network["hidden_layers"] - 1) * units + outputs)
+        """Numbers that are trained, by the columns of the configuration's rows."""
+        chosen = self.project.configuration(configuration)
+        database = self.project.options(chosen.dataset, "database")
+        skeleton = self.project.catalogue.skeleton(self.project.dataset(chosen.dataset).skeleton)
+        links = len(skeleton.links) if chosen.injury else 0
+        layout = RowLayout(len(skeleton.joints), database["window"], database["step"], links)
+        return model(chosen.network.kind).parameters(chosen.network, layout.x_size, layout.y_size)
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
     def all_thousands(self, dataset: str) -> float:

@@ -323,8 +323,9 @@ class Project:
 
     def web(self, suffix: str) -> list[str]:
         """The page's scripts (".js"), or what says which packages they need (".json")."""
-        folder = self.base / "src" / "hobble" / "report" / "web"
-        return sorted(str(p) for p in folder.iterdir() if p.suffix == suffix)
+        package = self.base / "src" / "hobble"
+        files = [*(package / "report" / "web").iterdir(), *package.glob("models/*/*.js")]
+        return sorted(str(p) for p in files if p.suffix == suffix)
 
     def published(self) -> str:
         """The file of published figures that stand beside ours."""
