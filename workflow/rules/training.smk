@@ -1,8 +1,8 @@
 rule training:
     """The network, learnt from the database; checkpoints survive a kill."""
     input:
-        database=lambda w: project.database(w.configuration),
-        checkpoint=lambda w: project.start(w.configuration),
+        database=lambda w: configurations.database(w.configuration),
+        checkpoint=lambda w: configurations.start(w.configuration),
     output:
         weights="results/{configuration}/network/weights.npz",
         history="results/{configuration}/network/history.csv",
@@ -18,12 +18,12 @@ rule training:
         gpu=lambda w: demands.gpus(w.configuration),
     params:
         configuration=lambda w: w.configuration,
-        network=lambda w: project.section(w.configuration, "network"),
-        training=lambda w: project.section(w.configuration, "training"),
-        terrain_side=lambda w: project.options(
-            project.configuration(w.configuration).dataset, "database"
+        network=lambda w: configurations.section(w.configuration, "network"),
+        training=lambda w: configurations.section(w.configuration, "training"),
+        terrain_side=lambda w: datasets.options(
+            configurations.dataset(w.configuration), "database", "terrain_side"
         )["terrain_side"],
         checkpoints="results/{configuration}/checkpoints",
-        code=project.code("training"),
+        code=lambda w: package.code("training", configurations.kind(w.configuration)),
     script:
         "../scripts/training.py"

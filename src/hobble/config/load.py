@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from hobble.config.models import Configuration, Dataset, SkeletonFile, configuration_of
 from hobble.core import untrusted
 from hobble.core.errors import HobbleError, InputError
-from hobble.models import MODELS
+from hobble.models import DEFAULT, MODELS
 
 Model = TypeVar("Model", bound=BaseModel)
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")  # so that no name leads out of its folder
@@ -39,7 +39,7 @@ def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 def _kind(network: Mapping[str, Any], below: Mapping[str, Any] | None = None) -> Any:
     """The kind of a section `network`, which may leave it to the one below it."""
-    return network.get("kind", _kind(below) if below is not None else MODELS[0])
+    return network.get("kind", _kind(below) if below is not None else DEFAULT)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, create_model, model_validator
 
 from hobble.config import sections as s
 from hobble.core.clip_files import NAMES, can_be_called
-from hobble.models import MODELS, model
+from hobble.models import DEFAULT, model
 from hobble.models.options import Options
 
 
@@ -102,7 +102,7 @@ class Configuration(s.Section):
     dataset: Name = "synthetic"
     injury: bool = Field(False, description="severities as inputs and all clips; else the healthy clips only")
     network_of: Name | None = Field(None, description="read another configuration's network, train none")
-    network: Options = model(MODELS[0]).options()()  # of its kind; see `configuration_of`
+    network: Options = model(DEFAULT).options()()  # of its kind; see `configuration_of`
     training: s.Training = s.Training()
     runtime: s.Runtime = s.Runtime()
     evaluation: s.Evaluation = s.Evaluation()

@@ -14,10 +14,9 @@ from hobble.core.files import load_npz
 from hobble.core.skeleton import Skeleton
 from hobble.core.untrusted import read_yaml
 from hobble.database.layout import GAITS, RowLayout
-from hobble.models import MODELS, checks, model
+from hobble.models import DEFAULT, MODELS, checks, model
 from hobble.models.network import TERRAIN_SIDE, Network
 
-OLDEST = "pfnn"  # what a file is that does not say
 MOST_META = 1 << 22  # characters
 WIDEST = 1e4  # centimetres from the path to the heights at its sides
 LARGEST_Y = 1e9  # of a prediction for the mean input; a sound one is below 1000
@@ -59,7 +58,7 @@ def network_from_arrays(
 ) -> Network:
     """Check the arrays and the `meta` of a file named `path` and build the network that they are."""
     meta = _meta(path, arrays)
-    kind = meta.get("kind", OLDEST)
+    kind = meta.get("kind", DEFAULT)
     if kind not in MODELS:
         raise InputError(path, f"is a network of kind {kind!a:.40}; there are: {', '.join(MODELS)}")
     statistics = checks.statistics(path, arrays)

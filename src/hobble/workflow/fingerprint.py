@@ -5,16 +5,19 @@ from __future__ import annotations
 import ast
 import functools
 import hashlib
+from collections.abc import Iterable
 from pathlib import Path
 
 
-def fingerprint(script: Path, source: Path) -> str:
+def fingerprint(script: Path, source: Path, parts: Iterable[Path] = ()) -> str:
     """Hash `script` and its import closure among the packages under `source`.
 
-    Comments, blank lines and docstrings do not count, so that editing them re-runs nothing.
+    parts: modules that it finds by a name in the configuration, with what they import. Comments, blank lines
+    and docstrings do not count, so that editing them re-runs nothing.
     """
     digest = hashlib.sha256(_stripped(script).encode())
-    for module in sorted(closure(script, source)):
+    modules = closure(script, source).union(*({part} | closure(part, source) for part in parts))
+    for module in sorted(modules):
         digest.update(_stripped(module).encode())
     return digest.hexdigest()[:16]
 

@@ -10,10 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.core.clip import Clip
-from hobble.core.errors import InputError
-from hobble.core.skeleton import Skeleton
-from hobble.injury.severity import (
+from hobble.channels.injury.severity import (
     clip_severity,
     load_injury,
     mirror_severity,
@@ -23,7 +20,10 @@ from hobble.injury.severity import (
     source_rows,
     write_report,
 )
-from hobble.injury.status import Spell, Status, read_status
+from hobble.channels.injury.status import Spell, Status, read_status
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
 from hobble.motion.resample import sample_times
 
 THIGH, ARM = "LeftUpLeg-LeftLeg", "LeftArm-LeftForeArm"

@@ -1,4 +1,4 @@
-"""Write status files from a table: python -m hobble.injury TABLE.csv FOLDER --skeleton SKELETON.yaml."""
+"""Write status files from a table: python -m hobble.channels.injury TABLE.csv FOLDER --skeleton SKELETON.yaml."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from hobble.channels.injury.table import write_statuses
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import read_yaml
-from hobble.injury.table import write_statuses
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m hobble.injury", description="Status files from a table.")
+    parser = argparse.ArgumentParser(
+        prog="python -m hobble.channels.injury", description="Status files from a table."
+    )
     parser.add_argument("table", help="CSV with the columns clip, link, severity, from, to")
     parser.add_argument("folder", help="where the clips' BVH files lie; the status files go beside them")
     parser.add_argument("--skeleton", default="config/skeletons/holden31.yaml", help="names the links")

@@ -1,0 +1,38 @@
+"""The package's own files that rules depend on: templates, scripts of the page, published figures, code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hobble.workflow.fingerprint import fingerprint
+
+
+class Package:
+    """The package `hobble` of a checkout. base: the checkout."""
+
+    def __init__(self, base: Path) -> None:
+        self.base = base
+        self.folder = base / "src" / "hobble"
+
+    def code(self, script: str, *kinds: str) -> str:
+        """Fingerprint of a rule's script and of all it imports from the package.
+
+        kinds: of the networks that it trains or runs, whose folders it finds by that name.
+        """
+        parts = sorted(file for kind in kinds for file in (self.folder / "models" / kind).glob("*.py"))
+        return fingerprint(self.base / "workflow" / "scripts" / f"{script}.py", self.base / "src", parts)
+
+    def templates(self) -> list[str]:
+        """The page's templates; a change in one re-makes only the reports."""
+        kinds = {".j2", ".css", ".yaml"}
+        files = [str(path) for path in (self.folder / "report").iterdir() if path.suffix in kinds]
+        return sorted([*files, self.published()])
+
+    def web(self, suffix: str) -> list[str]:
+        """The page's scripts (".js"), or what says which packages they need (".json")."""
+        files = [*(self.folder / "report" / "web").iterdir(), *self.folder.glob("models/*/*.js")]
+        return sorted(str(path) for path in files if path.suffix == suffix)
+
+    def published(self) -> str:
+        """The file of published figures that stand beside ours."""
+        return str(self.folder / "evaluation" / "published.yaml")
