@@ -61,8 +61,8 @@ class Configurations:
         return self.catalogue.configuration(configuration).network_of or configuration
 
     def kind(self, configuration: str) -> str:
-        """The kind of network that it trains or reads: a folder of hobble.models."""
-        return self.catalogue.configuration(self.owner(configuration)).network.kind
+        """The package of the kind of network that it trains or reads: hobble.models.pfnn."""
+        return f"hobble.models.{self.catalogue.configuration(self.owner(configuration)).network.kind}"
 
     def network(self, configuration: str, file: str) -> str:
         """A file of the configuration's network, or of the network it reads."""

@@ -9,23 +9,24 @@ from collections.abc import Iterable
 from pathlib import Path
 
 
-def fingerprint(script: Path, source: Path, parts: Iterable[Path] = ()) -> str:
+def fingerprint(script: Path, source: Path, modules: Iterable[str] = ()) -> str:
     """Hash `script` and its import closure among the packages under `source`.
 
-    parts: modules that it finds by a name in the configuration, with what they import. Comments, blank lines
-    and docstrings do not count, so that editing them re-runs nothing.
+    modules: full names of modules that the script imports by a name it is told. Comments, blank lines and
+    docstrings do not count, so that editing them re-runs nothing.
     """
     digest = hashlib.sha256(_stripped(script).encode())
-    modules = closure(script, source).union(*({part} | closure(part, source) for part in parts))
-    for module in sorted(modules):
+    for module in sorted(closure(script, source, modules)):
         digest.update(_stripped(module).encode())
     return digest.hexdigest()[:16]
 
 
-def closure(script: Path, source: Path) -> set[Path]:
-    """The project files that `script` imports, directly or through others."""
+def closure(script: Path, source: Path, modules: Iterable[str] = ()) -> set[Path]:
+    """The project files that `script` imports, directly or through others, and `modules` with theirs."""
     found: set[Path] = set()
     waiting = list(_imports(script, source))
+    for module in modules:
+        waiting += _files_of(module, source)
     while waiting:
         path = waiting.pop()
         if path not in found:

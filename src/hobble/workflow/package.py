@@ -14,13 +14,13 @@ class Package:
         self.base = base
         self.folder = base / "src" / "hobble"
 
-    def code(self, script: str, *kinds: str) -> str:
+    def code(self, script: str, *modules: str) -> str:
         """Fingerprint of a rule's script and of all it imports from the package.
 
-        kinds: of the networks that it trains or runs, whose folders it finds by that name.
+        modules: full names of those that it finds by a name it is told.
         """
-        parts = sorted(file for kind in kinds for file in (self.folder / "models" / kind).glob("*.py"))
-        return fingerprint(self.base / "workflow" / "scripts" / f"{script}.py", self.base / "src", parts)
+        path = self.base / "workflow" / "scripts" / f"{script}.py"
+        return fingerprint(path, self.base / "src", modules)
 
     def templates(self) -> list[str]:
         """The page's templates; a change in one re-makes only the reports."""
