@@ -39,8 +39,8 @@ def responsivity(
     modes: by default all that the network has. A lap that takes longer than `lap_seconds` of simulated time
     is ended there, its remaining waypoints not reached, and the next one starts from the beginning of the
     track. `modes` holds the laps of each mode and what they come to; those of the runtime's own mode stand at
-    the top too. Measured times stand under "milliseconds" only, each with the steps' means, their `total`, and
-    `spread`: sd, median and 99th percentile of the total, and the mean of a whole call.
+    the top too. Measured times stand under "milliseconds" only, each with the steps' means, their `total`,
+    and `spread`: sd, median and 99th percentile of the total, and the mean of a whole call.
     """
     own = network.mode(runtime.mode)
     found = {
