@@ -15,6 +15,7 @@ from pathlib import Path
 
 from hobble.database.layout import RowLayout
 from hobble.measures.registry import measure
+from hobble.models import model
 from hobble.workflow.clips import MIRROR
 from hobble.workflow.project import Project
 
@@ -99,19 +100,16 @@ class Demands:
         return self._frames(dataset, clip.removesuffix(MIRROR)) / 1e3 * self._joints(dataset) / JOINTS
 
     def weights(self, configuration: str) -> float:
-        """Weights of the network, of all its control points, by the layout of its rows."""
-        network = self.project.configurations.section(configuration, "network")
-        layout, units = self.layout(configuration), network["units"]
-        between = (network["hidden_layers"] - 1) * units
-        return network["control_points"] * units * (layout.x_size + between + layout.y_size)
+        """Numbers that are trained, by the columns of the configuration's rows."""
+        chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
+        return model(chosen.network.kind).parameters(chosen.network, layout.x_size, layout.y_size)
 
     def layout(self, configuration: str) -> RowLayout:
         """The columns of a configuration's rows."""
-        dataset = self.project.configurations.dataset(configuration)
-        model = self.project.catalogue.configuration(configuration)
-        skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(dataset).skeleton)
-        of_rows = self.project.datasets.options(dataset, "database", "window", "step")
-        links = len(skeleton.links) if model.injury else 0
+        chosen = self.project.catalogue.configuration(configuration)
+        skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(chosen.dataset).skeleton)
+        of_rows = self.project.datasets.options(chosen.dataset, "database", "window", "step")
+        links = len(skeleton.links) if chosen.injury else 0
         return RowLayout(joints=len(skeleton.joints), links=links, **of_rows)
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
