@@ -70,7 +70,7 @@ class Clips:
         return {name: turn for turn, name in enumerate(names)}
 
     def is_injured(self, dataset: str, clip: str) -> bool:
-        """Whether anything hurts in a clip: in a hurt version, by the configuration, or by its status file."""
+        """Whether anything hurts in a clip: a hurt version, or by the configuration or its status file."""
         if HURT.search(clip.removesuffix(MIRROR)) or self.entry(dataset, clip).is_injured:
             return True
         if self.catalogue.dataset(dataset).synthetic is not None:
