@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from hobble.report.body import body
 from hobble.report.scenes import packed
 from hobble.runtime import animation, feet, trajectory
 from hobble.runtime.network import Network
+from hobble.runtime.options import Runtime
 
 # Parts of the body that have a slider and a key of their own: label, roles of the ends, key.
 PARTS = (
@@ -34,10 +35,10 @@ PRESETS = {
 }
 
 
-def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
+def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     """What the page's second implementation of the runtime needs; {} where the network has no skeleton.
 
-    runtime: that section of the configuration. Joint rotations are left out of the outputs: the page draws
+    Joint rotations are left out of the outputs: the page draws
     positions only.
     """
     skeleton = network.skeleton
@@ -73,10 +74,10 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
         "carried": [np.flatnonzero(row).tolist() for row in feet.carried(skeleton, legs)],
         "sole": sole,
         "body": {**body(skeleton.joints, skeleton.parents, skeleton.roles, network.links), "sole": sole},
-        "severityStep": runtime["severity_rate"] / 60,
-        "severityScale": runtime["severity_scale"],
-        "footLocking": runtime["foot_locking"],
-        "steering": runtime["steering"],
+        "severityStep": runtime.severity_rate / 60,
+        "severityScale": runtime.severity_scale,
+        "footLocking": runtime.foot_locking,
+        "steering": runtime.steering,
         "parts": parts,
         "presets": [
             {"name": name, "severities": [[parts[label], value] for label, value in values.items()]}

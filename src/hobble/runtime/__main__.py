@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from hobble.core.errors import HobbleError
 from hobble.runtime.network import Network, load_network
 from hobble.runtime.onnx_export import write_checked
+from hobble.runtime.options import Runtime
 from hobble.runtime.predictor import MODES
 from hobble.runtime.release import write_release
 from hobble.runtime.scenarios import write_motions
@@ -50,7 +51,7 @@ def _write(to: str, network: Network, target: str, mode: str) -> str:
     if to == "bvh":
         if network.skeleton is None:
             raise HobbleError("the network carries no skeleton: name one with --skeleton")
-        names = [track.scenario.name for track in write_motions(network, target, mode=mode)]
+        names = [track.scenario.name for track in write_motions(network, target, Runtime(mode=mode))]
         return f"{target}: {', '.join(names)}"
     difference = write_checked(target, network, mode)
     return f"{target}: within {difference:.1g} of the runtime"
