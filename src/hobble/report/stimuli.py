@@ -23,7 +23,7 @@ from hobble.runtime.network import Network
 from hobble.runtime.options import Runtime
 
 SEVERITY = 8.0
-# The study of Ferre et al. showed thirteen walks, and asked which part is hurt; in them nothing is coloured.
+# The study of Quentin Ferre (2019) showed thirteen walks, and asked which part is hurt; nothing is coloured.
 STUDY: dict[str, tuple[str, ...]] = {
     "healthy": (),
     "left-thigh": ("left thigh",),
