@@ -30,7 +30,7 @@ class Line:
     def __init__(self, stream: TextIO) -> None:
         self.stream, self.live = stream, stream.isatty()
         self.fetched, self.name, self.size, self.now = 0.0, "", 0.0, 0.0
-        self.last = 0.0
+        self.last = float("-inf")
 
     def take(self, said: str) -> None:
         """Follow a line of pip's."""
@@ -41,13 +41,14 @@ class Line:
             self.now = float(found[1])
         elif said.startswith("Installing collected packages"):
             self.fetched, self.size = self.fetched + self.size, 0.0
-            self.name = f"unpacking {said.count(',') + 1} packages"
+            self.name = f"unpacking {said.count(',') + 1} packages, which takes a while"
+            self.last = float("-inf")  # to be said at once: pip is silent from here on
         else:
             return
         self._show()
 
     def _show(self) -> None:
-        of = f" {self.now / 1e6:.0f} of {self.size / 1e6:.0f} MB" if self.size else ""
+        of = f" {self.now / 1e6:.0f} of {self.size / 1e6:.0f} MB" if self.size >= 1e6 else ""
         text = f"environment: {(self.fetched + self.now) / 1e6:.0f} MB fetched; {self.name}{of}"
         if self.live:
             self.stream.write(f"\r\x1b[K{text[:78]}")
