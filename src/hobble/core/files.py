@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.untrusted import read_text
+from hobble.core.untrusted import read_text, regular
 
 MOST_INFLATED = 1 << 30  # bytes that a file's compressed arrays may become; our own are not compressed
 MOST_JSON = 1 << 30
@@ -130,9 +130,12 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
     the file can fill.
     """
     try:
+        size = regular(path).st_size
         with zipfile.ZipFile(path) as archive:
             if _entries(path, archive) != len(archive.infolist()):
                 raise zipfile.BadZipFile("its directory has lost an entry")
+            if sum(i.file_size for i in archive.infolist() if not i.compress_type) > size:
+                raise zipfile.BadZipFile("its entries overlap")
             there = [name.removesuffix(".npy") for name in archive.namelist()]
             wanted = there if names is None else list(names)
             if sum(i.file_size for i in archive.infolist() if i.compress_type) > MOST_INFLATED:

@@ -26,11 +26,7 @@ def read_bytes(path: str | Path, most: int) -> bytes:
     Raises InputError for anything else: what is not there or may not be read, a folder, a device, a pipe.
     """
     try:
-        kind = os.stat(path)
-        if not stat.S_ISREG(kind.st_mode):
-            raise InputError(
-                path, "not a file" if stat.S_ISDIR(kind.st_mode) else "a device or a pipe, not a file"
-            )
+        kind = regular(path)
         with open(path, "rb") as file:
             # no more room than the file takes: a buffer of `most` bytes is 1 GB for some
             data = file.read(kind.st_size + 1) if kind.st_size <= most else b""
@@ -42,6 +38,16 @@ def read_bytes(path: str | Path, most: int) -> bytes:
     if kind.st_size > most or len(data) > most:
         raise InputError(path, f"larger than {most / MB:g} MB, which is the most that is read of such a file")
     return data
+
+
+def regular(path: str | Path) -> os.stat_result:
+    """What the system says of a regular file; raises InputError for anything else, which may never end."""
+    kind = os.stat(path)
+    if not stat.S_ISREG(kind.st_mode):
+        raise InputError(
+            path, "not a file" if stat.S_ISDIR(kind.st_mode) else "a device or a pipe, not a file"
+        )
+    return kind
 
 
 def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
