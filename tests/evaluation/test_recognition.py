@@ -13,7 +13,7 @@ from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.evaluation import recognition as module
 from hobble.evaluation.captured import Captured
-from hobble.evaluation.discriminant import learn
+from hobble.gait.discriminant import learn
 from hobble.evaluation.gait_features import features
 from hobble.evaluation.recognition import HEALTHY, Window, recognition, rows, walking_windows
 

@@ -18,7 +18,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import FPS, Stretch, run, severities
-from hobble.evaluation.discriminant import Discriminant, learn
+from hobble.gait.discriminant import Discriminant, learn
 from hobble.evaluation.gait_features import features
 from hobble.runtime.network import Network
 
