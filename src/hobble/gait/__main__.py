@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from hobble.config.sections import Motion
-from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError, InputError
 from hobble.gait.compare import Comparison, compare, healthy_profile
 from hobble.gait.effects import EFFECTS, effects_of_people
-from hobble.gait.people import GAITS, NORMAL, SOURCE, people
-from hobble.gait.recogniser import impaired_share
-from hobble.motion.make import load_source, resample
-from hobble.motion.read import read_bvh
-from hobble.motion.rig import load_skeleton
+from hobble.gait.people import GAITS, SOURCE, people
+from hobble.gait.profile import Profile
+from hobble.gait.read import SKELETONS, read_clip
+from hobble.gait.recogniser import RIGHT
 
-SKELETONS = "config/skeletons"
-NO_HEALTHY = "No healthy walk was given: beside the mean of people, a figure's own build and manner count as differences."
+NO_HEALTHY = "No healthy walk was given: beside the mean of people, its own build and manner count too."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -48,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _compared(path: str, options: argparse.Namespace, healthy: dict[str, float]) -> Comparison:
+def _compared(path: str, options: argparse.Namespace, healthy: Profile) -> Comparison:
     clip = read_clip(path, options.skeletons)
     try:
         return compare(clip, healthy, options.window)
@@ -58,32 +54,33 @@ def _compared(path: str, options: argparse.Namespace, healthy: dict[str, float])
         raise InputError(path, str(error)) from None
 
 
-def read_clip(path: str | Path, skeletons: str | Path = SKELETONS) -> Clip:
-    """A BVH file on its own rig, which must be one of the known ones, at 60 Hz; raises InputError."""
-    options = Motion().model_dump()
-    target = load_skeleton(Path(skeletons) / "holden31.yaml")
-    return resample(load_source(read_bvh(path), target, skeletons, options).clip, options["fps"])
-
-
 def describe(name: str, seen: Comparison, side: str | None = None) -> str:
-    """The answer, the effects beside those of people, as text."""
-    answer = seen.answer
-    side = side or seen.side
-    called = f"{answer.label}, {answer.side}" if answer.side else answer.label
+    """The answers, and the effects beside those of people, as text."""
+    answer, grade = seen.answer, seen.grade
+    side = side or answer.side or grade.side or RIGHT
     likely = ", ".join(f"{gait} {answer.probabilities[gait]:.2f}" for gait in GAITS)
-    named = ", ".join(f"{key} {share:.2f}" for key, share in seen.named().items()) or "none with two cycles"
-    known = {gait: sizes for gait, sizes in effects_of_people(people()).items()}
     lines = [
-        f"{name}: {called} ({len(seen.walk)} cycles)",
+        f"{name}: {answer.label} {answer.side or ''} ({len(seen.walk)} cycles)",
         f"  probabilities: {likely}",
-        f"  windows: {len(seen.windows)}, impaired {impaired_share(seen.windows):.2f}: {named}",
+        f"  windows: {len(seen.windows)}, called {_listed(seen.named())}",
+        f"  mild limps too: {grade.label} {grade.side or ''}, {grade.strength:.2f} of what people showed",
+        f"  what may hurt: {', '.join(grade.parts) or 'nothing'}; windows called {_listed(seen.graded())}",
         f"  effects, hurt side {side}, beside people ({SOURCE}; mean, spread over people)",
-        " " * 60 + "".join(f"{gait[:13]:>15}" for gait in GAITS if gait != NORMAL),
     ]
+    return "\n".join([*lines, *_effects(seen.effects[side])])
+
+
+def _effects(sizes: Mapping[str, float]) -> list[str]:
+    known = effects_of_people(people())
+    lines = [" " * 60 + "".join(f"{gait[:13]:>15}" for gait in known)]
     for key, text in EFFECTS.items():
-        people_ = "".join(f"{known[gait][key][0]:9.2f} ±{known[gait][key][1]:4.2f}" for gait in known)
-        lines.append(f"  {key:14}{seen.effects[side][key]:8.2f}  {text[:36]:36}{people_}")
-    return "\n".join(lines)
+        beside = "".join("{:9.2f} ±{:4.2f}".format(*known[gait][key]) for gait in known)
+        lines.append(f"  {key:14}{sizes[key]:8.2f}  {text[:36]:36}{beside}")
+    return lines
+
+
+def _listed(shares: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {share:.2f}" for name, share in shares.items()) or "nothing: too few cycles"
 
 
 if __name__ == "__main__":

@@ -8,21 +8,28 @@ from dataclasses import dataclass, field
 from hobble.core.clip import Clip
 from hobble.gait.cycles import Walk, joined, measure
 from hobble.gait.effects import effects
-from hobble.gait.people import NORMAL, people
+from hobble.gait.graded import Grade, grade
+from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
-from hobble.gait.recogniser import RIGHT, Answer, recognise, recognise_windows
+from hobble.gait.recogniser import RIGHT, SIDES, Answer, recognise, windows
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """walk: its cycles. profile: its numbers. answer: what the whole clip is called. windows: (first frame,
-    answer) of each window of some seconds. effects: side -> sizes, as if that side were the hurt one.
+    """What was measured and said of a clip.
+
+    walk: its cycles. profile: its numbers. answer, grade: what the whole clip is called by the linear
+    classifier of people's strong limps, and by the recogniser that is made for mild ones too. windows,
+    grades: (first frame, answer or grade) of each window of some seconds. effects: side -> sizes, as if that
+    side were the hurt one.
     """
 
     walk: Walk = field(repr=False)
     profile: Profile = field(repr=False)
     answer: Answer
+    grade: Grade
     windows: Sequence[tuple[int, Answer]] = field(repr=False)
+    grades: Sequence[tuple[int, Grade]] = field(repr=False)
     effects: Mapping[str, Mapping[str, float]] = field(repr=False)
 
     @property
@@ -31,9 +38,17 @@ class Comparison:
         return self.answer.side or RIGHT
 
     def named(self) -> dict[str, float]:
-        """Share of the windows that are called by each label and side, such as "antalgic right"."""
-        names = [f"{a.label} {a.side}" if a.side else NORMAL for _, a in self.windows]
-        return {name: names.count(name) / len(names) for name in dict.fromkeys(names)}
+        """Share of the windows that the linear classifier calls each label and side: "antalgic right"."""
+        return _shares([answer for _, answer in self.windows])
+
+    def graded(self) -> dict[str, float]:
+        """The same of the recogniser of mild limps."""
+        return _shares([answer for _, answer in self.grades])
+
+
+def _shares(answers: Sequence[Answer | Grade]) -> dict[str, float]:
+    names = [f"{a.label} {a.side}" if a.side else a.label for a in answers]
+    return {name: names.count(name) / len(names) for name in dict.fromkeys(names)}
 
 
 def measure_clip(clip: Clip) -> Walk:
@@ -53,10 +68,13 @@ def compare(clip: Clip, healthy: Profile, seconds: float = 4.0) -> Comparison:
     """Measure a clip beside a healthy profile; windows last `seconds`. Raises HobbleError without a cycle."""
     walk = measure_clip(clip)
     own = profile(walk)
+    parts = [(start, profile(part)) for start, part in windows(walk, len(clip), seconds)]
     return Comparison(
         walk,
         own,
         recognise(own, healthy),
-        recognise_windows(walk, healthy, len(clip), seconds),
-        {side: effects(own, healthy, side) for side in ("right", "left")},
+        grade(own, healthy),
+        [(start, recognise(part, healthy)) for start, part in parts],
+        [(start, grade(part, healthy)) for start, part in parts],
+        {side: effects(own, healthy, side) for side in SIDES},
     )

@@ -1,7 +1,7 @@
 """The cycles of a walk, from one landing of a foot to its next, and each cycle in numbers.
 
-A foot lands where its ankle is furthest ahead of the hips. That is defined for a foot that drags and for one that is
-set down beside the other, where contacts and zero crossings are not.
+A foot lands where its ankle is furthest ahead of the hips. That is defined for a foot that drags and for one
+that is set down beside the other, where contacts and zero crossings are not.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ SHORTEST, LONGEST = 0.4, 3.5  # s, a cycle
 LEAST_TRAVEL = 0.2  # leg lengths in a cycle; less is standing
 LEAST_SWING = 0.12  # leg lengths that an ankle goes back and forth, or it makes no step
 OF_RANGE = 0.4  # of the ankle's range within the longest cycle: lesser turns of it are no step
+STRAIGHT = 25.0  # degrees that the path turns in a cycle at most: people were measured on straight paths
 AHEAD = 0.7  # mean cosine between facing and travel; less is a walk backward or sideways
 
 
@@ -76,10 +77,11 @@ class Walk:
 
 
 def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> Walk:
-    """Find and measure the cycles in which a figure walks ahead.
+    """Find and measure the cycles in which a figure walks straight ahead.
 
-    positions: (F, J, 3) world, cm, Y up. Standing, walking backward and sideways, and steps without a step
-    of the other foot between them make no cycle; of a clip shorter than a cycle nothing is left.
+    positions: (F, J, 3) world, cm, Y up. Standing, turning, walking backward and sideways, and steps
+    without one step of the other foot between them make no cycle; of a clip shorter than a cycle nothing is
+    left.
     """
     if len(positions) < SHORTEST * fps:
         return Walk(fps, (), ())
@@ -131,7 +133,8 @@ def _cycles(seen: Signals) -> Iterable[Cycle]:
         between = [i for i in left if a < i < b]
         if len(between) == 1 and SHORTEST * seen.fps <= b - a <= LONGEST * seen.fps:
             travel = np.linalg.norm(np.diff(seen.hips[a : b + 1], axis=0), axis=1).sum()
-            if travel >= LEAST_TRAVEL and seen.ahead[a:b].mean() >= AHEAD:
+            straight = abs(seen.heading[b] - seen.heading[a]) <= STRAIGHT
+            if travel >= LEAST_TRAVEL and straight and seen.ahead[a:b].mean() >= AHEAD:
                 yield _cycle(seen, a, between[0], b)
 
 

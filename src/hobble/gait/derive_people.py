@@ -1,7 +1,7 @@
-"""Write people.npz from the curves of Jun et al. 2020: python -m hobble.gait.derive_people WALKS.npz [PEOPLE.npz].
+"""Write people.npz from the curves of Jun et al.: python -m hobble.gait.derive_people WALKS.npz [PEOPLE.npz].
 
-WALKS.npz holds, for each gait and person, the median over the cycles: `gaits` (6), `curves` (22 names), `scalars`
-(8 names), `curve` (6, people, 22, 50) and `scalar` (6, people, 8), as profile.py defines them.
+WALKS.npz holds, for each gait and person, the median over the cycles: `gaits` (6), `curves` (22 names),
+`scalars` (8 names), `curve` (6, people, 22, 50) and `scalar` (6, people, 8), as profile.py defines them.
 """
 
 from __future__ import annotations

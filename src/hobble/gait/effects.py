@@ -1,4 +1,4 @@
-"""How much a hurt walk differs from the healthy walk of the same figure, in the sizes that are known of people."""
+"""How much a hurt walk differs from the same figure's healthy walk, in sizes that are known of people."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """What is known of people who walk with an impaired right leg.
 
-From skeleton recordings of ten people, each walking normally and with five impairments that they were told to imitate:
-Jun, K., Lee, Y., Lee, S., Lee, D.-W., Kim, M. S. (2020), "Pathological gait classification using Kinect v2 and gated
-recurrent neural networks", IEEE Access 8. `people.npz` holds statistics of them; `derive_people.py` writes it.
+From skeleton recordings of ten people, each walking normally and with five impairments that they imitated,
+as told: Jun et al. (2020), "Pathological gait classification using Kinect v2 and gated recurrent neural
+networks", IEEE Access 8. `people.npz` holds statistics of them; `derive_people.py` writes it.
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-
-import numpy as np
 
 from hobble.core.files import load_npz
 from hobble.core.quat import Array

@@ -1,7 +1,7 @@
 """A walking body in 22 curves over time, the same that are known of people who walk with an impaired leg.
 
-Joints are found by role, so that any rig of config/skeletons/ will do. Angles are measured against the vertical and the
-direction of travel, which is what a viewer beside the path sees.
+Joints are found by role, so that any rig of config/skeletons/ will do. Angles are measured against the
+vertical and the direction of travel, which is what a viewer beside the path sees.
 """
 
 from __future__ import annotations
@@ -48,14 +48,16 @@ TRAVEL = 0.5  # s, sigma of the smoothing after which the hips' velocity is the 
 class Signals:
     """F frames of a body on the move; every length is in leg lengths.
 
-    curves: name of CURVES -> (F,), degrees and leg lengths. ahead: (F,) cosine of the angle between where the
-    body faces and where it goes. hips: (F, 2) path over the ground. ankle_speed: side -> (F,), leg lengths a
-    second, over the ground. across: side -> (F,) how far the ankle is to the left of the hips. leg: cm.
+    curves: name of CURVES -> (F,), degrees and leg lengths. heading: (F,) where the body goes, degrees from
+    +Z towards +X, without jumps. ahead: (F,) cosine of the angle between where the body faces and where it
+    goes. hips: (F, 2) path over the ground. ankle_speed: side -> (F,), leg lengths a second, over the
+    ground. across: side -> (F,) how far the ankle is to the left of the hips. leg: cm.
     """
 
     fps: float
     leg: float
     curves: dict[str, Array] = field(repr=False)
+    heading: Array = field(repr=False)
     ahead: Array = field(repr=False)
     hips: Array = field(repr=False)
     ankle_speed: dict[str, Array] = field(repr=False)
@@ -74,15 +76,16 @@ def mirrored(signals: Signals) -> Signals:
     speed = {"L": signals.ankle_speed["R"], "R": signals.ankle_speed["L"]}
     across = {"L": -signals.across["R"], "R": -signals.across["L"]}
     hips = signals.hips * [-1.0, 1.0]
-    return Signals(signals.fps, signals.leg, curves, signals.ahead, hips, speed, across)
+    return Signals(signals.fps, signals.leg, curves, -signals.heading, signals.ahead, hips, speed, across)
 
 
 def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
     """The curves of joint positions (F, J, 3), cm, Y up, at `fps` frames a second; F is 2 or more.
 
     Hip flexion and abduction are the thigh's angles from the vertical, forward and outward; the arm's is that
-    from shoulder to elbow, forward; knee and elbow 0 where straight; foot pitch that of the line from ankle to
-    toe, up positive; the trunk's is the line from hips to neck. A rig without elbows or wrists has none (0).
+    from shoulder to elbow, forward; knee and elbow 0 where straight; foot pitch that of the line from ankle
+    to toe, up positive; the trunk's is the line from hips to neck. A rig without elbows or wrists has none
+    (0).
     """
     at = {role: positions[:, skeleton.role(role)].astype(float) for role in skeleton.roles}
     ahead, left = _travel(at["hips"], fps)
@@ -108,6 +111,7 @@ def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
         fps,
         leg,
         curves,
+        np.degrees(np.unwrap(np.arctan2(ahead[:, 0], ahead[:, 2]))),
         _dot(facing, ahead),
         at["hips"][:, ::2] / leg,
         {side: _speed(ankle, fps) / leg for side, ankle in ankles.items()},
