@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.errors import HobbleError
+from hobble.core.files import load_npz
 from hobble.gait.compare import compare, healthy_profile
-from hobble.gait.derive_healthy import REFERENCE, covariance, healthy_windows
-from hobble.gait.graded import Grader, learn_grader
+from hobble.gait.derive_healthy import REFERENCE, healthy_windows
+from hobble.gait.graded import HEALTHY, Grader, grade, healthy_covariance, learn_grader
 from hobble.gait.people import GAITS, NORMAL, people
 from hobble.gait.profile import NAMES, Profile, mirrored
 from hobble.gait.read import read_clip
@@ -72,28 +73,8 @@ def people_left_out(name: str, judges: dict[int, Callable]) -> None:
 
 
 def healthy_walks(folder: Path) -> None:
-    seen = list(healthy_windows(folder))
-    print(f"\nhealthy walks of the CMU database, {len(seen)} windows: share called impaired")
-    print("performer, windows, by the linear one, by the graded one that has not seen the performer")
-    for performer in REFERENCE:
-        own = [one for one in seen if one[0] == performer]
-        rest = covariance([one for one in seen if one[0] != performer])
-        grader = learn_grader(people(), range(people().count), rest)
-        linear = np.mean([recognise(walk, healthy).impaired for *_, walk, healthy in own])
-        graded = np.mean([grader.grade(walk, healthy).impaired for *_, walk, healthy in own])
-        print(f"  {performer:4}{len(own):4}{linear:6.2f}{graded:6.2f}")
-
-
-def strangers() -> None:
-    everyone = range(people().count)
-    pairs = [
-        (people().profile(NORMAL, a), people().profile(NORMAL, b))
-        for a in everyone
-        for b in everyone
-        if a != b
-    ]
-    wrong = np.mean([recognise(a, b).impaired for a, b in pairs])
-    print(f"\none person's normal walk beside another's: linear calls {wrong:.2f} impaired")
+    print("\nhealthy walks of the CMU database, windows: share called impaired")
+    print("performer, windows, by the linear one, the graded one, the graded one without the performer")
 
 
 def rounded(shares: Mapping[str, float]) -> str:
@@ -116,15 +97,11 @@ def captured(folder: Path, clips: list[str]) -> None:
 
 
 def main(folder: str, *clips: str) -> None:
-    seen = list(healthy_windows(folder))
-    healthy = covariance(seen)
     linear = {p: learn(*examples(people(), rest), shrinkage=SHRINKAGE) for p, rest in left_out()}
     people_left_out("linear", {p: lambda w, h, j=j: recognise(w, h, j) for p, j in linear.items()})
-    graders: dict[int, Grader] = {p: learn_grader(people(), rest, healthy) for p, rest in left_out()}
-    people_left_out("graded", {p: g.grade for p, g in graders.items()})
-    strangers()
-    healthy_walks(Path(folder))
-    captured(Path(folder), list(clips))
+    graders: dict[int, Grader] = {p: learn_grader(people(), rest, healthy_covariance()) for p, rest in
+    left_out()} people_left_out("graded", {p: g.grade for p, g in graders.items()}) strangers()
+    healthy_walks(Path(folder)) captured(Path(folder), list(clips))
 
 
 if __name__ == "__main__":

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.gait.compare import Comparison, compare, healthy_profile
+from hobble.gait.compare import Comparison, compare, healthy_profile, measure_clip
 from hobble.gait.effects import EFFECTS, effects_of_people
 from hobble.gait.people import GAITS, SOURCE, people
-from hobble.gait.profile import Profile
+from hobble.gait.profile import NO_CYCLE, Profile
 from hobble.gait.read import SKELETONS, read_clip
 from hobble.gait.recogniser import RIGHT
 
@@ -29,11 +29,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--healthy", nargs="+", default=[], metavar="CLIP.bvh", help="healthy walks of the figure"
     )
     parser.add_argument("--side", choices=("right", "left"), help="the hurt side; by default as recognised")
-    parser.add_argument("--window", type=float, default=4.0, help="seconds that are judged at once")
+    parser.add_argument("--window", type=_seconds, default=4.0, help="seconds that are judged at once")
     parser.add_argument("--skeletons", default=SKELETONS, help="folder of the known rigs")
     options = parser.parse_args(arguments)
     try:
-        healthy = healthy_profile([read_clip(path, options.skeletons) for path in options.healthy])
+        healthy = _healthy(options.healthy, options.skeletons)
         for path in options.clips:
             print(describe(Path(path).stem, _compared(path, options, healthy), options.side))
         if not options.healthy:
@@ -44,14 +44,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _seconds(text: str) -> float:
+    """A window's length from the command line: a cycle or more, a clip at most."""
+    seconds = float(text)
+    if not 1.0 <= seconds <= 3600.0:
+        raise ValueError
+    return seconds
+
+
+def _healthy(paths: Sequence[str], skeletons: str) -> Profile:
+    clips = [read_clip(path, skeletons) for path in paths]
+    for path, clip in zip(paths, clips, strict=True):
+        if not len(measure_clip(clip)):
+            raise InputError(
+                path, NO_CYCLE, fix="Name a clip that walks straight ahead for three steps or more."
+            )
+    return healthy_profile(clips)
+
+
 def _compared(path: str, options: argparse.Namespace, healthy: Profile) -> Comparison:
     clip = read_clip(path, options.skeletons)
-    try:
-        return compare(clip, healthy, options.window)
-    except InputError:
-        raise
-    except HobbleError as error:
-        raise InputError(path, str(error)) from None
+    if not len(measure_clip(clip)):
+        raise InputError(path, NO_CYCLE)
+    return compare(clip, healthy, options.window)
 
 
 def describe(name: str, seen: Comparison, side: str | None = None) -> str:

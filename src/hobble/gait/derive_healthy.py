@@ -9,7 +9,7 @@ funded.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -43,17 +43,15 @@ SECONDS = 4.0
 
 
 def healthy_windows(
-    folder: str | Path, skeletons: str | Path = SKELETONS
-) -> Iterator[tuple[str, str, Profile, Profile]]:
-    """(performer, clip, a window's profile, that of the performer's other healthy walks)."""
-    for performer, names in REFERENCE.items():
-        clips = {
-            name: read_clip(Path(folder, f"{name}.bvh"), skeletons) for name in names + OTHERS[performer]
-        }
-        for name, clip in clips.items():
-            healthy = healthy_profile([clips[other] for other in names if other != name])
-            for part in _parts(clip):
-                yield performer, name, profile(part), healthy
+    folder: str | Path, performer: str, skeletons: str | Path = SKELETONS
+) -> Iterator[tuple[str, Profile, Profile]]:
+    """(clip, profile, that of the performer's other healthy walks) of each window of a performer."""
+    names = REFERENCE[performer] + OTHERS[performer]
+    clips = {name: read_clip(Path(folder, f"{name}.bvh"), skeletons) for name in names}
+    for name, clip in clips.items():
+        healthy = healthy_profile([clips[other] for other in REFERENCE[performer] if other != name])
+        for part in _parts(clip):
+            yield name, profile(part), healthy
 
 
 def _parts(clip: Clip) -> list[Walk]:
@@ -63,25 +61,28 @@ def _parts(clip: Clip) -> list[Walk]:
     return found or [walk] * bool(len(walk))
 
 
-def covariance(seen: Sequence[tuple[str, str, Profile, Profile]]) -> Array:
-    """(D, D) mean square of the windows' features, left and right alike, each clip counting the same."""
-    names = [name for _, name, _, _ in seen]
-    total: Array = np.zeros(())
-    for _, name, walk, healthy in seen:
+def covariance(seen: Iterable[tuple[str, Profile, Profile]]) -> tuple[Array, int]:
+    """(D, D) mean square of the windows' features, left and right alike, each clip counting the same.
+
+    Returns with it how many clips there are.
+    """
+    by_clip: dict[str, list[Array]] = {}
+    for name, walk, healthy in seen:
         for pair in ((walk, healthy), (mirrored(walk), mirrored(healthy))):
-            x = np.array(list(features(*pair).values()))
-            total = total + np.outer(x, x) / names.count(name)
-    return total / (2 * len(set(names)))
+            by_clip.setdefault(name, []).append(np.array(list(features(*pair).values())))
+    squares = [np.einsum("ni,nj->ij", x, x) / len(x) for x in map(np.array, by_clip.values())]
+    return np.mean(squares, axis=0), len(by_clip)
 
 
-def derive(
-    folder: str | Path, out: str | Path = HEALTHY, skeletons: str | Path = SKELETONS
-) -> Mapping[str, Array]:
-    """Write the covariance of all performers."""
-    seen = list(healthy_windows(folder, skeletons))
-    arrays = {"covariance": covariance(seen), "clips": np.array(sorted({name for _, name, _, _ in seen}))}
-    save_npz(out, **arrays)
-    return arrays
+def derive(folder: str | Path, out: str | Path = HEALTHY) -> None:
+    """Write the covariance of each performer, and of how many clips it is the mean."""
+    each = [covariance(healthy_windows(folder, performer)) for performer in REFERENCE]
+    save_npz(
+        out,
+        performers=np.array(list(REFERENCE)),
+        covariances=np.array([square for square, _ in each]),
+        clips=np.array([clips for _, clips in each]),
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

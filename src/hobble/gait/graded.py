@@ -11,21 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
 
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
-from hobble.gait.features import ARMS, TRUNK, features
+from hobble.gait.features import ARMS, TRUNK, TRUNK_FORWARD, TRUNK_LEFT, features
 from hobble.gait.people import NORMAL, People, people
 from hobble.gait.profile import Profile
-from hobble.gait.recogniser import SIDES, examples
+from hobble.gait.recogniser import RIGHT, SIDES, examples
 
 HEALTHY = Path(__file__).with_name("healthy.npz")
 GUARDED_ARM, LEANING = "guarded_arm", "leaning_trunk"
-BOTH = "both"
+WAYS = {"forward": (1, 0), "backward": (-1, 0), "to the left": (0, 1), "to the right": (0, -1)}
 # label -> the parts of the body that it can mean. Pain in thigh, shank or foot looks alike in people's
 # data, and an arm is seen by its swing alone, wherever in it the pain is.
 PARTS: Mapping[str, tuple[str, ...]] = {
@@ -39,7 +39,7 @@ PARTS: Mapping[str, tuple[str, ...]] = {
     LEANING: ("back",),
 }
 STRENGTHS = np.array([0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.2])  # of what people showed, all as likely
-HEALTHY_SPREAD = 3.0  # times the measured covariance: a figure that nobody measured is less like itself
+HEALTHY_SPREAD = 2.5  # times the measured covariance: a figure that nobody measured is less like itself
 SHRINKAGE = 0.5  # of both covariances towards their diagonals
 
 
@@ -48,7 +48,8 @@ class Grade:
     """What hurts. label: a key of PARTS. side: "right", "left", or None where it is neither's.
 
     strength: 0 where the label is normal; 1 is as much as people showed who imitated the impairment.
-    probabilities: of each label, both sides together; sides: of each label and side.
+    probabilities: of each label, both sides together; sides: of each label and side, or where the trunk
+    leans.
     """
 
     label: str
@@ -70,34 +71,44 @@ class Grade:
 
 @dataclass(frozen=True)
 class Grader:
-    """For each (label, side): the mean (D,) at strength 1 and the covariance (D, D) over people there."""
+    """What walks of each kind look like.
+
+    kinds: (label, side or way to lean) -> the mean (D,) at strength 1 and the covariance (D, D) over people
+    there. healthy: (D, D) covariance of healthy walks.
+    """
 
     kinds: Mapping[tuple[str, str], tuple[Array, Array]] = field(repr=False)
     healthy: Array = field(repr=False)
 
+    @cached_property
+    def _densities(self) -> tuple[Array, Array, Array]:
+        """Mean, whitening and log of the highest density: of a healthy walk, then of each kind at each strength."""
+        each = [(s * mean, s**2 * spread) for mean, spread in self.kinds.values() for s in STRENGTHS]
+        means, spreads = zip((np.zeros(len(self.healthy)), 0 * self.healthy), *each, strict=True)
+        factors = np.linalg.cholesky(self.healthy + np.array(spreads))
+        top = -np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
+        top[1:] -= np.log(len(each))  # healthy or not is as likely; of the others each is
+        return np.array(means), np.linalg.inv(factors), top
+
     def grade(self, walk: Profile, healthy: Profile) -> Grade:
         """What hurts in the walk of a figure, beside its healthy walk."""
         x = np.array(list(features(walk, healthy).values()))
-        keys = list(self.kinds)
-        each = np.array([self._at_strengths(x, *self.kinds[key]) for key in keys])
-        each -= np.log(len(keys) * len(STRENGTHS))
-        none = _log_density(x, self.healthy)
-        top = max(none, each.max())
-        likely, none = np.exp(each - top), float(np.exp(none - top))
-        total = likely.sum() + none
-        sides = {key: float(p) for key, p in zip(keys, likely.sum(axis=1) / total, strict=True)}
+        means, whiten, top = self._densities
+        scores = top - 0.5 * np.sum(np.einsum("nij,nj->ni", whiten, x - means) ** 2, axis=1)
+        likely = np.exp(scores - scores.max())
+        likely /= likely.sum()
+        each = likely[1:].reshape(len(self.kinds), len(STRENGTHS))
+        sides = {key: float(p) for key, p in zip(self.kinds, each.sum(axis=1), strict=True)}
         labels = {label: sum(p for key, p in sides.items() if key[0] == label) for label in PARTS}
-        labels[NORMAL] = none / total
+        labels[NORMAL] = float(likely[0])
         label = max(labels, key=labels.__getitem__)
         if label == NORMAL:
             return Grade(label, None, 0.0, labels, sides)
-        side = max((key[1] for key in keys if key[0] == label), key=lambda s: sides[label, s])
-        row = likely[keys.index((label, side))]
-        strength = float(STRENGTHS @ row / row.sum())
-        return Grade(label, None if side == BOTH else side, strength, labels, sides)
-
-    def _at_strengths(self, x: Array, mean: Array, spread: Array) -> list[float]:
-        return [_log_density(x - s * mean, self.healthy + s**2 * spread) for s in STRENGTHS]
+        key = max((key for key in sides if key[0] == label), key=sides.__getitem__)
+        row = each[list(sides).index(key)]
+        return Grade(
+            label, key[1] if key[1] in SIDES else None, float(STRENGTHS @ row / row.sum()), labels, sides
+        )
 
 
 def learn_grader(known: People, whose: Iterable[int], healthy: Array) -> Grader:
@@ -111,15 +122,24 @@ def learn_grader(known: People, whose: Iterable[int], healthy: Array) -> Grader:
     kinds = {tuple(name.split(" ")): (mean, spread) for name, mean in means.items()}
     for side in SIDES:
         kinds[GUARDED_ARM, side] = _only(names, (ARMS,), kinds["antalgic", side][0], spread)
-    lean = np.mean([np.outer(mean, mean) for mean in means.values()], axis=0) + spread
-    kinds[LEANING, BOTH] = _only(names, TRUNK, np.zeros(len(names)), lean)
+    lean = abs(kinds["lurch", RIGHT][0][names.index(TRUNK_FORWARD)])
+    for way, (forward, left) in WAYS.items():
+        mean = np.zeros(len(names))
+        mean[[names.index(TRUNK_FORWARD), names.index(TRUNK_LEFT)]] = lean * forward, lean * left
+        kinds[LEANING, way] = _only(names, TRUNK, mean, spread)
     return Grader({(a, b): kind for (a, b), kind in kinds.items()}, HEALTHY_SPREAD * _shrunk(healthy))
 
 
 @cache
 def grader() -> Grader:
     """Learnt from all that the package knows."""
-    return learn_grader(people(), range(people().count), load_npz(HEALTHY)["covariance"])
+    return learn_grader(people(), range(people().count), healthy_covariance())
+
+
+def healthy_covariance() -> Array:
+    """(D, D) mean square of the features of healthy walks, each beside the walker's others."""
+    known = load_npz(HEALTHY)
+    return np.average(known["covariances"], axis=0, weights=known["clips"])
 
 
 def grade(walk: Profile, healthy: Profile) -> Grade:
@@ -135,9 +155,3 @@ def _only(names: list[str], kept: Iterable[str], mean: Array, spread: Array) -> 
 
 def _shrunk(covariance: Array) -> Array:
     return (1 - SHRINKAGE) * covariance + SHRINKAGE * np.diag(np.diag(covariance))
-
-
-def _log_density(x: Array, covariance: Array) -> float:
-    """Of a normal distribution about 0, without the constant that all share."""
-    factor = np.linalg.cholesky(covariance)
-    return float(-0.5 * np.sum(np.linalg.solve(factor, x) ** 2) - np.log(np.diag(factor)).sum())

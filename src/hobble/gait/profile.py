@@ -12,6 +12,7 @@ from hobble.gait.cycles import SCALARS, Cycle, Walk
 from hobble.gait.signals import CURVES, TURNS_ROUND
 
 Profile = Mapping[str, float]
+NO_CYCLE = "there is no whole cycle of walking straight ahead to measure"
 NAMES = (*SCALARS, *(f"{kind} {curve}" for curve in CURVES for kind in ("range", "mean")))
 
 
@@ -23,7 +24,7 @@ def profile(walk: Walk) -> dict[str, float]:
     Raises HobbleError where the walk has no cycle.
     """
     if not len(walk):
-        raise HobbleError("there is no whole cycle of walking ahead to measure")
+        raise HobbleError(NO_CYCLE)
     right, left = _of_cycles(walk.right), mirrored(_of_cycles(walk.left))
     return {name: (right[name] + left[name]) / 2 for name in NAMES}
 
