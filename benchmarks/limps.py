@@ -75,6 +75,24 @@ def people_left_out(name: str, judges: dict[int, Callable]) -> None:
 def healthy_walks(folder: Path) -> None:
     print("\nhealthy walks of the CMU database, windows: share called impaired")
     print("performer, windows, by the linear one, the graded one, the graded one without the performer")
+    known = load_npz(HEALTHY)
+    for i, performer in enumerate(REFERENCE):
+        own = [pair for _, *pair in healthy_windows(folder, performer)]
+        rest = np.arange(len(REFERENCE)) != i
+        others = np.average(known["covariances"][rest], axis=0, weights=known["clips"][rest])
+        stranger = learn_grader(people(), range(people().count), others)
+        said = [
+            np.mean([judge(*pair).impaired for pair in own]) for judge in (recognise, grade, stranger.grade)
+        ]
+        print(f"  {performer:4}{len(own):4}" + "".join(f"{share:6.2f}" for share in said))
+
+
+def strangers() -> None:
+    everyone, normal = range(people().count), lambda person: people().profile(NORMAL, person)
+    pairs = [(normal(a), normal(b)) for a in everyone for b in everyone if a != b]
+    for name, judge in (("linear", recognise), ("graded", grade)):
+        wrong = np.mean([judge(*pair).impaired for pair in pairs])
+        print(f"\none person's normal walk beside another's: {name} calls {wrong:.2f} impaired")
 
 
 def rounded(shares: Mapping[str, float]) -> str:
@@ -99,9 +117,12 @@ def captured(folder: Path, clips: list[str]) -> None:
 def main(folder: str, *clips: str) -> None:
     linear = {p: learn(*examples(people(), rest), shrinkage=SHRINKAGE) for p, rest in left_out()}
     people_left_out("linear", {p: lambda w, h, j=j: recognise(w, h, j) for p, j in linear.items()})
-    graders: dict[int, Grader] = {p: learn_grader(people(), rest, healthy_covariance()) for p, rest in
-    left_out()} people_left_out("graded", {p: g.grade for p, g in graders.items()}) strangers()
-    healthy_walks(Path(folder)) captured(Path(folder), list(clips))
+    healthy = healthy_covariance()
+    graders: dict[int, Grader] = {p: learn_grader(people(), rest, healthy) for p, rest in left_out()}
+    people_left_out("graded", {p: g.grade for p, g in graders.items()})
+    strangers()
+    healthy_walks(Path(folder))
+    captured(Path(folder), list(clips))
 
 
 if __name__ == "__main__":

@@ -82,7 +82,7 @@ class Grader:
 
     @cached_property
     def _densities(self) -> tuple[Array, Array, Array]:
-        """Mean, whitening and log of the highest density: of a healthy walk, then of each kind at each strength."""
+        """Mean, whitening, log of the peak density: of a healthy walk, then of each kind at each strength."""
         each = [(s * mean, s**2 * spread) for mean, spread in self.kinds.values() for s in STRENGTHS]
         means, spreads = zip((np.zeros(len(self.healthy)), 0 * self.healthy), *each, strict=True)
         factors = np.linalg.cholesky(self.healthy + np.array(spreads))
