@@ -4,30 +4,47 @@ import sys
 from pathlib import Path
 
 from hobble.core.errors import HobbleError
+from hobble.measures.registry import modules
+from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
+from hobble.workflow.measurements import NAMES as MEASURES
 from hobble.workflow.project import Project
+from hobble.workflow.targets import check
 
 try:
     # Relative, so that a checkout can be moved without making anything again.
     project = Project(Path(os.path.relpath(workflow.basedir)), config)
-    demands = Demands(project)
-    project.check(
-        argument for argument in sys.argv[1:] if argument.startswith("results/")
+    check(
+        project,
+        (argument for argument in sys.argv[1:] if argument.startswith("results/")),
     )
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 
+# What the rules ask; each part is a module of hobble.workflow.
+catalogue = project.catalogue
+clips = project.clips
+datasets = project.datasets
+configurations = project.configurations
+comparison = project.comparison
+package = project.package
+measurements = project.measurements
+demands = Demands(project)
+
 
 wildcard_constraints:
-    configuration="|".join(project.catalogue.names()),
+    configuration="|".join(catalogue.names()),
     dataset=r"[^/]+",
     clip=r"[^/]+(?<!_mirror)",
     rows=r"[^/]+",
     selection="healthy|all",
+    measure="|".join(MEASURES),
 
 
 def kept(files):
     """Files of the checkout or the user: they stay where they are, though results may lie in an object store."""
+    if isinstance(files, dict):
+        return {name: kept(some) for name, some in files.items()}
     many = [files] if isinstance(files, str) else files
     many = [f if f.startswith("results/") else local(f) for f in many]
     return many[0] if isinstance(files, str) else many

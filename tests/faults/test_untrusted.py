@@ -25,8 +25,8 @@ from hobble.core.clip import load_clip
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import load_npz, read_json
 from hobble.core.untrusted import read_bytes, read_yaml
-from hobble.injury.status import read_status
-from hobble.injury.table import write_statuses
+from hobble.channels.injury.status import read_status
+from hobble.channels.injury.table import write_statuses
 from hobble.labels.files import SourceTime, read_gait_keys
 from hobble.motion import read as bvh
 from hobble.motion.make import make_clip
@@ -34,6 +34,7 @@ from hobble.motion.rig import load_skeleton
 from hobble.runtime.network import load_network
 from hobble.terrain.heightmaps import read_heights
 from hobble.workflow.project import Project
+from hobble.workflow.targets import check
 
 from .texts import OPTIONS, SKELETON
 
@@ -136,7 +137,7 @@ def test_files_without_end_are_not_read(tmp_path: Path) -> None:
 
 def test_a_status_file_that_counts_two_billion_frames_takes_no_room(tmp_path: Path) -> None:
     from hobble.core.clip import Clip
-    from hobble.injury.severity import clip_severity
+    from hobble.channels.injury.severity import clip_severity
 
     skeleton = load_skeleton(SKELETON).skeleton
     clip = Clip("a", skeleton, 60.0, np.tile([1.0, 0, 0, 0], (9, 31, 1)), np.zeros((9, 3)))
@@ -344,7 +345,7 @@ def test_a_configuration_names_nothing_outside_its_folder(catalogue: Path, key: 
     write(catalogue / "mine.yaml", json.dumps(value))
     write(catalogue / "datasets/synthetic.yaml", "skeleton: holden31\nfolder: x\n")
     with pytest.raises(HobbleError, match="mine") as refusal:
-        Project(catalogue.parent, {}).check(["results/mine/report.html"])
+        check(Project(catalogue.parent, {}), ["results/mine/report.html"])
     assert "secret" not in str(refusal.value)
 
 
@@ -408,7 +409,7 @@ def test_clips_that_cannot_be_said_are_refused_with_their_folder(
     folder.mkdir(parents=True)
     write(folder / f"{name}.bvh", "HIERARCHY")
     with pytest.raises(InputError, match="mocap/mine: a clip is called") as refusal:
-        Project(catalogue.parent, {"mocap": tmp_path / "mocap"}).clips("mine")
+        Project(catalogue.parent, {"mocap": tmp_path / "mocap"}).clips.of("mine")
     assert str(refusal.value).isprintable()
 
 

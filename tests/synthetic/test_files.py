@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError
-from hobble.injury.status import read_status
+from hobble.channels.injury.status import read_status
 from hobble.synthetic.clip import ENOUGH, SHORTEST, write_clip
 from hobble.synthetic.files import footsteps_text, gait_text, status_text
 from hobble.synthetic.links import LINKS

@@ -2,7 +2,7 @@
 
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
-from hobble.injury.severity import clip_severity, save_injury, write_report
+from hobble.channels.injury.severity import clip_severity, save_injury, write_report
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

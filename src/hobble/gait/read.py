@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hobble.config.sections import Motion
 from hobble.core.clip import Clip
 from hobble.motion.make import load_source, resample
+from hobble.motion.options import Motion
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
 

@@ -1,0 +1,42 @@
+"""Write status files from a table: python -m hobble.channels.injury TABLE.csv FOLDER --skeleton SKELETON.yaml."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.untrusted import read_yaml
+from hobble.channels.injury.table import write_statuses
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m hobble.channels.injury", description="Status files from a table."
+    )
+    parser.add_argument("table", help="CSV with the columns clip, link, severity, from, to")
+    parser.add_argument("folder", help="where the clips' BVH files lie; the status files go beside them")
+    parser.add_argument("--skeleton", default="config/skeletons/holden31.yaml", help="names the links")
+    options = parser.parse_args(arguments)
+    try:
+        for path in write_statuses(options.table, options.folder, _links(Path(options.skeleton))):
+            print(path)
+    except HobbleError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+def _links(skeleton: Path) -> list[str]:
+    try:
+        links = read_yaml(skeleton)["links"]
+    except (KeyError, TypeError):
+        raise InputError(skeleton, "does not list `links`") from None
+    return [f"{a}-{b}" for a, b in links]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,135 @@
+"""Status files from a short table, so that nobody types them by hand.
+
+The table is CSV with the columns clip, link, severity, from, to; frames count from 1 in the clip file's own
+rate, an empty `from` means the first and an empty `to` the last::
+
+    clip,link,severity,from,to
+    walk_03,LeftUpLeg-LeftLeg,7,,
+    walk_03,LowerBack-Spine,3,400,
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from hobble.core.clip_files import find_clips, the_file
+from hobble.core.errors import InputError
+from hobble.core.untrusted import read_text
+from hobble.channels.injury.status import Spell, Status, check_link, check_severity, write_status
+
+COUNT = re.compile(r"\d{1,12}")
+COLUMNS = ("clip", "link", "severity", "from", "to")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table; `first` and `last` are None where the table leaves them out."""
+
+    clip: str
+    link: str
+    severity: float
+    first: int | None
+    last: int | None
+    line: int
+
+
+def read_table(path: str | Path, links: Sequence[str]) -> list[Row]:
+    """Read a table. Raises InputError with the line for no CSV and for what a status file would refuse."""
+    path = Path(path)
+    lines = io.StringIO(read_text(path), newline=None)  # an old Macintosh's lines end in \r
+    reader = csv.DictReader(lines, skipinitialspace=True, restkey="more")
+    try:
+        names = [name.strip() for name in reader.fieldnames or ()]
+        if sorted(names) != sorted(COLUMNS):
+            shown = f"{', '.join(names) or 'none':.200}"
+            raise InputError(path, f"has columns {shown}, not {', '.join(COLUMNS)}", line=1)
+        reader.fieldnames = names
+        return [_row(path, reader.line_num, values, links) for values in reader]
+    except csv.Error as error:
+        raise InputError(
+            path, f"not CSV: {error}", line=reader.reader.line_num, fix="Look for a quotation mark left open."
+        ) from None
+
+
+def statuses(
+    rows: Sequence[Row], frames: Mapping[str, int], path: str | Path = "the table"
+) -> dict[str, Status]:
+    """The status of each clip that the rows name; `frames` says how many its file has.
+
+    Rows of one clip with the same range share a line. Raises InputError, with the row's line, for a clip that
+    is not in `frames` and a range that runs backwards or leaves the clip.
+    """
+    spells: dict[str, dict[tuple[int, int], list[tuple[str, float]]]] = {}
+    for row in rows:
+        if row.clip not in frames:
+            raise InputError(path, f"no such clip: {row.clip}", line=row.line)
+        first, last = row.first or 1, row.last or frames[row.clip]
+        if not first <= last <= frames[row.clip]:
+            raise InputError(
+                path,
+                f"the range {first}-{last} does not lie in the {frames[row.clip]} frames of {row.clip}",
+                line=row.line,
+            )
+        spells.setdefault(row.clip, {}).setdefault((first, last), []).append((row.link, row.severity))
+    return {
+        clip: Status(frames[clip], tuple(Spell(*span, tuple(links)) for span, links in lines.items()))
+        for clip, lines in spells.items()
+    }
+
+
+def bvh_frames(path: Path) -> int:
+    """How many frames a BVH file says it has; raises InputError where it does not say."""
+    try:
+        with open(path, encoding="utf-8", errors="replace") as file:
+            for line in file:
+                key, _, value = line.partition(":")
+                if key.strip().lower() == "frames" and COUNT.fullmatch(value.strip()):
+                    return int(value)
+    except OSError as error:
+        raise InputError(path, f"cannot be read: {error.strerror}") from None
+    raise InputError(path, "does not say how many frames it has", fix="A BVH file has a line `Frames: 225`.")
+
+
+def write_statuses(table: str | Path, folder: str | Path, links: Sequence[str]) -> list[Path]:
+    """Write `<clip>_injuries.txt` beside each clip below `folder` that the table names; returns the paths.
+
+    Everything is checked before the first file is written.
+    """
+    rows = read_table(table, links)
+    folder = Path(folder)
+    there = find_clips(folder)
+    files = {row.clip: the_file(row.clip, there[row.clip]) for row in rows if row.clip in there}
+    frames = {clip: bvh_frames(file) for clip, file in files.items()}
+    written = []
+    for clip, status in statuses(rows, frames, table).items():
+        written.append(files[clip].with_name(f"{clip}_injuries.txt"))
+        write_status(written[-1], status)
+    return written
+
+
+def _row(path: Path, line: int, values: Mapping[str, str | None], links: Sequence[str]) -> Row:
+    if "more" in values or None in values.values():
+        raise InputError(path, f"a line has {len(COLUMNS)} values: {', '.join(COLUMNS)}", line=line)
+    text = {key: (value or "").strip() for key, value in values.items()}
+    check_link(path, line, text["link"], links)
+    return Row(
+        text["clip"],
+        text["link"],
+        check_severity(path, line, text["link"], text["severity"]),
+        _frame(path, line, text["from"]),
+        _frame(path, line, text["to"]),
+        line,
+    )
+
+
+def _frame(path: Path, line: int, text: str) -> int | None:
+    if not text:
+        return None
+    if not COUNT.fullmatch(text) or int(text) < 1:
+        raise InputError(path, f"{text!r} is not a frame number; they count from 1", line=line)
+    return int(text)

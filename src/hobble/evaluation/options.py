@@ -1,0 +1,32 @@
+"""The keys of a configuration's `evaluation` section: those of every measurement, together."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pydantic import create_model
+
+from hobble.core.section import Section
+from hobble.measures.registry import MEASURES
+
+
+def together(sections: list[type[Section]]) -> type[Section]:
+    """One section with the keys of all.
+
+    Raises TypeError for a key that two of them define; a common base may define it for both.
+    """
+    owner: dict[str, type] = {}
+    for section in sections:
+        for key in section.model_fields:
+            defines = [c for c in section.__mro__ if key in getattr(c, "model_fields", {})][-1]
+            if owner.setdefault(key, defines) is not defines:
+                raise TypeError(f"{key} is a key of {owner[key].__module__} and of {defines.__module__}")
+    different = list(dict.fromkeys(sections))
+    bases = [s for s in different if not any(o is not s and issubclass(o, s) for o in different)]
+    return create_model("Evaluation", __base__=tuple(bases) or Section, __doc__="The measurements.")
+
+
+if TYPE_CHECKING:
+    Evaluation = Section
+else:
+    Evaluation = together([one.options for one in MEASURES])

@@ -1,0 +1,26 @@
+"""The keys of a data set's `labels` section."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from hobble.core.section import Positive, PositiveFloat, Section
+
+
+class Labels(Section):
+    """Contacts, phase and gait. Speeds are those of the facts page: centimetres a frame at 120 Hz."""
+
+    files: bool = Field(True, description="use hand-made label files where they lie beside the clip")
+    contact_threshold: PositiveFloat = Field(0.02, description="squared displacement, cm2 per 60 Hz frame")
+    phase_zero: Literal["right", "left"] = Field("right", description="the foot that lands at phase 0")
+    heel_speed: PositiveFloat = 0.375
+    toe_speed: PositiveFloat = 0.0875
+    valley_factor: PositiveFloat = 2.875
+    margins: Literal["extend", "drop"] = Field(
+        "extend",
+        description="what becomes of a cycle with less than a second of clip before or after it: the path "
+        "goes on straight past the clip's end, or, as in the original, the cycle is dropped",
+    )
+    shortest_step: Positive = Field(5, description="steps of this many 120 Hz frames or fewer are dropped")

@@ -1,0 +1,70 @@
+"""The keys of a data set's `download` and `motion` sections."""
+
+from __future__ import annotations
+
+import re
+from string import Formatter
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from hobble.core.section import Finite, Inside, Positive, PositiveFloat, Section
+
+
+def _sixty(fps: float) -> float:
+    """The rate in which all that follows counts: windows, speeds, thresholds, the character's own frames."""
+    if fps != 60.0:
+        raise ValueError("clips are made at 60 frames a second, whatever the rate of their files")
+    return fps
+
+
+SixtyHz = Annotated[float, AfterValidator(_sixty)]
+
+
+class Download(Section):
+    """Where clips come from that the user's folder lacks."""
+
+    url: str = Field(
+        description="of a clip's file: {clip} its name, {subject} what stands before its first _"
+    )
+    checksums: Inside = Field(
+        description="SHA-256 of each file, as sha256sum writes them; beside the data set's own file"
+    )
+
+    @model_validator(mode="after")
+    def _url_of_a_clip(self) -> Download:
+        try:
+            fields = {name for _, name, _, _ in Formatter().parse(self.url) if name is not None}
+            made = self.url.format(clip="02_01", subject="02")
+        except (ValueError, LookupError, AttributeError) as error:
+            raise ValueError(f"url: {error}") from None
+        if not fields <= {"clip", "subject"} or "clip" not in fields:
+            raise ValueError("url: {clip} must stand in it, {subject} may, and nothing else in braces")
+        if not re.fullmatch(r"https?://[^/\s]+/\S+", made):
+            raise ValueError("url: must be an address like https://host/{subject}/{clip}.bvh")
+        return self
+
+
+class Motion(Section):
+    """How BVH files are read and checked. `auto` is found from the rig; anything else overrules it."""
+
+    fps: SixtyHz = Field(60.0, description="frames a second of the clips made: what follows counts in 60ths")
+    source_fps: PositiveFloat | None = Field(None, description="overrules the files' Frame Time")
+    unit: Literal["auto"] | PositiveFloat = Field("auto", description="centimetres per unit of the file")
+    up: Literal["auto", "Y", "Z"] = "auto"
+    handedness: Literal["auto", "right", "left"] = Field(
+        "auto", description="of the file's coordinates; a left-handed file has x negated"
+    )
+    facing: Finite | None = Field(
+        None, description="where the figure faces first, degrees from +Z towards +X; else as in the file"
+    )
+    proportions: Literal["skeleton", "clip"] = Field(
+        "skeleton", description="retarget onto the skeleton's bone lengths, or keep each clip's own"
+    )
+    defects: Literal["repair", "refuse"] = Field(
+        "repair", description="what to do with frames that are plainly broken; repairs are reported"
+    )
+    loops: Positive = Field(1, description="how often a clip that is one short cycle is repeated")
+    heading: Finite | None = Field(
+        None, description="where a looped clip leads, degrees from +Z towards +X; as in the file by default"
+    )

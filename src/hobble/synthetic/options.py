@@ -1,0 +1,19 @@
+"""The keys of a data set's `synthetic` section."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from hobble.core.section import Section
+
+
+class Synthetic(Section):
+    """The embedded data set: how much of it, and from which seed."""
+
+    frames: Annotated[int, Field(ge=600, le=1_000_000_000)] = Field(
+        20_000, description="frames at 60 Hz over all clips together"
+    )
+    fps: Literal[60, 120] = Field(120, description="frames a second in the files written")
+    seed: int = 1

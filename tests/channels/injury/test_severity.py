@@ -1,0 +1,198 @@
+"""Severities of a clip: ranges, rates, mirrors, and Ferre's own matrices."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.channels.injury.severity import (
+    clip_severity,
+    load_injury,
+    mirror_severity,
+    odd_ranges,
+    save_injury,
+    severity_matrix,
+    source_rows,
+    write_report,
+)
+from hobble.channels.injury.status import Spell, Status, read_status
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.motion.resample import sample_times
+
+THIGH, ARM = "LeftUpLeg-LeftLeg", "LeftArm-LeftForeArm"
+
+
+@pytest.fixture
+def clip(holden31: Skeleton) -> Clip:
+    rotations = np.zeros((300, 31, 4))
+    rotations[..., 0] = 1
+    return Clip("walk", holden31, 60.0, rotations, np.zeros((300, 3)))
+
+
+def motion(frames: int = 600, fps: float = 120.0, start: int = 0) -> dict:
+    return {"source": "walk.bvh", "source_frames": frames, "source_fps": fps, "source_start": start}
+
+
+def column(holden31: Skeleton, link: str) -> int:
+    return holden31.link_names.index(link)
+
+
+def test_ranges_are_one_based_and_inclusive():
+    out = severity_matrix(Status(10, (Spell(3, 5, ((THIGH, 7.0),)),)), (ARM, THIGH))
+    assert out[:, 0].tolist() == [0] * 10
+    assert out[:, 1].tolist() == [0, 0, 7, 7, 7, 0, 0, 0, 0, 0]
+
+
+def test_the_later_line_counts_from_its_first_frame_on_for_its_links_alone():
+    first = Spell(1, 8, ((THIGH, 3.0), (ARM, 2.0)), 2)
+    later = Spell(5, 9, ((THIGH, 9.0),), 3)
+    out = severity_matrix(Status(10, (first, later)), (THIGH, ARM))
+    assert out[:, 0].tolist() == [3, 3, 3, 3, 9, 9, 9, 9, 9, 0]
+    assert out[:, 1].tolist() == [2] * 8 + [0, 0]
+
+
+def test_odd_ranges_are_told_with_their_lines():
+    spells = (
+        Spell(0, 12, ((THIGH, 3.0),), 2),
+        Spell(5, 6, ((THIGH, 4.0), (ARM, 1.0)), 3),
+        Spell(11, 14, ((ARM, 4.0),), 4),
+        Spell(1, 10, ((ARM, 1.0),), 5),
+    )
+    said = odd_ranges(Status(10, spells), "walk_injuries.txt")
+    assert [s.split(": ")[0] for s in said] == [
+        "walk_injuries.txt, line 2",
+        "walk_injuries.txt, line 2",
+        "walk_injuries.txt, line 3",
+        "walk_injuries.txt, line 4",
+    ]
+    for sentence, word in zip(
+        said, ("past the last", "starts at 0", "overlaps that of line 2", "says nothing"), strict=True
+    ):
+        assert word in sentence
+    out = severity_matrix(Status(10, spells), (THIGH, ARM))
+    assert out.shape == (10, 2)
+    assert out[0, 0] == 3
+    assert out[-1, 0] == 3
+
+
+@pytest.mark.parametrize(
+    ("fps", "start", "expected"),
+    [
+        (120.0, 0, [0, 2, 4, 6]),
+        (120.0048, 0, [0, 2, 4, 6]),
+        (120.0, 3, [3, 5, 7, 9]),
+        (60.0, 0, [0, 1, 2, 3]),
+        (30.0, 0, [0, 0, 1, 1]),
+        (24.0, 0, [0, 0, 0, 1]),
+    ],
+)
+def test_each_frame_has_the_source_frame_that_shows_then(fps, start, expected):
+    assert source_rows(4, 100, motion(100, fps, start)).tolist() == expected
+
+
+@pytest.mark.parametrize("fps", [120.0, 1 / 0.00833, 1 / 0.01667, 23.976])
+def test_after_ten_minutes_each_frame_still_has_the_source_frame_of_its_moment(fps):
+    """A rate that is nearly whole is resampled as it stands, so severities are looked up as it stands."""
+    times = sample_times(72_000, fps, 60.0)
+    rows = source_rows(len(times), 72_000, motion(72_000, fps))
+    np.testing.assert_array_equal(rows, np.floor(times + 1e-6))
+
+
+def test_source_rows_stay_in_the_file():
+    assert source_rows(5, 4, motion(4, 60.0)).tolist() == [0, 1, 2, 3, 3]
+
+
+def test_a_status_file_at_its_own_rate(clip, tmp_path):
+    path = tmp_path / "walk_injuries.txt"
+    path.write_text(f"frames:600\n201-400 {THIGH}[8];\n")
+    severity, warnings = clip_severity(clip, path, None, motion())
+    hurt = np.flatnonzero(severity[:, column(clip.skeleton, THIGH)])
+    assert (hurt[0], hurt[-1]) == (100, 199)
+    assert severity.dtype == np.float32
+    assert severity.sum() == 800
+    assert warnings == []
+
+
+def test_one_frame_more_or_less_is_forgiven_and_two_are_not(clip, tmp_path):
+    path = tmp_path / "walk_injuries.txt"
+    for frames in (599, 601):
+        path.write_text(f"frames:{frames}\n1-{frames} {THIGH}[8];\n")
+        severity, _ = clip_severity(clip, path, None, motion())
+        assert (severity[:, column(clip.skeleton, THIGH)] == 8).all()
+    path.write_text(f"frames:602\n1-602 {THIGH}[8];\n")
+    with pytest.raises(InputError, match=r"line 1: counts 602 frames, but walk.bvh has 600"):
+        clip_severity(clip, path, None, motion())
+
+
+def test_the_status_of_a_data_set_holds_all_the_while(clip):
+    severity, _ = clip_severity(clip, None, f"{THIGH}[4];{ARM}[8.5]", motion())
+    assert (severity[:, column(clip.skeleton, THIGH)] == 4).all()
+    assert (severity[:, column(clip.skeleton, ARM)] == 8.5).all()
+    assert (severity > 0).sum() == 600
+
+
+def test_a_wrong_status_of_a_data_set_names_the_clip(clip):
+    with pytest.raises(InputError, match=r"status of walk.*no such link: LeftUpLeg-LeftArm"):
+        clip_severity(clip, None, "LeftUpLeg-LeftArm[4]", motion())
+
+
+def test_a_healthy_clip_is_all_zero(clip):
+    severity, warnings = clip_severity(clip, None, None, motion())
+    assert severity.shape == (300, 30)
+    assert not severity.any()
+    assert warnings == []
+
+
+@given(st.integers(0, 29), st.floats(0, 10, width=32))
+@settings(max_examples=30, deadline=None)
+def test_mirroring_twice_gives_the_same_back(holden31, link, value):
+    severity = np.zeros((3, 30), np.float32)
+    severity[:, link] = value
+    links = holden31.mirror_links
+    once = mirror_severity(severity, links)
+    assert (mirror_severity(once, links) == severity).all()
+    name = holden31.link_names[link]
+    other = name.replace("Left", "#").replace("Right", "Left").replace("#", "Right")
+    swap = {"LHipJoint": "RHipJoint", "RHipJoint": "LHipJoint", "LThumb": "RThumb", "RThumb": "LThumb"}
+    for old, new in swap.items():
+        if old in name:
+            other = other.replace(old, new)
+            break
+    assert (once[:, holden31.link_names.index(other)] == np.float32(value)).all()
+
+
+def test_files_keep_columns_and_report_says_what_hurts(clip, tmp_path):
+    severity, _ = clip_severity(clip, None, f"{THIGH}[4]", motion())
+    severity[:60] = 0
+    severity[90:120] = severity[90:120] / 2
+    hurt = {"seconds": 4.0, "highest": 4.0, "spells": [[1.0, 1.5, 4.0], [1.5, 2.0, 2.0], [2.0, 5.0, 4.0]]}
+    save_injury(tmp_path / "a.npz", severity, clip.skeleton.link_names)
+    save_injury(tmp_path / "b.npz", severity, clip.skeleton.link_names)
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    read, links = load_injury(tmp_path / "a.npz")
+    assert (read == severity).all()
+    assert links == clip.skeleton.link_names
+    write_report(tmp_path / "a.json", clip, severity, links, ["odd"])
+    report = json.loads((tmp_path / "a.json").read_text())
+    assert report == {"clip": "walk", "hurt": {THIGH: hurt}, "warnings": ["odd"]}
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("name", ["Run_LLL", "Walk_LLL", "Walk_RUL"])
+def test_the_matrices_of_ferre_come_out_as_his(shared: Path, holden31, name):
+    stem = shared / "mocap/ferre" / f"Injured_{name}_extended_converted_injuries"
+    status = read_status(stem.with_suffix(".txt"), holden31.link_names)
+    assert (severity_matrix(status, holden31.link_names) == np.loadtxt(stem)).all()
+    assert len(odd_ranges(status, stem)) == 1
+
+
+def test_source_rows_of_a_loop_begin_anew_with_each_cycle():
+    looped = motion(3, 60.0) | {"loops": 2, "cycle_frames": 3}
+    assert source_rows(6, 3, looped).tolist() == [0, 1, 2, 0, 1, 2]

@@ -1,0 +1,110 @@
+"""The status file: what it says, what it must not say, and that writing and reading it lose nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hobble.channels.injury.status import Spell, Status, format_status, read_status, write_status
+from hobble.core.errors import InputError
+
+LINKS = ("Hips-LHipJoint", "LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg", "LeftShoulder-LeftArm")
+
+
+@pytest.fixture
+def status_file(tmp_path: Path):
+    def write(text: str) -> Path:
+        path = tmp_path / "walk_injuries.txt"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def test_reads_what_the_facts_page_shows(status_file):
+    path = status_file(
+        "frames:2500\n1-225 RightUpLeg-RightLeg[10];\n"
+        "500-2000 LeftShoulder-LeftArm[5];LeftUpLeg-LeftLeg[10];\n"
+    )
+    status = read_status(path, LINKS)
+    assert status.frames == 2500
+    assert status.spells[0] == Spell(1, 225, (("RightUpLeg-RightLeg", 10.0),), 2)
+    assert status.spells[1].links == (("LeftShoulder-LeftArm", 5.0), ("LeftUpLeg-LeftLeg", 10.0))
+    assert status.spells[1].line == 3
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\ufeffframes: 10\r\n\r\n 1 - 5  LeftUpLeg-LeftLeg [ 2.5 ] ; \r\n",
+        "FRAMES:10\n1-5 LeftUpLeg-LeftLeg[2.5]",
+    ],
+)
+def test_forgives_what_editors_and_people_add(status_file, text):
+    assert read_status(status_file(text), LINKS).spells[0].links == (("LeftUpLeg-LeftLeg", 2.5),)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "word"),
+    [
+        ("", None, "empty"),
+        ("1-5 LeftUpLeg-LeftLeg[3];\n", 1, "frame count"),
+        ("frames:0\n", 1, "frame count"),
+        ("frames:ten\n", 1, "frame count"),
+        ("frames:10\n1-5 LeftLeg-Moon[3];\n", 2, "no such link: LeftLeg-Moon"),
+        ("frames:10\n1-5 LeftUpLeg-LeftLeg[11];\n", 2, "severity 11"),
+        ("frames:10\n1-5 LeftUpLeg-LeftLeg[-1];\n", 2, "severity -1"),
+        ("frames:10\n1-5 LeftUpLeg-LeftLeg[nan];\n", 2, "severity nan"),
+        ("frames:10\n1-5 LeftUpLeg-LeftLeg[];\n", 2, "severity nothing"),
+        ("frames:10\n\n5-1 LeftUpLeg-LeftLeg[3];\n", 3, "backwards"),
+        ("frames:10\n1-5 LeftUpLeg-LeftLeg\n", 2, "does not read as"),
+        ("frames:10\nLeftUpLeg-LeftLeg[3];\n", 2, "does not read as"),
+        ("frames:10\n1-5 ;\n", 2, "names no link"),
+        ("frames:10\n1-x LeftUpLeg-LeftLeg[3];\n", 2, "does not read as"),
+    ],
+)
+def test_refuses_with_file_and_line(status_file, text, line, word):
+    path = status_file(text)
+    with pytest.raises(InputError) as caught:
+        read_status(path, LINKS)
+    assert caught.value.line == line
+    assert caught.value.path == path
+    assert word in str(caught.value)
+
+
+def test_a_mistyped_link_gets_a_hint(status_file):
+    with pytest.raises(InputError, match=r"Did you mean LeftUpLeg-LeftLeg"):
+        read_status(status_file("frames:10\n1-5 LeftUpLeg-LeftLge[3];\n"), LINKS)
+
+
+def test_a_binary_and_a_missing_file_are_refused(tmp_path):
+    (tmp_path / "noise").write_bytes(b"\xff\xfe\x00\x81")
+    with pytest.raises(InputError, match="not a text file"):
+        read_status(tmp_path / "noise", LINKS)
+    with pytest.raises(InputError, match="no such file"):
+        read_status(tmp_path / "nothing", LINKS)
+
+
+severities = st.integers(0, 100).map(lambda n: n / 10)
+spells = st.builds(
+    lambda first, length, links: Spell(first, first + length, tuple(links.items())),
+    st.integers(0, 500),
+    st.integers(0, 500),
+    st.dictionaries(st.sampled_from(LINKS), severities, min_size=1),
+)
+
+
+@given(st.builds(Status, st.integers(1, 1000), st.lists(spells, max_size=4).map(tuple)))
+@settings(max_examples=40, deadline=None)
+def test_writing_and_reading_lose_nothing(tmp_path_factory, status):
+    path = tmp_path_factory.mktemp("status") / "clip_injuries.txt"
+    write_status(path, status)
+    assert path.read_text() == format_status(status)
+    read = read_status(path, LINKS)
+    assert read.frames == status.frames
+    assert [(s.first, s.last, s.links) for s in read.spells] == [
+        (s.first, s.last, s.links) for s in status.spells
+    ]

@@ -1,0 +1,128 @@
+"""Status files from a table of clip, link, severity, from and to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hobble.channels.injury.__main__ import main
+from hobble.channels.injury.status import read_status
+from hobble.channels.injury.table import bvh_frames, read_table, statuses, write_statuses
+from hobble.core.errors import InputError
+
+LINKS = ("LeftUpLeg-LeftLeg", "LowerBack-Spine")
+HEADER = "clip,link,severity,from,to\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name, frames in (("walk", 500), ("run", 90)):
+        (tmp_path / f"{name}.bvh").write_text(f"HIERARCHY\nMOTION\nFrames:\t{frames}\nFrame Time: 0.008333\n")
+    return tmp_path
+
+
+def table(folder: Path, text: str) -> Path:
+    path = folder / "table.csv"
+    path.write_text(HEADER + text)
+    return path
+
+
+def test_writes_a_file_beside_each_clip_it_names(folder):
+    rows = (
+        "walk,LeftUpLeg-LeftLeg,7,,\nwalk, LowerBack-Spine ,3,,\n"
+        "walk,LowerBack-Spine,4.5,400,\nrun,LowerBack-Spine,2,5,50\n"
+    )
+    paths = write_statuses(table(folder, rows), folder, LINKS)
+    assert [p.name for p in paths] == ["walk_injuries.txt", "run_injuries.txt"]
+    assert paths[0].read_text() == (
+        "frames:500\n1-500 LeftUpLeg-LeftLeg[7];LowerBack-Spine[3];\n400-500 LowerBack-Spine[4.5];\n"
+    )
+    assert read_status(paths[1], LINKS).spells[0].last == 50
+
+
+@pytest.mark.parametrize(
+    ("row", "word"),
+    [
+        ("walk,LeftUpLeg-LeftFoot,7,,\n", "no such link"),
+        ("walk,LowerBack-Spine,12,,\n", "severity 12"),
+        ("walk,LowerBack-Spine,3,0,\n", "count from 1"),
+        ("walk,LowerBack-Spine,3,x,\n", "not a frame number"),
+        ("walk,LowerBack-Spine,3,9,4\n", "9-4 does not lie"),
+        ("walk,LowerBack-Spine,3,1,501\n", "500 frames of walk"),
+        ("hop,LowerBack-Spine,3,,\n", "no such clip: hop"),
+        ("walk,LowerBack-Spine,3\n", "5 values"),
+        ("walk,LowerBack-Spine,3,1,2,3\n", "5 values"),
+    ],
+)
+def test_refuses_a_row_with_its_line_and_writes_nothing(folder, row, word):
+    with pytest.raises(InputError, match=word) as caught:
+        write_statuses(table(folder, "run,LowerBack-Spine,1,,\n" + row), folder, LINKS)
+    assert caught.value.line == 3
+    assert not list(folder.glob("*_injuries.txt"))
+
+
+def test_refuses_other_columns(tmp_path):
+    (tmp_path / "table.csv").write_text("clip,link\nwalk,LowerBack-Spine\n")
+    with pytest.raises(InputError, match="line 1: has columns clip, link, not"):
+        read_table(tmp_path / "table.csv", LINKS)
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_lines_end_as_on_any_machine(folder, end):
+    path = folder / "table.csv"
+    path.write_bytes(
+        (HEADER + "walk,LowerBack-Spine,3,2,4\nrun,LowerBack-Spine,1,,\n").replace("\n", end).encode()
+    )
+    assert [(row.clip, row.line) for row in read_table(path, LINKS)] == [("walk", 2), ("run", 3)]
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [("walk,LowerBack-Spine,3,,\n" + "x" * 200_000 + ",,,,\n", 3), ('walk,"' + "x\n" * 99_999, None)],
+)
+def test_what_is_no_csv_is_refused_in_one_message(folder, root, capsys, text, line):
+    with pytest.raises(InputError, match=r"not CSV: field larger.*Look for a quotation mark") as caught:
+        read_table(table(folder, text), LINKS)
+    assert caught.value.line == line or line is None
+    assert (
+        main(
+            [
+                str(folder / "table.csv"),
+                str(folder),
+                "--skeleton",
+                str(root / "config/skeletons/holden31.yaml"),
+            ]
+        )
+        == 1
+    )
+    assert len(capsys.readouterr().err) < 300 + len(str(folder))
+
+
+def test_statuses_need_no_files(folder):
+    rows = read_table(table(folder, "walk,LowerBack-Spine,3,2,4\n"), LINKS)
+    assert statuses(rows, {"walk": 10})["walk"].spells[0].links == (("LowerBack-Spine", 3.0),)
+
+
+def test_a_bvh_file_without_frames_is_named(tmp_path):
+    (tmp_path / "a.bvh").write_text("HIERARCHY\n")
+    with pytest.raises(InputError, match="does not say how many frames"):
+        bvh_frames(tmp_path / "a.bvh")
+
+
+def test_clips_in_subfolders_and_in_capitals_are_found(folder):
+    (folder / "takes").mkdir()
+    (folder / "walk.bvh").rename(folder / "takes/walk.BVH")
+    (path,) = write_statuses(table(folder, "walk,LowerBack-Spine,3,,\n"), folder, LINKS)
+    assert path == folder / "takes/walk_injuries.txt"
+    assert path.is_file()
+
+
+def test_the_command_line(folder, root, capsys):
+    skeleton = str(root / "config/skeletons/holden31.yaml")
+    path = table(folder, "walk,RightFoot-RightToeBase,5,,\n")
+    assert main([str(path), str(folder), "--skeleton", skeleton]) == 0
+    assert "walk_injuries.txt" in capsys.readouterr().out
+    path = table(folder, "walk,RightFoot,5,,\n")
+    assert main([str(path), str(folder), "--skeleton", skeleton]) == 1
+    assert "no such link: RightFoot" in capsys.readouterr().err
