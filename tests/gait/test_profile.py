@@ -11,7 +11,7 @@ from hobble.gait.effects import effects
 from hobble.gait.features import features
 from hobble.gait.graded import grade
 from hobble.gait.profile import NAMES, mirrored, profile
-from hobble.gait.recogniser import recognise
+from hobble.gait.recogniser import recognise, windows
 
 
 @pytest.fixture(scope="module")
@@ -105,3 +105,29 @@ def test_no_cycle_is_refused():
 
 def test_names_are_unique():
     assert len(set(NAMES)) == len(NAMES) == 52
+
+
+def test_features_are_those_that_their_names_say(holden31, stepper):
+    even, limp = stepper(), stepper(stance_right=30, stance_left=42, ahead_right=10)
+    told = features(*(profile(measure(holden31, made.positions(holden31))) for made in (limp, even)))
+    assert told["stance L - R"] == pytest.approx(12 / 60)
+    assert told["step R - L"] == pytest.approx(-30 / 81)  # 30 and 60 cm, where both were 45
+    assert told["left landing"] == pytest.approx(0)
+    assert told["step width"] == pytest.approx(0)
+    healthy = profile(measure(holden31, even.positions(holden31)))
+    walk = healthy | {"range knee_flexion_R": 0.4 * healthy["range knee_flexion_R"]}
+    walk["range arm_forward_L"] = 100.0  # of nothing: five times, the most that is said
+    told = features(walk, healthy)
+    assert told["range knee_flexion R - L"] == pytest.approx(-0.6)
+    assert told["range arm_forward R - L"] == pytest.approx(-np.log(5))
+
+
+def test_windows_begin_every_second_and_hold_three_cycles(holden31, stepper):
+    """Right cycles begin at frames 60, 120, 180, 240, left ones at 30, 90, .. 270; each has 60 frames."""
+    positions = stepper().positions(holden31)
+    walk = measure(holden31, positions)
+    found = windows(walk, len(positions), seconds=2.5)
+    assert [start for start, _ in found] == [0, 60, 120, 180]
+    assert [[c.start for c in part.right] for _, part in found] == [[60], [60, 120], [120, 180], [180, 240]]
+    assert [[c.start for c in part.left] for _, part in found] == [[30, 90], [90, 150], [150, 210], [210, 270]]
+    assert windows(walk, len(positions), seconds=2.0)[0][0] == 60  # from 0 on there is one cycle of each leg
