@@ -66,9 +66,13 @@ def healthy_profile(clips: Sequence[Clip]) -> Profile:
 
 def compare(clip: Clip, healthy: Profile, seconds: float = 4.0) -> Comparison:
     """Measure a clip beside a healthy profile; windows last `seconds`. Raises HobbleError without a cycle."""
-    walk = measure_clip(clip)
+    return compare_walk(measure_clip(clip), len(clip), healthy, seconds)
+
+
+def compare_walk(walk: Walk, frames: int, healthy: Profile, seconds: float = 4.0) -> Comparison:
+    """The same of the cycles that `measure` found in a motion of `frames` frames."""
     own = profile(walk)
-    parts = [(start, profile(part)) for start, part in windows(walk, len(clip), seconds)]
+    parts = [(start, profile(part)) for start, part in windows(walk, frames, seconds)]
     return Comparison(
         walk,
         own,
