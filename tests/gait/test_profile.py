@@ -123,11 +123,13 @@ def test_features_are_those_that_their_names_say(holden31, stepper):
 
 
 def test_windows_begin_every_second_and_hold_three_cycles(holden31, stepper):
-    """Right cycles begin at frames 60, 120, 180, 240, left ones at 30, 90, .. 270; each has 60 frames."""
+    """Right cycles begin at frames 60, 120, .. 240, left ones at 30, 90, .. 270; each has 60 frames."""
     positions = stepper().positions(holden31)
     walk = measure(holden31, positions)
     found = windows(walk, len(positions), seconds=2.5)
     assert [start for start, _ in found] == [0, 60, 120, 180]
-    assert [[c.start for c in part.right] for _, part in found] == [[60], [60, 120], [120, 180], [180, 240]]
-    assert [[c.start for c in part.left] for _, part in found] == [[30, 90], [90, 150], [150, 210], [210, 270]]
-    assert windows(walk, len(positions), seconds=2.0)[0][0] == 60  # from 0 on there is one cycle of each leg
+    right, left = ([[c.start for c in getattr(part, s)] for _, part in found] for s in ("right", "left"))
+    assert right == [[60], [60, 120], [120, 180], [180, 240]]
+    assert left == [[30, 90], [90, 150], [150, 210], [210, 270]]
+    short = windows(walk, len(positions), seconds=2.0)
+    assert short[0][0] == 60  # the first two seconds hold one cycle of each leg

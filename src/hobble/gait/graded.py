@@ -33,9 +33,9 @@ PARTS: Mapping[str, tuple[str, ...]] = {
     "antalgic": ("thigh", "shank", "foot"),
     "stiff_legged": ("thigh", "shank"),
     "steppage": ("shank", "foot"),
-    "trendelenburg": ("hip",),
+    "trendelenburg": ("pelvis", "hip"),
     "lurch": ("hip", "back"),
-    GUARDED_ARM: ("shoulder", "arm", "forearm", "hand"),
+    GUARDED_ARM: ("shoulder", "upper arm", "forearm", "hand"),
     LEANING: ("back",),
 }
 STRENGTHS = np.array([0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.2])  # of what people showed, all as likely

@@ -7,7 +7,7 @@ compare the two sides, since a healthy walk changes with its speed but stays eve
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -18,7 +18,7 @@ from hobble.gait.cycles import Walk
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.gait.features import features
 from hobble.gait.people import GAITS, NORMAL, People, people
-from hobble.gait.profile import Profile, mirrored, profile
+from hobble.gait.profile import Profile, mirrored
 
 SHRINKAGE = 0.2  # of the covariance towards its diagonal: 110 examples for some twenty features
 LEAST_CYCLES = 3  # in a window that is judged, both legs together: two of one and one of the other
@@ -94,15 +94,3 @@ def windows(walk: Walk, frames: int, seconds: float = 4.0, step: float = 1.0) ->
     starts = range(0, max(frames - long, 0) + 1, max(1, round(step * walk.fps)))
     parts = ((start, walk.within(start, start + long)) for start in starts)
     return [(a, p) for a, p in parts if len(p) and len(p.right) + len(p.left) >= LEAST_CYCLES]
-
-
-def recognise_windows(
-    walk: Walk, healthy: Profile, frames: int, seconds: float = 4.0, step: float = 1.0
-) -> list[tuple[int, Answer]]:
-    """What each of the `windows` of a walk is called: (first frame, answer)."""
-    return [(a, recognise(profile(p), healthy)) for a, p in windows(walk, frames, seconds, step)]
-
-
-def impaired_share(answers: Sequence[tuple[int, Answer]]) -> float:
-    """Share of windows that are called impaired."""
-    return float(np.mean([answer.impaired for _, answer in answers])) if answers else float("nan")
