@@ -13,7 +13,9 @@ import os
 import re
 from pathlib import Path
 
+from hobble.database.layout import RowLayout
 from hobble.measures.registry import measure
+from hobble.models import model
 from hobble.workflow.clips import MIRROR
 from hobble.workflow.project import Project
 
@@ -98,11 +100,17 @@ class Demands:
         return self._frames(dataset, clip.removesuffix(MIRROR)) / 1e3 * self._joints(dataset) / JOINTS
 
     def weights(self, configuration: str) -> float:
-        """Weights of the network, of all its control points, by the sizes of the rows of a figure."""
-        network = self.project.configurations.section(configuration, "network")
-        joints = self._joints(self.project.configurations.dataset(configuration))
-        inputs, outputs, units = 156 + 7 * joints, 32 + 9 * joints, network["units"]
-        return network["control_points"] * units * (inputs + (network["hidden_layers"] - 1) * units + outputs)
+        """Numbers that are trained, by the columns of the configuration's rows."""
+        chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
+        return model(chosen.network.kind).parameters(chosen.network, layout.x_size, layout.y_size)
+
+    def layout(self, configuration: str) -> RowLayout:
+        """The columns of a configuration's rows."""
+        chosen = self.project.catalogue.configuration(configuration)
+        skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(chosen.dataset).skeleton)
+        of_rows = self.project.datasets.options(chosen.dataset, "database", "window", "step")
+        links = len(skeleton.links) if chosen.injury else 0
+        return RowLayout(joints=len(skeleton.joints), links=links, **of_rows)
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
     def all_thousands(self, dataset: str) -> float:

@@ -23,7 +23,8 @@ from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.measures.given import Given, Outcome
-from hobble.runtime.network import Network, load_network
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 HEALTHY = "healthy"
