@@ -69,6 +69,19 @@ def test_mild_limps_are_named_by_the_one_that_is_made_for_them(left_out):
     assert found[1] >= 0.75 * 100
 
 
+def test_people_who_were_left_out_are_near_and_what_nobody_shows_is_far(left_out):
+    near = [
+        judges[1](walk, healthy).distance
+        for person, judges in enumerate(left_out)
+        for *_, walk, healthy in limps(person)
+    ]
+    assert max(near) < 1.5
+    healthy = dict(people().normal())
+    where = ("mean trunk_forward", "mean knee_flexion_R", "mean knee_flexion_L")
+    bent = {name: healthy[name] + 25 for name in where}
+    assert grade(healthy | bent, healthy).distance > 2
+
+
 def test_strength_grows_with_the_limp():
     strengths = []
     for share in (0.3, 0.6, 1.0):
