@@ -20,13 +20,13 @@ import numpy as np
 import pytest
 import yaml
 
+from hobble.channels.injury.status import read_status
+from hobble.channels.injury.table import write_statuses
 from hobble.config.load import Catalogue
 from hobble.core.clip import load_clip
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import load_npz, read_json
 from hobble.core.untrusted import read_bytes, read_yaml
-from hobble.channels.injury.status import read_status
-from hobble.channels.injury.table import write_statuses
 from hobble.labels.files import SourceTime, read_gait_keys
 from hobble.motion import read as bvh
 from hobble.motion.make import make_clip
@@ -135,8 +135,8 @@ def test_files_without_end_are_not_read(tmp_path: Path) -> None:
 
 
 def test_a_status_file_that_counts_two_billion_frames_takes_no_room(tmp_path: Path) -> None:
-    from hobble.core.clip import Clip
     from hobble.channels.injury.severity import clip_severity
+    from hobble.core.clip import Clip
 
     skeleton = load_skeleton(SKELETON).skeleton
     clip = Clip("a", skeleton, 60.0, np.tile([1.0, 0, 0, 0], (9, 31, 1)), np.zeros((9, 3)))
