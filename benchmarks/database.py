@@ -24,8 +24,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hobble.database.clip_rows import ClipRows, save_clip_rows
-from hobble.database.layout import RowLayout
+from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.layout import RowLayout
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
 

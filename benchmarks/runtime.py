@@ -18,7 +18,7 @@ import numpy as np
 import yaml
 
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.database.layout import RowLayout
+from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.network import Network, load_network, weights_at
 from hobble.runtime.predictor import MODES, STORAGES, Predictor

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from hobble.database.clip_rows import ClipRows
-from hobble.database.layout import RowLayout
+from hobble.rows.clip_rows import ClipRows
+from hobble.rows.layout import RowLayout
 
 LAYOUT = RowLayout(joints=3, links=2)
 SKELETON = {

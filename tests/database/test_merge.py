@@ -17,8 +17,8 @@ import pytest
 from hobble.core.errors import HobbleError, InputError
 from hobble.database import merge
 from hobble.database.buckets import INDEX, Buckets
-from hobble.database.clip_rows import load_clip_rows, save_clip_rows
-from hobble.database.layout import RowLayout
+from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
+from hobble.rows.layout import RowLayout
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
 

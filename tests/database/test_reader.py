@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.database.clip_rows import expanded
+from hobble.rows.clip_rows import expanded
 from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database, ahead
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.database.layout import RowLayout
+from hobble.rows.layout import RowLayout
 from hobble.database.merge import write_database
 from hobble.database.sizes import RELEASED_FLAT, RELEASED_FRAMES, sizes
 

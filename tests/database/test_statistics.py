@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.database.clip_rows import ClipRows, expanded
-from hobble.database.layout import RowLayout
+from hobble.rows.clip_rows import ClipRows, expanded
+from hobble.rows.layout import RowLayout
 from hobble.database.statistics import (
     SILENT,
     UNSEEN,

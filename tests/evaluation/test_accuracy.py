@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.database.clip_rows import ClipRows, expanded, save_clip_rows
-from hobble.database.layout import RowLayout
+from hobble.rows.clip_rows import ClipRows, expanded, save_clip_rows
+from hobble.rows.layout import RowLayout
 from hobble.evaluation.accuracy import (
     QUANTILES,
     Errors,

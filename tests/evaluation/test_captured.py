@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.database.clip_rows import ClipRows, save_clip_rows
-from hobble.database.layout import GAITS, RowLayout
+from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.layout import GAITS, RowLayout
 from hobble.evaluation.captured import captured, captured_clips, root_path, unbroken
 from hobble.evaluation.motion_measures import acceleration, in_root_frame
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.database.clip_rows import ClipRows, save_clip_rows
-from hobble.database.layout import RowLayout
+from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.layout import RowLayout
 from hobble.evaluation.motion_measures import in_root_frame
 from hobble.evaluation.rollouts import (
     Inputs,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.database.layout import CONTACTS, GAITS
+from hobble.rows.layout import CONTACTS, GAITS
 from hobble.labels import model
 from hobble.labels.label import label_clip, mirror_labels, write_report
 from hobble.labels.model import LabelReport, load_labels, save_labels

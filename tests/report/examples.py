@@ -13,8 +13,8 @@ import yaml
 from hobble.core import quat
 from hobble.core.files import save_npz, write_json, write_text
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.database.clip_rows import ClipRows, save_clip_rows
-from hobble.database.layout import RowLayout
+from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.layout import RowLayout
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 STAGES = (

@@ -10,7 +10,7 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.database.clip_rows import load_clip_rows, save_clip_rows
+from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 from hobble.report import (
     accuracy_section,
     cost_section,

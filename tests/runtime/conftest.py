@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.database.layout import RowLayout
+from hobble.rows.layout import RowLayout
 from hobble.runtime.network import Network
 
 MakeNetwork = Callable[..., Network]

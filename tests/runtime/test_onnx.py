@@ -13,7 +13,7 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.database.layout import RowLayout
+from hobble.rows.layout import RowLayout
 from hobble.runtime.__main__ import main
 from hobble.runtime.network import load_network, weights_at
 from hobble.runtime.onnx_export import OPSET, TOLERANCE, check_onnx, export_onnx, write_checked

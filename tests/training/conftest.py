@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton
-from hobble.database.clip_rows import ClipRows
-from hobble.database.layout import RowLayout
+from hobble.rows.clip_rows import ClipRows
+from hobble.rows.layout import RowLayout
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
 

@@ -16,7 +16,7 @@ import torch
 
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
-from hobble.database.layout import CONTACTS, GAITS, RowLayout
+from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 from hobble.database.reader import Database
 from hobble.training import checkpoint
 from hobble.training import run as run_module

@@ -2,8 +2,8 @@
 
 from hobble.core.clip import load_clip
 from hobble.core.files import load_npz
-from hobble.database.clip_rows import save_clip_rows
-from hobble.database.rows import clip_rows
+from hobble.rows.clip_rows import save_clip_rows
+from hobble.rows.build import clip_rows
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hobble.database.compose import fit_columns, x_columns
+from hobble.rows.compose import fit_columns, x_columns
 from hobble.database.manifest import Manifest
 from hobble.database.precision import STORED
 

@@ -13,6 +13,7 @@ from hobble.evaluation.injury_cases import divided_severities, into_a_jog, secon
 from hobble.evaluation.sweep import SEVERITIES, Sweep
 from hobble.runtime.network import Network
 
+INJURY = "injury"  # the channel
 GAITS = tuple(SPEEDS)
 REASON = "this network has no severity inputs"
 SUMMARY = (
@@ -103,7 +104,7 @@ def largest_accelerations(
         for gait in GAITS:
             going = clip.gait[:, network.gaits.index(gait)] > 0.5
             hurt: list[tuple[str | None, Any]] = [(None, going)]
-            hurt += [(link, going & (clip.severity[:, i] > 0)) for i, link in enumerate(network.links)]
+            hurt += [(link, going & (clip.told[INJURY][:, i] > 0)) for i, link in enumerate(network.links)]
             for link, chosen in hurt:
                 if np.any(chosen):
                     found = round(float(clip.acceleration[chosen].max()), 5)

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.database.clip_rows import ClipRows, load_clip_rows
-from hobble.database.layout import GAITS
+from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
+from hobble.rows.layout import GAITS, RowLayout
 from hobble.database.statistics import Moments
 from hobble.evaluation.accuracy import SPLITS, check_layout, joint_indices, relative_and_distance
 from hobble.evaluation.captured import turned, unbroken
@@ -86,15 +86,10 @@ class Inputs:
     moving: Array
 
 
-def inputs(rows: ClipRows, chosen: np.ndarray, links: bool) -> Inputs:
-    """Of the rows `chosen` (F,), on the first fit of each; severities only with `links`."""
-    layout = rows.layout
+def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
+    """Of the rows `chosen` (F,), on the first fit of each, laid out as the network's `layout`."""
     fit = rows.first_fit[chosen]
-    severity = rows.severity[chosen] if links else rows.severity[chosen, :0]
-    x = np.concatenate([rows.x[chosen], rows.heights[fit], severity], axis=1, dtype=np.float32)
-    y = rows.y[chosen].astype(np.float32)
-    for values, joints in ((x, layout.x_joint_position), (y, layout.y_joint_position)):
-        values[:, joints.start + 1 : joints.stop : 3] -= rows.mean[fit, None]
+    x, y, *_ = pairs(rows, layout, chosen, fit)
     gait = x[:, layout.x_gait].reshape(len(x), len(GAITS), layout.samples)
     stand = gait[:, GAITS.index("stand"), layout.samples // 2]
     return Inputs(
@@ -166,7 +161,7 @@ def clip_roll_outs(
     layout = predictor.network.layout
     out = {length: Strayed() for length in lengths}
     for chosen in unbroken(rows.frame):
-        asked = inputs(rows, chosen, layout.links > 0)
+        asked = inputs(rows, chosen, layout)
         for length in lengths:
             all_starts = np.arange(1, len(chosen), max(1, length // OVERLAP))
             for first in range(0, len(all_starts), BATCH):

@@ -103,7 +103,7 @@ def write_stimuli(
 
 def hurt_in_training(network: Network) -> set[str]:
     """Links whose severity was above 0 somewhere in training, as the mean of the input tells."""
-    means = network.x_mean[network.layout.x_injury]
+    means = network.x_mean[network.layout.x_channel("injury")]
     return {link for link, mean in zip(network.links, means, strict=True) if mean > 0}
 
 

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels import NAMES, channel, every
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.untrusted import read_yaml
-from hobble.database.layout import GAITS, RowLayout
+from hobble.rows.layout import GAITS, RowLayout
 
 # Rows: the four control points about a place between the second and the third; columns: powers of that place.
 CATMULL_ROM = 0.5 * np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]], float)
@@ -29,7 +30,7 @@ class Network:
     weights: per layer (K, out, in) float32; biases: per layer (K, out) float32.
     x_mean, x_std, y_mean, y_std: what standardises X and restores Y.
     layout: the columns; gaits: the order of the gait blocks; skeleton: None where the file carries none.
-    links: names of the severity columns, in order.
+    channels: name -> labels of its columns, for each channel that the network is told.
     """
 
     weights: tuple[Array, ...] = field(repr=False)
@@ -41,7 +42,7 @@ class Network:
     layout: RowLayout
     skeleton: Skeleton | None = field(default=None, repr=False)
     gaits: tuple[str, ...] = GAITS
-    links: tuple[str, ...] = ()
+    channels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     meta: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -49,11 +50,24 @@ class Network:
         """K, control points of each weight."""
         return len(self.weights[0])
 
+    def trained(self, channel: str) -> tuple[str, ...]:
+        """Labels of a channel's columns that were told something in training, as the means of their inputs tell.
+
+        All where none tells; () for a channel that the network is not told.
+        """
+        labels = self.channels.get(channel, ())
+        means = self.x_mean[self.layout.x_channel(channel)] if labels else ()
+        return tuple(label for label, mean in zip(labels, means, strict=True) if mean > 0) or labels
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Labels of the injury channel."""
+        return self.channels.get("injury", ())
+
     @property
     def hurt_links(self) -> tuple[str, ...]:
-        """Links that were hurt in training, as the means of their inputs tell; all where none tells."""
-        means = self.x_mean[self.layout.x_injury]
-        return tuple(name for name, mean in zip(self.links, means, strict=True) if mean > 0) or self.links
+        """Links that were hurt in training; see `trained`."""
+        return self.trained("injury")
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -115,7 +129,7 @@ def network_from_arrays(
     _check(path, weights, biases, statistics)
     meta = json.loads(str(arrays["meta"])) if "meta" in arrays else {}
     x_size, y_size = len(statistics[0]), len(statistics[2])
-    layout = RowLayout.from_dict(meta["layout"]) if meta.get("layout") else _guess_layout(x_size, y_size)
+    layout = _layout(path, meta["layout"]) if meta.get("layout") else _guess_layout(x_size, y_size, skeleton)
     if (layout.x_size, layout.y_size) != (x_size, y_size):
         raise InputError(path, f"{x_size} inputs and {y_size} outputs do not fit {layout}")
     if meta.get("skeleton"):
@@ -124,12 +138,10 @@ def network_from_arrays(
         raise InputError(
             path, f"{layout.joints} joints, but skeleton {skeleton.name} has {len(skeleton.joints)}"
         )
-    links = tuple(meta.get("links") or (skeleton.link_names if skeleton is not None else ()))[: layout.links]
-    if len(links) != layout.links:
-        raise InputError(path, f"{layout.links} severity inputs, but {len(links)} links named")
+    channels = {name: _labels(path, name, columns, meta, skeleton) for name, columns in layout.channels}
     gaits = tuple(meta.get("gaits") or GAITS)
     x_mean, x_std, y_mean, y_std = statistics
-    return Network(weights, biases, x_mean, x_std, y_mean, y_std, layout, skeleton, gaits, links, meta)
+    return Network(weights, biases, x_mean, x_std, y_mean, y_std, layout, skeleton, gaits, channels, meta)
 
 
 def _check(path: str | Path, weights: Any, biases: Any, statistics: list[Array]) -> None:
@@ -148,10 +160,39 @@ def _check(path: str | Path, weights: Any, biases: Any, statistics: list[Array])
             raise InputError(path, "weights that are not finite numbers", fix="The training diverged.")
 
 
-def _guess_layout(x_size: int, y_size: int) -> RowLayout:
-    """The layout of a file without one: the default window, joints from Y, links from what X has left."""
+def _layout(path: str | Path, data: Mapping[str, Any]) -> RowLayout:
+    try:
+        return RowLayout.from_dict(data)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(path, f"its layout cannot be understood ({error})") from None
+
+
+def _labels(
+    path: str | Path, name: str, columns: int, meta: Mapping[str, Any], skeleton: Skeleton | None
+) -> tuple[str, ...]:
+    """The labels of a channel, by the file, else by the skeleton. Raises InputError where they do not fit."""
+    if name not in NAMES:
+        raise InputError(path, f"is told {name!r:.80}, a channel that is not here: {', '.join(NAMES)}")
+    said = dict(meta.get("channels", {})).get(name) or next(
+        (meta[key] for key in channel(name).former if meta.get(key)), None
+    )
+    if said is None and skeleton is not None:
+        said = channel(name).columns(skeleton)
+    labels = tuple(str(label) for label in said or ())
+    if len(labels) != columns:
+        raise InputError(path, f"{columns} inputs of channel {name}, but {len(labels)} are named")
+    return labels
+
+
+def _guess_layout(x_size: int, y_size: int, skeleton: Skeleton | None) -> RowLayout:
+    """The layout of a file without one: the default window, joints from Y, and what X has left is of the first
+    channel with so many columns."""
     joints = (y_size - RowLayout(0).y_size) // 9
-    return RowLayout(joints, links=max(0, x_size - RowLayout(joints).x_size))
+    left = x_size - RowLayout(joints).x_size
+    if left <= 0:
+        return RowLayout(joints)
+    fitting = (one.name for one in every() if skeleton is None or len(one.columns(skeleton)) == left)
+    return RowLayout(joints, channels=((next(fitting, NAMES[0]), left),))
 
 
 def catmull_rom(phase: Array, points: int) -> tuple[np.ndarray, Array]:

@@ -9,14 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels import channel
 from hobble.core.files import save_npz
-from hobble.database.layout import CONTACTS, GAITS
+from hobble.core.skeleton import Skeleton
+from hobble.rows.layout import CONTACTS, GAITS
 from hobble.database.reader import Database
 from hobble.training.network import Network
 
 UNITS = (
-    "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z forward, +X left, "
-    "severities 0 to 10"
+    "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z forward, +X left"
 )
 
 
@@ -39,7 +40,8 @@ def write_weights(
 
 def meta(network: Network, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
     """What the columns mean and where the network comes from, as JSON; the joints keep their order."""
-    links = ["-".join(link) for link in database.skeleton["links"]] if database.layout.links else []
+    rig = Skeleton.from_dict(database.skeleton)
+    channels = [channel(name) for name, _ in database.layout.channels]
     return json.dumps(
         {
             "configuration": configuration,
@@ -47,9 +49,9 @@ def meta(network: Network, database: Database, configuration: str, facts: Mappin
             "skeleton": database.skeleton,
             "gaits": list(GAITS),
             "contacts": list(CONTACTS),
-            "links": links,
+            "channels": {one.name: one.columns(rig) for one in channels},
             "control_points": network.control_points,
-            "units": UNITS,
+            "units": "; ".join([UNITS, *(f"{one.value} 0 to {one.highest:g}" for one in channels)]),
             "network": "y = W2 elu(W1 elu(W0 x + b0) + b1) + b2 on standardised x and y; W and b are cyclic "
             "Catmull-Rom splines of the phase through their control points at k / control_points",
             **facts,

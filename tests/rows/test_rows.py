@@ -14,9 +14,9 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.database.clip_rows import ClipRows, expanded
-from hobble.database.layout import GAITS, RowLayout
-from hobble.database.rows import clip_rows, cycle_frames, cycle_phase, phase_change
+from hobble.rows.clip_rows import ClipRows, expanded
+from hobble.rows.layout import GAITS, RowLayout
+from hobble.rows.build import clip_rows, cycle_frames, cycle_phase, phase_change
 from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
 from hobble.terrain.clip_fits import clip_fits
