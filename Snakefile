@@ -4,22 +4,33 @@ import sys
 from pathlib import Path
 
 from hobble.core.errors import HobbleError
+from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
 from hobble.workflow.project import Project
+from hobble.workflow.targets import check
 
 try:
     # Relative, so that a checkout can be moved without making anything again.
     project = Project(Path(os.path.relpath(workflow.basedir)), config)
-    demands = Demands(project)
-    project.check(
-        argument for argument in sys.argv[1:] if argument.startswith("results/")
+    check(
+        project,
+        (argument for argument in sys.argv[1:] if argument.startswith("results/")),
     )
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 
+# What the rules ask; each part is a module of hobble.workflow.
+catalogue = project.catalogue
+clips = project.clips
+datasets = project.datasets
+configurations = project.configurations
+comparison = project.comparison
+package = project.package
+demands = Demands(project)
+
 
 wildcard_constraints:
-    configuration="|".join(project.catalogue.names()),
+    configuration="|".join(catalogue.names()),
     dataset=r"[^/]+",
     clip=r"[^/]+(?<!_mirror)",
     rows=r"[^/]+",

@@ -60,24 +60,24 @@ class Found(NamedTuple):
 def patches_of(dataset: str, mocap: Path) -> Patches:
     """The patches of a data set, drawn once a process."""
     project = Project(BASE, {"mocap": str(mocap)})
-    options = project.options(dataset, "terrain")
+    options = project.datasets.options(dataset, "terrain")
     scales = {name: options[name] for name in ("cell", "height_scale")}
-    maps = heightmaps(options["heightmaps"], project.heightmap_files(dataset), **scales)
+    maps = heightmaps(options["heightmaps"], project.clips.heightmap_files(dataset), **scales)
     names = ("cell", "size", "highest", "seed")
     return draw_patches(maps, count=options["patches"], **{name: options[name] for name in names})
 
 
 def source(project: Project, job: Job, folder: Path) -> tuple[Path, list[Path]]:
     """The BVH file of a clip and the label files beside it; written to `folder` where it is synthetic."""
-    if project.dataset(job.dataset).synthetic is None:
-        files = [Path(file) for file in project.label_files(job.dataset, job.clip)]
-        return Path(project.source(job.dataset, job.clip)), files
-    entry = project.entry(job.dataset, job.clip)
-    skeleton = yaml.safe_load(Path(project.skeleton_file(job.dataset)).read_text())
-    name = project.dataset(job.dataset).skeleton
+    if project.catalogue.dataset(job.dataset).synthetic is None:
+        files = [Path(file) for file in project.clips.label_files(job.dataset, job.clip)]
+        return Path(project.clips.source(job.dataset, job.clip)), files
+    entry = project.clips.entry(job.dataset, job.clip)
+    skeleton = yaml.safe_load(Path(project.clips.skeleton_file(job.dataset)).read_text())
+    name = project.catalogue.dataset(job.dataset).skeleton
     files = {part: folder / f"{job.clip}_{part}.txt" for part in ("footsteps", "gait", "status")}
-    bvh, frames = folder / f"{job.clip}.bvh", project.frames(job.dataset, job.clip)
-    options = project.options(job.dataset, "synthetic")
+    bvh, frames = folder / f"{job.clip}.bvh", project.datasets.frames(job.dataset, job.clip)
+    options = project.datasets.options(job.dataset, "synthetic")
     write_clip(
         job.clip, {"name": name, **skeleton}, frames, entry.recipe, entry.injured, options, bvh=bvh, **files
     )
@@ -87,16 +87,16 @@ def source(project: Project, job: Job, folder: Path) -> tuple[Path, list[Path]]:
 def made(project: Project, job: Job, folder: Path) -> Iterator[tuple[Clip, dict]]:
     """The clip and, where the data set has them, its mirror, with their labels."""
     bvh, files = source(project, job, folder)
-    entry, dataset = project.entry(job.dataset, job.clip), project.dataset(job.dataset)
+    entry, dataset = project.clips.entry(job.dataset, job.clip), project.catalogue.dataset(job.dataset)
     clip, report = make_clip(
         bvh,
-        project.skeleton_file(job.dataset),
+        project.clips.skeleton_file(job.dataset),
         str(BASE / "config/skeletons"),
         clip=job.clip,
         skeleton_name=dataset.skeleton,
-        options=project.motion_options(job.dataset, job.clip),
+        options=project.datasets.motion_options(job.dataset, job.clip),
     )
-    options = project.options(job.dataset, "labels")
+    options = project.datasets.options(job.dataset, "labels")
     labels, told = label_clip(clip, files, report, entry.gait, entry.ground, options)
     yield clip, vars(labels)
     if dataset.mirror:
@@ -107,7 +107,7 @@ def made(project: Project, job: Job, folder: Path) -> Iterator[tuple[Clip, dict]
 def found(job: Job) -> list[Found]:
     """The fits of one clip and its mirror."""
     project = Project(BASE, {"mocap": str(job.mocap)})
-    options, database = (project.options(job.dataset, name) for name in ("terrain", "database"))
+    options, database = (project.datasets.options(job.dataset, name) for name in ("terrain", "database"))
     out = []
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -116,7 +116,7 @@ def found(job: Job) -> list[Found]:
             print(f"{job.dataset} {job.clip} left out: {error}", flush=True)
             return []
     for clip, labels in pairs:
-        for kind in job.kinds or (project.entry(job.dataset, job.clip).ground,):
+        for kind in job.kinds or (project.clips.entry(job.dataset, job.clip).ground,):
             fits = clip_fits(clip, labels, patches_of(job.dataset, job.mocap), kind, options, database)
             if not len(fits.patch):
                 continue
@@ -135,7 +135,7 @@ def main() -> None:
     asked = parser.parse_args()
     project = Project(BASE, {"mocap": str(asked.mocap)})
     jobs = [
-        Job(d, clip, tuple(asked.kinds), asked.mocap) for d in asked.datasets for clip in project.clips(d)
+        Job(d, clip, tuple(asked.kinds), asked.mocap) for d in asked.datasets for clip in project.clips.of(d)
     ]
     with ProcessPoolExecutor(asked.workers) as pool:
         results = [one for some in pool.map(found, jobs) for one in some]

@@ -11,6 +11,7 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.workflow.project import Project
+from hobble.workflow.targets import check
 
 from .lab import Lab
 from .texts import SKELETON
@@ -120,8 +121,8 @@ def test_what_decides_on_the_jobs_but_may_not_be_read_is_named(reachable: Path, 
 
     def read() -> object:
         project = Project(reachable, {"mocap": reachable / "mocap"})
-        project.check(["results/test/report.html"])
-        return project.selected("mine", "healthy")
+        check(project, ["results/test/report.html"])
+        return project.datasets.selected("mine", "healthy")
 
     read()  # imports what nobody could not
     assert as_nobody(read).startswith("read: ")

@@ -34,6 +34,7 @@ from hobble.motion.rig import load_skeleton
 from hobble.runtime.network import load_network
 from hobble.terrain.heightmaps import read_heights
 from hobble.workflow.project import Project
+from hobble.workflow.targets import check
 
 from .texts import OPTIONS, SKELETON
 
@@ -344,7 +345,7 @@ def test_a_configuration_names_nothing_outside_its_folder(catalogue: Path, key: 
     write(catalogue / "mine.yaml", json.dumps(value))
     write(catalogue / "datasets/synthetic.yaml", "skeleton: holden31\nfolder: x\n")
     with pytest.raises(HobbleError, match="mine") as refusal:
-        Project(catalogue.parent, {}).check(["results/mine/report.html"])
+        check(Project(catalogue.parent, {}), ["results/mine/report.html"])
     assert "secret" not in str(refusal.value)
 
 
@@ -408,7 +409,7 @@ def test_clips_that_cannot_be_said_are_refused_with_their_folder(
     folder.mkdir(parents=True)
     write(folder / f"{name}.bvh", "HIERARCHY")
     with pytest.raises(InputError, match="mocap/mine: a clip is called") as refusal:
-        Project(catalogue.parent, {"mocap": tmp_path / "mocap"}).clips("mine")
+        Project(catalogue.parent, {"mocap": tmp_path / "mocap"}).clips.of("mine")
     assert str(refusal.value).isprintable()
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hobble.workflow import fingerprint as fp
-from hobble.workflow.project import STAGES
+from hobble.workflow.costs import OF_DATASET
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def test_no_job_depends_on_the_configuration_models(root: Path) -> None:
 
 
 def test_no_stage_imports_from_below(root: Path) -> None:
-    order = [*STAGES, "training", "runtime", "evaluation", "report"]
+    order = [*OF_DATASET, "training", "runtime", "evaluation", "report"]
     order[order.index("injury")] = "channels"  # injury's folder is one of channels/
     for rank, stage in enumerate(order):
         for module in (root / "src/hobble" / stage).rglob("*.py"):

@@ -11,6 +11,7 @@ import pytest
 from hobble.core.errors import HobbleError
 from hobble.workflow import targets
 from hobble.workflow.project import Project
+from hobble.workflow.targets import check
 
 DATASET = """
 skeleton: s
@@ -40,23 +41,23 @@ def base(tmp_path: Path) -> Path:
 def test_mirrors_go_with_their_originals_and_hurt_clips_to_injured_networks(base: Path) -> None:
     project = Project(base, {})
     healthy = {"a": "train", "a_mirror": "train", "b": "held_out", "b_mirror": "held_out"}
-    assert project.splits("one") == healthy
-    assert project.splits("hurt") == {**healthy, "c": "train", "c_mirror": "train"}
-    assert project.database("one").endswith("mine/database/healthy")
-    assert project.database("hurt").endswith("mine/database/all")
+    assert project.configurations.splits("one") == healthy
+    assert project.configurations.splits("hurt") == {**healthy, "c": "train", "c_mirror": "train"}
+    assert project.configurations.database("one").endswith("mine/database/healthy")
+    assert project.configurations.database("hurt").endswith("mine/database/all")
 
 
 def test_files_beside_a_clip_are_found_and_no_others(base: Path) -> None:
     project = Project(base, {})
-    assert [Path(f).name for f in project.label_files("mine", "b")] == ["b_gait.txt"]
-    assert project.label_files("mine", "c") == []
-    assert [Path(f).name for f in project.status_files("mine", "c")] == ["c_injuries.txt"]
+    assert [Path(f).name for f in project.clips.label_files("mine", "b")] == ["b_gait.txt"]
+    assert project.clips.label_files("mine", "c") == []
+    assert [Path(f).name for f in project.clips.status_files("mine", "c")] == ["c_injuries.txt"]
 
 
 def test_a_status_in_the_configuration_takes_the_place_of_the_file(base: Path) -> None:
     text = DATASET + "clips: {a: , b: , c: {status: 'LeftArm-LeftForeArm[3]'}}\n"
     (base / "config/datasets/mine.yaml").write_text(text)
-    assert Project(base, {}).status_files("mine", "c") == []
+    assert Project(base, {}).clips.status_files("mine", "c") == []
 
 
 def test_severities_of_0_hurt_nobody(base: Path) -> None:
@@ -66,10 +67,10 @@ def test_severities_of_0_hurt_nobody(base: Path) -> None:
     (base / "data/mine/c_injuries.txt").write_text(
         "frames:9\n1-4 LeftLeg-LeftFoot[0];\n5-9 LeftLeg-LeftFoot[.5];\n"
     )
-    assert [Project(base, {}).is_injured("mine", clip) for clip in "abc"] == [False, False, True]
+    assert [Project(base, {}).datasets.is_injured("mine", clip) for clip in "abc"] == [False, False, True]
     text = DATASET + "clips: {a: {status: 'LeftLeg-LeftFoot[2]'}, b: {status: 'LeftLeg-LeftFoot[0]'}, c: }\n"
     (base / "config/datasets/mine.yaml").write_text(text)
-    assert [Project(base, {}).is_injured("mine", clip) for clip in "abc"] == [True, False, True]
+    assert [Project(base, {}).datasets.is_injured("mine", clip) for clip in "abc"] == [True, False, True]
 
 
 @pytest.mark.parametrize("name", ["Walk Forward", "walk, slow (2)", "gå+走"])
@@ -78,9 +79,9 @@ def test_a_clip_can_be_configured_whatever_its_file_is_called(base: Path, name: 
     text = f"{DATASET.replace('[b]', json.dumps([name]))}clips: {{a: , {json.dumps(name)}: {{gait: jog}}}}\n"
     (base / "config/datasets/mine.yaml").write_text(text)
     project = Project(base, {})
-    assert project.entry("mine", name).gait == "jog"
-    assert project.splits("hurt")[name + "_mirror"] == "held_out"
-    assert project.source("mine", name) == str(base / f"data/mine/{name}.bvh")
+    assert project.clips.entry("mine", name).gait == "jog"
+    assert project.configurations.splits("hurt")[name + "_mirror"] == "held_out"
+    assert project.clips.source("mine", name) == str(base / f"data/mine/{name}.bvh")
 
 
 @pytest.mark.parametrize(
@@ -95,13 +96,13 @@ def test_a_clip_can_be_configured_whatever_its_file_is_called(base: Path, name: 
 def test_a_data_set_that_cannot_work_is_told(base: Path, text: str, message: str) -> None:
     (base / "config/datasets/mine.yaml").write_text(text)
     with pytest.raises(HobbleError, match=message):
-        Project(base, {}).splits("one")
+        Project(base, {}).configurations.splits("one")
 
 
 def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
     (base / "config/datasets/mine.yaml").write_text(DATASET.replace("[b]", "[a, b, c]"))
     with pytest.raises(HobbleError, match="mine: no clip is left to train on"):
-        Project(base, {}).splits("hurt")
+        Project(base, {}).configurations.splits("hurt")
 
 
 @pytest.mark.parametrize(
@@ -118,28 +119,28 @@ def test_what_no_network_could_give_is_told_before_it_is_trained(
     (base / "config/eyes.yaml").write_text("extends: hurt\nnetwork_of: one\n")
     monkeypatch.setattr(targets, "_dataset", lambda *_: None)
     with pytest.raises(HobbleError, match=message):
-        Project(base, {}).check([target])
+        check(Project(base, {}), [target])
     fine = ("results/hurt/stimuli", "results/one/export/pfnn", "results/one/export/cubic.onnx")
-    Project(base, {}).check(fine)
+    check(Project(base, {}), fine)
 
 
 def test_a_listed_clip_without_its_file_is_told(base: Path) -> None:
     (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , gone: }\n")
     with pytest.raises(HobbleError, match=r"gone\.bvh: no such file"):
-        Project(base, {}).source("mine", "gone")
+        Project(base, {}).clips.source("mine", "gone")
 
 
 def test_the_walkers_frames_are_shared_out(root: Path) -> None:
     project = Project(root, {})
-    total = sum(project.frames("synthetic", clip) for clip in project.clips("synthetic"))
+    total = sum(project.datasets.frames("synthetic", clip) for clip in project.clips.of("synthetic"))
     assert abs(total - 20_000) < 20
 
 
 def test_networks_that_others_make_are_read_where_they_lie(root: Path) -> None:
     project = Project(root, {})
-    assert project.network("ava-m", "weights.npz") == "results/ava/network/weights.npz"
-    assert project.start("holden-xt") == ["results/holden/network/checkpoint.npz"]
-    assert project.start("holden") == []
+    assert project.configurations.network("ava-m", "weights.npz") == "results/ava/network/weights.npz"
+    assert project.configurations.start("holden-xt") == ["results/holden/network/checkpoint.npz"]
+    assert project.configurations.start("holden") == []
 
 
 @pytest.fixture
@@ -179,7 +180,7 @@ def test_what_a_clip_names_wrongly_is_told_before_anything_runs(
 ) -> None:
     (complete / "config/datasets/mine.yaml").write_text(text)
     with pytest.raises(HobbleError, match=f"data set mine: .*{message}"):
-        Project(complete, {}).check(["results/one/report.html"])
+        check(Project(complete, {}), ["results/one/report.html"])
 
 
 def test_a_skeleton_without_a_mirror_image_is_told_before_anything_runs(complete: Path) -> None:
@@ -189,11 +190,11 @@ def test_a_skeleton_without_a_mirror_image_is_told_before_anything_runs(complete
         text = DATASET.replace("mirror: true", f"mirror: {str(mirror).lower()}") + "clips: {a: , b: }\n"
         (complete / "config/datasets/mine.yaml").write_text(text)
         if not mirror:
-            Project(complete, {}).check(["results/one/report.html"])
+            check(Project(complete, {}), ["results/one/report.html"])
     with pytest.raises(
         HobbleError, match="skeleton s cannot be mirrored: LeftFoot is the left heel and OtherF"
     ):
-        Project(complete, {}).check(["results/one/report.html"])
+        check(Project(complete, {}), ["results/one/report.html"])
 
 
 @pytest.mark.parametrize(
@@ -214,29 +215,30 @@ def test_what_cannot_be_gone_on_from_is_told_before_anything_runs(
     (complete / "config/other.yaml").write_text(f"extends: more\n{text}\n")
     project = Project(complete, {})
     if message is None:
-        return project.check(["results/other/report.html"])
+        return check(project, ["results/other/report.html"])
     with pytest.raises(HobbleError, match=f"configuration other goes on from one, .*{message}"):
-        project.check(["results/other/report.html"])
+        check(project, ["results/other/report.html"])
 
 
 def test_every_shipped_data_set_passes(root: Path) -> None:
     project = Project(root, {"mocap": "nowhere"})
-    project.check(f"results/datasets/{name}/x" for name in ("synthetic", "synthetic-ava", "tiny", "cmu"))
+    names = ("synthetic", "synthetic-ava", "tiny", "cmu")
+    check(project, [f"results/datasets/{name}/x" for name in names])
 
 
 def test_what_is_compared(complete: Path) -> None:
     base = complete
     project = Project(base, {"compare": ["one", "hurt"]})
-    project.check(["results/compare/compare.json"])
-    assert project.measured()["accuracy"] == [
+    check(project, ["results/compare/compare.json"])
+    assert project.comparison.measured()["accuracy"] == [
         f"results/{n}/evaluation/accuracy.json" for n in ("one", "hurt")
     ]
-    assert Project(base, {"compare": "one,hurt"}).compared() == ["one", "hurt"]
+    assert Project(base, {"compare": "one,hurt"}).comparison.names() == ["one", "hurt"]
     (base / "config/read.yaml").write_text("extends: one\nnetwork_of: one\n")
-    read = Project(base, {"compare": ["read"]}).measured()
+    read = Project(base, {"compare": ["read"]}).comparison.measured()
     assert read["history"] == ["results/one/network/history.csv"]
     # A list of configurations is no part of any of them.
-    assert project.resolved("one") == Project(base, {}).resolved("one")
+    assert project.configurations.resolved("one") == Project(base, {}).configurations.resolved("one")
 
 
 @pytest.mark.parametrize(
@@ -251,9 +253,9 @@ def test_what_is_compared(complete: Path) -> None:
 )
 def test_what_cannot_be_compared(complete: Path, names: object, message: str) -> None:
     project = Project(complete, {"compare": names})
-    project.check(["results/one/report.html"])
+    check(project, ["results/one/report.html"])
     with pytest.raises(HobbleError, match=message):
-        project.check(["results/compare/report.html"])
+        check(project, ["results/compare/report.html"])
 
 
 @pytest.mark.parametrize("name", ["compare", "datasets"])
@@ -272,10 +274,10 @@ def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(bas
     (base / "data/mine/.trash").mkdir()
     (base / "data/mine/.trash/e.bvh").write_text("")
     project = Project(base, {})
-    assert list(project.clips("mine")) == ["a", "b", "c", "d"]
-    assert project.source("mine", "d") == str(below / "d.BVH")
-    assert project.label_files("mine", "d") == [str(below / "d_gait.txt")]
-    assert project.status_files("mine", "d") == [str(below / "d_injuries.txt")]
+    assert list(project.clips.of("mine")) == ["a", "b", "c", "d"]
+    assert project.clips.source("mine", "d") == str(below / "d.BVH")
+    assert project.clips.label_files("mine", "d") == [str(below / "d_gait.txt")]
+    assert project.clips.status_files("mine", "d") == [str(below / "d_injuries.txt")]
 
 
 def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path) -> None:
@@ -289,9 +291,9 @@ def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path)
         (base / f"data/mine/{name}").symlink_to(base / "kept")
     (base / "data/mine/gone").symlink_to(base / "nowhere")
     project = Project(base, {})
-    assert list(project.clips("mine")) == ["a", "b", "c", "d"]
-    assert project.source("mine", "d") == str(base / "data/mine/first/day 1/d.bvh")
-    assert project.status_files("mine", "d") == [str(base / "data/mine/first/day 1/d_injuries.txt")]
+    assert list(project.clips.of("mine")) == ["a", "b", "c", "d"]
+    assert project.clips.source("mine", "d") == str(base / "data/mine/first/day 1/d.bvh")
+    assert project.clips.status_files("mine", "d") == [str(base / "data/mine/first/day 1/d_injuries.txt")]
 
 
 @pytest.mark.parametrize("mirror", [True, False])
@@ -299,21 +301,21 @@ def test_a_mirror_is_left_out_only_where_it_is_made_anew(base: Path, mirror: boo
     text = DATASET.replace("mirror: true", f"mirror: {str(mirror).lower()}")
     (base / "config/datasets/mine.yaml").write_text(text)
     if mirror:
-        assert list(Project(base, {}).clips("mine")) == ["a", "b", "c"]
+        assert list(Project(base, {}).clips.of("mine")) == ["a", "b", "c"]
         (base / "data/mine/a_mirror.bvh").rename(base / "data/mine/z_mirror.bvh")
     with pytest.raises(HobbleError, match="_mirror: only a mirror is called so, which `mirror: true` makes"):
-        Project(base, {}).clips("mine")
+        Project(base, {}).clips.of("mine")
 
 
 def test_two_files_of_one_clip_are_refused_with_both(base: Path) -> None:
     (base / "data/mine/old").mkdir()
     (base / "data/mine/old/a.BVH").write_text("")
     with pytest.raises(HobbleError, match=r"old/a\.BVH: a second file of clip a, beside .*mine/a\.bvh"):
-        Project(base, {}).clips("mine")
+        Project(base, {}).clips.of("mine")
     (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , c: }\n")
     with pytest.raises(HobbleError, match="a second file of clip a"):
-        Project(base, {}).source("mine", "a")
-    assert Project(base, {}).source("mine", "b").endswith("mine/b.bvh")
+        Project(base, {}).clips.source("mine", "a")
+    assert Project(base, {}).clips.source("mine", "b").endswith("mine/b.bvh")
 
 
 FAR = """
@@ -327,18 +329,18 @@ def test_what_the_folder_lacks_is_downloaded(base: Path) -> None:
     (base / "config/datasets/far.yaml").write_text(FAR + "clips: {'2_1': , '2_2': , '2_3': }\n")
     (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'B' * 64} *2_2.bvh\n\n")
     project = Project(base, {})
-    assert project.source("far", "2_1") == str(base / "data/downloaded/far/2_1.bvh")
-    assert project.label_files("far", "2_1") == project.status_files("far", "2_1") == []
-    assert project.download("far", "2_2") == {
+    assert project.clips.source("far", "2_1") == str(base / "data/downloaded/far/2_1.bvh")
+    assert project.clips.label_files("far", "2_1") == project.clips.status_files("far", "2_1") == []
+    assert project.clips.download("far", "2_2") == {
         "url": "https://host/002/2_2.bvh",
         "sha256": "b" * 64,
         "folder": str(base / "data/far"),
     }
     with pytest.raises(HobbleError, match=r"far/2_3\.bvh: no such file, .*far\.sha256 has none to download"):
-        project.source("far", "2_3")
+        project.clips.source("far", "2_3")
     (base / "data/far").mkdir()
     (base / "data/far/2_1.bvh").write_text("")
-    assert Project(base, {}).source("far", "2_1") == str(base / "data/far/2_1.bvh")
+    assert Project(base, {}).clips.source("far", "2_1") == str(base / "data/far/2_1.bvh")
 
 
 @pytest.mark.parametrize(
@@ -356,23 +358,23 @@ def test_what_the_folder_lacks_is_downloaded(base: Path) -> None:
 def test_an_address_that_cannot_work_is_told(base: Path, old: str, new: str, message: str) -> None:
     (base / "config/datasets/far.yaml").write_text((FAR + "clips: {'2_1': }\n").replace(old, new))
     with pytest.raises(HobbleError, match=message):
-        Project(base, {}).dataset("far")
+        Project(base, {}).catalogue.dataset("far")
 
 
 def test_a_manifest_that_does_not_read_is_told_with_its_line(base: Path) -> None:
     (base / "config/datasets/far.yaml").write_text(FAR + "clips: {'2_1': }\n")
     (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'a' * 63}  2_2.bvh\n")
     with pytest.raises(HobbleError, match=r"far\.sha256, line 2: a line holds a SHA-256"):
-        Project(base, {}).source("far", "2_1")
+        Project(base, {}).clips.source("far", "2_1")
 
 
 def test_every_clip_of_the_cmu_set_has_a_checksum_and_an_address(root: Path) -> None:
     project = Project(root, {"mocap": "nowhere"})
-    project.check(["results/datasets/cmu/motion/02_01.npz"])
-    assert len(project.clips("cmu")) == 69
-    assert project.download("cmu", "02_01")["url"].endswith("/cmu-mocap/master/data/002/02_01.bvh")
-    assert project.download("cmu", "105_16")["url"].endswith("/105/105_16.bvh")
-    assert all(len(project.download("cmu", clip)["sha256"]) == 64 for clip in project.clips("cmu"))
+    check(project, ["results/datasets/cmu/motion/02_01.npz"])
+    assert len(project.clips.of("cmu")) == 69
+    assert project.clips.download("cmu", "02_01")["url"].endswith("/cmu-mocap/master/data/002/02_01.bvh")
+    assert project.clips.download("cmu", "105_16")["url"].endswith("/105/105_16.bvh")
+    assert all(len(project.clips.download("cmu", clip)["sha256"]) == 64 for clip in project.clips.of("cmu"))
 
 
 @pytest.mark.shared
@@ -380,9 +382,9 @@ def test_the_checksums_are_those_of_the_files(root: Path, shared: Path) -> None:
     import hashlib
 
     project = Project(root, {})
-    for clip in project.clips("cmu"):
+    for clip in project.clips.of("cmu"):
         data = (shared / f"mocap/cmu/{clip}.bvh").read_bytes()
-        assert project.download("cmu", clip)["sha256"] == hashlib.sha256(data).hexdigest()
+        assert project.clips.download("cmu", clip)["sha256"] == hashlib.sha256(data).hexdigest()
 
 
 def test_a_clip_depends_on_the_skeleton_that_it_is_retargeted_from(complete: Path, root: Path) -> None:
@@ -393,10 +395,11 @@ def test_a_clip_depends_on_the_skeleton_that_it_is_retargeted_from(complete: Pat
     )
     (complete / "data/mine/b.bvh").write_text(header)
     project = Project(complete, {})
-    assert [Path(f).name for f in project.rig_files("mine", "b")] == ["mixamo55.yaml"]
-    assert project.rig_files("mine", "a") == []
-    assert [Path(f).name for f in Project(root, {}).rig_files("synthetic-ava", "walk-1")] == ["holden31.yaml"]
-    assert Project(root, {}).rig_files("synthetic", "walk-1") == []
+    assert [Path(f).name for f in project.clips.rig_files("mine", "b")] == ["mixamo55.yaml"]
+    assert project.clips.rig_files("mine", "a") == []
+    shipped = Project(root, {}).clips
+    assert [Path(f).name for f in shipped.rig_files("synthetic-ava", "walk-1")] == ["holden31.yaml"]
+    assert shipped.rig_files("synthetic", "walk-1") == []
 
 
 @pytest.mark.shared
@@ -410,12 +413,25 @@ def test_the_plan_and_the_job_agree_on_the_rig(root: Path, shared: Path) -> None
     target = load_skeleton(root / "config/skeletons/holden31.yaml")
     options = Motion().model_dump(mode="json")
     for clip in ("Injured_Ilde", "Injured_Walk_LLL", "Injured_Run_LLL_extended_converted"):
-        file = read_bvh(project.source("ferre", clip))
+        file = read_bvh(project.clips.source("ferre", clip))
         rig = load_source(file, target, root / "config/skeletons", options).match.rig
-        assert [Path(f).stem for f in project.rig_files("ferre", clip)] == [rig] * (rig != "holden31")
+        assert [Path(f).stem for f in project.clips.rig_files("ferre", clip)] == [rig] * (rig != "holden31")
 
 
 def test_motion_knows_what_the_clip_s_entry_says_of_it(root):
+    datasets = Project(root, {}).datasets
+    assert datasets.motion_options("cmu", "03_01")["ground"] == "rocky"
+    assert datasets.motion_options("cmu", "02_01") == {**datasets.options("cmu", "motion"), "ground": "flat"}
+
+
+@pytest.mark.parametrize("asked", [5, "", " ", ["a"], {"a": 1}, None, True])
+def test_a_mocap_folder_that_is_none_is_told(base: Path, asked: object) -> None:
+    with pytest.raises(HobbleError, match="--config mocap: must be the name of one folder"):
+        Project(base, {"mocap": asked})
+
+
+def test_sections_may_be_asked_for_some_of_their_keys(root: Path) -> None:
     project = Project(root, {})
-    assert project.motion_options("cmu", "03_01")["ground"] == "rocky"
-    assert project.motion_options("cmu", "02_01") == {**project.options("cmu", "motion"), "ground": "flat"}
+    assert project.datasets.options("tiny", "database", "window", "step") == {"window": 60, "step": 10}
+    with pytest.raises(KeyError):
+        project.configurations.section("test", "training", "passes", "learning_rat")

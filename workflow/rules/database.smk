@@ -17,8 +17,8 @@ rule database_clip:
         runtime=lambda w, attempt: demands.minutes(w.dataset, w.rows, 0.15, attempt),
     params:
         clip=lambda w: w.rows,
-        options=lambda w: project.options(w.dataset, "database"),
-        code=project.code("database_clip"),
+        options=lambda w: datasets.options(w.dataset, "database"),
+        code=package.code("database_clip"),
     script:
         "../scripts/database_clip.py"
 
@@ -28,7 +28,7 @@ rule database_merge:
     input:
         clips=lambda w: expand(
             f"results/datasets/{w.dataset}/database/clips/{{clip}}.npz",
-            clip=project.selected(w.dataset, w.selection),
+            clip=datasets.selected(w.dataset, w.selection),
         ),
     output:
         database=directory("results/datasets/{dataset}/database/{selection}"),
@@ -43,9 +43,9 @@ rule database_merge:
             w.dataset, 0.1, attempt, least=5
         ),
     params:
-        splits=lambda w: project.selected(w.dataset, w.selection),
+        splits=lambda w: datasets.selected(w.dataset, w.selection),
         injury=lambda w: w.selection == "all",
-        options=lambda w: project.options(w.dataset, "database"),
-        code=project.code("database_merge"),
+        options=lambda w: datasets.options(w.dataset, "database"),
+        code=package.code("database_merge"),
     script:
         "../scripts/database_merge.py"

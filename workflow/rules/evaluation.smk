@@ -1,10 +1,12 @@
 rule accuracy:
     """One-step accuracy of every clip, training and held-out."""
     input:
-        weights=lambda w: project.network(w.configuration, "weights.npz"),
-        clips=lambda w: project.of_dataset(w.configuration, "database/clips/{clip}.npz"),
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        clips=lambda w: configurations.of_dataset(
+            w.configuration, "database/clips/{clip}.npz"
+        ),
         skeleton=lambda w: kept(
-            project.skeleton_file(project.configuration(w.configuration).dataset)
+            clips.skeleton_file(configurations.dataset(w.configuration))
         ),
     output:
         json="results/{configuration}/evaluation/accuracy.json",
@@ -23,9 +25,9 @@ rule accuracy:
         ),
     params:
         configuration=lambda w: w.configuration,
-        splits=lambda w: project.splits(w.configuration),
-        joints=lambda w: project.configuration(w.configuration).evaluation.joints,
-        code=project.code("accuracy"),
+        splits=lambda w: configurations.splits(w.configuration),
+        joints=lambda w: catalogue.configuration(w.configuration).evaluation.joints,
+        code=package.code("accuracy"),
     script:
         "../scripts/accuracy.py"
 
@@ -33,10 +35,12 @@ rule accuracy:
 rule rollouts:
     """How far the figure strays from every clip when it is fed its own pose."""
     input:
-        weights=lambda w: project.network(w.configuration, "weights.npz"),
-        clips=lambda w: project.of_dataset(w.configuration, "database/clips/{clip}.npz"),
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        clips=lambda w: configurations.of_dataset(
+            w.configuration, "database/clips/{clip}.npz"
+        ),
         skeleton=lambda w: kept(
-            project.skeleton_file(project.configuration(w.configuration).dataset)
+            clips.skeleton_file(configurations.dataset(w.configuration))
         ),
     output:
         json="results/{configuration}/evaluation/rollouts.json",
@@ -55,10 +59,12 @@ rule rollouts:
         ),
     params:
         configuration=lambda w: w.configuration,
-        splits=lambda w: project.splits(w.configuration),
-        evaluation=lambda w: project.evaluation(w.configuration, "joints", "rollouts"),
-        mode=lambda w: project.section(w.configuration, "runtime")["mode"],
-        code=project.code("rollouts"),
+        splits=lambda w: configurations.splits(w.configuration),
+        evaluation=lambda w: configurations.section(
+            w.configuration, "evaluation", "joints", "rollouts"
+        ),
+        mode=lambda w: configurations.section(w.configuration, "runtime")["mode"],
+        code=package.code("rollouts"),
     script:
         "../scripts/rollouts.py"
 
@@ -66,7 +72,7 @@ rule rollouts:
 rule responsivity:
     """Laps of the waypoint track in each phase mode: milliseconds a frame, and how well it is followed."""
     input:
-        weights=lambda w: project.network(w.configuration, "weights.npz"),
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
         json="results/{configuration}/evaluation/responsivity.json",
         csv="results/{configuration}/evaluation/responsivity.csv",
@@ -80,11 +86,11 @@ rule responsivity:
         runtime=60,
     params:
         configuration=lambda w: w.configuration,
-        runtime=lambda w: project.section(w.configuration, "runtime"),
-        evaluation=lambda w: project.evaluation(
-            w.configuration, "laps", "lap_seconds", "modes"
+        runtime=lambda w: configurations.section(w.configuration, "runtime"),
+        evaluation=lambda w: configurations.section(
+            w.configuration, "evaluation", "laps", "lap_seconds", "modes"
         ),
-        code=project.code("responsivity"),
+        code=package.code("responsivity"),
     script:
         "../scripts/responsivity.py"
 
@@ -92,8 +98,10 @@ rule responsivity:
 rule injury_response:
     """How the gait changes as the severity of each link is swept from 0 to 10 and back."""
     input:
-        weights=lambda w: project.network(w.configuration, "weights.npz"),
-        clips=lambda w: project.of_dataset(w.configuration, "database/clips/{clip}.npz"),
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        clips=lambda w: configurations.of_dataset(
+            w.configuration, "database/clips/{clip}.npz"
+        ),
     output:
         json="results/{configuration}/evaluation/injury.json",
         csv="results/{configuration}/evaluation/injury.csv",
@@ -114,9 +122,11 @@ rule injury_response:
         ),
     params:
         configuration=lambda w: w.configuration,
-        runtime=lambda w: project.section(w.configuration, "runtime"),
-        evaluation=lambda w: project.evaluation(w.configuration, "seconds"),
-        code=project.code("injury_response"),
+        runtime=lambda w: configurations.section(w.configuration, "runtime"),
+        evaluation=lambda w: configurations.section(
+            w.configuration, "evaluation", "seconds"
+        ),
+        code=package.code("injury_response"),
     script:
         "../scripts/injury_response.py"
 
@@ -124,9 +134,11 @@ rule injury_response:
 rule recognition:
     """Whether it can be told what hurts: a classifier of the captured clips names generated walks."""
     input:
-        weights=lambda w: project.network(w.configuration, "weights.npz"),
-        clips=lambda w: project.of_dataset(w.configuration, "database/clips/{clip}.npz"),
-        published=kept(project.published()),
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        clips=lambda w: configurations.of_dataset(
+            w.configuration, "database/clips/{clip}.npz"
+        ),
+        published=kept(package.published()),
     output:
         json="results/{configuration}/evaluation/recognition.json",
         csv="results/{configuration}/evaluation/recognition.csv",
@@ -144,9 +156,9 @@ rule recognition:
         ),
     params:
         configuration=lambda w: w.configuration,
-        splits=lambda w: project.splits(w.configuration),
-        runtime=lambda w: project.section(w.configuration, "runtime"),
-        code=project.code("recognition"),
+        splits=lambda w: configurations.splits(w.configuration),
+        runtime=lambda w: configurations.section(w.configuration, "runtime"),
+        code=package.code("recognition"),
     script:
         "../scripts/recognition.py"
 
@@ -154,15 +166,15 @@ rule recognition:
 rule compare:
     """Configurations side by side, with the published figures: one JSON and its tables as CSV."""
     input:
-        configuration=lambda w: project.measured()["configuration"],
-        accuracy=lambda w: project.measured()["accuracy"],
-        rollouts=lambda w: project.measured()["rollouts"],
-        responsivity=lambda w: project.measured()["responsivity"],
-        injury=lambda w: project.measured()["injury"],
-        recognition=lambda w: project.measured()["recognition"],
-        pipeline=lambda w: project.measured()["pipeline"],
-        history=lambda w: project.measured()["history"],
-        published=kept(project.published()),
+        configuration=lambda w: comparison.measured()["configuration"],
+        accuracy=lambda w: comparison.measured()["accuracy"],
+        rollouts=lambda w: comparison.measured()["rollouts"],
+        responsivity=lambda w: comparison.measured()["responsivity"],
+        injury=lambda w: comparison.measured()["injury"],
+        recognition=lambda w: comparison.measured()["recognition"],
+        pipeline=lambda w: comparison.measured()["pipeline"],
+        history=lambda w: comparison.measured()["history"],
+        published=kept(package.published()),
     output:
         json="results/compare/compare.json",
         configurations="results/compare/configurations.csv",
@@ -181,8 +193,8 @@ rule compare:
         mem_mb=1000,
         runtime=10,
     params:
-        configurations=lambda w: project.compared(),
-        files=lambda w: sorted(project.measured()),
-        code=project.code("compare"),
+        configurations=lambda w: comparison.names(),
+        files=lambda w: sorted(comparison.measured()),
+        code=package.code("compare"),
     script:
         "../scripts/compare.py"

@@ -3,7 +3,7 @@ rule injury_clip:
     input:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
         report="results/datasets/{dataset}/motion/{clip}.json",
-        status=lambda w: kept(project.status_files(w.dataset, w.clip)),
+        status=lambda w: kept(clips.status_files(w.dataset, w.clip)),
     output:
         injury="results/datasets/{dataset}/injury/{clip}.npz",
         report="results/datasets/{dataset}/injury/{clip}.json",
@@ -17,9 +17,9 @@ rule injury_clip:
         runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.1, attempt),
     params:
         clip=lambda w: w.clip,
-        status=lambda w: project.entry(w.dataset, w.clip).status,
+        status=lambda w: clips.entry(w.dataset, w.clip).status,
         options={},
-        code=project.code("injury_clip"),
+        code=package.code("injury_clip"),
     script:
         "../scripts/injury_clip.py"
 
@@ -43,6 +43,6 @@ rule injury_mirror:
         runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.1, attempt),
     params:
         clip=lambda w: f"{w.clip}_mirror",
-        code=project.code("injury_mirror"),
+        code=package.code("injury_mirror"),
     script:
         "../scripts/injury_mirror.py"

@@ -3,7 +3,7 @@ rule labels_clip:
     input:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
         report="results/datasets/{dataset}/motion/{clip}.json",
-        files=lambda w: kept(project.label_files(w.dataset, w.clip)),
+        files=lambda w: kept(clips.label_files(w.dataset, w.clip)),
     output:
         labels="results/datasets/{dataset}/labels/{clip}.npz",
         report="results/datasets/{dataset}/labels/{clip}.json",
@@ -17,10 +17,10 @@ rule labels_clip:
         runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.15, attempt),
     params:
         clip=lambda w: w.clip,
-        gait=lambda w: project.entry(w.dataset, w.clip).gait,
-        ground=lambda w: project.entry(w.dataset, w.clip).ground,
-        options=lambda w: project.options(w.dataset, "labels"),
-        code=project.code("labels_clip"),
+        gait=lambda w: clips.entry(w.dataset, w.clip).gait,
+        ground=lambda w: clips.entry(w.dataset, w.clip).ground,
+        options=lambda w: datasets.options(w.dataset, "labels"),
+        code=package.code("labels_clip"),
     script:
         "../scripts/labels_clip.py"
 
@@ -44,7 +44,7 @@ rule labels_mirror:
         runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.1, attempt),
     params:
         clip=lambda w: f"{w.clip}_mirror",
-        options=lambda w: project.options(w.dataset, "labels"),
-        code=project.code("labels_mirror"),
+        options=lambda w: datasets.options(w.dataset, "labels"),
+        code=package.code("labels_mirror"),
     script:
         "../scripts/labels_mirror.py"

@@ -2,7 +2,7 @@
 rule download_clip:
     """A clip that the user's folder lacks, from the address that the data set names."""
     output:
-        bvh=local(project.downloaded("{dataset}", "{clip}")),
+        bvh=local(clips.downloaded("{dataset}", "{clip}")),
     log:
         "results/datasets/{dataset}/logs/motion/download_clip/{clip}.log",
     localrule: True
@@ -10,9 +10,9 @@ rule download_clip:
         mem_mb=500,
         runtime=10,
     params:
-        url=lambda w: project.download(w.dataset, w.clip)["url"],
-        sha256=lambda w: project.download(w.dataset, w.clip)["sha256"],
-        folder=lambda w: project.download(w.dataset, w.clip)["folder"],
+        url=lambda w: clips.download(w.dataset, w.clip)["url"],
+        sha256=lambda w: clips.download(w.dataset, w.clip)["sha256"],
+        folder=lambda w: clips.download(w.dataset, w.clip)["folder"],
     script:
         "../scripts/download_clip.py"
 
@@ -20,9 +20,9 @@ rule download_clip:
 rule motion_clip:
     """A BVH file, read, checked and put on the data set's skeleton at 60 Hz."""
     input:
-        bvh=lambda w: kept(project.source(w.dataset, w.clip)),
-        skeleton=lambda w: kept(project.skeleton_file(w.dataset)),
-        rig=lambda w: project.rig_files(w.dataset, w.clip),
+        bvh=lambda w: kept(clips.source(w.dataset, w.clip)),
+        skeleton=lambda w: kept(clips.skeleton_file(w.dataset)),
+        rig=lambda w: clips.rig_files(w.dataset, w.clip),
     output:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
         report="results/datasets/{dataset}/motion/{clip}.json",
@@ -36,10 +36,10 @@ rule motion_clip:
         runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.2, attempt),
     params:
         clip=lambda w: w.clip,
-        skeleton_name=lambda w: project.dataset(w.dataset).skeleton,
-        maps=str(project.base / "config/skeletons"),
-        options=lambda w: project.motion_options(w.dataset, w.clip),
-        code=project.code("motion_clip"),
+        skeleton_name=lambda w: catalogue.dataset(w.dataset).skeleton,
+        maps=clips.skeletons,
+        options=lambda w: datasets.motion_options(w.dataset, w.clip),
+        code=package.code("motion_clip"),
     script:
         "../scripts/motion_clip.py"
 
@@ -62,6 +62,6 @@ rule motion_mirror:
         runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.1, attempt),
     params:
         clip=lambda w: f"{w.clip}_mirror",
-        code=project.code("motion_mirror"),
+        code=package.code("motion_mirror"),
     script:
         "../scripts/motion_mirror.py"

@@ -1,7 +1,7 @@
 rule page_packages:
     """What the page takes from the npm registry, as its lock file says; fetched once."""
     input:
-        kept(project.web(".json")),
+        kept(package.web(".json")),
     output:
         "results/page/node_modules/.package-lock.json",
     log:
@@ -11,7 +11,7 @@ rule page_packages:
         mem_mb=1000,
         runtime=10,
     params:
-        code=project.code("page_packages"),
+        code=package.code("page_packages"),
     script:
         "../scripts/page_packages.py"
 
@@ -20,7 +20,7 @@ rule page_bundle:
     """The page's scripts in one, shared by every report."""
     input:
         packages=rules.page_packages.output,
-        scripts=kept(project.web(".js")),
+        scripts=kept(package.web(".js")),
     output:
         js="results/page/bundle.js",
     log:
@@ -29,7 +29,7 @@ rule page_bundle:
         mem_mb=1000,
         runtime=5,
     params:
-        code=project.code("page_bundle"),
+        code=package.code("page_bundle"),
     script:
         "../scripts/page_bundle.py"
 
@@ -46,8 +46,8 @@ rule configuration:
     params:
         name=lambda w: w.configuration,
         base=str(project.base),
-        digest=lambda w: project.digest(w.configuration),
-        code=project.code("configuration"),
+        digest=lambda w: configurations.digest(w.configuration),
+        code=package.code("configuration"),
     script:
         "../scripts/configuration.py"
 
@@ -71,8 +71,8 @@ rule pipeline_summary:
         runtime=5,
     params:
         configuration=lambda w: w.configuration,
-        stages=lambda w: project.stages(w.configuration),
-        code=project.code("pipeline_summary"),
+        stages=lambda w: stages(configurations, w.configuration),
+        code=package.code("pipeline_summary"),
     script:
         "../scripts/pipeline_summary.py"
 
@@ -88,16 +88,24 @@ rule report:
         pipeline=rules.pipeline_summary.output.json,
         scenarios=rules.generate.output.scenarios,
         configuration=rules.configuration.output.yaml,
-        weights=lambda w: project.network(w.configuration, "weights.npz"),
-        history=lambda w: project.network(w.configuration, "history.csv"),
-        motion=lambda w: project.of_dataset(w.configuration, "motion/{clip}.json"),
-        labels=lambda w: project.of_dataset(w.configuration, "labels/{clip}.json"),
-        injuries=lambda w: project.of_dataset(w.configuration, "injury/{clip}.json"),
-        rows=lambda w: project.of_dataset(w.configuration, "database/clips/{clip}.npz"),
-        terrain=lambda w: project.of_dataset(
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        history=lambda w: configurations.network(w.configuration, "history.csv"),
+        motion=lambda w: configurations.of_dataset(
+            w.configuration, "motion/{clip}.json"
+        ),
+        labels=lambda w: configurations.of_dataset(
+            w.configuration, "labels/{clip}.json"
+        ),
+        injuries=lambda w: configurations.of_dataset(
+            w.configuration, "injury/{clip}.json"
+        ),
+        rows=lambda w: configurations.of_dataset(
+            w.configuration, "database/clips/{clip}.npz"
+        ),
+        terrain=lambda w: configurations.of_dataset(
             w.configuration, "terrain/clips/{clip}.npz"
         ),
-        template=kept(project.templates()),
+        template=kept(package.templates()),
         bundle=rules.page_bundle.output.js,
     output:
         html="results/{configuration}/report.html",
@@ -114,10 +122,10 @@ rule report:
         ),
     params:
         configuration=lambda w: w.configuration,
-        dataset=lambda w: project.configuration(w.configuration).dataset,
-        splits=lambda w: project.splits(w.configuration),
-        title=lambda w: project.configuration(w.configuration).report.title,
-        code=project.code("report"),
+        dataset=lambda w: configurations.dataset(w.configuration),
+        splits=lambda w: configurations.splits(w.configuration),
+        title=lambda w: catalogue.configuration(w.configuration).report.title,
+        code=package.code("report"),
     script:
         "../scripts/report.py"
 
@@ -126,11 +134,11 @@ rule report_compare:
     """Configurations side by side, and two of them in the same world."""
     input:
         compared=rules.compare.output.json,
-        configuration=lambda w: project.measured()["configuration"],
+        configuration=lambda w: comparison.measured()["configuration"],
         weights=lambda w: [
-            project.network(name, "weights.npz") for name in project.compared()
+            configurations.network(name, "weights.npz") for name in comparison.names()
         ],
-        template=kept(project.templates()),
+        template=kept(package.templates()),
         bundle=rules.page_bundle.output.js,
     output:
         html="results/compare/report.html",
@@ -140,8 +148,8 @@ rule report_compare:
         mem_mb=2000,
         runtime=10,
     params:
-        configurations=lambda w: project.compared(),
-        code=project.code("report_compare"),
+        configurations=lambda w: comparison.names(),
+        code=package.code("report_compare"),
     script:
         "../scripts/report_compare.py"
 
@@ -149,7 +157,7 @@ rule report_compare:
 rule stimuli:
     """Short loops of the character walking hurt: the thirteen of a questionnaire, and the page's presets."""
     input:
-        weights=lambda w: project.network(w.configuration, "weights.npz"),
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
         folder=directory("results/{configuration}/stimuli"),
     log:
@@ -160,7 +168,7 @@ rule stimuli:
         mem_mb=1500,
         runtime=15,
     params:
-        runtime=lambda w: project.section(w.configuration, "runtime"),
-        code=project.code("stimuli"),
+        runtime=lambda w: configurations.section(w.configuration, "runtime"),
+        code=package.code("stimuli"),
     script:
         "../scripts/stimuli.py"

@@ -1,7 +1,7 @@
 rule generate:
     """The character walking, jogging, crouching and limping by itself, as BVH files."""
     input:
-        weights=lambda w: project.network(w.configuration, "weights.npz"),
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
         scenarios="results/{configuration}/runtime/scenarios.npz",
         bvh=directory("results/{configuration}/runtime/bvh"),
@@ -14,8 +14,8 @@ rule generate:
         mem_mb=1000,
         runtime=10,
     params:
-        runtime=lambda w: project.section(w.configuration, "runtime"),
-        code=project.code("generate"),
+        runtime=lambda w: configurations.section(w.configuration, "runtime"),
+        code=package.code("generate"),
     script:
         "../scripts/generate.py"
 
@@ -23,7 +23,7 @@ rule generate:
 rule export_onnx:
     """The network as one ONNX file in a phase mode, checked with onnxruntime."""
     input:
-        weights=lambda w: project.network(w.configuration, "weights.npz"),
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
         onnx="results/{configuration}/export/{mode}.onnx",
     log:
@@ -38,7 +38,7 @@ rule export_onnx:
         runtime=10,
     params:
         mode=lambda w: w.mode,
-        code=project.code("export_onnx"),
+        code=package.code("export_onnx"),
     script:
         "../scripts/export_onnx.py"
 
@@ -46,7 +46,7 @@ rule export_onnx:
 rule export_release:
     """The network as the original release's folder of .bin files, for its demo and its ports."""
     input:
-        weights=lambda w: project.network(w.configuration, "weights.npz"),
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
         folder=directory("results/{configuration}/export/pfnn"),
     log:
@@ -58,6 +58,6 @@ rule export_release:
         mem_mb=1000,
         runtime=10,
     params:
-        code=project.code("export_release"),
+        code=package.code("export_release"),
     script:
         "../scripts/export_release.py"

@@ -1,7 +1,7 @@
 rule synthetic_clip:
     """One clip of the embedded walker, as a user's folder would hold it."""
     input:
-        skeleton=lambda w: kept(project.skeleton_file(w.dataset)),
+        skeleton=lambda w: kept(clips.skeleton_file(w.dataset)),
     output:
         bvh="results/datasets/{dataset}/synthetic/{clip}.bvh",
         footsteps="results/datasets/{dataset}/synthetic/{clip}_footsteps.txt",
@@ -17,11 +17,11 @@ rule synthetic_clip:
         runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.2, attempt),
     params:
         clip=lambda w: w.clip,
-        frames=lambda w: project.frames(w.dataset, w.clip),
-        recipe=lambda w: project.entry(w.dataset, w.clip).recipe,
-        injured=lambda w: project.entry(w.dataset, w.clip).injured,
-        ground=lambda w: project.entry(w.dataset, w.clip).ground,
-        options=lambda w: project.options(w.dataset, "synthetic"),
-        code=project.code("synthetic_clip"),
+        frames=lambda w: datasets.frames(w.dataset, w.clip),
+        recipe=lambda w: clips.entry(w.dataset, w.clip).recipe,
+        injured=lambda w: clips.entry(w.dataset, w.clip).injured,
+        ground=lambda w: clips.entry(w.dataset, w.clip).ground,
+        options=lambda w: datasets.options(w.dataset, "synthetic"),
+        code=package.code("synthetic_clip"),
     script:
         "../scripts/synthetic_clip.py"

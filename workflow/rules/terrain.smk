@@ -1,7 +1,7 @@
 rule terrain_patches:
     """Patches of ground drawn from the heightmaps."""
     input:
-        files=lambda w: kept(project.heightmap_files(w.dataset)),
+        files=lambda w: kept(clips.heightmap_files(w.dataset)),
     output:
         patches="results/datasets/{dataset}/terrain/patches.npz",
     log:
@@ -13,8 +13,8 @@ rule terrain_patches:
         mem_mb=2000,
         runtime=10,
     params:
-        options=lambda w: project.options(w.dataset, "terrain"),
-        code=project.code("terrain_patches"),
+        options=lambda w: datasets.options(w.dataset, "terrain"),
+        code=package.code("terrain_patches"),
     script:
         "../scripts/terrain_patches.py"
 
@@ -39,9 +39,9 @@ rule terrain_fits:
         ),
     params:
         clip=lambda w: w.rows,
-        ground=lambda w: project.entry(w.dataset, w.rows).ground,
-        options=lambda w: project.options(w.dataset, "terrain"),
-        database=lambda w: project.options(w.dataset, "database"),
-        code=project.code("terrain_fits"),
+        ground=lambda w: clips.entry(w.dataset, w.rows).ground,
+        options=lambda w: datasets.options(w.dataset, "terrain"),
+        database=lambda w: datasets.options(w.dataset, "database"),
+        code=package.code("terrain_fits"),
     script:
         "../scripts/terrain_fits.py"

@@ -1,8 +1,8 @@
 rule training:
     """The network, learnt from the database; checkpoints survive a kill."""
     input:
-        database=lambda w: project.database(w.configuration),
-        checkpoint=lambda w: project.start(w.configuration),
+        database=lambda w: configurations.database(w.configuration),
+        checkpoint=lambda w: configurations.start(w.configuration),
     output:
         weights="results/{configuration}/network/weights.npz",
         history="results/{configuration}/network/history.csv",
@@ -18,9 +18,9 @@ rule training:
         gpu=lambda w: demands.gpus(w.configuration),
     params:
         configuration=lambda w: w.configuration,
-        network=lambda w: project.section(w.configuration, "network"),
-        training=lambda w: project.section(w.configuration, "training"),
+        network=lambda w: configurations.section(w.configuration, "network"),
+        training=lambda w: configurations.section(w.configuration, "training"),
         checkpoints="results/{configuration}/checkpoints",
-        code=project.code("training"),
+        code=package.code("training"),
     script:
         "../scripts/training.py"

@@ -10,5 +10,5 @@ from hobble.workflow.project import Project
 
 with job(snakemake):
     project = Project(Path(snakemake.params.base), snakemake.config)
-    resolved = project.resolved(snakemake.params.name)
+    resolved = project.configurations.resolved(snakemake.params.name)
     write_text(snakemake.output.yaml, yaml.safe_dump(resolved, sort_keys=False))

@@ -13,7 +13,8 @@ import os
 import re
 from pathlib import Path
 
-from hobble.workflow.project import MIRROR, Project
+from hobble.workflow.clips import MIRROR
+from hobble.workflow.project import Project
 
 ENGINE_MB = 400  # Snakemake, twice in a cluster's job: as the step that SLURM starts, and beside the script
 PYTHON_MB = 400  # Python with numpy, scipy and the package
@@ -42,7 +43,7 @@ class Demands:
 
     def memory_of_longest(self, dataset: str, each: float, rows: float = 0.0, attempt: int = 1) -> int:
         """Megabytes for a job that takes one clip after another, and `rows` bytes for each frame of all."""
-        longest = max(self.thousands(dataset, clip) for clip in self.project.clips(dataset))
+        longest = max(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
         return _megabytes(each * longest + rows * self.all_thousands(dataset) / 1e3, attempt)
 
     def minutes_of_all(self, dataset: str, each: float, attempt: int = 1, least: int = 1) -> int:
@@ -51,16 +52,16 @@ class Demands:
 
     def evaluation_memory(self, configuration: str, each: float, attempt: int = 1) -> int:
         """Megabytes for a measurement of a network on one clip of its data set after another."""
-        return self.memory_of_longest(self.project.configuration(configuration).dataset, each, 0.0, attempt)
+        return self.memory_of_longest(self.project.configurations.dataset(configuration), each, 0.0, attempt)
 
     def evaluation_minutes(self, configuration: str, each: float, attempt: int = 1, least: int = 1) -> int:
         """Minutes for a measurement that takes `each` seconds for a thousand frames of the data set."""
-        dataset = self.project.configuration(configuration).dataset
+        dataset = self.project.configurations.dataset(configuration)
         return self.minutes_of_all(dataset, each, attempt, least)
 
     def training_memory(self, configuration: str, attempt: int = 1) -> int:
         """Megabytes for a training: PyTorch, the part of the database it holds, weights and their moments."""
-        training = self.project.section(configuration, "training")
+        training = self.project.configurations.section(configuration, "training")
         return _megabytes(500 + training["memory_mb"] + 32e-6 * self.weights(configuration), attempt)
 
     def training_minutes(self, configuration: str, attempt: int = 1) -> int:
@@ -68,15 +69,15 @@ class Demands:
 
         It does some 6.4e9 products of weights in a second (10,700 samples of 342-512-512-311, two cores).
         """
-        training = self.project.section(configuration, "training")
-        dataset = self.project.configuration(configuration).dataset
+        training = self.project.configurations.section(configuration, "training")
+        dataset = self.project.configurations.dataset(configuration)
         frames = 1e3 * self.all_thousands(dataset) * JOINTS / self._joints(dataset)
         samples = frames * VISITS * training["passes"]
         return _minutes(samples * self.weights(configuration) / 4 / 6.4e9, attempt, least=60)
 
     def gpus(self, configuration: str) -> int:
         """1 where a training is told to use CUDA: `auto` takes what it finds, but asks for none."""
-        return int(self.project.section(configuration, "training")["device"] == "cuda")
+        return int(self.project.configurations.section(configuration, "training")["device"] == "cuda")
 
     # Sizes
 
@@ -86,27 +87,27 @@ class Demands:
 
     def weights(self, configuration: str) -> float:
         """Weights of the network, of all its control points, by the sizes of the rows of a figure."""
-        network = self.project.section(configuration, "network")
-        joints = self._joints(self.project.configuration(configuration).dataset)
+        network = self.project.configurations.section(configuration, "network")
+        joints = self._joints(self.project.configurations.dataset(configuration))
         inputs, outputs, units = 156 + 7 * joints, 32 + 9 * joints, network["units"]
         return network["control_points"] * units * (inputs + (network["hidden_layers"] - 1) * units + outputs)
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
     def all_thousands(self, dataset: str) -> float:
         """Thousands of frames of all clips, mirrors included."""
-        once = sum(self.thousands(dataset, clip) for clip in self.project.clips(dataset))
-        return once * (1 + self.project.dataset(dataset).mirror)
+        once = sum(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
+        return once * (1 + self.project.catalogue.dataset(dataset).mirror)
 
     @functools.cache  # noqa: B019
     def _joints(self, dataset: str) -> int:
-        return len(self.project.catalogue.skeleton(self.project.dataset(dataset).skeleton).joints)
+        return len(self.project.catalogue.skeleton(self.project.catalogue.dataset(dataset).skeleton).joints)
 
     @functools.cache  # noqa: B019
     def _frames(self, dataset: str, clip: str) -> float:
-        if self.project.dataset(dataset).synthetic is not None:
-            return self.project.frames(dataset, clip)
-        seconds = bvh_seconds(Path(self.project.source(dataset, clip)))
-        rate = self.project.options(dataset, "motion")["fps"]
+        if self.project.catalogue.dataset(dataset).synthetic is not None:
+            return self.project.datasets.frames(dataset, clip)
+        seconds = bvh_seconds(Path(self.project.clips.source(dataset, clip)))
+        rate = self.project.datasets.options(dataset, "motion")["fps"]
         return UNKNOWN if seconds is None else seconds * rate
 
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, get_args
 from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
 from hobble.synthetic.links import check_link
+from hobble.workflow.comparison import COMPARE
+from hobble.workflow.project import Project
 
 if TYPE_CHECKING:
     from hobble.config.models import ClipEntry, Configuration, SkeletonFile
-    from hobble.workflow.project import Project
 
-COMPARE = "compare"
 PAGE = "page"  # under results/: what all reports share
 
 
@@ -28,7 +28,7 @@ def check(project: Project, targets: Iterable[str]) -> None:
         if name == "datasets":
             _dataset(project, folder)
         elif name == COMPARE:
-            for one in project.compared():
+            for one in project.comparison.names():
                 _configuration(project, one)
         elif name and name != PAGE:
             _configuration(project, name)
@@ -36,13 +36,13 @@ def check(project: Project, targets: Iterable[str]) -> None:
 
 
 def _configuration(project: Project, name: str) -> None:
-    model = project.configuration(name)
+    model = project.catalogue.configuration(name)
     for other in filter(None, (model.network_of, model.training.continues)):
         if other == name:
             raise HobbleError(f"configuration {name} cannot go on from itself")
-        project.configuration(other)
+        project.catalogue.configuration(other)
     if model.training.continues:
-        _goes_on(name, model, project.configuration(model.training.continues))
+        _goes_on(name, model, project.catalogue.configuration(model.training.continues))
     _dataset(project, model.dataset)
 
 
@@ -66,12 +66,12 @@ def _goes_on(name: str, model: Configuration, start: Configuration) -> None:
 
 
 def _dataset(project: Project, name: str) -> None:
-    model = project.dataset(name)
+    model = project.catalogue.dataset(name)
     skeleton = project.catalogue.skeleton(model.skeleton)
-    for clip, entry in project.clips(name).items():
-        project.rig_files(name, clip)
+    for clip, entry in project.clips.of(name).items():
+        project.clips.rig_files(name, clip)
         _entry(f"data set {name}: clips.{clip}", entry, [f"{a}-{b}" for a, b in skeleton.links])
-    project.selected(name, "all")
+    project.datasets.selected(name, "all")
     if model.mirror:
         _mirrored(model.skeleton, skeleton)
 
@@ -108,8 +108,8 @@ def _mirrored(name: str, skeleton: SkeletonFile) -> None:
 
 def _asked(project: Project, name: str, folder: str, file: str) -> None:
     """What no network of this configuration could give, though it were trained."""
-    owner = project.configuration(name).network_of or name
-    if folder == "stimuli" and not project.configuration(owner).injury:
+    owner = project.catalogue.configuration(name).network_of or name
+    if folder == "stimuli" and not project.catalogue.configuration(owner).injury:
         raise HobbleError(
             f"results/{name}/stimuli: configuration {owner} has `injury: false`, so nothing can hurt its "
             "character. Ask for results/injured/stimuli, or for those of a configuration of your own with "

@@ -1,0 +1,176 @@
+"""The clips of each data set by name, and where the files lie that they come from."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from urllib.parse import quote
+
+from hobble.config.load import Catalogue
+from hobble.config.models import ClipEntry
+from hobble.core.clip_files import NAMES, can_be_called, find_clips, the_file
+from hobble.core.errors import HobbleError, InputError
+from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
+
+DATASETS = "results/datasets"
+MIRROR = "_mirror"
+LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
+
+
+class Clips:
+    """Clips and their files. base: the checkout; mocap: the folder with the user's clips."""
+
+    def __init__(self, base: Path, mocap: Path, catalogue: Catalogue) -> None:
+        self.base, self.mocap, self.catalogue = base, mocap, catalogue
+
+    @functools.cache  # noqa: B019 - one project lives as long as the process
+    def of(self, dataset: str) -> dict[str, ClipEntry]:
+        """The clips of a data set by name, without mirrors. Raises HobbleError where there are none."""
+        listed = self.catalogue.dataset(dataset).clips or dict.fromkeys(self._scanned(dataset))
+        if odd := [name for name in listed if name.endswith(MIRROR)]:
+            raise HobbleError(
+                f"data set {dataset}: {', '.join(odd)}: only a mirror is called so, which `mirror: true` "
+                "makes from its original. Take it out, or rename its file."
+            )
+        return {name: entry or ClipEntry() for name, entry in listed.items()}
+
+    def entry(self, dataset: str, clip: str) -> ClipEntry:
+        """What the data set says of a clip or of the original of a mirror."""
+        clips = self.of(dataset)
+        name = clip.removesuffix(MIRROR)
+        if name not in clips:
+            raise HobbleError(f"data set {dataset} has no clip {name!r}; it has: {', '.join(clips)}")
+        return clips[name]
+
+    def folder(self, dataset: str) -> Path:
+        """Where the data set's own source files lie.
+
+        Raises InputError where a user's folder is missing, unless its clips can be downloaded.
+        """
+        model = self.catalogue.dataset(dataset)
+        if model.synthetic is not None:
+            return Path(DATASETS, model.source or dataset, "synthetic")
+        path = self.mocap / (model.folder or "")
+        if model.download is not None and not path.exists():
+            return path
+        if not path.is_dir():
+            raise InputError(
+                path,
+                f"no such folder, but data set {dataset} reads its clips there",
+                fix="Put the clips there, or name the folder that holds it with --config mocap=FOLDER.",
+            )
+        if not os.access(path, os.R_OK | os.X_OK):
+            raise InputError(path, "no permission to read this folder", fix="Check who owns it.")
+        return path
+
+    def source(self, dataset: str, clip: str) -> str:
+        """Path of the clip's BVH file."""
+        self.entry(dataset, clip)
+        model = self.catalogue.dataset(dataset)
+        if model.synthetic is not None:
+            return str(self.folder(dataset) / f"{clip}.bvh")
+        if clip in (files := self._files(dataset)):
+            return str(the_file(clip, files[clip]))
+        if clip in (known := self._checksums(dataset)):
+            return self.downloaded(model.source or dataset, clip)
+        path = self.folder(dataset) / f"{clip}.bvh"
+        nor = f", and {self._manifest(dataset)} has none to download" if known else ""
+        raise InputError(path, f"no such file, but data set {dataset} lists this clip{nor}")
+
+    def downloaded(self, dataset: str, clip: str) -> str:
+        """Where a clip of a data set is kept that is downloaded."""
+        return str(self.base / "data" / "downloaded" / dataset / f"{clip}.bvh")
+
+    def download(self, dataset: str, clip: str) -> dict[str, str]:
+        """What fetches a clip: its `url`, the `sha256` that it must have, the `folder` that lacks it."""
+        model = self.catalogue.dataset(dataset)
+        if model.download is None or clip not in self._checksums(dataset):
+            raise HobbleError(f"data set {dataset}: clip {clip} cannot be downloaded")
+        return {
+            "url": model.download.url.format(clip=quote(clip), subject=quote(clip.partition("_")[0])),
+            "sha256": self._checksums(dataset)[clip],
+            "folder": str(self.mocap / (model.folder or "")),
+        }
+
+    def label_files(self, dataset: str, clip: str) -> list[str]:
+        """Hand-made label files beside the clip."""
+        if self.catalogue.dataset(dataset).synthetic is not None:
+            return self.beside(dataset, clip, ("_footsteps.txt", "_gait.txt"))
+        return self.beside(dataset, clip, LABEL_FILES) if self._reads_labels(dataset) else []
+
+    def status_files(self, dataset: str, clip: str) -> list[str]:
+        """The status file beside the clip, if there is one and the data set gives no status of its own."""
+        if self.catalogue.dataset(dataset).synthetic is None and self.entry(dataset, clip).status:
+            return []
+        return self.beside(dataset, clip, ("_injuries.txt",))
+
+    def beside(self, dataset: str, clip: str, suffixes: Iterable[str]) -> list[str]:
+        """The files called as the clip is, with one of `suffixes` after its name.
+
+        Those of the embedded walker are named whether they exist or not, since it makes them all.
+        """
+        made = self.catalogue.dataset(dataset).synthetic is not None
+        stem = self.folder(dataset) / clip
+        if not made and clip in (files := self._files(dataset)):
+            stem = files[clip][0].with_suffix("")
+        return [file for file in (f"{stem}{suffix}" for suffix in suffixes) if made or Path(file).is_file()]
+
+    def heightmap_files(self, dataset: str) -> list[str]:
+        """Heightmaps that are files, in the order of the configuration."""
+        maps = self.catalogue.dataset(dataset).terrain.heightmaps
+        return [str(self.mocap / m.path) for m in maps if m.path]
+
+    def skeleton_file(self, dataset: str) -> str:
+        """Path of the data set's skeleton."""
+        return self._skeleton(self.catalogue.dataset(dataset).skeleton)
+
+    def rig_files(self, dataset: str, clip: str) -> list[str]:
+        """The skeleton file of the rig that the clip is on, where that is another than the data set's."""
+        model = self.catalogue.dataset(dataset)
+        if model.synthetic is not None:
+            name: str | None = self.catalogue.dataset(model.source or dataset).skeleton
+        else:
+            rigs = sorted(path.stem for path in Path(self.skeletons).glob("*.yaml"))
+            known = {rig: self.catalogue.skeleton(rig).joints for rig in rigs}
+            name = nearest_rig(joint_names(Path(self.source(dataset, clip))), known, model.skeleton)
+        return [self._skeleton(name)] if name is not None and name != model.skeleton else []
+
+    @property
+    def skeletons(self) -> str:
+        """The folder of the skeletons."""
+        return str(self.base / "config" / "skeletons")
+
+    def _skeleton(self, name: str) -> str:
+        return str(Path(self.skeletons) / f"{name}.yaml")
+
+    def _reads_labels(self, dataset: str) -> bool:
+        return self.catalogue.dataset(dataset).labels.files
+
+    def _scanned(self, dataset: str) -> list[str]:
+        """The clips in the user's folder, but for mirrors that are made anew from originals beside them."""
+        folder, files = self.folder(dataset), self._files(dataset)
+        for name in sorted(files):
+            if not can_be_called(name):
+                raise InputError(folder, f"a clip is called {name!a:.80}", fix=f"Rename it: {NAMES}.")
+            the_file(name, files[name])
+        if not files:
+            raise InputError(folder, "no .bvh files here", fix="Put clips there.")
+        made = {name + MIRROR for name in files} if self.catalogue.dataset(dataset).mirror else set()
+        return sorted(set(files) - made)
+
+    def _manifest(self, dataset: str) -> Path:
+        options = self.catalogue.dataset(dataset).download
+        return self.base / "config" / "datasets" / (options.checksums if options else "")
+
+    @functools.cache  # noqa: B019
+    def _checksums(self, dataset: str) -> dict[str, str]:
+        downloads = self.catalogue.dataset(dataset).download is not None
+        return read_checksums(self._manifest(dataset)) if downloads else {}
+
+    @functools.cache  # noqa: B019
+    def _files(self, dataset: str) -> dict[str, list[Path]]:
+        """The BVH files in the user's folder by clip."""
+        folder = self.folder(dataset)
+        return find_clips(folder) if folder.is_dir() else {}

@@ -1,0 +1,47 @@
+"""Which configurations are set side by side, and what each of them has measured."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hobble.core.errors import HobbleError
+from hobble.workflow.configurations import Configurations
+
+COMPARE = "compare"  # the folder under results/, and the key of --config
+# What a comparison reads of each configuration, under results/<configuration>/.
+MEASURED = {
+    "configuration": "configuration.yaml",
+    "accuracy": "evaluation/accuracy.json",
+    "rollouts": "evaluation/rollouts.json",
+    "responsivity": "evaluation/responsivity.json",
+    "injury": "evaluation/injury.json",
+    "recognition": "evaluation/recognition.json",
+    "pipeline": "pipeline.json",
+}
+
+
+class Comparison:
+    """The configurations that `--config compare='[holden,injured]'` names.
+
+    asked: as it came from the command line, where anything may stand.
+    """
+
+    def __init__(self, configurations: Configurations, asked: Any) -> None:
+        self.configurations, self._asked = configurations, asked
+
+    def names(self) -> list[str]:
+        """Their names. Raises HobbleError for anything but names, each once."""
+        names = self._asked.split(",") if isinstance(self._asked, str) else self._asked
+        if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
+            raise HobbleError(f"compare: a list of configurations, as in '[holden,injured]', not {names!r}")
+        if not names or len(set(names)) < len(names):
+            raise HobbleError(
+                f"compare: each configuration once, one or more, not {', '.join(names) or 'none'}"
+            )
+        return list(names)
+
+    def measured(self) -> dict[str, list[str]]:
+        """Kind of file -> that of each configuration compared."""
+        names = self.names()
+        out = {kind: [f"results/{name}/{file}" for name in names] for kind, file in MEASURED.items()}
+        return out | {"history": [self.configurations.network(name, "history.csv") for name in names]}

@@ -1,0 +1,30 @@
+"""Where each stage's benchmark files and artefacts lie, for the account of what a configuration cost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hobble.workflow.clips import DATASETS
+from hobble.workflow.configurations import Configurations
+
+OF_DATASET = ("synthetic", "motion", "labels", "injury", "terrain", "database")
+
+Places = dict[str, list[str]]
+
+
+def stages(configurations: Configurations, name: str) -> dict[str, Places]:
+    """Stage -> its "benchmarks" and its "files" (folders), of configuration `name`."""
+    dataset = configurations.dataset(name)
+    root, own = Path(DATASETS, dataset), Path("results", name)
+    source = Path(DATASETS, configurations.catalogue.dataset(dataset).source or dataset)
+    out = {stage: _places(root, stage, stage) for stage in OF_DATASET}
+    out["synthetic"] = _places(source, "synthetic", "synthetic")
+    out["database"]["files"] = [str(root / "database/clips"), configurations.database(name)]
+    out["training"] = _places(Path("results", configurations.owner(name)), "training", "network")
+    out["runtime"] = _places(own, "runtime", "runtime")
+    out["evaluation"] = _places(own, "evaluation", "evaluation")
+    return out
+
+
+def _places(home: Path, stage: str, folder: str) -> Places:
+    return {"benchmarks": [str(home / "benchmarks" / stage)], "files": [str(home / folder)]}

@@ -1,0 +1,33 @@
+"""The package's own files that rules depend on: templates, scripts of the page, published figures, code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hobble.workflow.fingerprint import fingerprint
+
+
+class Package:
+    """The package `hobble` of a checkout. base: the checkout."""
+
+    def __init__(self, base: Path) -> None:
+        self.base = base
+        self.folder = base / "src" / "hobble"
+
+    def code(self, script: str) -> str:
+        """Fingerprint of a rule's script and of all it imports from the package."""
+        return fingerprint(self.base / "workflow" / "scripts" / f"{script}.py", self.base / "src")
+
+    def templates(self) -> list[str]:
+        """The page's templates; a change in one re-makes only the reports."""
+        kinds = {".j2", ".css", ".yaml"}
+        files = [str(path) for path in (self.folder / "report").iterdir() if path.suffix in kinds]
+        return sorted([*files, self.published()])
+
+    def web(self, suffix: str) -> list[str]:
+        """The page's scripts (".js"), or what says which packages they need (".json")."""
+        return sorted(str(p) for p in (self.folder / "report" / "web").iterdir() if p.suffix == suffix)
+
+    def published(self) -> str:
+        """The file of published figures that stand beside ours."""
+        return str(self.folder / "evaluation" / "published.yaml")
