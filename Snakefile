@@ -3,11 +3,13 @@ import os
 import sys
 from pathlib import Path
 
+from hobble.channels import NAMES
 from hobble.core.errors import HobbleError
 from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check
+from hobble.workflow.told import told_by
 
 try:
     # Relative, so that a checkout can be moved without making anything again.
@@ -34,7 +36,8 @@ wildcard_constraints:
     dataset=r"[^/]+",
     clip=r"[^/]+(?<!_mirror)",
     rows=r"[^/]+",
-    selection="healthy|all",
+    channel="|".join(NAMES),
+    told=r"plain|[a-z_+]+(?<!clips)",
 
 
 def kept(files):
@@ -53,7 +56,7 @@ rule all:
 include: "workflow/rules/synthetic.smk"
 include: "workflow/rules/motion.smk"
 include: "workflow/rules/labels.smk"
-include: "workflow/rules/injury.smk"
+include: "workflow/rules/channels.smk"
 include: "workflow/rules/terrain.smk"
 include: "workflow/rules/database.smk"
 include: "workflow/rules/training.smk"

@@ -60,7 +60,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         for dtype in DTYPES:
             database = Path(name, dtype)
-            options = {"injury": False, "joint_weight": made.joint_weight, "dtype": dtype}
+            options = {"channels": [], "joint_weight": made.joint_weight, "dtype": dtype}
             manifest = write_database(database, clips, splits, **options)
             for seed in asked.seeds:
                 weights = trained(database, Path(name, f"{dtype}-{seed}"), asked.passes, seed, asked.threads)

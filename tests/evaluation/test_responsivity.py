@@ -16,8 +16,6 @@ from hobble.runtime.waypoints import Waypoint
 
 RUNTIME = {
     "mode": "cubic",
-    "severity_rate": 10.0,
-    "severity_scale": 1.0,
     "foot_locking": True,
     "steering": 1.0,
 }

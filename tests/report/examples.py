@@ -32,8 +32,6 @@ CLIPS = ("walk_straight", "walk_turns", "jog", "crouch", "stand", "strafe", "hur
 LINKS = ("LeftUpLeg-LeftLeg", "RightLeg-RightFoot", "Hips-LowerBack")
 RUNTIME = {
     "mode": "cubic",
-    "severity_rate": 10.0,
-    "severity_scale": 1.0,
     "foot_locking": True,
     "steering": 1.0,
 }
@@ -101,7 +99,7 @@ def scenarios(path: Path, skeleton: Skeleton, hurt: bool = True) -> None:
 def weights(path: Path, skeleton: Skeleton, units: int = 16, links: bool = True) -> None:
     """network/weights.npz of a small untrained network that stays near a standing pose and walks a little."""
     rng = np.random.default_rng(0)
-    layout = RowLayout(len(skeleton.joints), links=len(skeleton.links) if links else 0)
+    layout = RowLayout(len(skeleton.joints), channels=(("injury", len(skeleton.links)),) if links else ())
     sizes = (layout.x_size, units, units, layout.y_size)
     arrays: dict[str, Any] = {}
     for i, (a, b) in enumerate(pairwise(sizes)):
@@ -121,7 +119,9 @@ def weights(path: Path, skeleton: Skeleton, units: int = 16, links: bool = True)
     spread[layout.y_joint_position], spread[layout.y_joint_velocity] = 3.0, 0.3
     spread[layout.y_contacts], spread[layout.y_phase_change] = 0.4, 0.003
     x_spread = np.full(layout.x_size, 50.0)
-    x_spread[layout.x_gait], x_spread[layout.x_direction], x_spread[layout.x_injury] = 1.0, 1.0, 5.0
+    x_spread[layout.x_gait], x_spread[layout.x_direction] = 1.0, 1.0
+    for name, _ in layout.channels:
+        x_spread[layout.x_channel(name)] = 5.0
     x_mean = np.zeros(layout.x_size)
     x_mean[layout.x_joint_position] = mean[layout.y_joint_position]
     meta = {
@@ -295,7 +295,7 @@ def costs() -> dict[str, Any]:
 
 def rows(path: Path, skeleton: Skeleton, frames: int = 200, links: bool = True) -> str:
     """database/clips/<clip>.npz of a straight walk on flat ground; two cycles share a frame."""
-    layout = RowLayout(len(skeleton.joints), links=len(skeleton.links))
+    layout = RowLayout(len(skeleton.joints), channels=(("injury", len(skeleton.links)),))
     made = walker(skeleton, frames, 2.2)
     made["positions"][..., 2] += 7.0
     local = made["positions"] - made["positions"][:, :1] * [1, 0, 1]
@@ -315,7 +315,7 @@ def rows(path: Path, skeleton: Skeleton, frames: int = 200, links: bool = True) 
             x=np.zeros((count, layout.x_terrain.start)),
             y=y,
             p=made["phase"][frame],
-            severity=np.zeros((count, layout.links)),
+            channels={"injury": np.zeros((count, len(skeleton.links)))},
             frame=frame,
             cycle=np.zeros(count, int),
             fits=np.ones(count, int),

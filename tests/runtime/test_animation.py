@@ -70,8 +70,8 @@ def test_the_row_is_that_of_the_definition(hurtable) -> None:
     np.testing.assert_allclose(x[layout.x_joint_position], joints.ravel(), atol=1e-4)
     velocities = to_root(state.joint_velocity[0], now - 1)
     np.testing.assert_allclose(x[layout.x_joint_velocity], velocities.ravel(), atol=1e-5)
-    assert x[layout.x_injury][2] == 6.0
-    assert x[layout.x_injury].sum() == 6.0
+    assert x[layout.x_channel("injury")][2] == 6.0
+    assert x[layout.x_channel("injury")].sum() == 6.0
 
 
 def test_the_pose_is_that_of_the_prediction(network) -> None:
@@ -122,7 +122,7 @@ def test_what_the_caller_does_to_a_pose_stays_with_the_caller(network) -> None:
     for _ in range(40):
         pose, untouched = left.next_pose((1, 2)), right.next_pose((1, 2))
         np.testing.assert_array_equal(pose.positions, untouched.positions)
-        for array in (pose.positions, pose.rotations, pose.contacts, pose.root, pose.severity):
+        for array in (pose.positions, pose.rotations, pose.contacts, pose.root, pose.told["injury"]):
             array[...] = 1e6
 
 
@@ -145,7 +145,7 @@ def test_many_characters_are_so_many_single_ones(hurtable, count: int) -> None:
     many = crowd.next_pose(velocity, facing, gaits, {KNEE: severity}, hills)
     np.testing.assert_allclose(many.positions[-1], one.positions, atol=0.02)
     np.testing.assert_allclose(many.phase[-1], one.phase, atol=1e-4)
-    assert single.severity.max() == pytest.approx(min(severity[-1], 7.5))
+    assert single.told["injury"].max() == pytest.approx(min(severity[-1], 7.5))
 
 
 def test_the_same_calls_give_the_same_motion(network) -> None:
@@ -198,16 +198,16 @@ def test_gait_blends_slowly_into_the_future(network) -> None:
 
 
 def test_severities_come_on_at_their_rate_and_are_scaled(hurtable) -> None:
-    character = ProceduralAnimation(hurtable, severity_rate=5.0, severity_scale=2.0)
+    character = ProceduralAnimation(hurtable, rates={"injury": 5.0}, scales={"injury": 2.0})
     index = hurtable.links.index(KNEE)
-    on = [p.severity[index] for p in walk(character, 120, injury={KNEE: 10})]
+    on = [p.told["injury"][index] for p in walk(character, 120, injury={KNEE: 10})]
     np.testing.assert_allclose(on[:60], 5.0 / 60 * np.arange(1, 61))
     assert on[-1] == pytest.approx(5.0)
     kept = walk(character, 5)[-1]
-    assert kept.severity[index] == pytest.approx(5.0)
-    assert kept.severity.sum() == pytest.approx(5.0)
+    assert kept.told["injury"][index] == pytest.approx(5.0)
+    assert kept.told["injury"].sum() == pytest.approx(5.0)
     healed = walk(character, 120, injury={})[-1]
-    assert healed.severity.sum() == 0
+    assert healed.told["injury"].sum() == 0
 
 
 @pytest.mark.parametrize("injury", [{"LeftUpLeg-LeftLeg": 11}, {KNEE: -0.1}, {KNEE: np.nan}])
@@ -235,8 +235,8 @@ def test_wishes_that_make_no_sense(network) -> None:
         character.next_pose((0, 1), gait=["walk"])
     for name, value in (
         ("characters", 0),
-        ("severity_rate", 0),
-        ("severity_scale", -1),
+        ("rates", {"injury": 0}),
+        ("scales", {"injury": -1}),
         ("steering", np.nan),
     ):
         with pytest.raises(ValueError, match=f"{name} is {value!r}, but has to be"):

@@ -78,7 +78,7 @@ class Channel(ABC):
         motion: the report of the motion stage. Raises InputError where the source cannot be understood.
         """
 
-    def check(self, source: Source, rig: Rig) -> None:
+    def check(self, source: Source, rig: Rig) -> None:  # noqa: B027 - most have nothing to check
         """Raise InputError for what a clip's entry or the options say that cannot be, before any job runs."""
 
     def tables(self, options: Mapping[str, Any]) -> Sequence[str]:

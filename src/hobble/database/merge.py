@@ -23,13 +23,13 @@ from hobble.core.files import explained, save_npz
 from hobble.core.quat import Array
 from hobble.database.buckets import INDEX, Buckets
 from hobble.database.chunks import Chunk, write_chunk
-from hobble.rows.clip_rows import ClipRows, Outline, load_clip_rows, outline
-from hobble.database.split import split_rows
-from hobble.rows.compose import fit_columns, of_frame, x_columns
-from hobble.rows.layout import RowLayout
 from hobble.database.manifest import FILE, SPLITS, STATISTICS, Manifest
 from hobble.database.precision import STORED, narrow
+from hobble.database.split import split_rows
 from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
+from hobble.rows.clip_rows import ClipRows, Outline, load_clip_rows, outline
+from hobble.rows.compose import fit_columns, of_frame, x_columns
+from hobble.rows.layout import RowLayout
 
 CHUNK_BYTES = 4 << 20  # what a reader takes in one go: long enough for any disk, short enough for any memory
 PART_ROWS = 8192  # of a clip that are scattered at a time
@@ -67,10 +67,10 @@ def write_database(
 ) -> Manifest:
     """Build the database folder `path` from rows by clip name, or from the files that hold them.
 
-    splits: clip name -> "train" or "held_out". channels: those that the network is told, in the order of their
-    columns. dtype: float32, float16 or bfloat16. The statistics are those of the clips in training. The same rows and options give the same
-    bytes. Raises HobbleError where no clip has rows to train on, InputError where a clip does not fit the
-    others.
+    splits: clip name -> "train" or "held_out". channels: those that the network is told, in the order of
+    their columns. dtype: float32, float16 or bfloat16. The statistics are those of the clips in training. The
+    same rows and options give the same bytes. Raises HobbleError where no clip has rows to train on,
+    InputError where a clip does not fit the others.
     """
     path = Path(path)
     path.mkdir(parents=True, exist_ok=True)

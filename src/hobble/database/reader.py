@@ -16,11 +16,11 @@ from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.database import order
 from hobble.database.chunks import read_chunk
-from hobble.rows.compose import compose, fit_columns, x_columns
-from hobble.rows.layout import RowLayout
 from hobble.database.manifest import STATISTICS, Manifest
 from hobble.database.precision import STORED, widen
 from hobble.database.statistics import Statistics
+from hobble.rows.compose import compose, fit_columns, x_columns
+from hobble.rows.layout import RowLayout
 
 Item = TypeVar("Item")
 Rooms = Iterator[Mapping[str, np.ndarray]]
@@ -270,9 +270,7 @@ class Database:
             y[...] = widen(window.y[rows])
         lift = ground[:, -1:].astype(np.float32)
         some = lift if lift.any() else None
-        compose(
-            self.layout, frames, ground[:, :-1], some, x, y, self.statistics.x_std, self.statistics.y_std
-        )
+        compose(self.layout, frames, ground[:, :-1], some, x, y, self.statistics.x_std, self.statistics.y_std)
 
     def _empty(self, rows: int) -> Block:
         x = np.empty((rows, self.layout.x_size), np.float32)

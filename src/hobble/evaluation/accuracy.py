@@ -19,10 +19,10 @@ import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
-from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
-from hobble.rows.layout import RowLayout
 from hobble.database.statistics import Moments
 from hobble.evaluation.predict import predict
+from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
+from hobble.rows.layout import RowLayout
 from hobble.runtime.network import Network, load_network
 
 LEAST = 1e-3  # cm; below this a joint stands at the root itself and a relative error says nothing

@@ -19,9 +19,9 @@ class Captured:
     """F consecutive frames of a clip.
 
     local: (F, J, 3) positions in the root frame, cm above the ground; contacts: (F, 4); phase: (F,);
-    told: channel -> (F, its columns); gait: (F, 6); velocity: (F, 2) of the root, seen from itself, cm a frame; root: (F, 3)
-    where it is, level, from the origin on; acceleration: (F,) the largest of any joint, cm per frame squared,
-    0 in the first frame; rows: (F,) which row of the clip each frame is.
+    told: channel -> (F, its columns); gait: (F, 6); velocity: (F, 2) of the root, seen from itself, cm a
+    frame; root: (F, 3) where it is, level, from the origin on; acceleration: (F,) the largest of any joint,
+    cm per frame squared, 0 in the first frame; rows: (F,) which row of the clip each frame is.
     """
 
     clip: str

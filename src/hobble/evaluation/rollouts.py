@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
-from hobble.rows.layout import GAITS, RowLayout
 from hobble.database.statistics import Moments
 from hobble.evaluation.accuracy import SPLITS, check_layout, joint_indices, relative_and_distance
 from hobble.evaluation.captured import turned, unbroken
+from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
+from hobble.rows.layout import GAITS, RowLayout
 from hobble.runtime.network import load_network
 from hobble.runtime.predictor import Predictor
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
 from hobble.evaluation.captured import headings, root_path, turned, unbroken
 from hobble.evaluation.predict import predict
 from hobble.report.body import body
 from hobble.report.scenes import FPS, UNIT, pack_positions, packed
+from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
 from hobble.runtime.network import Network
 
 CLIPS = 6  # that are shown at least, if there are so many; every held-out clip is

@@ -10,8 +10,8 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.rows.clip_rows import load_clip_rows
 from hobble.report.charts import Chart, Trace, axis
+from hobble.rows.clip_rows import load_clip_rows
 
 INJURY = "injury"  # the channel
 FPS = 60.0

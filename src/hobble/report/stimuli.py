@@ -151,7 +151,7 @@ def walk(network: Network, injury: Mapping[str, float], **runtime: Any) -> Loop:
     animation = ProceduralAnimation(network, **runtime)
     ahead = np.array([0.0, SPEED])
     poses = [
-        animation.next_pose(ahead, None, "walk", dict(injury) or None)
+        animation.next_pose(ahead, None, "walk", injury=dict(injury) or None)
         for _ in range(SETTLED + 60 + LONGEST + BLEND)
     ]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])

@@ -13,9 +13,9 @@ from hobble.channels import channel
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
+from hobble.motion.root import RootFrames, continued, local_pose, points_to_root, root_frames, vectors_to_root
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import RowLayout
-from hobble.motion.root import RootFrames, continued, local_pose, points_to_root, root_frames, vectors_to_root
 
 Arrays = Mapping[str, np.ndarray]
 
@@ -33,9 +33,10 @@ def clip_rows(
 ) -> ClipRows:
     """The rows of a clip's locomotion cycles, one after another, factorised.
 
-    labels, terrain: the arrays that docs/artefacts.md lists for these stages. channels: name -> values (F, columns). window, step,
-    facing_sigma: frames. Past the clip's ends the root goes on as `continued` has it and the gait is held.
-    Raises InputError where the files do not belong together or a cycle lacks a frame before or after it.
+    labels, terrain: the arrays that docs/artefacts.md lists for these stages. channels: name -> values (F,
+    columns). window, step, facing_sigma: frames. Past the clip's ends the root goes on as `continued` has it
+    and the gait is held. Raises InputError where the files do not belong together or a cycle lacks a frame
+    before or after it.
     """
     skeleton = clip.skeleton
     told = tuple((name, values.shape[1]) for name, values in channels.items())

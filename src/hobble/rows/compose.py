@@ -1,4 +1,5 @@
-"""How a row is put together: the columns of a frame, what the body is told, and the ground of one terrain fit.
+"""How a row is put together: the columns of a frame, what the body is told, and the ground of one terrain
+fit.
 
 One composition for numpy's arrays and PyTorch's tensors, raw or standardised. `n` is a number of rows.
 """

@@ -1,4 +1,4 @@
-"""Where everything stands in a row: columns by name, computed from the skeleton, the window and the channels."""
+"""Where everything stands in a row: columns by name, of the skeleton, the window and the channels."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class RowLayout:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> RowLayout:
-        """The inverse of `to_dict`; a file written before there were channels counts columns under an old key."""
+        """The inverse of `to_dict`; files older than channels have columns under an old key."""
         known = {key: data[key] for key in ("joints", "window", "step") if key in data}
         channels = dict(data.get("channels", {}))
         for key in set(data) - {"joints", "window", "step", "channels", "order"}:

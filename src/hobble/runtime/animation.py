@@ -107,12 +107,12 @@ class ProceduralAnimation:
 
         skeleton: where the file carries none; it, or a file of config/skeletons. mode: "constant", "linear"
         or "cubic". storage: "float32" or "int16". characters: how many. waypoints: a track to follow when
-        `next_pose` is given no velocity. rates: channel -> largest change of its values in a second, instead of
-        the channel's own; scales: channel -> what its values are divided by. foot_locking: hold feet in contact where they landed.
-        steering: how hard a velocity that is not reached is asked for, 0 as the original. axes: the caller's
-        convention. position, facing: as of `reset`.
-        Raises InputError where the file is not a network that fits, ValueError for an option out of range,
-        UnknownName for a gait that the network does not have.
+        `next_pose` is given no velocity. rates: channel -> largest change of its values in a second, instead
+        of the channel's own; scales: channel -> what its values are divided by. foot_locking: hold feet in
+        contact where they landed. steering: how hard a velocity that is not reached is asked for, 0 as the
+        original. axes: the caller's convention. position, facing: as of `reset`. Raises InputError where the
+        file is not a network that fits, ValueError for an option out of range, UnknownName for a gait that
+        the network does not have.
         """
         network = load_network(path, skeleton)
         if network.skeleton is None:
@@ -163,13 +163,13 @@ class ProceduralAnimation:
         your unit); None follows the waypoints or stands. facing: direction to look in, likewise, of any
         length; None or zero looks where it goes. gait: a name ("walk"), one for each, shares (6,) or (C, 6),
         or None to choose by speed; below 0.1 cm a frame the figure stands, whatever the gait. told: by the
-        name of a channel (injury={"LeftUpLeg-LeftLeg": 7}) label -> value (or (C,) values), or (L,) or (C, L);
-        labels not named go back to 0; None, or no such keyword, leaves the channel as it was. terrain: None for flat at zero, a function of two ground coordinates (arrays) to heights, a
-        `ground.Heightmap` or a 2D array around the origin, all in your axes and unit; give the same object
-        every frame.
-        Raises UnknownName (a KeyError) for a label or gait that the network does not have, TypeError for a
-        keyword that is no channel, ValueError for a channel that the network is not told, for values out of
-        range and for what is not finite or of another shape.
+        name of a channel (injury={"LeftUpLeg-LeftLeg": 7}) label -> value (or (C,) values), or (L,) or (C,
+        L); labels not named go back to 0; None, or no such keyword, leaves the channel as it was. terrain:
+        None for flat at zero, a function of two ground coordinates (arrays) to heights, a `ground.Heightmap`
+        or a 2D array around the origin, all in your axes and unit; give the same object every frame. Raises
+        UnknownName (a KeyError) for a label or gait that the network does not have, TypeError for a keyword
+        that is no channel, ValueError for a channel that the network is not told, for values out of range and
+        for what is not finite or of another shape.
         """
         velocity, ahead, gait = self._wish(target_velocity, facing, gait)
         strafe, direction = self._facing(velocity, ahead)

@@ -2,7 +2,8 @@
 
 - prepare: the caller's wish becomes targets, the future trajectory bends toward them, the ground is looked
 up;
-- input: trajectory, gait, ground, last pose and what the channels tell are put into a row X, in the root frame;
+- input: trajectory, gait, ground, last pose and what the channels tell are put into a row X, in the root
+frame;
 - insert: the row is standardised into the network's input;
 - predict: the network at the present phase gives Y;
 - output: Y becomes the pose in the world, and the copy for the caller gets its feet placed;
@@ -19,10 +20,10 @@ import numpy as np
 from numba import njit
 
 from hobble.core.quat import Array
+from hobble.rows.layout import BODY
 from hobble.runtime import feet, trajectory
 from hobble.runtime.character import Character
 from hobble.runtime.predictor import Predictor
-from hobble.rows.layout import BODY
 
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
@@ -37,8 +38,9 @@ Ground = Callable[[Array, Array], Array]
 class Controller:
     """Runs characters of one network; `seconds` (6,) holds what each of STEPS took in the last frame.
 
-    rates: channel -> largest change of one of its values in a second; foot_locking: hold feet in contact where they
-    landed; steering: as of `trajectory.follow_wish`; side: centimetres from the path to the side heights.
+    rates: channel -> largest change of one of its values in a second; foot_locking: hold feet in contact
+    where they landed; steering: as of `trajectory.follow_wish`; side: centimetres from the path to the side
+    heights.
     """
 
     def __init__(

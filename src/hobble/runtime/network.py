@@ -51,7 +51,8 @@ class Network:
         return len(self.weights[0])
 
     def trained(self, channel: str) -> tuple[str, ...]:
-        """Labels of a channel's columns that were told something in training, as the means of their inputs tell.
+        """Labels of a channel's columns that were told something in training, as the means of their inputs
+        tell.
 
         All where none tells; () for a channel that the network is not told.
         """
@@ -185,8 +186,8 @@ def _labels(
 
 
 def _guess_layout(x_size: int, y_size: int, skeleton: Skeleton | None) -> RowLayout:
-    """The layout of a file without one: the default window, joints from Y, and what X has left is of the first
-    channel with so many columns."""
+    """The layout of a file without one: the default window, joints from Y, and what X has left is of the
+    first channel with so many columns."""
     joints = (y_size - RowLayout(0).y_size) // 9
     left = x_size - RowLayout(joints).x_size
     if left <= 0:

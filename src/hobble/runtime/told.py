@@ -14,7 +14,7 @@ from hobble.runtime.network import Network
 
 
 class UnknownName(KeyError):
-    """A label of a channel, or a gait, that the network does not have; the text names those that are nearest."""
+    """A label of a channel, or a gait, that the network does not have; the text names the nearest."""
 
     def __init__(self, what: str, name: object, known: Iterable[str]) -> None:
         names = list(known)
@@ -30,7 +30,9 @@ class Told:
     """The channels of a network; `columns`: name -> those of the state, all channels side by side."""
 
     def __init__(self, network: Network, scales: Mapping[str, float]) -> None:
-        self.labels = {name: {label: i for i, label in enumerate(of)} for name, of in network.channels.items()}
+        self.labels = {
+            name: {label: i for i, label in enumerate(of)} for name, of in network.channels.items()
+        }
         self.scales = dict(scales)
         self.columns: dict[str, slice] = {}
         start = 0

@@ -147,7 +147,8 @@ def prepare(
     velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
     owed: Any, told: Any, told_target: Any, told_step: Any, step: int, side: float, points: Any,
 ) -> None:  # fmt: skip
-    """All of the above in one call, and what is told (C, K) moves toward its target, at most by told_step (K,).
+    """All of the above in one call, and what is told (C, K) moves toward its target, at most by told_step
+    (K,).
 
     In this file because compiled code kept on disk is renewed when its own file changes, not its callees'.
     """

@@ -10,10 +10,10 @@ from torch import Tensor
 
 from hobble.database import order
 from hobble.database.chunks import read_chunk
-from hobble.rows.compose import compose, fit_columns, x_columns
 from hobble.database.manifest import Manifest
 from hobble.database.precision import STORED
 from hobble.database.reader import Database
+from hobble.rows.compose import compose, fit_columns, x_columns
 from hobble.training.batches import TRAIN, Batch, HostRows
 
 AT_ONCE = 4096  # rows composed in one go: few launches, 10 MB

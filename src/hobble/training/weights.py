@@ -12,13 +12,11 @@ import numpy as np
 from hobble.channels import channel
 from hobble.core.files import save_npz
 from hobble.core.skeleton import Skeleton
-from hobble.rows.layout import CONTACTS, GAITS
 from hobble.database.reader import Database
+from hobble.rows.layout import CONTACTS, GAITS
 from hobble.training.network import Network
 
-UNITS = (
-    "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z forward, +X left"
-)
+UNITS = "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z forward, +X left"
 
 
 def write_weights(

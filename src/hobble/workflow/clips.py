@@ -12,6 +12,7 @@ from hobble.config.load import Catalogue
 from hobble.config.models import ClipEntry
 from hobble.core.clip_files import NAMES, can_be_called, find_clips, the_file
 from hobble.core.errors import HobbleError, InputError
+from hobble.synthetic.links import WRITES
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 
 DATASETS = "results/datasets"
@@ -100,18 +101,14 @@ class Clips:
             return self.beside(dataset, clip, ("_footsteps.txt", "_gait.txt"))
         return self.beside(dataset, clip, LABEL_FILES) if self._reads_labels(dataset) else []
 
-    def status_files(self, dataset: str, clip: str) -> list[str]:
-        """The status file beside the clip, if there is one and the data set gives no status of its own."""
-        if self.catalogue.dataset(dataset).synthetic is None and self.entry(dataset, clip).status:
-            return []
-        return self.beside(dataset, clip, ("_injuries.txt",))
-
     def beside(self, dataset: str, clip: str, suffixes: Iterable[str]) -> list[str]:
         """The files called as the clip is, with one of `suffixes` after its name.
 
         Those of the embedded walker are named whether they exist or not, since it makes them all.
         """
         made = self.catalogue.dataset(dataset).synthetic is not None
+        if made:
+            suffixes = [suffix for suffix in suffixes if suffix in WRITES]
         stem = self.folder(dataset) / clip
         if not made and clip in (files := self._files(dataset)):
             stem = files[clip][0].with_suffix("")

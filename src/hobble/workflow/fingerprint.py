@@ -5,16 +5,22 @@ from __future__ import annotations
 import ast
 import functools
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
 
 
-def fingerprint(script: Path, source: Path) -> str:
+def fingerprint(script: Path, source: Path, more: Sequence[str] = ()) -> str:
     """Hash `script` and its import closure among the packages under `source`.
 
+    more: modules that it imports by a name which its text does not hold.
     Comments, blank lines and docstrings do not count, so that editing them re-runs nothing.
     """
     digest = hashlib.sha256(_stripped(script).encode())
-    for module in sorted(closure(script, source)):
+    found = closure(script, source)
+    for name in more:
+        for file in _files_of(name, source):
+            found |= {file} | closure(file, source)
+    for module in sorted(found):
         digest.update(_stripped(module).encode())
     return digest.hexdigest()[:16]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from hobble.workflow.fingerprint import fingerprint
@@ -14,9 +15,10 @@ class Package:
         self.base = base
         self.folder = base / "src" / "hobble"
 
-    def code(self, script: str) -> str:
-        """Fingerprint of a rule's script and of all it imports from the package."""
-        return fingerprint(self.base / "workflow" / "scripts" / f"{script}.py", self.base / "src")
+    def code(self, script: str, channels: Sequence[str] = ()) -> str:
+        """Fingerprint of a rule's script, of all it imports from the package, and of its job's channels."""
+        more = [f"hobble.channels.{name}" for name in channels]
+        return fingerprint(self.base / "workflow" / "scripts" / f"{script}.py", self.base / "src", more)
 
     def templates(self) -> list[str]:
         """The page's templates; a change in one re-makes only the reports."""

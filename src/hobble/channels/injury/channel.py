@@ -33,9 +33,11 @@ class Injury(Channel):
     former = ("links", "injury", "status", "severity")
 
     def columns(self, rig: Rig) -> tuple[str, ...]:
+        """The links: "LeftUpLeg-LeftLeg"."""
         return tuple(f"{a}-{b}" for a, b in rig.links)
 
     def is_neutral(self, source: Source) -> bool:
+        """Whether no status has a severity above 0."""
         if source.value is not None:
             return not hurts(str(source.value))
         if source.entry.get("injured"):  # the embedded walker is asked to limp, and writes the file itself
@@ -43,6 +45,7 @@ class Injury(Channel):
         return not any(hurts(read_bytes(file, MOST_TEXT).decode("latin-1")) for file in source.files)
 
     def check(self, source: Source, rig: Rig) -> None:
+        """The status of an entry has to follow the grammar of a status file."""
         from hobble.channels.injury.status import parse_links
         from hobble.core.errors import InputError
 
@@ -54,11 +57,13 @@ class Injury(Channel):
         parse_links(source.value, self.columns(rig), where)
 
     def read(self, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
+        """See `clip_severity`."""
         from hobble.channels.injury.severity import clip_severity
 
         return clip_severity(clip, next(iter(source.files), None), source.value, motion)
 
     def mirror(self, values: Array, rig: Any) -> Array:
+        """What hurt on the left hurts on the right."""
         from hobble.channels.injury.severity import mirror_severity
 
         return mirror_severity(values, rig.mirror_links)
