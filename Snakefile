@@ -3,10 +3,12 @@ import os
 import sys
 from pathlib import Path
 
-from hobble.channels import NAMES
+from hobble.channels import NAMES, modules_of
 from hobble.core.errors import HobbleError
+from hobble.measures.registry import modules
 from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
+from hobble.workflow.measurements import NAMES as MEASURES
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check
 from hobble.workflow.told import told_by
@@ -28,6 +30,7 @@ datasets = project.datasets
 configurations = project.configurations
 comparison = project.comparison
 package = project.package
+measurements = project.measurements
 demands = Demands(project)
 
 
@@ -38,10 +41,13 @@ wildcard_constraints:
     rows=r"[^/]+",
     channel="|".join(NAMES),
     told=r"plain|[a-z_+]+(?<!clips)",
+    measure="|".join(MEASURES),
 
 
 def kept(files):
     """Files of the checkout or the user: they stay where they are, though results may lie in an object store."""
+    if isinstance(files, dict):
+        return {name: kept(some) for name, some in files.items()}
     many = [files] if isinstance(files, str) else files
     many = [f if f.startswith("results/") else local(f) for f in many]
     return many[0] if isinstance(files, str) else many

@@ -16,7 +16,7 @@ import numpy as np
 from runtime import SKELETON, load_skeleton, random_network
 
 from hobble.evaluation.crowd import Stretch, run, severities
-from hobble.evaluation.rollouts import Inputs, roll_out
+from hobble.measures.rollouts.run import Inputs, roll_out
 from hobble.runtime.network import Network, load_network
 from hobble.runtime.predictor import Predictor
 

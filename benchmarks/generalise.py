@@ -26,8 +26,8 @@ import yaml
 
 from hobble.config.sections import Network, Training
 from hobble.database.reader import Database
-from hobble.evaluation.responsivity import responsivity
-from hobble.evaluation.rollouts import measure_roll_outs
+from hobble.measures.responsivity.run import responsivity
+from hobble.measures.rollouts.run import measure_roll_outs
 from hobble.runtime.network import load_network
 from hobble.training.held_out import HeldOut
 from hobble.training.train import train

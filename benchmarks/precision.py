@@ -19,7 +19,7 @@ import numpy as np
 from hobble.config.sections import Network, Training
 from hobble.database.manifest import Manifest
 from hobble.database.merge import write_database
-from hobble.evaluation.accuracy import measure
+from hobble.measures.accuracy.run import measure
 from hobble.training.run import run
 
 DTYPES = ("float32", "float16", "bfloat16")

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from hobble.database.reader import Database
-from hobble.evaluation.rollouts import Inputs, roll_out
+from hobble.measures.rollouts.run import Inputs, roll_out
 from hobble.training.batches import HostRows
 from hobble.training.fused import FusedStep
 from hobble.training.network import initialise

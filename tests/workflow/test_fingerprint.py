@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from hobble.measures.measure import Measure
+from hobble.measures.registry import MEASURES
 from hobble.workflow import fingerprint as fp
 from hobble.workflow.costs import OF_DATASET
 
@@ -63,8 +65,22 @@ def test_no_job_depends_on_the_configuration_models(root: Path) -> None:
 def test_no_stage_imports_from_below(root: Path) -> None:
     order = [*OF_DATASET, "training", "runtime", "evaluation", "report"]
     order[order.index("injury")] = "channels"  # injury's folder is one of channels/
+    measures = {root / "src" / one.package.replace(".", "/") for one in MEASURES}
     for rank, stage in enumerate(order):
         for module in (root / "src/hobble" / stage).rglob("*.py"):
+            if module.parent in measures:  # what a channel measures of the character comes after all of them
+                continue
             for path in fp._imports(module, root / "src"):
                 used = path.relative_to(root / "src/hobble").parts[0]
                 assert used not in order[rank + 1 :], f"{module.name} of {stage} imports {used}"
+
+
+@pytest.mark.parametrize("measure", MEASURES, ids=lambda measure: measure.name)
+def test_a_measurement_depends_neither_on_the_page_nor_on_the_list(root: Path, measure: Measure) -> None:
+    """Else a new measurement, or another word on a page, would measure everything again."""
+    files = fp.closure(root / "workflow/scripts/measure.py", root / "src", [measure.module("run")])
+    used = {path.relative_to(root / "src/hobble").as_posix() for path in files}
+    assert "measures/registry.py" not in used
+    assert not [path for path in used if path.startswith("report/")]
+    folder = (root / "src" / measure.package.replace(".", "/")).relative_to(root / "src/hobble").as_posix()
+    assert f"{folder}/run.py" in used

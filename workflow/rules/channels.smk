@@ -19,7 +19,7 @@ rule channel_clip:
         clip=lambda w: w.clip,
         channel=lambda w: w.channel,
         source=lambda w: datasets.told.source(w.dataset, w.clip, w.channel),
-        code=lambda w: package.code("channel_clip", [w.channel]),
+        code=lambda w: package.code("channel_clip", f"hobble.channels.{w.channel}"),
     script:
         "../scripts/channel_clip.py"
 
@@ -44,6 +44,6 @@ rule channel_mirror:
     params:
         clip=lambda w: f"{w.clip}_mirror",
         channel=lambda w: w.channel,
-        code=lambda w: package.code("channel_mirror", [w.channel]),
+        code=lambda w: package.code("channel_mirror", f"hobble.channels.{w.channel}"),
     script:
         "../scripts/channel_mirror.py"

@@ -22,7 +22,7 @@ rule database_clip:
         clip=lambda w: w.rows,
         channels=lambda w: datasets.told.channels(w.dataset),
         options=lambda w: datasets.options(w.dataset, "database"),
-        code=lambda w: package.code("database_clip", datasets.told.channels(w.dataset)),
+        code=lambda w: package.code("database_clip", *modules_of(datasets.told.channels(w.dataset))),
     script:
         "../scripts/database_clip.py"
 
@@ -50,6 +50,6 @@ rule database_merge:
         splits=lambda w: datasets.selected(w.dataset, told_by(w.told)),
         channels=lambda w: told_by(w.told),
         options=lambda w: datasets.options(w.dataset, "database"),
-        code=lambda w: package.code("database_merge", told_by(w.told)),
+        code=lambda w: package.code("database_merge", *modules_of(told_by(w.told))),
     script:
         "../scripts/database_merge.py"

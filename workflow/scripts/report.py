@@ -19,9 +19,7 @@ with job(snakemake):
         title=asked.title,
         splits=asked.splits,
         configuration=given.configuration,
-        accuracy=given.accuracy,
-        responsivity=given.responsivity,
-        injury=given.injury,
+        measured=given.measured,
         pipeline=given.pipeline,
         history=given.history,
         weights=given.weights,
@@ -30,8 +28,6 @@ with job(snakemake):
         told=given.told,
         terrain=given.terrain,
         rows=given.rows,
-        rollouts=given.rollouts,
-        recognition=given.recognition,
     )
     network = material.network
     play = scenes(given.scenarios, network["skeleton"], network["links"])

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import functools
 import importlib
+from collections.abc import Iterable
 
 from hobble.channels.channel import Channel, Source
 
-__all__ = ["NAMES", "Channel", "Source", "channel", "every", "formerly"]
+__all__ = ["NAMES", "Channel", "Source", "channel", "every", "formerly", "modules_of"]
 
 # Every channel that there is: the folder NAME beside this file, whose package has the channel as CHANNEL.
 NAMES = ("injury",)
@@ -30,6 +31,11 @@ def channel(name: str) -> Channel:
 def every() -> tuple[Channel, ...]:
     """All channels, in the order of the list."""
     return tuple(channel(name) for name in NAMES)
+
+
+def modules_of(names: Iterable[str]) -> list[str]:
+    """Full names of the modules of channels: what a job that is told their names depends on."""
+    return [f"{__name__}.{name}" for name in names]
 
 
 def formerly(key: str) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
+from hobble.report import measured, side_by_side
 from hobble.report.formats import embedded
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
@@ -26,25 +27,17 @@ def render_compared(
     """
     sections: dict[str, dict[str, Any]] = {
         "overview": {"table": tables.configuration_table(compared), "beside": tables.beside_table(compared)},
-        "accuracy": {
-            "boxes": parts.error_boxes(compared),
-            "clips": parts.clip_dots(compared),
-            "rollouts": parts.rollout_chart(compared),
-            "differences": parts.difference_map(compared),
-            "table": tables.difference_table(compared),
-        },
-        "injury": {"table": tables.injury_table(compared)},
-        "speed": {"laps": parts.lap_lines(compared), "fit": parts.fit_chart(compared)},
         "training": {"curves": parts.training_curves(compared)},
         "stages": {"charts": parts.stage_dots(compared)},
     }
-    names = parts.names(compared)
-    charts = specs(sections)
+    shown, names = measured.compared_sections(compared), side_by_side.names(compared)
+    charts = specs([sections, shown])
     room = LARGEST - ELSE - len(bundle.encode()) - len(embedded(charts).encode())
     kept, left_out = fitting(playables or {}, room)
     data = {"name": NAME, "charts": charts, "playable": kept}
     return template("compare.html.j2").render(
         name=NAME,
+        measured=shown,
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
         eyebrow="Hobble report · configurations side by side",
         lead="What the same measurements say of " + ", ".join(names) + ", beside the published figures.",

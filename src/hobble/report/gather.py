@@ -15,6 +15,7 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, read_json
 from hobble.core.untrusted import read_text, read_yaml
+from hobble.measures.given import Json
 
 PUBLISHED = Path(__file__).parents[1] / "evaluation" / "published.yaml"
 COUNTED = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
@@ -24,6 +25,7 @@ COUNTED = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 class Material:
     """What one configuration left behind.
 
+    measured: measurement -> its JSON.
     history: column -> values, one per section of training; None where a cell is empty. motion, labels: the
     reports of the clips, in one order; told: those of their channels. terrain, rows: paths of their fits and
     of their rows.
@@ -35,9 +37,7 @@ class Material:
     title: str | None
     splits: Mapping[str, str] = field(repr=False)
     resolved: Mapping[str, Any] = field(repr=False)
-    accuracy: Mapping[str, Any] = field(repr=False)
-    responsivity: Mapping[str, Any] = field(repr=False)
-    injury: Mapping[str, Any] = field(repr=False)
+    measured: Mapping[str, Json] = field(repr=False)
     pipeline: Mapping[str, Any] = field(repr=False)
     history: Mapping[str, list[float | None]] = field(repr=False)
     network: Mapping[str, Any] = field(repr=False)
@@ -46,13 +46,20 @@ class Material:
     told: list[dict[str, Any]] = field(repr=False)
     terrain: list[str] = field(repr=False)
     rows: list[str] = field(repr=False)
-    rollouts: Mapping[str, Any] = field(repr=False)
-    recognition: Mapping[str, Any] = field(repr=False)
     published: Mapping[str, Any] = field(repr=False)
 
     def split(self, clip: str) -> str:
         """ "train" or "held_out"."""
         return self.splits.get(clip, "train")
+
+    def found(self, measure: str) -> Json:
+        """What a measurement found; empty where it was not made."""
+        return self.measured.get(measure, {})
+
+    def beside(self, what: str) -> Json | None:
+        """The published entry of kind `what` for this configuration's network, if there is one."""
+        rows = self.published.get(what, ())
+        return next((row for row in rows if row["configuration"] == self.name), None)
 
     @property
     def blocks(self) -> list[str]:
@@ -67,9 +74,7 @@ def gather(
     title: str | None,
     splits: Mapping[str, str],
     configuration: str,
-    accuracy: str,
-    responsivity: str,
-    injury: str,
+    measured: Iterable[str],
     pipeline: str,
     history: str,
     weights: str,
@@ -78,8 +83,6 @@ def gather(
     told: Iterable[str],
     terrain: Iterable[str] = (),
     rows: Iterable[str] = (),
-    rollouts: str | None = None,
-    recognition: str | None = None,
 ) -> Material:
     """Read the files a report is made from. Raises InputError naming the one that cannot be read."""
     return Material(
@@ -88,9 +91,7 @@ def gather(
         title=title,
         splits=dict(splits),
         resolved=read_yaml(configuration) or {},
-        accuracy=read_json(accuracy),
-        responsivity=read_json(responsivity),
-        injury=read_json(injury),
+        measured={Path(path).stem: read_json(path) for path in measured},
         pipeline=read_json(pipeline),
         history=read_history(history),
         network=describe_network(weights),
@@ -99,8 +100,6 @@ def gather(
         told=[read_json(path) for path in told],
         terrain=list(terrain),
         rows=list(rows),
-        rollouts=read_json(rollouts) if rollouts else {},
-        recognition=read_json(recognition) if recognition else {},
         published=read_yaml(PUBLISHED),
     )
 

@@ -8,12 +8,11 @@ from typing import Any
 import yaml
 
 from hobble.report import (
-    accuracy_section,
     cost_section,
     coverage,
     data_section,
     findings,
-    injury_section,
+    measured,
     terrain_section,
     training_section,
 )
@@ -38,12 +37,12 @@ def render(
 
     Every value is escaped where it stands; data for the scripts is JSON in which no "<" is left.
     """
-    sections = _sections(material)
+    sections, shown = _sections(material), measured.sections(material)
     strips = data_section.strips(material)
     scenes = dict(scenes or {})
     grounds = ground_pictures(material.terrain, material.network["skeleton"])
     data = {
-        "charts": specs(sections),
+        "charts": specs([sections, shown]),
         "scenes": scenes,
         "strips": strips,
         "grounds": grounds,
@@ -56,6 +55,7 @@ def render(
         name=material.name,
         title=material.title or material.name,
         eyebrow=f"Hobble report · configuration {material.name} · data set {material.dataset}",
+        measured=shown,
         figures=findings.key_figures(material),
         hints=findings.hints(material),
         lead=findings.lead(material),
@@ -76,7 +76,7 @@ def render(
 
 def _sections(material: Material) -> dict[str, dict[str, Any]]:
     """Charts and tables by section; None where there is nothing to show."""
-    accuracy, costs, data, training = accuracy_section, cost_section, data_section, training_section
+    costs, data, training = cost_section, data_section, training_section
     found = coverage.counted(material.rows, material.splits)
     return {
         "training": {
@@ -84,20 +84,6 @@ def _sections(material: Material) -> dict[str, dict[str, Any]]:
             "blocks": training.block_curves(material),
             "table": training.history_table(material),
         },
-        "accuracy": {
-            "bars": accuracy.clip_bars(material),
-            "boxes": accuracy.clip_boxes(material),
-            "rollouts": accuracy.rollout_chart(material),
-            "table": accuracy.accuracy_table(material),
-            "published": accuracy.beside_published(material),
-        },
-        "speed": {
-            "figures": costs.track_figures(material),
-            "laps": costs.lap_chart(material),
-            "published": costs.speed_published(material),
-            "table": costs.lap_table(material),
-        },
-        "injury": injury_section.section(material),
         "terrain": terrain_section.section(material.terrain),
         "stages": {
             **dict(zip(("seconds", "bytes"), costs.stage_charts(material), strict=True)),

@@ -13,6 +13,7 @@ import os
 import re
 from pathlib import Path
 
+from hobble.measures.registry import measure
 from hobble.workflow.clips import MIRROR
 from hobble.workflow.project import Project
 
@@ -49,6 +50,17 @@ class Demands:
     def minutes_of_all(self, dataset: str, each: float, attempt: int = 1, least: int = 1) -> int:
         """Minutes for a job that takes `each` seconds for a thousand frames of all clips and mirrors."""
         return _minutes(each * self.all_thousands(dataset), attempt, least)
+
+    def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
+        """Megabytes for the measurement `name`."""
+        cost = measure(name).cost
+        more = math.ceil(SPARE * cost.memory_mb * attempt)
+        return more + self.evaluation_memory(configuration, cost.memory_each, attempt)
+
+    def measure_minutes(self, configuration: str, name: str, attempt: int = 1) -> int:
+        """Minutes for the measurement `name`."""
+        cost = measure(name).cost
+        return self.evaluation_minutes(configuration, cost.seconds_each, attempt, cost.minutes)
 
     def evaluation_memory(self, configuration: str, each: float, attempt: int = 1) -> int:
         """Megabytes for a measurement of a network on one clip of its data set after another."""

@@ -5,30 +5,28 @@ from __future__ import annotations
 import ast
 import functools
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 
-def fingerprint(script: Path, source: Path, more: Sequence[str] = ()) -> str:
+def fingerprint(script: Path, source: Path, modules: Iterable[str] = ()) -> str:
     """Hash `script` and its import closure among the packages under `source`.
 
-    more: modules that it imports by a name which its text does not hold.
-    Comments, blank lines and docstrings do not count, so that editing them re-runs nothing.
+    modules: full names of modules that the script imports by a name it is told. Comments, blank lines and
+    docstrings do not count, so that editing them re-runs nothing.
     """
     digest = hashlib.sha256(_stripped(script).encode())
-    found = closure(script, source)
-    for name in more:
-        for file in _files_of(name, source):
-            found |= {file} | closure(file, source)
-    for module in sorted(found):
+    for module in sorted(closure(script, source, modules)):
         digest.update(_stripped(module).encode())
     return digest.hexdigest()[:16]
 
 
-def closure(script: Path, source: Path) -> set[Path]:
-    """The project files that `script` imports, directly or through others."""
+def closure(script: Path, source: Path, modules: Iterable[str] = ()) -> set[Path]:
+    """The project files that `script` imports, directly or through others, and `modules` with theirs."""
     found: set[Path] = set()
     waiting = list(_imports(script, source))
+    for module in modules:
+        waiting += _files_of(module, source)
     while waiting:
         path = waiting.pop()
         if path not in found:

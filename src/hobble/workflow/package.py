@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from hobble.workflow.fingerprint import fingerprint
@@ -15,10 +14,13 @@ class Package:
         self.base = base
         self.folder = base / "src" / "hobble"
 
-    def code(self, script: str, channels: Sequence[str] = ()) -> str:
-        """Fingerprint of a rule's script, of all it imports from the package, and of its job's channels."""
-        more = [f"hobble.channels.{name}" for name in channels]
-        return fingerprint(self.base / "workflow" / "scripts" / f"{script}.py", self.base / "src", more)
+    def code(self, script: str, *modules: str) -> str:
+        """Fingerprint of a rule's script and of all it imports from the package.
+
+        modules: full names of those that it finds by a name it is told.
+        """
+        path = self.base / "workflow" / "scripts" / f"{script}.py"
+        return fingerprint(path, self.base / "src", modules)
 
     def templates(self) -> list[str]:
         """The page's templates; a change in one re-makes only the reports."""
