@@ -50,7 +50,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--threads", type=int, default=2)
     asked = parser.parse_args()
-    made = Manifest.load(asked.folder / "database/healthy")
+    made = Manifest.load(asked.folder / "database/plain")
     splits = {clip["clip"]: clip["split"] for clip in made.clips}
     clips = {name: asked.folder / f"database/clips/{name}.npz" for name in splits}
     frames = f"{made.rows('train'):,} frames to learn from, {made.rows('held_out'):,} held out"

@@ -22,7 +22,9 @@ rule database_clip:
         clip=lambda w: w.rows,
         channels=lambda w: datasets.told.channels(w.dataset),
         options=lambda w: datasets.options(w.dataset, "database"),
-        code=lambda w: package.code("database_clip", *modules_of(datasets.told.channels(w.dataset))),
+        code=lambda w: package.code(
+            "database_clip", *modules_of(datasets.told.channels(w.dataset))
+        ),
     script:
         "../scripts/database_clip.py"
 

@@ -90,7 +90,9 @@ rule report:
         ),
         told=lambda w: [
             file
-            for channel in datasets.told.channels(configurations.dataset(w.configuration))
+            for channel in datasets.told.channels(
+                configurations.dataset(w.configuration)
+            )
             for file in configurations.of_dataset(
                 w.configuration, f"channels/{channel}/{{clip}}.json"
             )

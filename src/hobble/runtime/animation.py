@@ -266,7 +266,7 @@ class ProceduralAnimation:
 
     def _known_gait(self, name: Any) -> None:
         if name not in self._gaits:
-            raise UnknownName("gait", name, self._gaits)
+            raise UnknownName("no gait", name, self._gaits)
 
     def _turning(self, c: int, direction: Array) -> float:
         """1 where a standing figure has to step around to face `direction`, else 0."""

@@ -20,7 +20,7 @@ class UnknownName(KeyError):
         names = list(known)
         near = difflib.get_close_matches(str(name), names, 3, 0.5)
         hint = f"; did you mean {' or '.join(near)}?" if near else f": there are {', '.join(names)}"
-        super().__init__(f"no {what} {name!r}{hint}")
+        super().__init__(f"{what} {name!r}{hint}")
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -80,7 +80,7 @@ class Told:
         if not labels:
             raise ValueError(f"{label} cannot be told: {_blind(name)}")
         if label not in labels:
-            raise UnknownName(f"column of {name}", label, labels)
+            raise UnknownName(f"{name} has no", label, labels)
 
 
 def _blind(name: str) -> str:
