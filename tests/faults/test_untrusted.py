@@ -28,10 +28,10 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import load_npz, read_json
 from hobble.core.untrusted import read_bytes, read_yaml
 from hobble.labels.files import SourceTime, read_gait_keys
+from hobble.models.load import load_network
 from hobble.motion import read as bvh
 from hobble.motion.make import make_clip
 from hobble.motion.rig import load_skeleton
-from hobble.runtime.network import load_network
 from hobble.terrain.heightmaps import read_heights
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check

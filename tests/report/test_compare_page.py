@@ -16,12 +16,12 @@ from hobble.evaluation.compare import compare
 from hobble.evaluation.measured import Measured
 from hobble.measures.accuracy import comparison_page as of_accuracy
 from hobble.measures.responsivity import comparison_page as of_responsivity
+from hobble.models.load import load_network
 from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
 from hobble.report.compare_page import render_compared
 from hobble.report.gather import PUBLISHED, Material
 from hobble.report.playable import playable
-from hobble.runtime.network import load_network
 
 
 @pytest.fixture(scope="module")

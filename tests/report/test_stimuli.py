@@ -13,11 +13,12 @@ from PIL import Image
 
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.motion.read import read_bvh
 from hobble.report import stimuli
 from hobble.report.body import body
 from hobble.report.raster import BODY, Camera, Studio
-from hobble.runtime.network import Network, load_network
 
 
 @pytest.fixture(scope="module")

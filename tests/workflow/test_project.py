@@ -74,7 +74,8 @@ def test_severities_of_0_hurt_nobody(base: Path) -> None:
     ]
     text = (
         DATASET
-        + "clips: {a: {channels: {injury: 'LeftLeg-LeftFoot[2]'}}, b: {channels: {injury: 'LeftLeg-LeftFoot[0]'}}, c: }\n"
+        + "clips: {a: {channels: {injury: 'LeftLeg-LeftFoot[2]'}}, "
+        + "b: {channels: {injury: 'LeftLeg-LeftFoot[0]'}}, c: }\n"
     )
     (base / "config/datasets/mine.yaml").write_text(text)
     assert [Project(base, {}).datasets.told.neutral("mine", clip, "injury") for clip in "abc"] == [

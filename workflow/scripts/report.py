@@ -3,12 +3,12 @@
 from pathlib import Path
 
 from hobble.core.files import write_text
+from hobble.models.load import load_network
 from hobble.report.compare import comparisons
 from hobble.report.gather import gather
 from hobble.report.page import render
 from hobble.report.playable import playable
 from hobble.report.scenes import scenes
-from hobble.runtime.network import load_network
 from hobble.workflow.job import job
 
 with job(snakemake):

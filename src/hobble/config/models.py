@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, create_model, field_validator, model_validator
 
 from hobble.channels import NAMES as NAMES_OF_CHANNELS
 from hobble.channels import channel, every
 from hobble.config import sections as s
 from hobble.core.clip_files import NAMES, can_be_called
+from hobble.models import DEFAULT, model
+from hobble.models.options import Options
 
 
 def _clip_name(name: str) -> str:
@@ -128,7 +131,7 @@ class Configuration(s.Section):
         (), description="what the network is told; clips that another channel tells something are left out"
     )
     network_of: Name | None = Field(None, description="read another configuration's network, train none")
-    network: s.Network = s.Network()
+    network: Options = model(DEFAULT).options()()  # of its kind; see `configuration_of`
     training: s.Training = s.Training()
     runtime: s.Runtime = s.Runtime()
     evaluation: s.Evaluation = s.Evaluation()
@@ -144,6 +147,13 @@ class Configuration(s.Section):
     def _in_order(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         """In the order of the list of channels, each once: the same channels are the same database."""
         return tuple(name for name in NAMES_OF_CHANNELS if name in names)
+
+
+@functools.cache
+def configuration_of(kind: str) -> type[Configuration]:
+    """`Configuration` with the keys that a network of this kind has, one of MODELS."""
+    of_network = model(kind).options()
+    return create_model("Configuration", __base__=Configuration, network=(of_network, of_network()))
 
 
 class JointEntry(s.Section):

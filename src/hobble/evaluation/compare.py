@@ -67,8 +67,8 @@ def describe(measured: Measured, found: Iterable[SideBySide]) -> dict[str, Any]:
         "dataset": measured.dataset,
         "network_of": model.get("network_of"),
         "injury": bool(model.get("injury")),
-        "hidden_layers": model["network"]["hidden_layers"],
-        "units": model["network"]["units"],
+        "hidden_layers": model["network"].get("hidden_layers"),
+        "units": model["network"].get("units"),
         "passes": model["training"]["passes"],
         **about,
     }

@@ -10,7 +10,7 @@ import numpy as np
 
 from hobble.channels import NAMES, channel
 from hobble.core.quat import Array
-from hobble.runtime.network import Network
+from hobble.models.network import Network
 
 
 class UnknownName(KeyError):

@@ -14,6 +14,9 @@ import re
 from pathlib import Path
 
 from hobble.measures.registry import measure
+from hobble.channels import channel
+from hobble.models import model
+from hobble.rows.layout import RowLayout
 from hobble.workflow.clips import MIRROR
 from hobble.workflow.project import Project
 
@@ -98,11 +101,13 @@ class Demands:
         return self._frames(dataset, clip.removesuffix(MIRROR)) / 1e3 * self._joints(dataset) / JOINTS
 
     def weights(self, configuration: str) -> float:
-        """Weights of the network, of all its control points, by the sizes of the rows of a figure."""
-        network = self.project.configurations.section(configuration, "network")
-        joints = self._joints(self.project.configurations.dataset(configuration))
-        inputs, outputs, units = 156 + 7 * joints, 32 + 9 * joints, network["units"]
-        return network["control_points"] * units * (inputs + (network["hidden_layers"] - 1) * units + outputs)
+        """Numbers that are trained, by the columns of the configuration's rows."""
+        chosen = self.project.catalogue.configuration(configuration)
+        database = self.project.datasets.options(chosen.dataset, "database")
+        skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(chosen.dataset).skeleton)
+        told = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
+        layout = RowLayout(len(skeleton.joints), database["window"], database["step"], told)
+        return model(chosen.network.kind).parameters(chosen.network, layout.x_size, layout.y_size)
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
     def all_thousands(self, dataset: str) -> float:

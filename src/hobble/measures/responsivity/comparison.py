@@ -52,7 +52,7 @@ def by_mode(measured: Measured) -> list[dict[str, Any]]:
 def _sizes(measured: Measured) -> dict[str, Any]:
     """Computations as Table 6.1 counts them, and bytes of the weights of so many phases."""
     counts = measured.found(NAME)["parameters"]
-    phases = {**PHASES, "cubic": measured.resolved["configuration"]["network"]["control_points"]}
+    phases = {**PHASES, "cubic": measured.resolved["configuration"]["network"].get("control_points", 1)}
     return {
         "computations": {key: counts[key] for key in COUNTS},
         "weights_bytes": {mode: count * counts["true"] * FLOAT for mode, count in phases.items()},

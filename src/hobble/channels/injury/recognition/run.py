@@ -23,7 +23,8 @@ from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.discriminant import Discriminant, learn
 from hobble.evaluation.gait_features import features
 from hobble.measures.given import Given, Outcome
-from hobble.runtime.network import Network, load_network
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # the channel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from hobble.training.network import Network
+from hobble.models.pfnn.trainable import TrainablePfnn
 
 
 def spline(control_points: Tensor, p: float) -> Tensor:
@@ -44,6 +44,6 @@ def loss(
     return error, error + l1 * weights / (2 * len(layers))
 
 
-def parameters(network: Network) -> list[Tensor]:
+def parameters(network: TrainablePfnn) -> list[Tensor]:
     """The network's layers as leaves of a graph."""
     return [layer.clone().requires_grad_() for layer in network.layers]

@@ -1,16 +1,16 @@
 // The phase-functioned network: a prediction from a row of inputs and a phase. What Python's `Predictor` does in
 // cubic mode: the outputs of the four control points around the phase are blended, never the weights.
-import { bytes } from "./numbers.js";
+import { bytes } from "../../report/web/numbers.js";
 
 export const createNetwork = (spec) => {
   const floats = (text) => new Float32Array(bytes(text));
-  const layers = spec.layers.map(({ points, rows, columns, weights, scale, biases }) => {
+  const layers = spec.network.layers.map(({ points, rows, columns, weights, scale, biases }) => {
     const integers = new Int16Array(bytes(weights)), factors = floats(scale);
     const w = new Float32Array(integers.length);
     for (let r = 0, i = 0; r < points * rows; r++) for (let c = 0; c < columns; c++, i++) w[i] = integers[i] * factors[r];
     return { rows, columns, w, b: floats(biases), out: new Float32Array(rows) };
   });
-  const K = spec.layers[0].points, mean = floats(spec.xMean), inverse = floats(spec.xScale);
+  const K = spec.network.layers[0].points, mean = floats(spec.xMean), inverse = floats(spec.xScale);
   const yMean = floats(spec.yMean), yStd = floats(spec.yStd), z = new Float32Array(mean.length);
   const index = new Int32Array(4), share = new Float64Array(4);
 

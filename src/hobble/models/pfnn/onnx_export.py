@@ -15,8 +15,10 @@ import numpy as np
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import atomic_path
 from hobble.core.quat import Array
-from hobble.runtime.network import CATMULL_ROM, Network
-from hobble.runtime.predictor import Predictor, inverse, phase_tables
+from hobble.models.network import inverse
+from hobble.models.pfnn.forward import CATMULL_ROM
+from hobble.models.pfnn.network import Pfnn
+from hobble.models.pfnn.predictor import phase_tables
 
 OPSET = 15
 TOLERANCE = 1e-4  # of the runtime, in the units of Y, or of the value where it is above 1
@@ -43,7 +45,7 @@ class _Graph:
         return output
 
 
-def export_onnx(path: str | Path, network: Network, mode: str = "cubic") -> None:
+def export_onnx(path: str | Path, network: Pfnn, mode: str = "cubic") -> None:
     """Write the network in one phase mode; its columns, skeleton and links go along as metadata `hobble`.
 
     cubic blends the outputs of all control points, which is exact; linear and constant look weights up.
@@ -83,14 +85,14 @@ def export_onnx(path: str | Path, network: Network, mode: str = "cubic") -> None
         temporary.write_bytes(model.SerializeToString(deterministic=True))
 
 
-def write_checked(path: str | Path, network: Network, mode: str = "cubic") -> float:
+def write_checked(path: str | Path, network: Pfnn, mode: str = "cubic") -> float:
     """Export, and check before the file has its name; returns and raises what the two functions do."""
     with atomic_path(path) as temporary:
         export_onnx(temporary, network, mode)
         return check_onnx(temporary, network, mode)
 
 
-def check_onnx(path: str | Path, network: Network, mode: str = "cubic") -> float:
+def check_onnx(path: str | Path, network: Pfnn, mode: str = "cubic") -> float:
     """The largest difference between the file, run by onnxruntime, and the runtime, over random rows.
 
     It is in the units of Y, or in shares of the value where that is above 1.
@@ -110,14 +112,14 @@ def check_onnx(path: str | Path, network: Network, mode: str = "cubic") -> float
     phase[:3] = 0.0, 0.5, 1.0
     x = x.astype(np.float32)
     (y,) = session.run(["y"], {"x": x, "phase": phase})
-    expected = Predictor(network, mode).predict(x, phase.astype(float))
+    expected = network.predictor(mode).predict(x, phase.astype(float))
     difference = float((np.abs(y - expected) / np.maximum(1.0, np.abs(expected))).max())
     if not difference <= TOLERANCE:
         raise InputError(path, f"onnxruntime gives other numbers than the runtime: off by {difference:.2g}")
     return difference
 
 
-def _about(network: Network, mode: str) -> dict[str, Any]:
+def _about(network: Pfnn, mode: str) -> dict[str, Any]:
     """What a reader has to know of the columns."""
     keys = ("configuration", "contacts", "units")
     return {
@@ -133,7 +135,7 @@ def _about(network: Network, mode: str) -> dict[str, Any]:
 def _lookup(g: _Graph, mode: str, points: int) -> tuple[str, str]:
     """Which points a phase blends (batch, n) and their shares (batch, n, 1); for cubic, of all points."""
     one = g.constant(1.0)
-    # A phase of exactly 1 is the end of the cycle and not its start, as in `Predictor`.
+    # A phase of exactly 1 is the end of the cycle and not its start, as in `PfnnPredictor`.
     wrapped = g("Where", g("Equal", "phase", one), "phase", g("Sub", "phase", g("Floor", "phase")))
     scaled = g("Mul", wrapped, g.constant(points))
     last = g.constant(points - 1)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 import torch
 
-from hobble.training.fused import FusedStep
-from hobble.training.network import Network, initialise
+from hobble.models.pfnn.fused import FusedStep
+from hobble.models.pfnn.step import Step
+from hobble.models.pfnn.trainable import initialise
 from hobble.training.optimiser import Adam
-from hobble.training.step import Step
 
 from . import definition
 
@@ -105,7 +105,7 @@ def test_both_steps_round_to_bfloat16_alike() -> None:
 @pytest.mark.parametrize("kind", STEPS)
 @pytest.mark.parametrize("dropout", [0.0, 0.3])
 def test_masks_keep_their_share_and_scale_it_up(kind: type[Step], dropout: float) -> None:
-    network: Network = initialise((300, 200, 10), 4, 1)
+    network = initialise((300, 200, 10), 4, 1)
     step = kind(network, dropout)
     step.seed(9)
     first = [mask.clone() for mask in step.masks(500)]

@@ -8,26 +8,29 @@ products.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import njit
 
 from hobble.core.quat import Array
-from hobble.runtime.network import Network, weights_at
+from hobble.models.network import STORAGES, inverse
+from hobble.models.pfnn.forward import weights_at
+
+if TYPE_CHECKING:
+    from hobble.models.pfnn.network import Pfnn
 
 MODES = {"constant": 50, "linear": 10, "cubic": None}
-STORAGES = ("float32", "int16")
 
 
-class Predictor:
+class PfnnPredictor:
     """A network prepared for one phase mode.
 
     mode: "constant" (50 phases, the one at or before the phase), "linear" (10, blended), "cubic" (exact).
     storage: "float32", or "int16" with a scale for each row: half the memory traffic, poses within 0.1 mm.
     """
 
-    def __init__(self, network: Network, mode: str = "cubic", storage: str = "float32") -> None:
+    def __init__(self, network: Pfnn, mode: str = "cubic", storage: str = "float32") -> None:
         if storage not in STORAGES:
             raise ValueError(f"storage {storage!r}: not one of {', '.join(STORAGES)}")
         self.network, self.mode, self.storage = network, mode, storage
@@ -76,7 +79,7 @@ CROWD = 2
 BLOCK = 4  # characters that go through a layer's weights together
 
 
-def phase_tables(network: Network, mode: str) -> list[tuple[Array, Array]]:
+def phase_tables(network: Pfnn, mode: str) -> list[tuple[Array, Array]]:
     """What a mode looks up or blends: for each layer weights (points, out, in) and biases (points, out).
 
     50 or 10 points, or the control points themselves. Raises ValueError for an unknown mode.
@@ -91,11 +94,6 @@ def phase_tables(network: Network, mode: str) -> list[tuple[Array, Array]]:
         (weights_at(w, phases), weights_at(b, phases))
         for w, b in zip(network.weights, network.biases, strict=True)
     ]
-
-
-def inverse(std: Array) -> Array:
-    """1 / std, and 0 for a column that never varied: it tells nothing and must not blow up."""
-    return np.where(std > 0, 1 / np.maximum(std, 1e-30), 0)
 
 
 def _pack(weights: Array, storage: str) -> tuple[Array, Array]:

@@ -14,8 +14,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from hobble.training.network import Network, coefficients, expand
-from hobble.training.products import product
+from hobble.models.pfnn.trainable import TrainablePfnn, coefficients, expand
+from hobble.models.products import product
 
 
 class Step:
@@ -28,7 +28,7 @@ class Step:
     call, (B, Y), prediction minus y.
     """
 
-    def __init__(self, network: Network, dropout: float, half: bool = False) -> None:
+    def __init__(self, network: TrainablePfnn, dropout: float, half: bool = False) -> None:
         self.network = network
         self.keep = 1.0 - dropout
         self.half = half

@@ -9,17 +9,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from hobble.training.network import Network
-from hobble.training.step import Step
-
-WORTH_A_THREAD = 100_000  # numbers, some 20 microseconds of work
-ODD = np.uint64(0x9E3779B97F4A7C15)
+from hobble.models.kernels import bits, draw, rounded, team, widened
+from hobble.models.pfnn.step import Step
+from hobble.models.pfnn.trainable import TrainablePfnn
 
 
 class FusedStep(Step):
     """As `Step`, several times faster outside the products, in buffers that are kept from batch to batch."""
 
-    def __init__(self, network: Network, dropout: float, half: bool = False) -> None:
+    def __init__(self, network: TrainablePfnn, dropout: float, half: bool = False) -> None:
         super().__init__(network, dropout, half)
         self.counter = np.uint64(0)
         self.buffers: dict[tuple[str, int], Tensor] = {}
@@ -34,7 +32,7 @@ class FusedStep(Step):
         for number, width in enumerate(self.network.sizes[:-1]):
             masks.append(self._buffer(f"mask {number}", rows, width))
             team(rows * width)
-            self.counter = np.uint64(_draw(masks[-1].numpy(), self.counter, self.keep))
+            self.counter = np.uint64(draw(masks[-1].numpy(), self.counter, self.keep))
         return masks
 
     def coefficients(self, p: Tensor) -> Tensor:
@@ -66,49 +64,9 @@ class FusedStep(Step):
         return self.buffers[key][:rows]
 
 
-def team(values: int) -> None:
-    """Give the next compiled loop as many threads as pay for `values` numbers: waking one takes a while."""
-    most = min(torch.get_num_threads(), numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-    numba.set_num_threads(max(1, min(most, values // WORTH_A_THREAD)))
-
-
-def bits(array: Tensor) -> np.ndarray:
-    """An array that compiled loops can use: numpy has no bfloat16, so its bits as uint16."""
-    return array.view(torch.uint16).numpy() if array.dtype == torch.bfloat16 else array.numpy()
-
-
-@numba.njit(cache=True, inline="always")
-def rounded(value: Any) -> Any:
-    """The bits of a float32 as bfloat16, rounded to even."""
-    word = np.float32(value).view(np.uint32)
-    even = np.uint32(np.uint32(word >> np.uint32(16)) & np.uint32(1))
-    return np.uint16(np.uint32(word + even + np.uint32(0x7FFF)) >> np.uint32(16))
-
-
-@numba.njit(cache=True, inline="always")
-def widened(half: Any) -> Any:
-    """The float32 whose bfloat16 bits these are."""
-    return np.uint32(np.uint32(half) << np.uint32(16)).view(np.float32)
-
-
-@numba.njit(parallel=True, error_model="numpy", cache=True)
-def _draw(mask: Any, counter: Any, keep: Any) -> Any:
-    """Fill `mask` from a counter (splitmix64: Steele et al. 2014); returns the counter of the next one."""
-    rows, width = mask.shape
-    scale = mask.dtype.type(1 / keep)
-    bound = np.uint64(keep * 2.0**32)
-    for row in numba.prange(rows):
-        for i in range(width):
-            z = counter + np.uint64(row * width + i + 1) * ODD
-            z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-            z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-            mask[row, i] = scale if (z >> np.uint64(32)) < bound else 0
-    return counter + np.uint64(rows * width) * ODD
-
-
 @numba.njit(cache=True)
 def _coefficients(p: Any, c: Any) -> None:
-    """As `hobble.training.network.coefficients`."""
+    """As `hobble.models.pfnn.trainable.coefficients`."""
     points = c.shape[1]
     c[:] = 0
     for row in range(len(p)):

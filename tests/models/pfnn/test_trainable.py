@@ -10,8 +10,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.training.fused import FusedStep
-from hobble.training.network import Network, coefficients, initialise, parameters
+from hobble.models.pfnn.fused import FusedStep
+from hobble.models.pfnn.trainable import TrainablePfnn, coefficients, initialise, parameters
 
 from .definition import output, spline
 
@@ -91,7 +91,7 @@ def test_it_runs_the_released_network(shared: Path) -> None:
         w, b = weights[f"W{number}"], weights[f"b{number}"]
         layer = np.concatenate([w.transpose(1, 0, 2), b.reshape(4, -1).T[:, :, None]], axis=2)
         parts.append(torch.from_numpy(np.ascontiguousarray(layer, np.float32)).flatten())
-    network = Network((342, 512, 512, 311), 4, torch.cat(parts))
+    network = TrainablePfnn(torch.cat(parts), (342, 512, 512, 311), 4)
     p = np.minimum(np.floor(rows["P"] * 50), 49) / 50
     mean, std = (weights[name].ravel() for name in ("Ymean", "Ystd"))
     x = (rows["X"] - weights["Xmean"].ravel()) / weights["Xstd"].ravel()
