@@ -13,8 +13,8 @@ import os
 import re
 from pathlib import Path
 
-from hobble.measures.registry import measure
 from hobble.channels import channel
+from hobble.measures.registry import measure
 from hobble.models import model
 from hobble.rows.layout import RowLayout
 from hobble.workflow.clips import MIRROR
