@@ -6,6 +6,7 @@ from pathlib import Path
 from hobble.channels import NAMES, modules_of
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import modules
+from hobble.workflow import lifetime
 from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
@@ -23,6 +24,9 @@ try:
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 
+lifetime.announce()
+lifetime.clear_stale_lock()
+
 # What the rules ask; each part is a module of hobble.workflow.
 catalogue = project.catalogue
 clips = project.clips
@@ -32,6 +36,12 @@ comparison = project.comparison
 package = project.package
 measurements = project.measurements
 demands = Demands(project)
+
+
+onstart:
+    if workflow.is_main_process:
+        lifetime.own_lock()
+        lifetime.end_jobs_with_run()
 
 
 wildcard_constraints:

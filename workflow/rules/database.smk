@@ -1,3 +1,6 @@
+from hobble.database.options import Merging, Rows
+
+
 rule database_clip:
     """The rows of X, Y and P of one clip."""
     input:
@@ -21,7 +24,7 @@ rule database_clip:
     params:
         clip=lambda w: w.rows,
         channels=lambda w: datasets.told.channels(w.dataset),
-        options=lambda w: datasets.options(w.dataset, "database"),
+        options=lambda w: datasets.part(w.dataset, "database", Rows),
         code=lambda w: package.code(
             "database_clip", *modules_of(datasets.told.channels(w.dataset))
         ),
@@ -51,7 +54,7 @@ rule database_merge:
     params:
         splits=lambda w: datasets.selected(w.dataset, told_by(w.told)),
         channels=lambda w: told_by(w.told),
-        options=lambda w: datasets.options(w.dataset, "database"),
+        options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=lambda w: package.code("database_merge", *modules_of(told_by(w.told))),
     script:
         "../scripts/database_merge.py"

@@ -102,12 +102,16 @@ class Demands:
 
     def weights(self, configuration: str) -> float:
         """Numbers that are trained, by the columns of the configuration's rows."""
-        chosen = self.project.catalogue.configuration(configuration)
-        database = self.project.datasets.options(chosen.dataset, "database")
-        skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(chosen.dataset).skeleton)
-        told = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
-        layout = RowLayout(len(skeleton.joints), database["window"], database["step"], told)
+        chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
         return model(chosen.network.kind).parameters(chosen.network, layout.x_size, layout.y_size)
+
+    def layout(self, configuration: str) -> RowLayout:
+        """The columns of a configuration's rows."""
+        chosen = self.project.catalogue.configuration(configuration)
+        skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(chosen.dataset).skeleton)
+        of_rows = self.project.datasets.options(chosen.dataset, "database", "window", "step")
+        told = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
+        return RowLayout(joints=len(skeleton.joints), channels=told, **of_rows)
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
     def all_thousands(self, dataset: str) -> float:
