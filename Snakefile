@@ -38,6 +38,10 @@ measurements = project.measurements
 demands = Demands(project)
 
 
+# A clip that a data set lists or its folder holds: no mirror, no hurt version.
+OWN = r"[^/]+(?<!_mirror)(?<!_hurt[1-9])"
+
+
 onstart:
     if workflow.is_main_process:
         lifetime.own_lock()
@@ -73,6 +77,12 @@ include: "workflow/rules/synthetic.smk"
 include: "workflow/rules/motion.smk"
 include: "workflow/rules/labels.smk"
 include: "workflow/rules/channels.smk"
+include: "workflow/rules/hurt.smk"
+
+
+ruleorder: hurt_clip > channel_clip
+
+
 include: "workflow/rules/terrain.smk"
 include: "workflow/rules/database.smk"
 include: "workflow/rules/training.smk"

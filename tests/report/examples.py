@@ -15,6 +15,7 @@ from hobble.core.files import save_npz, write_json, write_text
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout
+from hobble.runtime.options import Runtime
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 STAGES = (
@@ -30,11 +31,7 @@ STAGES = (
 )
 CLIPS = ("walk_straight", "walk_turns", "jog", "crouch", "stand", "strafe", "hurt_left_knee", "hurt_back")
 LINKS = ("LeftUpLeg-LeftLeg", "RightLeg-RightFoot", "Hips-LowerBack")
-RUNTIME = {
-    "mode": "cubic",
-    "foot_locking": True,
-    "steering": 1.0,
-}
+RUNTIME = Runtime(steering=1.0)
 HELD_OUT = ("walk_turns", "hurt_back")
 
 
@@ -219,7 +216,7 @@ def strip(seconds: float) -> dict[str, Any]:
 def clip_reports(folder: Path, clips: tuple[str, ...]) -> dict[str, list[str]]:
     """motion/, labels/ and injury/<clip>.json of every clip and its mirror; returns their paths."""
     rng = np.random.default_rng(5)
-    paths: dict[str, list[str]] = {"motion": [], "labels": [], "injuries": []}
+    paths: dict[str, list[str]] = {"motion": [], "labels": [], "told": []}
     for clip in clips:
         for i, name in enumerate((clip, f"{clip}_mirror")):
             safe = f"{len(paths['motion']):03d}"
@@ -255,8 +252,8 @@ def clip_reports(folder: Path, clips: tuple[str, ...]) -> dict[str, list[str]]:
                 "hurt_left_knee": {f"{side}UpLeg-{side}Leg": {"seconds": frames / 60, "highest": 7.0}},
                 "hurt_back": {"Hips-LowerBack": {"seconds": frames / 90, "highest": 5.0}},
             }.get(clip, {})
-            injury = {"clip": name, "hurt": hurt, "warnings": []}
-            for key, value in (("motion", motion), ("labels", labels), ("injuries", injury)):
+            injury = {"clip": name, "channel": "injury", "told": hurt, "warnings": []}
+            for key, value in (("motion", motion), ("labels", labels), ("told", injury)):
                 path = folder / key / f"{safe}.json"
                 write_json(path, value)
                 paths[key].append(str(path))
@@ -480,7 +477,7 @@ def write_all(
     }
     resolved = {
         "name": "example",
-        "configuration": {"training": {"passes": 20}, "runtime": RUNTIME},
+        "configuration": {"training": {"passes": 20}, "runtime": RUNTIME.model_dump()},
         "dataset": {"name": "made_up"},
     }
     write_text(folder / "configuration.yaml", yaml.safe_dump(resolved))

@@ -72,7 +72,7 @@ def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) 
 
 
 def test_the_page_moves_as_python_does(tab: Any, network: Network, examples: ModuleType) -> None:
-    animation = ProceduralAnimation(network, storage="int16", **examples.RUNTIME)
+    animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
     expected = []
     for frame in range(FRAMES):
         asked = wish(frame)

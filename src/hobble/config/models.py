@@ -83,6 +83,7 @@ class Dataset(s.Section):
     synthetic: s.Synthetic | None = None
     motion: s.Motion = s.Motion()
     labels: s.Labels = s.Labels()
+    hurt: s.Hurt | None = Field(None, description="hurt versions of the healthy clips, as further clips")
     terrain: s.Terrain = s.Terrain()
     database: s.Database = s.Database()
 

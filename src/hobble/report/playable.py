@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from hobble.models.network import Network, inverse
 from hobble.models.packing import packed
 from hobble.report.body import body
 from hobble.runtime import animation, feet, trajectory
+from hobble.runtime.options import Runtime
 
 # Parts of the body that have a slider and a key of their own: label, roles of the ends, key.
 PARTS = (
@@ -33,10 +34,10 @@ PRESETS = {
 }
 
 
-def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
+def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     """What the page's second implementation of the runtime needs; {} where the network has no skeleton.
 
-    runtime: that section of the configuration. Joint rotations are left out of the outputs: the page draws
+    Joint rotations are left out of the outputs: the page draws
     positions only.
     """
     skeleton = network.skeleton
@@ -68,10 +69,10 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
         "carried": [np.flatnonzero(row).tolist() for row in feet.carried(skeleton, legs)],
         "sole": sole,
         "body": {**body(skeleton.joints, skeleton.parents, skeleton.roles, network.links), "sole": sole},
-        "severityStep": runtime.get("rates", {}).get("injury", 10.0) / 60,
-        "severityScale": runtime.get("scales", {}).get("injury", 1.0),
-        "footLocking": runtime["foot_locking"],
-        "steering": runtime["steering"],
+        "severityStep": runtime.rates.get("injury", 10.0) / 60,
+        "severityScale": runtime.scales.get("injury", 1.0),
+        "footLocking": runtime.foot_locking,
+        "steering": runtime.steering,
         "parts": parts,
         "presets": [
             {"name": name, "severities": [[parts[label], value] for label, value in values.items()]}

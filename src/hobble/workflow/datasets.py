@@ -8,15 +8,14 @@ from typing import Any
 from hobble.config.load import Catalogue
 from hobble.core.errors import HobbleError
 from hobble.core.section import Section
-from hobble.workflow.clips import MIRROR, Clips
-from hobble.workflow.told import Told
+from hobble.workflow.clips import MIRROR, Clips, original
 
 
 class Datasets:
     """The data sets of a project, with the clips that lie in its folders."""
 
     def __init__(self, catalogue: Catalogue, clips: Clips) -> None:
-        self.catalogue, self.clips, self.told = catalogue, clips, Told(catalogue, clips)
+        self.catalogue, self.clips, self.told = catalogue, clips, clips.told
 
     def options(self, dataset: str, section: str, *keys: str) -> dict[str, Any]:
         """Plain values of one section of a data set: of those `keys`, or of all where none is named."""
@@ -37,7 +36,7 @@ class Datasets:
         """Synthetic clips: the frames at 60 Hz that fall to this one."""
         synthetic = self.catalogue.dataset(dataset).synthetic
         assert synthetic is not None
-        total = sum(entry.share for entry in self.clips.of(dataset).values())
+        total = sum(entry.share for entry in self.clips.own(dataset).values())
         return round(synthetic.frames * self.clips.entry(dataset, clip).share / total)
 
     def selected(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
@@ -55,14 +54,14 @@ class Datasets:
         others = [name for name in there if name not in channels]
         model, clips = self.catalogue.dataset(dataset), self.clips.of(dataset)
         held_out = set(model.held_out)
-        if missing := held_out - set(clips):
+        if missing := held_out - set(self.clips.own(dataset)):
             raise HobbleError(f"data set {dataset}: held_out names no clip: {', '.join(sorted(missing))}")
         splits = {}
         for clip in clips:
             if not all(self.told.neutral(dataset, clip, name) for name in others):
                 continue
             for name in (clip, clip + MIRROR) if model.mirror else (clip,):
-                splits[name] = "held_out" if clip in held_out else "train"
+                splits[name] = "held_out" if original(clip) in held_out else "train"
         if "train" not in splits.values():
             only = f" that is told nothing of {' or '.join(others)}" if others else ""
             raise HobbleError(f"data set {dataset}: no clip{only} is left to train on")

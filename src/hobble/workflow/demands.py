@@ -17,7 +17,7 @@ from hobble.channels import channel
 from hobble.measures.registry import measure
 from hobble.models import model
 from hobble.rows.layout import RowLayout
-from hobble.workflow.clips import MIRROR
+from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 
 ENGINE_MB = 400  # Snakemake, twice in a cluster's job: as the step that SLURM starts, and beside the script
@@ -98,7 +98,7 @@ class Demands:
 
     def thousands(self, dataset: str, clip: str) -> float:
         """Thousands of frames at the data set's rate, as if of 31 joints."""
-        return self._frames(dataset, clip.removesuffix(MIRROR)) / 1e3 * self._joints(dataset) / JOINTS
+        return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / JOINTS
 
     def weights(self, configuration: str) -> float:
         """Numbers that are trained, by the columns of the configuration's rows."""

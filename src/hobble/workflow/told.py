@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hobble.channels import NAMES, Source, channel
 from hobble.config.load import Catalogue
 from hobble.core.errors import HobbleError, InputError
-from hobble.workflow.clips import MIRROR, Clips
+
+if TYPE_CHECKING:
+    from hobble.workflow.clips import Clips
 
 PLAIN = "plain"  # the folder of the database whose network is told nothing
 
@@ -35,7 +37,7 @@ class Told:
     def source(self, dataset: str, clip: str, name: str) -> dict[str, Any]:
         """What the data set says of a clip to channel `name`: plain data, all of a `Source` but files."""
         return {
-            "clip": clip.removesuffix(MIRROR),
+            "clip": self.clips.original(clip),
             "entry": self.clips.entry(dataset, clip).model_dump(mode="json", exclude={"channels"}),
             "value": self._value(dataset, clip, name),
             "options": self.catalogue.dataset(dataset).channels.get(name, {}),
@@ -44,6 +46,8 @@ class Told:
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def neutral(self, dataset: str, clip: str, name: str) -> bool:
         """Whether a clip is told nothing by channel `name`."""
+        if self.clips.is_version(clip) and name == self.clips.versions_of:
+            return False
         made = self.catalogue.dataset(dataset).synthetic is not None
         files = self._tables(dataset, name) if made else self.files(dataset, clip, name)
         return channel(name).is_neutral(Source(**self.source(dataset, clip, name), files=files))
@@ -52,7 +56,7 @@ class Told:
         """Raise HobbleError for what the entries or options say that a channel cannot understand."""
         model = self.catalogue.dataset(dataset)
         rig = self.catalogue.skeleton(model.skeleton)
-        for clip, entry in self.clips.of(dataset).items():
+        for clip, entry in self.clips.own(dataset).items():
             if extra := set(entry.channels) - set(self.channels(dataset)):
                 raise HobbleError(
                     f"data set {dataset}: clips.{clip}.channels: the data set has no "

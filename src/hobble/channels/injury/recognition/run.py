@@ -2,7 +2,7 @@
 
 It learns windows of the training clips, each labelled with the link that hurts. How well it names windows of
 captured motion that it has not seen is the ceiling; how well it names those of generated walks stands beside
-the share that people got right when shown figures (Ferre et al. 2019).
+the share that people got right when shown figures (Ferre 2019).
 """
 
 from __future__ import annotations
