@@ -56,11 +56,12 @@ def test_names_are_unique() -> None:
     assert len(modules("run")) == len(NAMES)
 
 
-def test_the_list_is_read_without_what_measures() -> None:
-    """It is read before anything is planned, in every job of a cluster."""
-    code = "import sys, hobble.measures.registry; print([m for m in sys.modules if m.endswith('.run')])"
+def test_the_list_and_the_options_are_read_without_what_measures() -> None:
+    """They are read before anything is planned, and again in every job of a cluster."""
+    code = "import sys, hobble.measures.registry, hobble.config.sections; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    loaded = done.stdout.split()
+    assert [name for name in loaded if name in ("numpy", "numba", "torch") or name.endswith(".run")] == []
 
 
 def test_options_of_all_are_one_section() -> None:
