@@ -14,8 +14,8 @@ from hobble.channels.injury.recognition.run import HEALTHY, Window, recognition,
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.evaluation.captured import Captured
-from hobble.evaluation.discriminant import learn
 from hobble.evaluation.gait_features import features
+from hobble.gait.discriminant import learn
 from hobble.runtime.options import Runtime
 
 RUNTIME = Runtime(steering=1.0)

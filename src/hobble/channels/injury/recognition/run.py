@@ -20,8 +20,8 @@ from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured, captured_clips
 from hobble.evaluation.crowd import FPS, Stretch, severities
 from hobble.evaluation.crowd import run as run_walks
-from hobble.evaluation.discriminant import Discriminant, learn
 from hobble.evaluation.gait_features import features
+from hobble.gait.discriminant import Discriminant, learn
 from hobble.measures.given import Given, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network
