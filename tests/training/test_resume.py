@@ -257,9 +257,10 @@ def test_weights_are_all_that_a_runtime_needs(
 ) -> None:
     files = {name: tmp_path / name for name in ("weights", "history", "checkpoint")}
     settings = {"network": network, "training": training, "threads": 2, "start": None, "code": None}
-    run(small_database, configuration="small", checkpoints=tmp_path / "c", **settings, **files)
+    settings |= {"configuration": "small", "terrain_side": 31.0}
+    run(small_database, checkpoints=tmp_path / "c", **settings, **files)
     first = files["weights"].read_bytes()
-    run(small_database, configuration="small", checkpoints=tmp_path / "d", **settings, **files)
+    run(small_database, checkpoints=tmp_path / "d", **settings, **files)
     assert files["weights"].read_bytes() == first
     weights = load_npz(files["weights"])
     meta = json.loads(str(weights["meta"]))
@@ -267,6 +268,8 @@ def test_weights_are_all_that_a_runtime_needs(
     assert list(meta["skeleton"]["joints"]) == list(data.skeleton["joints"])
     assert (meta["gaits"], meta["contacts"]) == (list(GAITS), list(CONTACTS))
     assert (meta["channels"], meta["configuration"]) == ({"injury": ["Hips-LeftLeg"]}, "small")
+    assert (meta["kind"], meta["terrain_side"]) == ("pfnn", 31.0)
+    assert meta["network"].startswith("y = W2 elu(W1 elu(W0 x + b0) + b1) + b2 on")
     assert weights["W0"].shape == (4, 24, data.layout.x_size)
     assert weights["b2"].shape == (4, data.layout.y_size)
     block = next(data.blocks("held_out", 0, 0, data.manifest.visits, 0))
