@@ -12,7 +12,7 @@ from hobble.core.section import Positive, Section
 from hobble.evaluation.options import together
 from hobble.measures.joints import Joints
 from hobble.measures.measure import INPUTS, Measure
-from hobble.measures.registry import MEASURES, measure, modules
+from hobble.measures.registry import MEASURES, measure, modules, of_channels
 
 NAMES = [one.name for one in MEASURES]
 # Part -> its functions and what they are given.
@@ -48,6 +48,11 @@ def test_asks_for_what_there_is_and_has_the_parts_that_are_called(one: Measure) 
         assert present or module is None, f"{part} has none of {', '.join(functions)}"
         for name in present:
             assert len(inspect.signature(getattr(module, name)).parameters) == functions[name], (part, name)
+
+
+def test_channels_bring_their_own() -> None:
+    brought = [one.name for one in MEASURES if one.package.startswith("hobble.channels.")]
+    assert brought == ["injury", "recognition"] == [one.name for one in of_channels()]
 
 
 def test_names_are_unique() -> None:
