@@ -286,7 +286,7 @@ def test_entries_that_overlap_take_no_memory(tmp_path: Path, holden31: Skeleton)
                 setattr(again, key, getattr(first, key))
             archive.filelist.append(again)
             archive.NameToInfo[again.filename] = again
-    with pytest.raises(InputError, match="over each other|overlap"):
+    with pytest.raises(InputError, match="over each other"):
         load_network(path)
 
 
@@ -311,4 +311,4 @@ def test_the_ground_is_looked_up_where_it_was_in_training(tmp_path: Path, holden
         expected = side or 25.0
         np.testing.assert_allclose(np.linalg.norm(left - path, axis=-1), expected, rtol=1e-6)
         np.testing.assert_allclose(np.linalg.norm(right - path, axis=-1), expected, rtol=1e-6)
-        assert playable(network, Runtime().model_dump())["constants"]["side"] == expected
+        assert playable(network, Runtime())["constants"]["side"] == expected
