@@ -16,10 +16,10 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.database.layout import CONTACTS, GAITS, RowLayout
 from hobble.models.load import load_network
 from hobble.models.pfnn.release import PHASES
 from hobble.report.playable import playable
+from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 from hobble.runtime import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
@@ -29,7 +29,7 @@ Change = Callable[[Content], None]
 
 def content(skeleton: Skeleton, links: int = 30) -> Content:
     """The arrays and the meta (still a mapping) of a sound file."""
-    layout = RowLayout(len(skeleton.joints), links=links)
+    layout = RowLayout(len(skeleton.joints), channels=(("injury", links),) if links else ())
     rng = np.random.default_rng(1)
     sizes = (layout.x_size, 6, 5, layout.y_size)
     arrays: Content = {}
@@ -41,7 +41,7 @@ def content(skeleton: Skeleton, links: int = 30) -> Content:
         arrays[f"{name}std"] = rng.uniform(1, 5, size).astype(np.float32)
     arrays["meta"] = {
         "kind": "pfnn",
-        "layout": layout.to_dict(),
+        "layout": {"joints": layout.joints, "window": layout.window, "step": layout.step, "links": links},
         "skeleton": skeleton.to_dict(),
         "gaits": list(GAITS),
         "contacts": list(CONTACTS),
@@ -147,19 +147,25 @@ MALFORMED: dict[str, tuple[Change, str]] = {
     "step -10": (layout(step=-10), "layout.step"),
     "a window that is no multiple of the step": (layout(window=65), "no multiple"),
     "joints that are true": (layout(joints=True), "layout.joints"),
-    "links below 0": (layout(links=-1), "layout.links"),
+    "links below 0": (layout(links=-1), "layout.channels.injury"),
     "more links than columns": (layout(links=31), "do not fit"),
     "a layout without joints": (lambda c: c["meta"]["layout"].pop("joints"), "layout has the keys"),
-    "a layout of another program": (layout(phase=1), "layout has the keys"),
+    "a layout of another program": (
+        layout(phase=1),
+        "layout cannot be understood: there is no such key: phase",
+    ),
     "a layout that is a list": (meta(layout=[31, 60, 10, 30]), "layout is"),
     "3,000 gaits": (meta(gaits=[f"gait {i}" for i in range(3000)]), "gaits"),
     "seven gaits": (meta(gaits=[*GAITS, "fly"]), "gaits"),
     "one gait six times": (meta(gaits=["walk"] * 6), "gaits"),
     "gaits that are a text": (meta(gaits="walk"), "gaits"),
     "gaits that are numbers": (meta(gaits=[1, 2, 3, 4, 5, 6]), "gaits"),
-    "5 links for 30 columns": (meta(links=["a", "b", "c", "d", "e"]), "links named"),
-    "a link with a control character": (meta(links=["a\x1b[31m", *"bcdefghijklmnopqrstuvwxyzABCD"]), "links"),
-    "links that are a number": (meta(links=30), "links"),
+    "5 links for 30 columns": (meta(links=["a", "b", "c", "d", "e"]), "are named"),
+    "a link with a control character": (
+        meta(links=["a\x1b[31m", *"bcdefghijklmnopqrstuvwxyzABCD"]),
+        "channel injury",
+    ),
+    "links that are a number": (meta(links=30), "channel injury"),
     "a side that is text": (meta(terrain_side="wide"), "terrain_side"),
     "a side that is NaN": (meta(terrain_side=float("nan")), "terrain_side"),
     "a side of 1e30": (meta(terrain_side=1e30), "terrain_side"),
@@ -286,7 +292,7 @@ def test_entries_that_overlap_take_no_memory(tmp_path: Path, holden31: Skeleton)
                 setattr(again, key, getattr(first, key))
             archive.filelist.append(again)
             archive.NameToInfo[again.filename] = again
-    with pytest.raises(InputError, match="over each other|overlap"):
+    with pytest.raises(InputError, match=r"over each other|overlap"):
         load_network(path)
 
 
@@ -311,4 +317,4 @@ def test_the_ground_is_looked_up_where_it_was_in_training(tmp_path: Path, holden
         expected = side or 25.0
         np.testing.assert_allclose(np.linalg.norm(left - path, axis=-1), expected, rtol=1e-6)
         np.testing.assert_allclose(np.linalg.norm(right - path, axis=-1), expected, rtol=1e-6)
-        assert playable(network, Runtime().model_dump())["constants"]["side"] == expected
+        assert playable(network, Runtime())["constants"]["side"] == expected

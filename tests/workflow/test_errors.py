@@ -148,7 +148,7 @@ def small_disk(workflow) -> Iterator[Path]:
 
 
 def test_a_disk_that_fills(workflow, small_disk: Path) -> None:
-    target = "results/datasets/tiny/database/all"
+    target = "results/datasets/tiny/database/injury"
     text = workflow.run("-c2", target, "--keep-going", ok=False)
     assert "the disk is full" in text
     assert "Traceback" not in text
