@@ -7,12 +7,14 @@ from typing import Any
 
 from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
+from hobble.figure.pack import packed_body
 from hobble.report.formats import embedded
+from hobble.report.playable import skeleton_of
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
 LARGEST = 24_850_000  # bytes of the page, which is to stay under 25 MB
-ELSE = 60_000  # of them for words, style and tables
+ELSE = 800_000  # of them for words, style, tables and a body
 NAME = "compare"
 
 
@@ -42,7 +44,8 @@ def render_compared(
     charts = specs(sections)
     room = LARGEST - ELSE - len(bundle.encode()) - len(embedded(charts).encode())
     kept, left_out = fitting(playables or {}, room)
-    data = {"name": NAME, "charts": charts, "playable": kept}
+    bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in kept.values()}
+    data = {"name": NAME, "charts": charts, "playable": kept, "bodies": bodies}
     return template("compare.html.j2").render(
         name=NAME,
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
@@ -51,7 +54,7 @@ def render_compared(
         embedded=embedded(data),
         playable=list(kept),
         left_out=left_out,
-        hurts=any(spec["links"] for spec in kept.values()),
+        hurts=any(spec["parts"] for spec in kept.values()),
         style=style(),
         bundle=trusted("the bundle", bundle),
         provenance={"commit": commit(FOLDER), "machine": machine(), "versions": versions()},

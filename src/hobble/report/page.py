@@ -17,9 +17,13 @@ from hobble.report import (
     terrain_section,
     training_section,
 )
+from hobble.core.skeleton import Skeleton
+from hobble.figure.mesh import key
+from hobble.figure.pack import packed_body
 from hobble.report.formats import embedded, plain
 from hobble.report.gather import Material
 from hobble.report.ground_pictures import ground_pictures
+from hobble.report.hero import opening
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
@@ -42,8 +46,11 @@ def render(
     strips = data_section.strips(material)
     scenes = dict(scenes or {})
     grounds = ground_pictures(material.terrain, material.network["skeleton"])
+    figure = Skeleton.from_dict({"name": "", **material.network["skeleton"]}) if material.network["skeleton"] else None
     data = {
         "charts": specs(sections),
+        "bodies": {key(figure): packed_body(figure)} if figure else {},
+        "hero": opening(playable or {}, material.injury),
         "scenes": scenes,
         "strips": strips,
         "grounds": grounds,
@@ -55,6 +62,7 @@ def render(
         material=material,
         name=material.name,
         title=material.title or material.name,
+        titled=bool(material.title),
         eyebrow=f"Hobble report · configuration {material.name} · data set {material.dataset}",
         figures=findings.key_figures(material),
         hints=findings.hints(material),
@@ -62,7 +70,7 @@ def render(
         embedded=embedded(data),
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable={material.name: playable} if playable else {},
-        hurts=bool((playable or {}).get("links")),
+        hurts=bool((playable or {}).get("parts")),
         compared=[clip["name"] for clip in (compared or {}).get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],

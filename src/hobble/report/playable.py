@@ -9,23 +9,12 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.report.body import body
-from hobble.report.scenes import packed
-from hobble.runtime import animation, feet, trajectory
+from hobble.figure.mesh import body, key
+from hobble.figure.pack import packed, regions
+from hobble.report.words import PARTS, spoken_links, way
+from hobble.runtime import animation, controller, feet, trajectory
 from hobble.runtime.network import Network
 
-# Parts of the body that have a slider and a key of their own: label, roles of the ends, key.
-PARTS = (
-    ("left thigh", "left_hip", "left_knee"),
-    ("left shank", "left_knee", "left_heel"),
-    ("left foot", "left_heel", "left_toe"),
-    ("right thigh", "right_hip", "right_knee"),
-    ("right shank", "right_knee", "right_heel"),
-    ("right foot", "right_heel", "right_toe"),
-    ("lower back", "hips", "spine"),
-    ("left upper arm", "left_shoulder", "left_elbow"),
-    ("right upper arm", "right_shoulder", "right_elbow"),
-)
 PRESETS = {
     "Hurt knee": {"left thigh": 7, "left shank": 7},
     "Sprained ankle": {"right shank": 6, "right foot": 8},
@@ -37,31 +26,33 @@ PRESETS = {
 def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
     """What the page's second implementation of the runtime needs; {} where the network has no skeleton.
 
-    runtime: that section of the configuration. Joint rotations are left out of the outputs: the page draws
-    positions only.
+    runtime: that section of the configuration.
     """
     skeleton = network.skeleton
     if skeleton is None:
         return {}
     layout = network.layout
-    outputs = layout.y_joint_rotation.start
-    weights, biases = list(network.weights), list(network.biases)
-    weights[-1], biases[-1] = weights[-1][:, :outputs], biases[-1][:, :outputs]
     legs = feet.leg_joints(skeleton)
-    parts = body_parts(skeleton, network.links, network.hurt_links)
+    felt = network.hurt_links  # hurting another would change nothing
+    parts = {
+        label: i
+        for label, i in body_parts(skeleton, network.links, felt).items()
+        if network.links[i] in felt
+    }
     sole = feet.sole_heights(network, legs).tolist()
     return {
-        "layers": [_layer(w, b) for w, b in zip(weights, biases, strict=True)],
+        "layers": [_layer(w, b) for w, b in zip(network.weights, network.biases, strict=True)],
         "xMean": packed(network.x_mean.astype(np.float32)),
         "xScale": packed(
             np.where(network.x_std > 0, 1 / np.maximum(network.x_std, 1e-30), 0).astype(np.float32)
         ),
-        "yMean": packed(network.y_mean[:outputs].astype(np.float32)),
-        "yStd": packed(network.y_std[:outputs].astype(np.float32)),
+        "yMean": packed(network.y_mean.astype(np.float32)),
+        "yStd": packed(network.y_std.astype(np.float32)),
         "joints": layout.joints,
         "names": list(skeleton.joints),
         "parents": list(skeleton.parents),
         "offsets": np.round(skeleton.offsets, 4).tolist(),
+        "roles": dict(skeleton.roles),
         "window": layout.window,
         "step": layout.step,
         "x": {name: block.start for name, block in layout.blocks("x").items()} | {"size": layout.x_size},
@@ -72,7 +63,9 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
         "legs": legs.tolist(),
         "carried": [np.flatnonzero(row).tolist() for row in feet.carried(skeleton, legs)],
         "sole": sole,
-        "body": {**body(skeleton.joints, skeleton.parents, skeleton.roles, network.links), "sole": sole},
+        "body": key(skeleton),
+        "regions": regions(skeleton, network.links),
+        "spoken": spoken_links(skeleton, network.links),
         "severityStep": runtime["severity_rate"] / 60,
         "severityScale": runtime["severity_scale"],
         "footLocking": runtime["foot_locking"],
@@ -87,6 +80,12 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def skeleton_of(spec: Mapping[str, Any]) -> Skeleton:
+    """The skeleton of a character that `playable` packed, as far as its body needs it."""
+    joints, parents = tuple(spec["names"]), tuple(spec["parents"])
+    return Skeleton("", joints, parents, np.array(spec["offsets"]), spec["roles"])
+
+
 def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] = ()) -> dict[str, int]:
     """Label -> index of the link that the part is, for those that the network knows.
 
@@ -95,14 +94,7 @@ def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] =
     """
     found = {}
     for label, upper, lower in PARTS:
-        if upper not in skeleton.roles or lower not in skeleton.roles:
-            continue
-        joint, top = skeleton.role(lower), skeleton.role(upper)
-        way = []
-        while joint != top and skeleton.parents[joint] >= 0:
-            way.append(f"{skeleton.joints[skeleton.parents[joint]]}-{skeleton.joints[joint]}")
-            joint = skeleton.parents[joint]
-        known = [name for name in reversed(way) if name in links]
+        known = [name for name in way(skeleton, upper, lower) if name in links]
         if known:
             best = next((name for name in known if name in hurt), known[0])
             found[label] = list(links).index(best)
@@ -128,6 +120,7 @@ def _constants() -> dict[str, float]:
         "lockAt": feet.LOCK_AT,
         "release": feet.RELEASE,
         "tooFar": feet.TOO_FAR,
+        "fastestTurn": float(controller.FASTEST_TURN),
         "heightMix": feet.HEIGHT_MIX,
         "floating": feet.FLOATING,
     }

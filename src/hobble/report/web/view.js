@@ -29,9 +29,9 @@ const shared = () => {
 const lit = (scene) => {
   const sky = new HemisphereLight(), key = new DirectionalLight(), rim = new DirectionalLight();
   key.castShadow = true;
-  key.shadow.mapSize.set(512, 512);
-  Object.assign(key.shadow, { radius: 5, blurSamples: 10, bias: -.0004, normalBias: 1 });
-  Object.assign(key.shadow.camera, { left: -170, right: 170, top: 170, bottom: -170, near: 100, far: 1200 });
+  key.shadow.mapSize.set(768, 768);
+  Object.assign(key.shadow, { radius: 6, blurSamples: 12, bias: -.0004, normalBias: 1, intensity: .85 });
+  Object.assign(key.shadow.camera, { left: -190, right: 190, top: 190, bottom: -190, near: 100, far: 1200 });
   scene.add(sky, key, key.target, rim, rim.target);
   return {
     colour(paint) {
@@ -61,7 +61,8 @@ export const createView = (canvas, home, draw) => {
   const context = canvas.getContext("2d"), scene = new Scene(), camera = new PerspectiveCamera(30, 1, 10, 6000);
   const lights = lit(scene);
   let scale = 1, eye = [0, 0, 1], right, up, ahead, seen = false, waiting = false;
-  const view = { scene, W: 0, H: 0, zoom: 1, paint: {}, milliseconds: 0, onHidden: () => {} };
+  // framing: how large what is looked at is drawn, and by how much of the width and height it is moved aside.
+  const view = { scene, W: 0, H: 0, zoom: 1, paint: {}, milliseconds: 0, framing: { size: 1.75, aside: 0, up: 0 }, onHidden: () => {} };
   view.land = createLand(scene);
   view.marks = createMarks(scene);
 
@@ -81,7 +82,12 @@ export const createView = (canvas, home, draw) => {
     gl.setScissor(0, 0, w, h);
     view.marks.done();
     gl.render(scene, camera);
-    context.clearRect(0, 0, w, h);
+    // The sky lies under the scene, so that saved pictures and films have one.
+    const sky = context.createLinearGradient(0, 0, 0, h), [r, g, b] = view.paint.sky, [u, v, t] = view.paint.zenith;
+    sky.addColorStop(0, `rgb(${u},${v},${t})`);
+    sky.addColorStop(.7, `rgb(${r},${g},${b})`);
+    context.fillStyle = sky;
+    context.fillRect(0, 0, w, h);
     context.drawImage(room, 0, room.height - h, w, h, 0, 0, w, h);
     view.milliseconds += .1 * (performance.now() - before - view.milliseconds);
   };
@@ -98,7 +104,8 @@ export const createView = (canvas, home, draw) => {
     ahead = away.map((v) => -v);
     right = unit(cross(ahead, [0, 1, 0]));
     up = cross(right, ahead);
-    view.zoom = 1.75 * Math.min(view.H, view.W * 1.15);
+    view.zoom = view.framing.size * Math.min(view.H, view.W * 1.15);
+    camera.setViewOffset(view.W, view.H, -view.framing.aside * view.W, view.framing.up * view.H, view.W, view.H);
     camera.fov = 2 * Math.atan(view.H / 2 / view.zoom) * 180 / Math.PI;
     camera.aspect = view.W / view.H;
     camera.position.set(...eye);
@@ -109,7 +116,8 @@ export const createView = (canvas, home, draw) => {
   // Screen x, y and distance along the view.
   view.project = (p) => {
     const d = minus(p, eye), z = Math.max(1, dot(d, ahead));
-    return [view.W / 2 + view.zoom * dot(d, right) / z, view.H / 2 - view.zoom * dot(d, up) / z, z];
+    const { aside, up: raised } = view.framing;
+    return [view.W * (.5 + aside) + view.zoom * dot(d, right) / z, view.H * (.5 - raised) - view.zoom * dot(d, up) / z, z];
   };
 
   const recolour = () => {
@@ -128,6 +136,6 @@ export const createView = (canvas, home, draw) => {
     [canvas.width, canvas.height] = [Math.round(view.W * scale), Math.round(view.H * scale)];
     if (seen) paint(performance.now()); // at once: a canvas loses its picture with its size
   }).observe(canvas);
-  new IntersectionObserver(([entry]) => { seen = entry.isIntersecting; view.onHidden(); view.ask(); }).observe(canvas);
+  new IntersectionObserver((entries) => { seen = entries.at(-1).isIntersecting; view.onHidden(); view.ask(); }).observe(canvas);
   return view;
 };
