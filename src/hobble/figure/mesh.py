@@ -89,10 +89,10 @@ def _made(text: str) -> Mesh:
         stand, solids, bones = _sticks(skeleton)
         size, fine = 1.0, []
     corners, faces = surface(solids, STEP * size, fine)
-    slope = slopes(solids, corners)
+    slope, _ = slopes(solids, corners)
     normals = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
     owner = owners(solids, corners, bones)
-    bone, share = spread(corners, faces, owner, _reach(solids, corners, stand, size) if known else 2.0)
+    bone, share = spread(corners, faces, owner, _reach(owner, stand, size) if known else 2.0)
     used = np.unique(bone)
     return Mesh(
         corners,
@@ -129,10 +129,9 @@ def _fine(stand: Bind) -> list[Fine]:
     return out
 
 
-def _reach(solids: Sequence[Solid], corners: Array, stand: Bind, size: float) -> Array:
-    """Over how many cm the shares of two bones meet, at each corner."""
-    owner = owners(solids, corners, stand.bones)
-    wide = np.full(len(corners), WIDE[""])
+def _reach(owner: NDArray[np.int64], stand: Bind, size: float) -> Array:
+    """Over how many cm the shares of two bones meet, at each corner, by its owner (V,)."""
+    wide = np.full(len(owner), WIDE[""])
     for part, roles in (
         ("hand", ("left_wrist", "right_wrist")),
         ("head", ("head", "neck")),

@@ -22,7 +22,10 @@ def owners(solids: Sequence[Solid], points: Array, bones: Mapping[str, int]) -> 
     for solid in solids:
         if solid.cut:
             continue
-        away = solid.distance(x, y, z)
+        low, high = (corner.reshape(3, 1) for corner in solid.bounds())
+        chosen = np.flatnonzero(((points.T > low - 4) & (points.T < high + 4)).all(axis=0))
+        away = np.full(len(points), np.inf)
+        away[chosen] = solid.distance(x[chosen], y[chosen], z[chosen])
         nearer = away < best
         joint = np.zeros(len(points), np.int64)
         along = solid.along(points)

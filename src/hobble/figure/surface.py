@@ -11,6 +11,7 @@ from hobble.core.quat import Array
 from hobble.figure.solids import Solid, taken_away, united
 
 FAR = 12.0  # cm; nothing is said of how much further away the surface is
+NEAR = 7.0  # cm around a solid within which it counts; all blends are narrower
 # The corners of a cell, and its edges as pairs of them.
 CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if (CORNERS[a] != CORNERS[b]).sum() == 1]
@@ -22,14 +23,16 @@ Fine = tuple[Array, Array, float]
 def distances(solids: Sequence[Solid], points: Array) -> Array:
     """Distance (N,) of points (N, 3) to the surface of the blended solids, below 0 inside, FAR at most."""
     out = np.full(len(points), FAR)
-    x, y, z = points.T
+    x, y, z = (np.ascontiguousarray(part) for part in points.T)
     for solid in solids:
         low, high = solid.bounds()
-        near = ((points > low - FAR / 2) & (points < high + FAR / 2)).all(axis=1)
-        if near.any():
-            found = solid.distance(x[near], y[near], z[near])
+        low, high = low - NEAR, high + NEAR
+        near = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & (z > low[2]) & (z < high[2])
+        chosen = np.flatnonzero(near)
+        if len(chosen):
+            found = solid.distance(x[chosen], y[chosen], z[chosen])
             act = taken_away if solid.cut else united
-            out[near] = act(out[near], found, solid.blend)
+            out[chosen] = act(out[chosen], found, solid.blend)
     return out
 
 
@@ -81,28 +84,29 @@ def surface(solids: Sequence[Solid], step: float, fine: Sequence[Fine] = ()) -> 
     ]
     values = settled(field(solids, axes))
     corners, faces = nets(values, axes)
-    for _ in range(3):
+    for _ in range(2):
         corners = corners - onto(solids, corners, 0.35 * step)
     return corners, faces
 
 
 def onto(solids: Sequence[Solid], points: Array, most: float) -> Array:
     """How far points (N, 3) lie from the surface along its slope, (N, 3), `most` cm at the most."""
-    slope = slopes(solids, points)
+    slope, away = slopes(solids, points)
     steep = (slope * slope).sum(axis=1)
-    move = (distances(solids, points) / np.maximum(steep, 0.25))[:, None] * slope
+    move = (away / np.maximum(steep, 0.25))[:, None] * slope
     size = np.linalg.norm(move, axis=1, keepdims=True)
     return move * np.minimum(1.0, most / np.maximum(size, 1e-9))
 
 
-def slopes(solids: Sequence[Solid], points: Array, h: float = 0.05) -> Array:
-    """Slope (N, 3) of the distance at points (N, 3)."""
-    out = np.empty_like(points)
-    for i in range(3):
-        shift = np.zeros(3)
-        shift[i] = h
-        out[:, i] = (distances(solids, points + shift) - distances(solids, points - shift)) / (2 * h)
-    return out
+def slopes(solids: Sequence[Solid], points: Array, h: float = 0.06) -> tuple[Array, Array]:
+    """Slope (N, 3) of the distance at points (N, 3), and the distance (N,), from the corners of a small
+    tetrahedron around each."""
+    slope, away = np.zeros_like(points), np.zeros(len(points))
+    for corner in np.array([[1.0, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]]):
+        found = distances(solids, points + h * corner)
+        slope += found[:, None] * corner / (4 * h)
+        away += found / 4
+    return slope, away
 
 
 def settled(values: Array) -> Array:

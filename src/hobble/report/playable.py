@@ -6,15 +6,18 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.database.layout import RowLayout
 from hobble.figure.mesh import body, key
 from hobble.figure.pack import packed, regions
 from hobble.report.words import PARTS, spoken_links, way
 from hobble.runtime import animation, controller, feet, trajectory
 from hobble.runtime.network import Network
 
+UNSEEN = 1e-7  # an input that is scaled by less than this says nothing
 PRESETS = {
     "Hurt knee": {"left thigh": 7, "left shank": 7},
     "Sprained ankle": {"right shank": 6, "right foot": 8},
@@ -26,12 +29,21 @@ PRESETS = {
 def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
     """What the page's second implementation of the runtime needs; {} where the network has no skeleton.
 
-    runtime: that section of the configuration.
+    runtime: that section of the configuration. Left out are inputs that weigh nothing (joints that a network
+    is not shown), and the rotations of joints that move no part of the body, such as fingers: these stay at
+    rest on the joint above.
     """
     skeleton = network.skeleton
     if skeleton is None:
         return {}
     layout = network.layout
+    turning = turning_joints(skeleton)
+    rows = _rows(layout, turning)
+    scale = np.where(network.x_std > 0, 1 / np.maximum(network.x_std, 1e-30), 0)
+    seen = np.flatnonzero(scale > UNSEEN)
+    weights, biases = list(network.weights), list(network.biases)
+    weights[0] = weights[0][:, :, seen]
+    weights[-1], biases[-1] = weights[-1][:, rows], biases[-1][:, rows]
     legs = feet.leg_joints(skeleton)
     felt = network.hurt_links  # hurting another would change nothing
     parts = {
@@ -41,13 +53,13 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
     }
     sole = feet.sole_heights(network, legs).tolist()
     return {
-        "layers": [_layer(w, b) for w, b in zip(network.weights, network.biases, strict=True)],
-        "xMean": packed(network.x_mean.astype(np.float32)),
-        "xScale": packed(
-            np.where(network.x_std > 0, 1 / np.maximum(network.x_std, 1e-30), 0).astype(np.float32)
-        ),
-        "yMean": packed(network.y_mean.astype(np.float32)),
-        "yStd": packed(network.y_std.astype(np.float32)),
+        "layers": [_layer(w, b) for w, b in zip(weights, biases, strict=True)],
+        "seen": seen.tolist(),
+        "xMean": packed(network.x_mean[seen].astype(np.float32)),
+        "xScale": packed(scale[seen].astype(np.float32)),
+        "yMean": packed(network.y_mean[rows].astype(np.float32)),
+        "yStd": packed(network.y_std[rows].astype(np.float32)),
+        "turning": turning,
         "joints": layout.joints,
         "names": list(skeleton.joints),
         "parents": list(skeleton.parents),
@@ -78,6 +90,23 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
         ],
         "constants": _constants(),
     }
+
+
+def turning_joints(skeleton: Skeleton) -> list[int]:
+    """The joints whose rotations are seen: the bones of the body, legs, and all above them."""
+    found: set[int] = set()
+    for joint in (*body(skeleton).bones.tolist(), *feet.leg_joints(skeleton).ravel().tolist()):
+        while joint >= 0 and joint not in found:
+            found.add(joint)
+            joint = skeleton.parents[joint]
+    return sorted(found)
+
+
+def _rows(layout: RowLayout, turning: Sequence[int]) -> NDArray[np.int64]:
+    """Outputs that the page uses: all before the rotations, and those of the joints that turn."""
+    start = layout.y_joint_rotation.start
+    turns = start + 3 * np.asarray(turning)[:, None] + np.arange(3)
+    return np.concatenate([np.arange(start), turns.ravel()])
 
 
 def skeleton_of(spec: Mapping[str, Any]) -> Skeleton:

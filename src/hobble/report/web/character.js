@@ -26,6 +26,12 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     const [a, b, d] = [y[i] * scale, y[i + 1] * scale, y[i + 2] * scale];
     [q[0], q[1], q[2], q[3]] = [co * w - si * b, co * a + si * d, co * b + si * w, co * d - si * a];
   };
+  // The rotations of this frame; joints that move nothing stay at rest on the one above.
+  const rests = spec.parents.flatMap((p, j) => (p < 0 || spec.turning.includes(j) ? [] : [[j, p]]));
+  const settle = () => {
+    c.turns.set(c.rotations);
+    for (const [j, p] of rests) for (let i = 0; i < 4; i++) c.turns[4 * j + i] = c.turns[4 * p + i];
+  };
   for (let t = 0; t < T; t++) c.gait[t * G + gaits.indexOf("stand")] = 1;
   for (let j = 0; j < J; j++) {
     const [a, b, d] = [0, 1, 2].map((i) => mean[Y.joint_position + 3 * j + i]);
@@ -34,11 +40,11 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     c.joints[3 * j + 2] = d * cos(heading) - a * sin(heading) + place[1];
   }
   c.pose.set(c.joints);
-  for (let j = 0; j < J; j++) {
-    turned(mean, Y.joint_rotation + 3 * j, cos(heading / 2), sin(heading / 2));
+  spec.turning.forEach((j, n) => {
+    turned(mean, Y.joint_rotation + 3 * n, cos(heading / 2), sin(heading / 2));
     c.rotations.set(q, 4 * j);
-  }
-  c.turns.set(c.rotations);
+  });
+  settle();
 
   // Wishes, as `ProceduralAnimation.next_pose` takes them: velocity [x, z], facing [x, z] or null, gait or null.
 
@@ -161,9 +167,9 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     }
     // No joint turns further than fastestTurn in a frame, along the shorter way.
     const yaw = atan2(si, co), halfCos = cos(yaw / 2), halfSin = sin(yaw / 2), slowest = cos(k.fastestTurn / 2);
-    for (let j = 0; j < J; j++) {
-      const o = 4 * j, old = c.rotations;
-      turned(y, Y.joint_rotation + 3 * j, halfCos, halfSin);
+    for (let n = 0; n < spec.turning.length; n++) {
+      const o = 4 * spec.turning[n], old = c.rotations;
+      turned(y, Y.joint_rotation + 3 * n, halfCos, halfSin);
       const near = old[o] * q[0] + old[o + 1] * q[1] + old[o + 2] * q[2] + old[o + 3] * q[3];
       let keep = 0, take = 1;
       if (abs(near) < slowest) {
@@ -174,7 +180,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       for (let i = 0; i < 4; i++) old[o + i] = keep * old[o + i] + take * q[i];
     }
     c.pose.set(c.joints);
-    c.turns.set(c.rotations);
+    settle();
     for (let i = 0; i < 4; i++) c.contacts[i] = y[Y.contacts + i];
     for (let f = 0; f < 2; f++) placeFoot(f, ground);
   };

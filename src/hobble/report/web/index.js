@@ -2,6 +2,7 @@
 import { colour, material } from "./base.js";
 import { bvh } from "./bvh.js";
 import { createCharacter } from "./character.js";
+import { createChase } from "./chase.js";
 import { hero } from "./hero.js";
 import { createRig } from "./rig.js";
 import { drawAll } from "./charts.js";
@@ -13,4 +14,4 @@ import "./fits.js";
 import "./strips.js";
 import "./page.js";
 
-globalThis.Hobble = { bvh, character: createCharacter, colour, csv, drawAll, hero, material, player, rig: createRig };
+globalThis.Hobble = { bvh, character: createCharacter, chase: createChase, colour, csv, drawAll, hero, material, player, rig: createRig };
