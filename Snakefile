@@ -4,8 +4,11 @@ import sys
 from pathlib import Path
 
 from hobble.core.errors import HobbleError
+from hobble.measures.registry import modules
+from hobble.workflow import lifetime
 from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
+from hobble.workflow.measurements import NAMES as MEASURES
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check
 
@@ -19,6 +22,9 @@ try:
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 
+lifetime.announce()
+lifetime.clear_stale_lock()
+
 # What the rules ask; each part is a module of hobble.workflow.
 catalogue = project.catalogue
 clips = project.clips
@@ -26,7 +32,14 @@ datasets = project.datasets
 configurations = project.configurations
 comparison = project.comparison
 package = project.package
+measurements = project.measurements
 demands = Demands(project)
+
+
+onstart:
+    if workflow.is_main_process:
+        lifetime.own_lock()
+        lifetime.end_jobs_with_run()
 
 
 wildcard_constraints:
@@ -35,10 +48,13 @@ wildcard_constraints:
     clip=r"[^/]+(?<!_mirror)",
     rows=r"[^/]+",
     selection="healthy|all",
+    measure="|".join(MEASURES),
 
 
 def kept(files):
     """Files of the checkout or the user: they stay where they are, though results may lie in an object store."""
+    if isinstance(files, dict):
+        return {name: kept(some) for name, some in files.items()}
     many = [files] if isinstance(files, str) else files
     many = [f if f.startswith("results/") else local(f) for f in many]
     return many[0] if isinstance(files, str) else many

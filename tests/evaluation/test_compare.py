@@ -17,9 +17,9 @@ from hobble.core.errors import InputError
 from hobble.evaluation.compare import compare
 from hobble.evaluation.compare_tables import tables
 from hobble.evaluation.measured import read_measured
-from hobble.evaluation.responsivity import parameter_counts
 from hobble.evaluation.series import difference, line
 from hobble.evaluation.tables import write_csv
+from hobble.measures.responsivity.run import parameter_counts
 
 SIZES = {
     "holden": (342, 512, 512, 311),

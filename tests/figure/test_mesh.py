@@ -64,7 +64,9 @@ def test_the_surface_is_smooth(mesh: Mesh, holden31: Skeleton) -> None:
     """The normals at the ends of an edge differ little, but for fingers, the edges of soles and the face."""
     a, b = edges(mesh).T
     turn = np.degrees(np.arccos(np.clip((mesh.normals[a] * mesh.normals[b]).sum(axis=1), -1, 1)))
-    fine = [holden31.role(f"{side}_{role}") for side in ("left", "right") for role in ("wrist", "heel", "toe")]
+    fine = [
+        holden31.role(f"{side}_{role}") for side in ("left", "right") for role in ("wrist", "heel", "toe")
+    ]
     trunk = ~np.isin(mesh.bones[mesh.bone[a, 0]], [*fine, holden31.role("head")])
     assert np.median(turn) < 8
     assert np.quantile(turn[trunk], 0.99) < 25

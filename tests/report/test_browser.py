@@ -128,14 +128,16 @@ def test_captured_and_predicted_are_drawn_and_stepped_through(tab: Any) -> None:
 def test_choosers_change_their_pictures(tab: Any, material: Material) -> None:
     choose(tab, "sweeps-choice", 2)
     drawn = "document.querySelector('[data-chart=\"sweep-speed\"]').data[0].y[0]"
-    assert tab.run(drawn) == pytest.approx(material.injury["rows"][22]["speed"])
+    assert tab.run(drawn) == pytest.approx(material.measured["injury"]["rows"][22]["speed"])
     choose(tab, "strip-clip", 6)
     assert "eftUpLeg-LeftLeg" in text(tab, "strip")
 
 
 def test_tables_sort_and_become_csv(tab: Any, material: Material) -> None:
     table = "document.querySelector('table[data-csv=\"example-accuracy\"]')"
-    ranked = [row["clip"] for row in sorted(material.accuracy["clips"], key=lambda row: row["mean"])]
+    ranked = [
+        row["clip"] for row in sorted(material.measured["accuracy"]["clips"], key=lambda row: row["mean"])
+    ]
     column = f"[...{table}.tBodies[0].rows].map((row) => row.cells[0].textContent)"
     for order, name in ((ranked, "ascending"), (ranked[::-1], "descending")):
         tab.run(f"{table}.tHead.rows[0].cells[3].querySelector('button').click()")
@@ -143,7 +145,7 @@ def test_tables_sort_and_become_csv(tab: Any, material: Material) -> None:
         assert tab.run(f"{table}.tHead.rows[0].cells[3].getAttribute('aria-sort')") == name
     lines = tab.run(f"Hobble.csv({table})").split("\r\n")
     assert lines[0] == 'clip,split,frames,mean,sd,"position error, cm"'
-    worst = max(material.accuracy["clips"], key=lambda row: row["mean"])
+    worst = max(material.measured["accuracy"]["clips"], key=lambda row: row["mean"])
     assert lines[1].startswith(f"{worst['clip']},{worst['split']},{worst['frames']},{worst['mean']},")
 
 

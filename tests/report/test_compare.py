@@ -10,9 +10,9 @@ import pytest
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import headings, root_path
 from hobble.figure.mesh import body
+from hobble.models.network import Network
 from hobble.report.compare import in_world
 from hobble.report.scenes import UNIT
-from hobble.runtime.network import Network
 
 
 def positions(clip: dict[str, Any], table: str, joints: int) -> np.ndarray:
@@ -41,7 +41,9 @@ def test_captured_motion_comes_back(
     made = examples.walker(holden31, 200, 2.2)["positions"][60:121:2]
     found = positions(clip, "captured", compared["joints"])
     # The same motion, begun at the origin; the walker's path is straight up to its frame 66 and bends after.
-    assert found[:, :, 1] == pytest.approx(_drawn(made, compared, holden31)[:, :, 1], abs=0.9)  # legs are not stretched out wholly
+    assert found[:, :, 1] == pytest.approx(
+        _drawn(made, compared, holden31)[:, :, 1], abs=0.9
+    )  # legs are not stretched out wholly
     step = np.linalg.norm(np.diff(found[:, 0, ::2], axis=0), axis=1)
     assert step == pytest.approx(np.linalg.norm(np.diff(made[:, 0, ::2], axis=0), axis=1), abs=1e-3)
 

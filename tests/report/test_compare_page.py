@@ -10,14 +10,18 @@ from typing import Any
 import pytest
 import yaml
 
+from hobble.channels.injury.response.comparison_page import injury_table
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.compare import Measured, compare
+from hobble.evaluation.compare import compare
+from hobble.evaluation.measured import Measured
+from hobble.measures.accuracy import comparison_page as of_accuracy
+from hobble.measures.responsivity import comparison_page as of_responsivity
+from hobble.models.load import load_network
 from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
 from hobble.report.compare_page import render_compared
 from hobble.report.gather import PUBLISHED, Material
 from hobble.report.playable import playable
-from hobble.runtime.network import load_network
 
 
 @pytest.fixture(scope="module")
@@ -32,10 +36,13 @@ def compared(material: Material) -> dict[str, Any]:
         }
     }
     counts = {"true": 5000, "table_6_1": 4000, "table_6_1_as_printed": 3000}
-    better = [{**row, "mean": row["mean"] / 2} for row in material.accuracy["clips"]]
+    better = [{**row, "mean": row["mean"] / 2} for row in material.measured["accuracy"]["clips"]]
     measured = []
-    for name, clips, factor in (("holden", material.accuracy["clips"], 1), ("ava", better, 2)):
-        responsivity = {**material.responsivity, "parameters": {k: factor * v for k, v in counts.items()}}
+    for name, clips, factor in (("holden", material.measured["accuracy"]["clips"], 1), ("ava", better, 2)):
+        responsivity = {
+            **material.measured["responsivity"],
+            "parameters": {k: factor * v for k, v in counts.items()},
+        }
         splits = {
             s: {
                 **part,
@@ -43,7 +50,7 @@ def compared(material: Material) -> dict[str, Any]:
                 "mean_of_clips": part["mean"] / factor,
                 **{f"p{q:02}": part["mean"] * q / 50 / factor for q in (5, 25, 50, 75, 95)},
             }
-            for s, part in ((s, material.accuracy[s]) for s in ("train", "held_out"))
+            for s, part in ((s, material.measured["accuracy"][s]) for s in ("train", "held_out"))
         }
         lengths = [
             {
@@ -57,11 +64,13 @@ def compared(material: Material) -> dict[str, Any]:
             Measured(
                 name=name,
                 resolved=resolved,
-                accuracy={**material.accuracy, **splits, "clips": clips, "joints": 31},
-                rollouts={"lengths": lengths},
-                responsivity=responsivity,
-                injury=material.injury,
-                recognition={"applies": False, "reason": "not tried"},
+                measured={
+                    "accuracy": {**material.measured["accuracy"], **splits, "clips": clips, "joints": 31},
+                    "rollouts": {"lengths": lengths},
+                    "responsivity": responsivity,
+                    "injury": material.measured["injury"],
+                    "recognition": {"applies": False, "reason": "not tried"},
+                },
                 pipeline=material.pipeline,
                 history=material.history,
             )
@@ -87,7 +96,7 @@ def tab(
 
 
 def test_boxes_stand_at_the_quantiles_and_published_means_beside_them(compared: dict[str, Any]) -> None:
-    chart = parts.error_boxes(compared)
+    chart = of_accuracy.error_boxes(compared)
     assert chart is not None
     boxes = [t for t in chart.options["held-out clips"] if t["type"] == "box"]
     assert [box["name"] for box in boxes] == ["holden", "ava"]
@@ -108,7 +117,7 @@ def test_training_is_drawn_over_passes_seconds_and_samples(
 
 
 def test_every_pair_is_in_the_table_and_the_map(compared: dict[str, Any]) -> None:
-    table, chart = tables.difference_table(compared), parts.difference_map(compared)
+    table, chart = tables.difference_table(compared), of_accuracy.difference_map(compared)
     assert table is not None
     assert chart is not None
     overall = next(row for row in table.rows if row[2] == "error, held out")
@@ -133,18 +142,18 @@ def test_published_figures_have_ours_beside_them(compared: dict[str, Any]) -> No
 def test_frame_times_are_medians_and_measures_have_names(
     compared: dict[str, Any], material: Material
 ) -> None:
-    median = material.responsivity["milliseconds"]["spread"]["median"]
+    median = material.measured["responsivity"]["milliseconds"]["spread"]["median"]
     table = tables.configuration_table(compared)
     column = [c.label for c in table.columns].index("ms a frame, median")
     assert [row[column] for row in table.rows] == [median, median]
-    laps, fit = parts.lap_lines(compared), parts.fit_chart(compared)
+    laps, fit = of_responsivity.lap_lines(compared), of_responsivity.fit_chart(compared)
     assert laps is not None
     assert fit is not None
-    first = material.responsivity["laps"][0]["milliseconds"]["spread"]["median"]
+    first = material.measured["responsivity"]["laps"][0]["milliseconds"]["spread"]["median"]
     assert next(iter(laps.options.values()))[0]["y"][0] == first
     assert fit.traces[0]["y"] == [median, median]
     summary = {"walk": {"speed_share": 0.8, "after_healing_cm": 0.1}}
-    named = tables.injury_table(
+    named = injury_table(
         {"injury": [{"configuration": "a", "applies": True, "summary": summary}], "recognition": []}
     )
     assert named is not None

@@ -9,13 +9,20 @@ from hobble.report.findings import hints, key_figures
 from hobble.report.gather import Material
 
 
+def changed(material: Material, **changes: Any) -> Material:
+    """The material with other measurements, or with other fields."""
+    fields = {key: value for key, value in changes.items() if hasattr(material, key)}
+    found = {key: value for key, value in changes.items() if key not in fields}
+    return replace(material, measured={**material.measured, **found}, **fields)
+
+
 def heads(material: Material, **changes: Any) -> dict[str, str]:
     """Head of each hint -> its kind."""
-    return {hint.head: hint.kind for hint in hints(replace(material, **changes))}
+    return {hint.head: hint.kind for hint in hints(changed(material, **changes))}
 
 
 def accuracy(material: Material, held_out: float | None, train: float = 0.04) -> dict[str, Any]:
-    return {**material.accuracy, "train": {"mean": train}, "held_out": {"mean": held_out}}
+    return {**material.measured["accuracy"], "train": {"mean": train}, "held_out": {"mean": held_out}}
 
 
 def history(losses: list[float]) -> dict[str, list[float | None]]:
@@ -61,14 +68,14 @@ def test_curve_that_rises_falls_or_rests(material: Material) -> None:
 @pytest.mark.parametrize("losses", [[0.3] * 8, [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3]])
 def test_what_more_passes_would_do_is_said_once(material: Material, losses: list[float]) -> None:
     """By the curve, which shows it; a small gap to the held-out clips tells of the network's size only."""
-    found = hints(replace(material, accuracy=accuracy(material, 0.041), history=history(losses)))
+    found = hints(changed(material, accuracy=accuracy(material, 0.041), history=history(losses)))
     said = [hint.text for hint in found if "passes" in hint.text]
     assert len(said) == 1
     assert said[0].startswith("More passes ")
 
 
 def test_waypoints_flips_and_links_that_do_nothing(material: Material) -> None:
-    missed = {**material.responsivity, "largest_turn_degrees": 175.0}
+    missed = {**material.measured["responsivity"], "largest_turn_degrees": 175.0}
     found = heads(material, responsivity=missed)
     assert found["The character reached 113 of 114 waypoints."] == "warn"
     assert found["A joint turned by 175 degrees in one frame."] == "warn"
@@ -96,7 +103,9 @@ def test_links_that_were_never_hurt_say_nothing_but_how_the_walk_drifts(material
 
 def test_one_slow_frame_does_not_decide_the_time_of_a_frame(material: Material) -> None:
     times = {"predict": 0.17, "total": 0.17, "spread": {"median": 0.025, "p99": 0.163}}
-    slow = replace(material, name="holden", responsivity={**material.responsivity, "milliseconds": times})
+    slow = changed(
+        material, name="holden", responsivity={**material.measured["responsivity"], "milliseconds": times}
+    )
     figure = next(f for f in key_figures(slow) if f.label == "Time for a frame")
     assert (figure.value, figure.unit) == ("0.025", "ms")
     assert "667 characters" in figure.beside
@@ -110,14 +119,14 @@ def test_most_pressing_first(material: Material) -> None:
 
 
 def test_key_figures_stand_beside_the_published(material: Material) -> None:
-    figures = {f.label: f for f in key_figures(replace(material, name="holden"))}
+    figures = {f.label: f for f in key_figures(changed(material, name="holden"))}
     assert "HOLDEN was published at 4.39 %" in figures["Error on held-out clips"].beside
     assert "published mean 0.376 ms" in figures["Time for a frame"].beside
     assert figures["Network"].beside.startswith("parameters a phase: 372–16–16–311")
 
 
 def test_figures_of_almost_nothing(material: Material) -> None:
-    bare = replace(
+    bare = changed(
         material, accuracy={}, responsivity={}, injury={}, pipeline={}, history={}, motion=[], labels=[]
     )
     assert [f.label for f in key_figures(bare)] == ["Network"]

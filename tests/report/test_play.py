@@ -17,6 +17,8 @@ import yaml
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.figure.mesh import body
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.motion.decode import decode, frame_rate
 from hobble.motion.read import read_bvh
 from hobble.report.formats import embedded
@@ -24,7 +26,6 @@ from hobble.report.playable import body_parts, playable
 from hobble.report.words import PARTS
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import jointed
-from hobble.runtime.network import Network, load_network
 
 FRAMES = 120
 
@@ -42,16 +43,20 @@ def test_parts_are_the_links_of_their_roles(holden31: Skeleton) -> None:
 
 
 def test_weights_are_kept_to_a_part_in_sixty_thousand(network: Network, character: dict[str, Any]) -> None:
-    layer, kept = character["layers"][0], network.weights[0][:, :, character["seen"]]
+    layer, kept = character["network"]["layers"][0], network.weights[0][:, :, character["seen"]]
     integers = np.frombuffer(base64.b64decode(layer["weights"]), "<i2").reshape(kept.shape)
     scale = np.frombuffer(base64.b64decode(layer["scale"]), "<f4").reshape(kept.shape[:2])
     error = np.abs(integers * scale[..., None] - kept)
     assert np.all(error <= 0.501 * scale[..., None])
     turning = character["turning"]
-    assert character["layers"][-1]["rows"] == network.layout.y_joint_rotation.start + 3 * len(turning)
+    assert character["network"]["layers"][-1]["rows"] == network.layout.y_joint_rotation.start + 3 * len(
+        turning
+    )
 
 
-def test_inputs_that_weigh_nothing_are_left_out(examples: ModuleType, holden31: Skeleton, tmp_path: Path) -> None:
+def test_inputs_that_weigh_nothing_are_left_out(
+    examples: ModuleType, holden31: Skeleton, tmp_path: Path
+) -> None:
     examples.weights(tmp_path / "weights.npz", holden31)
     network = load_network(tmp_path / "weights.npz")
     x_std = network.x_std.copy()
@@ -177,7 +182,7 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
     shin = "Hobble.player.injuries.severity.get('LeftLeg-LeftFoot')"
     for modifiers, severity in ((0, 2), (0, 4), (8, 2)):
         tab.run("new Promise(requestAnimationFrame)")
-        tab.run('Hobble.player.chase.touch()')
+        tab.run("Hobble.player.chase.touch()")
         x, y = tab.run(place)
         for kind in ("mousePressed", "mouseReleased"):
             tab.send(
@@ -281,9 +286,13 @@ def test_every_point_along_the_left_thigh_takes_a_click(tab: Any) -> None:
 @pytest.mark.parametrize("ground", ["constructor", "toString", "__proto__", "nowhere", "boxes"])
 def test_a_link_pasted_into_the_open_page_is_followed_and_taken_with_care(tab: Any, ground: str) -> None:
     tab.run("document.getElementById('play-ground').value = 'slope'")
-    tab.run(f"location.hash = '#play?ground={ground}&camera=,,&hurt=LeftLeg-LeftFoot:3,x:9,Hips-LowerBack:-1'")
+    tab.run(
+        f"location.hash = '#play?ground={ground}&camera=,,&hurt=LeftLeg-LeftFoot:3,x:9,Hips-LowerBack:-1'"
+    )
     assert tab.until("Hobble.player.injuries.severity.get('LeftLeg-LeftFoot') === 3")
-    assert tab.run("document.getElementById('play-ground').value") == ("boxes" if ground == "boxes" else "slope")
+    assert tab.run("document.getElementById('play-ground').value") == (
+        "boxes" if ground == "boxes" else "slope"
+    )
     assert tab.run("Hobble.player.injuries.severity.get('Hips-LowerBack')") == 0
     assert tab.run("Hobble.player.view.orbit.distance") >= 140
     assert tab.run("Hobble.player.view.orbit.pitch") > 0.02

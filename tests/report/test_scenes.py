@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.core.skeleton import Skeleton
 from hobble.core import quat
+from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body
 from hobble.figure.pack import TURN
 from hobble.report.scenes import UNIT, pack_positions, scenes
@@ -50,7 +50,11 @@ def test_bones_lie_where_rotations_put_them_and_keep_their_lengths(
     pose = UNIT * unpacked(walk["pose"], "<i2").reshape(-1, count, 3)
     turn = unpacked(walk["turn"], "<i2").reshape(-1, count, 4) / TURN
     assert np.abs(np.linalg.norm(turn, axis=-1) - 1).max() < 1e-3
-    for upper, lower in (("left_hip", "left_knee"), ("right_knee", "right_heel"), ("left_shoulder", "left_elbow")):
+    for upper, lower in (
+        ("left_hip", "left_knee"),
+        ("right_knee", "right_heel"),
+        ("left_shoulder", "left_elbow"),
+    ):
         a, b = holden31.role(upper), holden31.role(lower)
         reach = pose[:, keep.index(b)] - pose[:, keep.index(a)]
         assert np.abs(np.linalg.norm(reach, axis=-1) - np.linalg.norm(holden31.offsets[b])).max() < 0.03

@@ -8,23 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hobble.channels.injury.recognition.page import recognition_chart
+from hobble.channels.injury.response import page as injury_page
+from hobble.channels.injury.response import page_cases
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.database.clip_rows import load_clip_rows, save_clip_rows
-from hobble.report import (
-    accuracy_section,
-    cost_section,
-    coverage,
-    data_section,
-    injury_cases,
-    injury_section,
-    terrain_section,
-    training_section,
-)
-from hobble.report.charts import Chart
-from hobble.report.findings import Figure
+from hobble.measures.accuracy import page as accuracy_page
+from hobble.measures.responsivity import page as responsivity_page
+from hobble.report import cost_section, coverage, data_section, terrain_section, training_section
+from hobble.report.charts import Chart, Family
 from hobble.report.gather import Material, describe_network, read_history
 from hobble.report.ground_pictures import ground_pictures
+from hobble.report.parts import Pair
+from hobble.report.summary import Figure
 
 
 def test_sections_end_where_their_pass_does(material: Material) -> None:
@@ -55,20 +52,20 @@ def test_weights_that_are_not(tmp_path: Path) -> None:
 
 
 def test_bars_show_every_clip_of_its_split(material: Material) -> None:
-    chart = accuracy_section.clip_bars(material)
+    chart = accuracy_page.clip_bars(material.found("accuracy"), material)
     assert chart is not None
     bars = {trace["name"]: dict(zip(trace["y"], trace["x"], strict=True)) for trace in chart.traces}
     assert set(bars["held out"]) == {"walk_turns", "walk_turns_mirror", "hurt_back", "hurt_back_mirror"}
     assert len(bars["training"]) == 12
-    row = next(r for r in material.accuracy["clips"] if r["clip"] == "jog")
+    row = next(r for r in material.measured["accuracy"]["clips"] if r["clip"] == "jog")
     assert bars["training"]["jog"] == pytest.approx(100 * row["mean"])
     assert set(chart.layout["yaxis"]["categoryarray"]) == set(bars["held out"]) | set(bars["training"])
 
 
 def test_boxes_only_where_there_are_quantiles(material: Material) -> None:
-    assert accuracy_section.clip_boxes(material) is not None
-    clips = [{k: v for k, v in row.items() if k != "p50"} for row in material.accuracy["clips"]]
-    assert accuracy_section.clip_boxes(replace(material, accuracy={"clips": clips})) is None
+    assert accuracy_page.clip_boxes(material.found("accuracy")) is not None
+    clips = [{k: v for k, v in row.items() if k != "p50"} for row in material.measured["accuracy"]["clips"]]
+    assert accuracy_page.clip_boxes({"clips": clips}) is None
 
 
 def test_gait_seconds_add_up(material: Material) -> None:
@@ -119,7 +116,7 @@ def test_stages_beside_the_published(material: Material) -> None:
 
 
 def test_steps_of_a_frame_in_their_order(material: Material) -> None:
-    chart = cost_section.lap_chart(material)
+    chart = responsivity_page.lap_chart(material.found("responsivity"), material)
     assert chart is not None
     traces = next(iter(chart.options.values()))
     assert [t["name"] for t in traces] == [
@@ -131,16 +128,16 @@ def test_steps_of_a_frame_in_their_order(material: Material) -> None:
         "update",
         "median",
     ]
-    times = material.responsivity["laps"][0]["milliseconds"]
+    times = material.measured["responsivity"]["laps"][0]["milliseconds"]
     assert sum(trace["y"][0] for trace in traces[:-1]) == pytest.approx(times["total"])
     assert traces[-1]["y"][0] == times["spread"]["median"]
 
 
 def test_feet_that_hardly_stood_have_no_slide(material: Material) -> None:
     def slide(steps: int) -> Figure:
-        laps = [{**lap, "steps": steps} for lap in material.responsivity["laps"][:2]]
-        found = {**material.responsivity, "laps": laps, "foot_slide_cm": 0.0}
-        figures = cost_section.track_figures(replace(material, responsivity=found))
+        laps = [{**lap, "steps": steps} for lap in material.measured["responsivity"]["laps"][:2]]
+        found = {**material.measured["responsivity"], "laps": laps, "foot_slide_cm": 0.0}
+        figures = responsivity_page.track_figures(found)
         return next(figure for figure in figures if figure.label == "Foot slide")
 
     assert (slide(4).value, slide(4).unit) == ("–", "")
@@ -149,23 +146,27 @@ def test_feet_that_hardly_stood_have_no_slide(material: Material) -> None:
 
 
 def test_links_never_hurt_in_training_are_told_from_the_others(material: Material) -> None:
-    responses = [{**r, "trained": r["link"].startswith("Left")} for r in material.injury["responses"]]
+    responses = [
+        {**r, "trained": r["link"].startswith("Left")} for r in material.measured["injury"]["responses"]
+    ]
     rows = [
         {"link": link, "severity": v, "jog_from_healthy_cm": 0.1 * v}
         for link in {r["link"]: None for r in responses}
         for v in (5.0, 10.0)
     ]
-    injury = {**material.injury, "responses": responses, "into_a_jog": rows}
-    made = injury_section.section(replace(material, injury=injury))
+    injury = {**material.measured["injury"], "responses": responses, "into_a_jog": rows}
+    parts = [part.content for part in injury_page.section(injury, material).parts]
+    (curves,) = [content for content in parts if isinstance(content, Family)]
+    overview, (_, into_a_jog) = [content.charts for content in parts if isinstance(content, Pair)]
     never = {r["link"] for r in responses if not r["trained"]}
-    for chart in made["overview"]:
+    for chart in overview:
         hollow = [t for t in chart.traces if t["name"].endswith(", never hurt in training")]
         assert [set(t["y"]) for t in hollow] == [never, never]
         assert set(chart.layout["yaxis"]["categoryarray"][: len(never)]) == never
-    marked = [o.endswith("(never hurt in training)") for o in made["curves"].charts[0].options]
+    marked = [o.endswith("(never hurt in training)") for o in curves.charts[0].options]
     assert marked == sorted(marked)
     assert sum(marked) == 2 * len(never)
-    names = [trace["name"] for trace in made["into_a_jog"].traces]
+    names = [trace["name"] for trace in into_a_jog.traces]
     assert not never & set(names)
     assert names[-1] == "never hurt in training"
 
@@ -215,14 +216,14 @@ def test_confusions_are_shares_of_what_hurts_and_name_how_often_it_was_right() -
     confusion = {"knee": {"knee": 3, "back": 1}, "back": {"knee": 0, "back": 2}}
     part = {"confusion": confusion, "right": 5 / 6}
     found = {"applies": True, "classes": ["knee", "back"], "chance": 0.5, "people": 0.82}
-    chart = injury_cases.recognition_chart({**found, "generated": part, "captured": {}})
+    chart = recognition_chart({**found, "generated": part, "captured": {}})
     assert chart is not None
     assert list(chart.options) == ["generated walks, window by window: 83 % right"]
     (trace,) = next(iter(chart.options.values()))
     assert trace["z"] == [[0.75, 0.25], [None, 1.0]]
     assert "50 %" in chart.caption
     assert "82 %" in chart.caption
-    assert injury_cases.recognition_chart({"applies": False}) is None
+    assert recognition_chart({"applies": False}) is None
 
 
 def test_every_pair_of_injuries_is_drawn_as_it_is_measured() -> None:
@@ -230,9 +231,9 @@ def test_every_pair_of_injuries_is_drawn_as_it_is_measured() -> None:
         {"first": "a-b", "second": "c-d", "from_first_cm": 2.0, "share": 0.5, "from_second_cm": 1.0},
         {"first": "c-d", "second": "a-b", "from_first_cm": 0.0, "share": None, "from_second_cm": 0.0},
     ]
-    chart = injury_cases.second_chart(rows)
+    chart = page_cases.second_chart(rows)
     assert chart is not None
     far, share = (traces[0] for traces in chart.options.values())
     assert (far["y"], far["x"], far["z"]) == (["a-b", "c-d"], ["c-d", "a-b"], [[2.0, None], [None, 0.0]])
     assert share["z"] == [[0.5, None], [None, None]]
-    assert injury_cases.second_chart([]) is None
+    assert page_cases.second_chart([]) is None

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
-from hobble.motion.read import read_bvh
-from hobble.report import stimuli
-from hobble.core import quat
 from hobble.figure.mesh import body
 from hobble.figure.pack import regions
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.motion.read import read_bvh
+from hobble.report import stimuli
 from hobble.report.raster import BODY, Camera, Studio
-from hobble.runtime.network import Network, load_network
-
 
 UPRIGHT = np.tile(quat.IDENTITY, (19, 1))
 

@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from hobble.core import quat
 from hobble.core.skeleton import forward_kinematics
+from hobble.models.load import load_network
 from hobble.runtime import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton, motion_clip
 from hobble.runtime.feet import leg_joints
-from hobble.runtime.network import load_network
 from hobble.runtime.scenarios import generate, hurt_links, scenarios
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -350,6 +351,10 @@ def test_what_the_folder_lacks_is_downloaded(base: Path) -> None:
         ("{clip}", "{name}", r"download: url: 'name'"),
         ("{clip}", "a", r"download: url: \{clip\} must stand in it"),
         ("{clip}", "{clip.x}", "download: url: "),
+        ("{clip}", "{clip:a>400000000}", "only a width of up to 99 may stand behind a name"),
+        ("{clip}", "{clip:{subject}}", "only a width of up to 99"),
+        ("{clip}", "{clip!r}", "only a width of up to 99"),
+        ("https://host/", "https://host/\u202e", "must be an address like"),
         ("{clip}", "{clip", "download: url: "),
         ("far.sha256", "../far.sha256", "checksums: must be relative"),
         ("clips: {'2_1': }\n", "", "lists them and names a `folder`"),
@@ -435,3 +440,20 @@ def test_sections_may_be_asked_for_some_of_their_keys(root: Path) -> None:
     assert project.datasets.options("tiny", "database", "window", "step") == {"window": 60, "step": 10}
     with pytest.raises(KeyError):
         project.configurations.section("test", "training", "passes", "learning_rat")
+
+
+@pytest.mark.parametrize("name", ["a.bvh", "map.txt"])
+def test_a_pipe_is_no_file_to_wait_for(base: Path, name: str) -> None:
+    """Refused when the run is planned: Snakemake would wait for it to end."""
+    text = DATASET + "terrain: {heightmaps: [{kind: file, path: mine/map.txt}]}\n"
+    (base / "config/datasets/mine.yaml").write_text(text)
+    (base / f"data/mine/{name}").unlink(missing_ok=True)
+    os.mkfifo(base / f"data/mine/{name}")
+    clips = Project(base, {}).clips
+    with pytest.raises(HobbleError, match=f"mine/{name}: a device or a pipe, not a file"):
+        (clips.of if name == "a.bvh" else clips.heightmap_files)("mine")
+    listed = text + "clips: {a: , b: }\n"
+    (base / "config/datasets/mine.yaml").write_text(listed)
+    if name == "a.bvh":
+        with pytest.raises(HobbleError, match=f"mine/{name}: a device or a pipe"):
+            Project(base, {}).clips.source("mine", "a")

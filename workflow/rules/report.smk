@@ -56,11 +56,7 @@ rule pipeline_summary:
     """What each stage cost: seconds and memory from its benchmark files, bytes from its artefacts."""
     input:
         # Everything that the account covers, so that it is drawn up last.
-        rules.accuracy.output.json,
-        rules.rollouts.output.json,
-        rules.responsivity.output.json,
-        rules.injury_response.output.json,
-        rules.recognition.output.json,
+        expand(rules.measure.output.json, measure=MEASURES, allow_missing=True),
         rules.generate.output.scenarios,
     output:
         json="results/{configuration}/pipeline.json",
@@ -80,11 +76,7 @@ rule pipeline_summary:
 rule report:
     """One HTML file that a person opens, reads and plays with."""
     input:
-        accuracy=rules.accuracy.output.json,
-        rollouts=rules.rollouts.output.json,
-        responsivity=rules.responsivity.output.json,
-        injury=rules.injury_response.output.json,
-        recognition=rules.recognition.output.json,
+        measured=expand(rules.measure.output.json, measure=MEASURES, allow_missing=True),
         pipeline=rules.pipeline_summary.output.json,
         scenarios=rules.generate.output.scenarios,
         configuration=rules.configuration.output.yaml,
@@ -125,7 +117,9 @@ rule report:
         dataset=lambda w: configurations.dataset(w.configuration),
         splits=lambda w: configurations.splits(w.configuration),
         title=lambda w: catalogue.configuration(w.configuration).report.title,
-        code=package.code("report"),
+        code=lambda w: package.code(
+            "report", configurations.kind(w.configuration), *modules("page")
+        ),
     script:
         "../scripts/report.py"
 
@@ -149,7 +143,7 @@ rule report_compare:
         runtime=10,
     params:
         configurations=lambda w: comparison.names(),
-        code=package.code("report_compare"),
+        code=package.code("report_compare", *modules("comparison_page")),
     script:
         "../scripts/report_compare.py"
 
@@ -169,6 +163,6 @@ rule stimuli:
         runtime=15,
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=package.code("stimuli"),
+        code=lambda w: package.code("stimuli", configurations.kind(w.configuration)),
     script:
         "../scripts/stimuli.py"

@@ -8,7 +8,7 @@ from hobble.core.files import write_json
 from hobble.evaluation.compare import compare
 from hobble.evaluation.compare_tables import tables
 from hobble.evaluation.measured import read_measured
-from hobble.evaluation.tables import write_csv
+from hobble.evaluation.tables import write_tables
 from hobble.workflow.job import job
 
 with job(snakemake):
@@ -19,5 +19,4 @@ with job(snakemake):
     ]
     compared = compare(measured, yaml.safe_load(Path(files.published).read_text(encoding="utf-8")))
     write_json(snakemake.output.json, compared)
-    for name, rows in tables(compared).items():
-        write_csv(snakemake.output[name], rows)
+    write_tables(snakemake.output.tables, tables(compared))

@@ -1,6 +1,6 @@
 """Creates the generated motion of each scripted scenario (npz and BVH) from a trained network."""
 
-from hobble.runtime.network import load_network
+from hobble.models.load import load_network
 from hobble.runtime.scenarios import generate
 from hobble.workflow.job import job
 

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 from hobble.core.files import write_text
+from hobble.models.load import load_network
 from hobble.report.compare import comparisons
 from hobble.report.gather import gather
 from hobble.report.page import render
 from hobble.report.playable import playable
 from hobble.report.scenes import scenes
-from hobble.runtime.network import load_network
 from hobble.workflow.job import job
 
 with job(snakemake):
@@ -19,9 +19,7 @@ with job(snakemake):
         title=asked.title,
         splits=asked.splits,
         configuration=given.configuration,
-        accuracy=given.accuracy,
-        responsivity=given.responsivity,
-        injury=given.injury,
+        measured=given.measured,
         pipeline=given.pipeline,
         history=given.history,
         weights=given.weights,
@@ -30,8 +28,6 @@ with job(snakemake):
         injuries=given.injuries,
         terrain=given.terrain,
         rows=given.rows,
-        rollouts=given.rollouts,
-        recognition=given.recognition,
     )
     network = material.network
     play = scenes(given.scenarios, network["skeleton"], network["links"])

@@ -5,9 +5,9 @@ from pathlib import Path
 import yaml
 
 from hobble.core.files import read_json, write_text
+from hobble.models.load import load_network
 from hobble.report.compare_page import render_compared
 from hobble.report.playable import playable
-from hobble.runtime.network import load_network
 from hobble.workflow.job import job
 
 with job(snakemake):

@@ -1,7 +1,7 @@
 """Creates results/<configuration>/stimuli/: loops of the hurt character as animated images and BVH files."""
 
+from hobble.models.load import load_network
 from hobble.report.stimuli import doubts, write_stimuli
-from hobble.runtime.network import load_network
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

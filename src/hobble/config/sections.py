@@ -23,7 +23,7 @@ from hobble.report.options import Report
 from hobble.runtime.options import Runtime
 from hobble.synthetic.options import Synthetic
 from hobble.terrain.options import Heightmap, Terrain
-from hobble.training.options import Network, Training
+from hobble.training.options import Training
 
 __all__ = [
     "COMPARED",
@@ -37,7 +37,6 @@ __all__ = [
     "Inside",
     "Labels",
     "Motion",
-    "Network",
     "PhaseMode",
     "Positive",
     "PositiveFloat",

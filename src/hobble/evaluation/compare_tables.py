@@ -2,58 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hobble.evaluation.accuracy import COLUMNS, SPLITS
-from hobble.evaluation.recognition import rows as recognition_rows
-
-STEPS = ("prepare", "input", "insert", "predict", "output", "update", "total")
+from hobble.evaluation.compare import each
+from hobble.measures.given import Json, Row
 
 
-def tables(compared: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
+def tables(compared: Json) -> dict[str, Sequence[Row]]:
     """Table name -> rows of equal keys, of what `compare.compare` returned."""
+    of_measures = {name: rows for _, say in each("tables") for name, rows in say(compared).items()}
     return {
-        "configurations": [_flat(row) for row in compared["configurations"]],
-        "accuracy": [
-            {"configuration": entry["configuration"], **{key: clip.get(key) for key in COLUMNS}}
-            for entry in compared["accuracy"]
-            for clip in entry["clips"]
-        ],
-        "rollouts": [
-            {
-                "configuration": entry["configuration"],
-                "length": entry["length"],
-                "split": split,
-                **entry[split],
-            }
-            for entry in compared["rollouts"]
-            for split in SPLITS
-        ],
-        "recognition": [
-            {"configuration": entry["configuration"], **row}
-            for entry in compared["recognition"]
-            for row in recognition_rows(entry)
-        ],
-        "responsivity": [lap for entry in compared["responsivity"] for lap in _laps(entry)],
+        "configurations": [flat(row) for row in compared["configurations"]],
+        **of_measures,
         "training": _training(compared),
         "stages": list(compared["stages"]),
         "difference": [
             {"measure": measure, **row}
             for measure, rows in (
                 ("relative error", compared["difference"]),
-                ("milliseconds a frame", compared["milliseconds"]["difference"]),
+                ("milliseconds a frame", compared["milliseconds"].get("difference", ())),
             )
             for row in rows
-        ],
-        "fit": [
-            {k: v for k, v in row.items() if k not in ("x", "y")} for row in compared["milliseconds"]["fit"]
         ],
         "published": [*compared["beside"], *compared["milliseconds"]["beside"]],
     }
 
 
-def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
+def flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row with the mappings in it laid out as `key_inner`."""
     out: dict[str, Any] = {}
     for key, value in row.items():
         if isinstance(value, Mapping):
@@ -61,18 +38,6 @@ def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
         else:
             out[key] = value
     return out
-
-
-def _laps(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
-    head = {"configuration": entry["configuration"], "mode": entry["mode"]}
-    rows = []
-    for lap in entry["laps"]:
-        times = lap["milliseconds"]
-        row = {key: value for key, value in lap.items() if key != "milliseconds"}
-        row |= {f"milliseconds_{step}": times[step] for step in STEPS}
-        row |= {f"milliseconds_{step}_sd": sd for step, sd in times["sd"].items()}
-        rows.append({**head, **row, **{f"milliseconds_{k}": v for k, v in _flat(times["spread"]).items()}})
-    return rows
 
 
 def _training(compared: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import in_root_frame
+from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.network import Network
+from hobble.runtime.options import Runtime
 
 FPS = 60
 SPEEDS = {"walk": 2.5, "jog": 7.0}  # cm a frame asked for
@@ -61,14 +61,11 @@ class Walks:
         return slice(start + int(np.searchsorted(turned, turned[-1] - whole)), stop)
 
 
-def run(network: Network, script: Sequence[Stretch], runtime: Mapping[str, Any]) -> Walks:
-    """Let figures that stand at first walk by `script`, straight ahead on flat ground.
-
-    runtime: options of ProceduralAnimation.
-    """
+def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
+    """Let figures that stand at first walk by `script`, straight ahead on flat ground."""
     assert network.skeleton is not None
     count, frames = len(script[0].gait), sum(s.frames for s in script)
-    animation = ProceduralAnimation(network, characters=count, **runtime)
+    animation = ProceduralAnimation(network, characters=count, **dict(runtime))
     local = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
     contacts, root = np.zeros((frames, count, 4)), np.zeros((frames, count, 3))
     phase, rough = np.zeros((frames, count)), np.zeros((frames, count))

@@ -6,79 +6,50 @@ import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import yaml
 
 from hobble.core.errors import InputError
 from hobble.core.files import read_json
-
-COUNTS = ("true", "table_6_1", "table_6_1_as_printed")
-FLOAT = 4  # bytes of a stored weight
-PHASES = {"constant": 50, "linear": 10}  # whose weights the original stores
+from hobble.measures.given import Json
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What one configuration left behind: its resolved configuration, its measurements and its history."""
+    """What one configuration left behind: its resolved configuration, its costs, its history.
+
+    measured: measurement -> its JSON.
+    """
 
     name: str
-    resolved: Mapping[str, Any] = field(repr=False)
-    accuracy: Mapping[str, Any] = field(repr=False)
-    rollouts: Mapping[str, Any] = field(repr=False)
-    responsivity: Mapping[str, Any] = field(repr=False)
-    injury: Mapping[str, Any] = field(repr=False)
-    recognition: Mapping[str, Any] = field(repr=False)
-    pipeline: Mapping[str, Any] = field(repr=False)
+    resolved: Json = field(repr=False)
+    measured: Mapping[str, Json] = field(repr=False)
+    pipeline: Json = field(repr=False)
     history: Mapping[str, list[float | None]] = field(repr=False)
+
+    def found(self, measure: str) -> Json:
+        """What a measurement found."""
+        return self.measured[measure]
+
+    @property
+    def dataset(self) -> str:
+        """The data set it learns from."""
+        return self.resolved["configuration"]["dataset"]
+
+    def of_stage(self, stage: str, key: str) -> float | None:
+        """What one stage took or left behind."""
+        return next((s[key] for s in self.pipeline["stages"] if s["stage"] == stage), None)
 
 
 def read_measured(name: str, files: Mapping[str, str | Path]) -> Measured:
-    """Read one configuration's files, named as the fields of `Measured` (`configuration` for `resolved`).
+    """Read one configuration's files: `configuration`, `pipeline`, `history`, and one for each measurement.
 
     Raises InputError naming the file that cannot be read.
     """
-    read = {key: read_json(path) for key, path in files.items() if key not in ("configuration", "history")}
-    resolved = yaml.safe_load(Path(files["configuration"]).read_text(encoding="utf-8"))
-    return Measured(name, resolved, **read, history=_history(files["history"]))
-
-
-def describe(measured: Measured) -> dict[str, Any]:
-    """What sets a configuration apart: its data, network, training, and the counts of Table 6.1."""
-    model = measured.resolved["configuration"]
-    counts = measured.responsivity["parameters"]
-    phases = {mode: count * counts["true"] * FLOAT for mode, count in PHASES.items()}
-    return {
-        "configuration": measured.name,
-        "dataset": dataset(measured),
-        "network_of": model.get("network_of"),
-        "injury": bool(model.get("injury")),
-        "hidden_layers": model["network"]["hidden_layers"],
-        "units": model["network"]["units"],
-        "passes": model["training"]["passes"],
-        "joints": measured.accuracy["joints"],
-        "computations": {key: counts[key] for key in COUNTS},
-        "weights_bytes": {
-            **phases,
-            "cubic": model["network"]["control_points"] * counts["true"] * FLOAT,
-        },
-    }
-
-
-def by_mode(measured: Measured) -> list[dict[str, Any]]:
-    """The responsivity of each phase mode that was run."""
-    found = measured.responsivity
-    return [{**entry, "configuration": measured.name} for entry in found.get("modes", [found])]
-
-
-def dataset(measured: Measured) -> str:
-    """The data set it learns from."""
-    return measured.resolved["configuration"]["dataset"]
-
-
-def of_stage(measured: Measured, stage: str, key: str) -> float | None:
-    """What one stage took or left behind, of pipeline.json."""
-    return next((s[key] for s in measured.pipeline["stages"] if s["stage"] == stage), None)
+    paths = dict(files)
+    resolved = yaml.safe_load(Path(paths.pop("configuration")).read_text(encoding="utf-8"))
+    history, pipeline = _history(paths.pop("history")), read_json(paths.pop("pipeline"))
+    return Measured(name, resolved, {key: read_json(path) for key, path in paths.items()}, pipeline, history)
 
 
 def _history(path: str | Path) -> dict[str, list[float | None]]:

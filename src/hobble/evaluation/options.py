@@ -1,36 +1,32 @@
-"""The keys of a configuration's `evaluation` section."""
+"""The keys of a configuration's `evaluation` section: those of every measurement, together."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING
 
-from pydantic import AfterValidator, Field
+from pydantic import create_model
 
-from hobble.core.section import PhaseMode, Positive, PositiveFloat, Section
-
-
-def _some(lengths: tuple[int, ...]) -> tuple[int, ...]:
-    """At least one length: of none there is nothing to measure."""
-    if not lengths:
-        raise ValueError("must name at least one number of frames")
-    return lengths
+from hobble.core.section import Section
+from hobble.measures.registry import MEASURES
 
 
-class Evaluation(Section):
-    """The measurements."""
+def together(sections: list[type[Section]]) -> type[Section]:
+    """One section with the keys of all.
 
-    joints: Literal["all", "equivalent"] = Field(
-        "all", description="`equivalent`: only the joints that the 31-joint skeleton has too"
-    )
-    rollouts: Annotated[tuple[Positive, ...], AfterValidator(_some)] = Field(
-        (1, 10, 60, 300), description="frames for which the network is fed its own pose"
-    )
-    laps: Positive = 19
-    lap_seconds: Annotated[float, Field(ge=1, allow_inf_nan=False)] = Field(
-        400.0, description="a lap that takes longer is ended there"
-    )
-    modes: tuple[PhaseMode, ...] = Field(
-        ("constant", "linear", "cubic"),
-        description="phase modes that laps are run in, beside the runtime's own",
-    )
-    seconds: PositiveFloat = Field(4.0, description="at each severity of the injury sweeps")
+    Raises TypeError for a key that two of them define; a common base may define it for both.
+    """
+    owner: dict[str, type] = {}
+    for section in sections:
+        for key in section.model_fields:
+            defines = [c for c in section.__mro__ if key in getattr(c, "model_fields", {})][-1]
+            if owner.setdefault(key, defines) is not defines:
+                raise TypeError(f"{key} is a key of {owner[key].__module__} and of {defines.__module__}")
+    different = list(dict.fromkeys(sections))
+    bases = [s for s in different if not any(o is not s and issubclass(o, s) for o in different)]
+    return create_model("Evaluation", __base__=tuple(bases) or Section, __doc__="The measurements.")
+
+
+if TYPE_CHECKING:
+    Evaluation = Section
+else:
+    Evaluation = together([one.options for one in MEASURES])

@@ -19,3 +19,10 @@ def write_csv(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> None:
         writer.writeheader()
         writer.writerows(rows)
     write_text(path, out.getvalue())
+
+
+def write_tables(folder: str | Path, tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
+    """Write each table to <folder>/<name>.csv; the folder is made."""
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for name, rows in tables.items():
+        write_csv(Path(folder) / f"{name}.csv", rows)

@@ -23,7 +23,11 @@ from hobble.figure.surface import FAR, Fine, distances, slopes, surface
 STEP = 1.9  # cm between the corners of trunk and limbs
 FINE = {"hand": 0.64, "face": 0.85, "foot": 1.2}
 WIDE = {"": 3.6, "hand": 0.8, "head": 2.6, "foot": 1.8}  # cm over which the shares of two bones meet
-OPEN = ((1.5, 0.30), (4.0, 0.30), (9.0, 0.25))  # how far is looked for what shades a corner, and how much it counts
+OPEN = (
+    (1.5, 0.30),
+    (4.0, 0.30),
+    (9.0, 0.25),
+)  # how far is looked for what shades a corner, and how much it counts
 NEEDED = ("hips", "head", *(f"{s}_{r}" for s in SIDES for r in ("shoulder", "hip", "knee", "heel", "toe")))
 STICK = (2.6, 1.9)  # half widths of a bone of a skeleton that is no person's
 
@@ -166,4 +170,8 @@ def _sticks(skeleton: Skeleton) -> tuple[Bind, list[Solid], dict[str, int]]:
             if p >= 0:
                 yield Rod(1.0, ((-np.inf, skeleton.joints[p]),), positions[p], positions[j], *STICK)
 
-    return stand, list(rods()) or [Rod(1.0, ((-np.inf, skeleton.joints[0]),), positions[0], positions[0], *STICK)], bones
+    return (
+        stand,
+        list(rods()) or [Rod(1.0, ((-np.inf, skeleton.joints[0]),), positions[0], positions[0], *STICK)],
+        bones,
+    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,6 +12,7 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import Mesh, body
+from hobble.models.packing import packed
 
 UNIT = 0.01  # cm of one step of corners and of places of bones
 TURN = 32767  # steps of a component of a rotation
@@ -68,7 +68,9 @@ def regions(skeleton: Skeleton, links: Sequence[str]) -> list[list[int]]:
     to the part of the back, to which they lead.
     """
     bones = body(skeleton).bones.tolist()
-    turning = {skeleton.role(role) for role in ("hips", "chest") if skeleton.roles.get(role) in skeleton.joints}
+    turning = {
+        skeleton.role(role) for role in ("hips", "chest") if skeleton.roles.get(role) in skeleton.joints
+    }
     found: list[list[int]] = [[] for _ in bones]
     for index, ends in enumerate(link_ends(skeleton.joints, links)):
         if ends is None:
@@ -106,9 +108,3 @@ def link_ends(joints: Sequence[str], links: Sequence[str]) -> list[tuple[int, in
 def packed_turns(rotations: Array) -> str:
     """Rotations (F, B, 4) as 16-bit integers."""
     return packed(np.round(np.clip(rotations, -1, 1) * TURN).astype(np.int16))
-
-
-def packed(array: NDArray[Any]) -> str:
-    """The little-endian bytes of an array as base64."""
-    array = np.ascontiguousarray(array)
-    return base64.b64encode(array.astype(array.dtype.newbyteorder("<")).tobytes()).decode("ascii")

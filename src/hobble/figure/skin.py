@@ -23,7 +23,7 @@ def owners(solids: Sequence[Solid], points: Array, bones: Mapping[str, int]) -> 
         if solid.cut:
             continue
         low, high = (corner.reshape(3, 1) for corner in solid.bounds())
-        chosen = np.flatnonzero(((points.T > low - 4) & (points.T < high + 4)).all(axis=0))
+        chosen = np.flatnonzero(((low - 4 < points.T) & (high + 4 > points.T)).all(axis=0))
         away = np.full(len(points), np.inf)
         away[chosen] = solid.distance(x[chosen], y[chosen], z[chosen])
         nearer = away < best
@@ -45,7 +45,9 @@ def spread(
     """
     joints = np.unique(owner)
     shares = (owner[:, None] == joints).astype(float)
-    edges = np.unique(np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0)
+    edges = np.unique(
+        np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0
+    )
     a, b = edges.T
     length = np.maximum(np.linalg.norm(corners[a] - corners[b], axis=1), 0.05)
     wide = np.broadcast_to(np.asarray(reach, float), (len(corners),))

@@ -72,17 +72,12 @@ class Sweep(Solid):
         q = ((a / wide) ** n + (b / deep) ** n) ** (1 / n) + 1e-9
         aside = np.maximum(size * (1 - 1 / q), -np.minimum(wide, deep))
         end = np.maximum(rows[0, 0] - s, s - rows[-1, 0])
-        return np.where(
-            end > 0, np.hypot(np.maximum(aside, 0), np.maximum(end, 0)), np.maximum(aside, end)
-        )
+        return np.where(end > 0, np.hypot(np.maximum(aside, 0), np.maximum(end, 0)), np.maximum(aside, end))
 
     def bounds(self) -> tuple[Array, Array]:
         rows: Array = self._rows  # type: ignore[attr-defined]
         middle = (
-            self.start
-            + rows[:, :1] * self.axis
-            + rows[:, 3:4] * self.across
-            + rows[:, 4:5] * self._third  # type: ignore[attr-defined]
+            self.start + rows[:, :1] * self.axis + rows[:, 3:4] * self.across + rows[:, 4:5] * self._third  # type: ignore[attr-defined]
         )
         reach = np.maximum(rows[:, 1], rows[:, 2])[:, None]
         return (middle - reach).min(axis=0), (middle + reach).max(axis=0)

@@ -65,13 +65,17 @@ def field(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
             )
             for i, axis in enumerate(axes)
         )
-        grid = np.meshgrid(*(axis[part] for axis, part in zip(axes, parts, strict=True)), indexing="ij", sparse=True)
+        grid = np.meshgrid(
+            *(axis[part] for axis, part in zip(axes, parts, strict=True)), indexing="ij", sparse=True
+        )
         act = taken_away if solid.cut else united
         out[parts] = act(out[parts], solid.distance(*grid), solid.blend)
     return out
 
 
-def surface(solids: Sequence[Solid], step: float, fine: Sequence[Fine] = ()) -> tuple[Array, NDArray[np.int64]]:
+def surface(
+    solids: Sequence[Solid], step: float, fine: Sequence[Fine] = ()
+) -> tuple[Array, NDArray[np.int64]]:
     """Corners (V, 3) and triangles (T, 3), counter-clockwise seen from outside, of a closed surface.
 
     step: cm between grid points, finer within the boxes `fine`.
@@ -79,9 +83,7 @@ def surface(solids: Sequence[Solid], step: float, fine: Sequence[Fine] = ()) -> 
     kept = [solid for solid in solids if not solid.cut]
     low = np.min([solid.bounds()[0] for solid in kept], axis=0) - 3 * step
     high = np.max([solid.bounds()[1] for solid in kept], axis=0) + 3 * step
-    axes = [
-        ticks(low[i], high[i], step, [(a[i], b[i], s) for a, b, s in fine]) for i in range(3)
-    ]
+    axes = [ticks(low[i], high[i], step, [(a[i], b[i], s) for a, b, s in fine]) for i in range(3)]
     values = settled(field(solids, axes))
     corners, faces = nets(values, axes)
     for _ in range(2):

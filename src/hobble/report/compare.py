@@ -12,10 +12,9 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.database.clip_rows import ClipRows, expanded, load_clip_rows
 from hobble.evaluation.captured import headings, root_path, turned, unbroken
-from hobble.evaluation.predict import predict
 from hobble.figure.mesh import body, key
+from hobble.models.network import Network
 from hobble.report.scenes import FPS, UNIT, packed_motion
-from hobble.runtime.network import Network
 
 CLIPS = 6  # that are shown at least, if there are so many; every held-out clip is
 MOST = 40
@@ -54,7 +53,7 @@ def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> 
         wanted = np.isin(row, chosen) & ~seen[row]
         row, first = row[wanted], first[wanted]
         if len(row):
-            made = predict(network, pairs.x[first], pairs.p[first])
+            made = network.predict(pairs.x[first], pairs.p[first])
             truth[row], guess[row] = pairs.y[first][:, pose], made[:, pose]
             seen[row] = True
     parts = [v[chosen].reshape(len(chosen), 3, -1, 3) for v in (truth, guess)]

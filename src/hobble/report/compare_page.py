@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from hobble.figure.pack import packed_body
 from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
-from hobble.figure.pack import packed_body
+from hobble.report import measured, side_by_side
 from hobble.report.formats import embedded
 from hobble.report.playable import skeleton_of
 from hobble.report.provenance import commit, machine, versions
@@ -28,26 +29,18 @@ def render_compared(
     """
     sections: dict[str, dict[str, Any]] = {
         "overview": {"table": tables.configuration_table(compared), "beside": tables.beside_table(compared)},
-        "accuracy": {
-            "boxes": parts.error_boxes(compared),
-            "clips": parts.clip_dots(compared),
-            "rollouts": parts.rollout_chart(compared),
-            "differences": parts.difference_map(compared),
-            "table": tables.difference_table(compared),
-        },
-        "injury": {"table": tables.injury_table(compared)},
-        "speed": {"laps": parts.lap_lines(compared), "fit": parts.fit_chart(compared)},
         "training": {"curves": parts.training_curves(compared)},
         "stages": {"charts": parts.stage_dots(compared)},
     }
-    names = parts.names(compared)
-    charts = specs(sections)
+    shown, names = measured.compared_sections(compared), side_by_side.names(compared)
+    charts = specs([sections, shown])
     room = LARGEST - ELSE - len(bundle.encode()) - len(embedded(charts).encode())
     kept, left_out = fitting(playables or {}, room)
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in kept.values()}
     data = {"name": NAME, "charts": charts, "playable": kept, "bodies": bodies}
     return template("compare.html.j2").render(
         name=NAME,
+        measured=shown,
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
         eyebrow="Hobble report · configurations side by side",
         lead="What the same measurements say of " + ", ".join(names) + ", beside the published figures.",

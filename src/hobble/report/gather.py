@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,8 +12,10 @@ from typing import Any
 import numpy as np
 
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz, read_json
+from hobble.core.files import read_json
 from hobble.core.untrusted import read_text, read_yaml
+from hobble.measures.given import Json
+from hobble.models.load import load_network
 
 PUBLISHED = Path(__file__).parents[1] / "evaluation" / "published.yaml"
 COUNTED = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
@@ -24,6 +25,7 @@ COUNTED = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 class Material:
     """What one configuration left behind.
 
+    measured: measurement -> its JSON.
     history: column -> values, one per section of training; None where a cell is empty. motion, labels,
     injuries: the reports of the clips, in one order. terrain, rows: paths of their fits and of their rows.
     splits: clip -> "train" or "held_out".
@@ -34,9 +36,7 @@ class Material:
     title: str | None
     splits: Mapping[str, str] = field(repr=False)
     resolved: Mapping[str, Any] = field(repr=False)
-    accuracy: Mapping[str, Any] = field(repr=False)
-    responsivity: Mapping[str, Any] = field(repr=False)
-    injury: Mapping[str, Any] = field(repr=False)
+    measured: Mapping[str, Json] = field(repr=False)
     pipeline: Mapping[str, Any] = field(repr=False)
     history: Mapping[str, list[float | None]] = field(repr=False)
     network: Mapping[str, Any] = field(repr=False)
@@ -45,13 +45,20 @@ class Material:
     injuries: list[dict[str, Any]] = field(repr=False)
     terrain: list[str] = field(repr=False)
     rows: list[str] = field(repr=False)
-    rollouts: Mapping[str, Any] = field(repr=False)
-    recognition: Mapping[str, Any] = field(repr=False)
     published: Mapping[str, Any] = field(repr=False)
 
     def split(self, clip: str) -> str:
         """ "train" or "held_out"."""
         return self.splits.get(clip, "train")
+
+    def found(self, measure: str) -> Json:
+        """What a measurement found; empty where it was not made."""
+        return self.measured.get(measure, {})
+
+    def beside(self, what: str) -> Json | None:
+        """The published entry of kind `what` for this configuration's network, if there is one."""
+        rows = self.published.get(what, ())
+        return next((row for row in rows if row["configuration"] == self.name), None)
 
     @property
     def blocks(self) -> list[str]:
@@ -66,9 +73,7 @@ def gather(
     title: str | None,
     splits: Mapping[str, str],
     configuration: str,
-    accuracy: str,
-    responsivity: str,
-    injury: str,
+    measured: Iterable[str],
     pipeline: str,
     history: str,
     weights: str,
@@ -77,8 +82,6 @@ def gather(
     injuries: Iterable[str],
     terrain: Iterable[str] = (),
     rows: Iterable[str] = (),
-    rollouts: str | None = None,
-    recognition: str | None = None,
 ) -> Material:
     """Read the files a report is made from. Raises InputError naming the one that cannot be read."""
     return Material(
@@ -87,9 +90,7 @@ def gather(
         title=title,
         splits=dict(splits),
         resolved=read_yaml(configuration) or {},
-        accuracy=read_json(accuracy),
-        responsivity=read_json(responsivity),
-        injury=read_json(injury),
+        measured={Path(path).stem: read_json(path) for path in measured},
         pipeline=read_json(pipeline),
         history=read_history(history),
         network=describe_network(weights),
@@ -98,8 +99,6 @@ def gather(
         injuries=[read_json(path) for path in injuries],
         terrain=list(terrain),
         rows=list(rows),
-        rollouts=read_json(rollouts) if rollouts else {},
-        recognition=read_json(recognition) if recognition else {},
         published=read_yaml(PUBLISHED),
     )
 
@@ -124,19 +123,13 @@ def _cell(path: str | Path, key: str, text: str | None) -> float | None:
 
 
 def describe_network(path: str | Path) -> dict[str, Any]:
-    """Layer sizes, control points and parameters of a weights file; its skeleton and links."""
-    arrays = load_npz(path)
-    shapes = {key: array.shape for key, array in arrays.items() if key[:1] in "Wb" and key[1:].isdigit()}
-    if "W0" not in shapes:
-        raise InputError(path, "not a network's weights", fix="Train again.")
-    meta = json.loads(str(arrays["meta"])) if "meta" in arrays else {}
-    layers = sorted(int(key[1:]) for key in shapes if key[0] == "W")
-    sizes = [shapes[f"W{layers[0]}"][2]] + [shapes[f"W{i}"][1] for i in layers]
+    """What the page says of a network: what it is, its sizes and parameters, its skeleton and links."""
+    network = load_network(path)
     return {
-        "sizes": sizes,
-        "control_points": shapes["W0"][0],
-        "parameters": int(sum(np.prod(shape[1:]) for shape in shapes.values())),
+        "described": network.described,
+        "sizes": list(network.sizes),
+        "parameters": network.parameters,
         "bytes": Path(path).stat().st_size,
-        "skeleton": meta.get("skeleton") or {},
-        "links": meta.get("links") or [],
+        "skeleton": network.meta.get("skeleton") or {},
+        "links": list(network.links),
     }

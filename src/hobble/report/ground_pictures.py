@@ -13,7 +13,8 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.fit import fitted_rotations
 from hobble.figure.mesh import body, key
-from hobble.figure.pack import packed, packed_turns
+from hobble.figure.pack import packed_turns
+from hobble.models.packing import packed
 
 STEPS_PER_CM = 10  # everything is kept in 16-bit steps of a millimetre
 MOST = 24

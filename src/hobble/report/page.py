@@ -7,19 +7,18 @@ from typing import Any
 
 import yaml
 
+from hobble.core.skeleton import Skeleton
+from hobble.figure.mesh import key
+from hobble.figure.pack import packed_body
 from hobble.report import (
-    accuracy_section,
     cost_section,
     coverage,
     data_section,
     findings,
-    injury_section,
+    measured,
     terrain_section,
     training_section,
 )
-from hobble.core.skeleton import Skeleton
-from hobble.figure.mesh import key
-from hobble.figure.pack import packed_body
 from hobble.report.formats import embedded, plain
 from hobble.report.gather import Material
 from hobble.report.ground_pictures import ground_pictures
@@ -42,15 +41,19 @@ def render(
 
     Every value is escaped where it stands; data for the scripts is JSON in which no "<" is left.
     """
-    sections = _sections(material)
+    sections, shown = _sections(material), measured.sections(material)
     strips = data_section.strips(material)
     scenes = dict(scenes or {})
     grounds = ground_pictures(material.terrain, material.network["skeleton"])
-    figure = Skeleton.from_dict({"name": "", **material.network["skeleton"]}) if material.network["skeleton"] else None
+    figure = (
+        Skeleton.from_dict({"name": "", **material.network["skeleton"]})
+        if material.network["skeleton"]
+        else None
+    )
     data = {
-        "charts": specs(sections),
+        "charts": specs([sections, shown]),
         "bodies": {key(figure): packed_body(figure)} if figure else {},
-        "hero": opening(playable or {}, material.injury),
+        "hero": opening(playable or {}, material.measured.values()),
         "scenes": scenes,
         "strips": strips,
         "grounds": grounds,
@@ -64,6 +67,7 @@ def render(
         title=material.title or material.name,
         titled=bool(material.title),
         eyebrow=f"Hobble report · configuration {material.name} · data set {material.dataset}",
+        measured=shown,
         figures=findings.key_figures(material),
         hints=findings.hints(material),
         lead=findings.lead(material),
@@ -84,7 +88,7 @@ def render(
 
 def _sections(material: Material) -> dict[str, dict[str, Any]]:
     """Charts and tables by section; None where there is nothing to show."""
-    accuracy, costs, data, training = accuracy_section, cost_section, data_section, training_section
+    costs, data, training = cost_section, data_section, training_section
     found = coverage.counted(material.rows, material.splits)
     return {
         "training": {
@@ -92,20 +96,6 @@ def _sections(material: Material) -> dict[str, dict[str, Any]]:
             "blocks": training.block_curves(material),
             "table": training.history_table(material),
         },
-        "accuracy": {
-            "bars": accuracy.clip_bars(material),
-            "boxes": accuracy.clip_boxes(material),
-            "rollouts": accuracy.rollout_chart(material),
-            "table": accuracy.accuracy_table(material),
-            "published": accuracy.beside_published(material),
-        },
-        "speed": {
-            "figures": costs.track_figures(material),
-            "laps": costs.lap_chart(material),
-            "published": costs.speed_published(material),
-            "table": costs.lap_table(material),
-        },
-        "injury": injury_section.section(material),
         "terrain": terrain_section.section(material.terrain),
         "stages": {
             **dict(zip(("seconds", "bytes"), costs.stage_charts(material), strict=True)),

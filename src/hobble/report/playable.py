@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.database.layout import RowLayout
 from hobble.figure.mesh import body, key
-from hobble.figure.pack import packed, regions
+from hobble.figure.pack import regions
+from hobble.models.network import Network, inverse
+from hobble.models.packing import packed
 from hobble.report.words import PARTS, spoken_links, way
 from hobble.runtime import animation, controller, feet, trajectory
-from hobble.runtime.network import Network
 
 UNSEEN = 1e-7  # an input that is scaled by less than this says nothing
 PRESETS = {
@@ -38,22 +38,16 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
         return {}
     layout = network.layout
     turning = turning_joints(skeleton)
-    rows = _rows(layout, turning)
-    scale = np.where(network.x_std > 0, 1 / np.maximum(network.x_std, 1e-30), 0)
+    rows, scale = _rows(layout, turning), inverse(network.x_std)
     seen = np.flatnonzero(scale > UNSEEN)
-    weights, biases = list(network.weights), list(network.biases)
-    weights[0] = weights[0][:, :, seen]
-    weights[-1], biases[-1] = weights[-1][:, rows], biases[-1][:, rows]
     legs = feet.leg_joints(skeleton)
     felt = network.hurt_links  # hurting another would change nothing
     parts = {
-        label: i
-        for label, i in body_parts(skeleton, network.links, felt).items()
-        if network.links[i] in felt
+        label: i for label, i in body_parts(skeleton, network.links, felt).items() if network.links[i] in felt
     }
     sole = feet.sole_heights(network, legs).tolist()
     return {
-        "layers": [_layer(w, b) for w, b in zip(weights, biases, strict=True)],
+        "network": {"kind": network.kind, **network.page(seen, rows)},
         "seen": seen.tolist(),
         "xMean": packed(network.x_mean[seen].astype(np.float32)),
         "xScale": packed(scale[seen].astype(np.float32)),
@@ -88,7 +82,7 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
             for name, values in PRESETS.items()
             if all(label in parts for label in values)
         ],
-        "constants": _constants(),
+        "constants": {**_constants(), "side": network.terrain_side},
     }
 
 
@@ -145,24 +139,10 @@ def _constants() -> dict[str, float]:
         "strafeFrom": float(animation.STRAFE_FROM),
         "turnInPlace": float(animation.TURN_IN_PLACE),
         "jogFrom": animation.JOG_FROM,
-        "side": 25.0,
         "lockAt": feet.LOCK_AT,
         "release": feet.RELEASE,
         "tooFar": feet.TOO_FAR,
         "fastestTurn": float(controller.FASTEST_TURN),
         "heightMix": feet.HEIGHT_MIX,
         "floating": feet.FLOATING,
-    }
-
-
-def _layer(weights: Array, biases: Array) -> dict[str, Any]:
-    """Control points (K, out, in) as integers of -32767..32767, with a factor for each row."""
-    scale = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30).astype(np.float32)
-    return {
-        "points": weights.shape[0],
-        "rows": weights.shape[1],
-        "columns": weights.shape[2],
-        "weights": packed(np.round(weights / scale[..., None]).astype(np.int16)),
-        "scale": packed(scale),
-        "biases": packed(biases.astype(np.float32)),
     }

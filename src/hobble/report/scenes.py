@@ -13,7 +13,8 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.fit import fitted_rotations
 from hobble.figure.mesh import body, key
-from hobble.figure.pack import packed, packed_turns, regions
+from hobble.figure.pack import packed_turns, regions
+from hobble.models.packing import packed
 from hobble.report.words import spoken, spoken_links
 from hobble.runtime.export import jointed
 

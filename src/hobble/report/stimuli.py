@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_json
-from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body
 from hobble.figure.pack import regions
+from hobble.models.network import Network
 from hobble.report.playable import PRESETS, body_parts
 from hobble.report.raster import GRID, Camera, Studio
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton, jointed
-from hobble.runtime.network import Network
 
 SEVERITY = 8.0
 # The study of Ferre et al. showed thirteen walks, and asked which part is hurt; in them nothing is coloured.

@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from hobble.report.charts import Chart, Family
 from hobble.report.formats import duration, number, size
+from hobble.report.parts import Pair, Section
 
 FOLDER = Path(__file__).parent
 
@@ -28,14 +29,19 @@ def template(name: str) -> Template:
     return environment.get_template(name)
 
 
-def specs(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """What the scripts need of every chart, wherever in a section it stands."""
-    found: dict[str, Any] = {}
-    for section in sections.values():
-        for item in section.values():
-            charts = item.charts if isinstance(item, Family) else item if isinstance(item, list) else [item]
-            found.update({chart.name: chart.spec() for chart in charts if isinstance(chart, Chart)})
-    return found
+def specs(shown: Any) -> dict[str, Any]:
+    """What the scripts need of every chart, wherever in a section, or in a collection of them, it stands."""
+    if isinstance(shown, Chart):
+        return {shown.name: shown.spec()}
+    if isinstance(shown, Family | Pair):
+        return specs(shown.charts)
+    if isinstance(shown, Section):
+        return specs([part.content for part in shown.parts])
+    if isinstance(shown, Mapping):
+        return specs(list(shown.values()))
+    if isinstance(shown, list | tuple):
+        return {name: spec for item in shown for name, spec in specs(item).items()}
+    return {}
 
 
 def style() -> Markup:

@@ -12,9 +12,9 @@ import numpy as np
 
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
+from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton
-from hobble.runtime.network import Network
 
 Wish = tuple[Array, Array | None, str]  # velocity, facing, gait
 

@@ -12,6 +12,7 @@ from hobble.config.load import Catalogue
 from hobble.config.models import ClipEntry
 from hobble.core.clip_files import NAMES, can_be_called, find_clips, the_file
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.untrusted import check_regular
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 
 DATASETS = "results/datasets"
@@ -120,7 +121,10 @@ class Clips:
     def heightmap_files(self, dataset: str) -> list[str]:
         """Heightmaps that are files, in the order of the configuration."""
         maps = self.catalogue.dataset(dataset).terrain.heightmaps
-        return [str(self.mocap / m.path) for m in maps if m.path]
+        files = [self.mocap / m.path for m in maps if m.path]
+        for file in filter(Path.exists, files):
+            check_regular(file)
+        return [str(file) for file in files]
 
     def skeleton_file(self, dataset: str) -> str:
         """Path of the data set's skeleton."""

@@ -6,18 +6,9 @@ from typing import Any
 
 from hobble.core.errors import HobbleError
 from hobble.workflow.configurations import Configurations
+from hobble.workflow.measurements import NAMES, found
 
 COMPARE = "compare"  # the folder under results/, and the key of --config
-# What a comparison reads of each configuration, under results/<configuration>/.
-MEASURED = {
-    "configuration": "configuration.yaml",
-    "accuracy": "evaluation/accuracy.json",
-    "rollouts": "evaluation/rollouts.json",
-    "responsivity": "evaluation/responsivity.json",
-    "injury": "evaluation/injury.json",
-    "recognition": "evaluation/recognition.json",
-    "pipeline": "pipeline.json",
-}
 
 
 class Comparison:
@@ -41,7 +32,11 @@ class Comparison:
         return list(names)
 
     def measured(self) -> dict[str, list[str]]:
-        """Kind of file -> that of each configuration compared."""
+        """Kind of file, or measurement -> that of each configuration compared."""
         names = self.names()
-        out = {kind: [f"results/{name}/{file}" for name in names] for kind, file in MEASURED.items()}
-        return out | {"history": [self.configurations.network(name, "history.csv") for name in names]}
+        return {
+            "configuration": [f"results/{name}/configuration.yaml" for name in names],
+            "pipeline": [f"results/{name}/pipeline.json" for name in names],
+            "history": [self.configurations.network(name, "history.csv") for name in names],
+            **{measure: [found(name, measure) for name in names] for measure in NAMES},
+        }

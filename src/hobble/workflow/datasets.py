@@ -7,6 +7,7 @@ from typing import Any
 from hobble.config.load import Catalogue
 from hobble.config.models import hurts
 from hobble.core.errors import HobbleError
+from hobble.core.section import Section
 from hobble.core.untrusted import MOST_TEXT, read_bytes
 from hobble.workflow.clips import MIRROR, Clips
 
@@ -21,6 +22,10 @@ class Datasets:
         """Plain values of one section of a data set: of those `keys`, or of all where none is named."""
         values = getattr(self.catalogue.dataset(dataset), section).model_dump(mode="json")
         return {key: values[key] for key in keys} if keys else values
+
+    def part(self, dataset: str, section: str, model: type[Section]) -> dict[str, Any]:
+        """Plain values of the keys of a section that `model` has: what one rule reads of it."""
+        return self.options(dataset, section, *model.model_fields)
 
     def motion_options(self, dataset: str, clip: str) -> dict[str, Any]:
         """The motion section, with what the clip's entry overrules, and the ground that the clip is on."""

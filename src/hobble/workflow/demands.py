@@ -13,6 +13,9 @@ import os
 import re
 from pathlib import Path
 
+from hobble.database.layout import RowLayout
+from hobble.measures.registry import measure
+from hobble.models import model
 from hobble.workflow.clips import MIRROR
 from hobble.workflow.project import Project
 
@@ -50,6 +53,17 @@ class Demands:
         """Minutes for a job that takes `each` seconds for a thousand frames of all clips and mirrors."""
         return _minutes(each * self.all_thousands(dataset), attempt, least)
 
+    def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
+        """Megabytes for the measurement `name`."""
+        cost = measure(name).cost
+        more = math.ceil(SPARE * cost.memory_mb * attempt)
+        return more + self.evaluation_memory(configuration, cost.memory_each, attempt)
+
+    def measure_minutes(self, configuration: str, name: str, attempt: int = 1) -> int:
+        """Minutes for the measurement `name`."""
+        cost = measure(name).cost
+        return self.evaluation_minutes(configuration, cost.seconds_each, attempt, cost.minutes)
+
     def evaluation_memory(self, configuration: str, each: float, attempt: int = 1) -> int:
         """Megabytes for a measurement of a network on one clip of its data set after another."""
         return self.memory_of_longest(self.project.configurations.dataset(configuration), each, 0.0, attempt)
@@ -86,11 +100,17 @@ class Demands:
         return self._frames(dataset, clip.removesuffix(MIRROR)) / 1e3 * self._joints(dataset) / JOINTS
 
     def weights(self, configuration: str) -> float:
-        """Weights of the network, of all its control points, by the sizes of the rows of a figure."""
-        network = self.project.configurations.section(configuration, "network")
-        joints = self._joints(self.project.configurations.dataset(configuration))
-        inputs, outputs, units = 156 + 7 * joints, 32 + 9 * joints, network["units"]
-        return network["control_points"] * units * (inputs + (network["hidden_layers"] - 1) * units + outputs)
+        """Numbers that are trained, by the columns of the configuration's rows."""
+        chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
+        return model(chosen.network.kind).parameters(chosen.network, layout.x_size, layout.y_size)
+
+    def layout(self, configuration: str) -> RowLayout:
+        """The columns of a configuration's rows."""
+        chosen = self.project.catalogue.configuration(configuration)
+        skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(chosen.dataset).skeleton)
+        of_rows = self.project.datasets.options(chosen.dataset, "database", "window", "step")
+        links = len(skeleton.links) if chosen.injury else 0
+        return RowLayout(joints=len(skeleton.joints), links=links, **of_rows)
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
     def all_thousands(self, dataset: str) -> float:

@@ -14,9 +14,13 @@ class Package:
         self.base = base
         self.folder = base / "src" / "hobble"
 
-    def code(self, script: str) -> str:
-        """Fingerprint of a rule's script and of all it imports from the package."""
-        return fingerprint(self.base / "workflow" / "scripts" / f"{script}.py", self.base / "src")
+    def code(self, script: str, *modules: str) -> str:
+        """Fingerprint of a rule's script and of all it imports from the package.
+
+        modules: full names of those that it finds by a name it is told.
+        """
+        path = self.base / "workflow" / "scripts" / f"{script}.py"
+        return fingerprint(path, self.base / "src", modules)
 
     def templates(self) -> list[str]:
         """The page's templates; a change in one re-makes only the reports."""
@@ -26,7 +30,8 @@ class Package:
 
     def web(self, suffix: str) -> list[str]:
         """The page's scripts (".js"), or what says which packages they need (".json")."""
-        return sorted(str(p) for p in (self.folder / "report" / "web").iterdir() if p.suffix == suffix)
+        files = [*(self.folder / "report" / "web").iterdir(), *self.folder.glob("models/*/*.js")]
+        return sorted(str(path) for path in files if path.suffix == suffix)
 
     def published(self) -> str:
         """The file of published figures that stand beside ours."""

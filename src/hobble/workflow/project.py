@@ -13,6 +13,7 @@ from hobble.workflow.clips import Clips
 from hobble.workflow.comparison import COMPARE, Comparison
 from hobble.workflow.configurations import Configurations
 from hobble.workflow.datasets import Datasets
+from hobble.workflow.measurements import Measurements
 from hobble.workflow.package import Package
 
 MOCAP = "mocap"
@@ -39,6 +40,7 @@ class Project:
         self.configurations = Configurations(self.catalogue, self.datasets)
         self.comparison = Comparison(self.configurations, config.get(COMPARE, list(COMPARED)))
         self.package = Package(base)
+        self.measurements = Measurements(self.configurations, self.clips, self.package)
 
 
 def _folder(asked: Any) -> Path:

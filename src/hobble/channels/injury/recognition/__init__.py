@@ -1,0 +1,12 @@
+"""Whether it can be told what hurts: a classifier of the captured clips names generated walks."""
+
+from hobble.measures.measure import Cost, Measure
+from hobble.runtime.options import Runtime
+
+MEASURE = Measure(
+    name="recognition",
+    package=__name__,
+    inputs=("weights", "clips", "published"),
+    runtime=tuple(Runtime.model_fields),
+    cost=Cost(memory_each=18, seconds_each=0.2, minutes=30),
+)

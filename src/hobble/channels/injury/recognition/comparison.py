@@ -1,0 +1,41 @@
+"""Whether one can tell what hurts, of configurations side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hobble.channels.injury.recognition.run import rows
+from hobble.evaluation.measured import Measured
+from hobble.evaluation.side_by_side import SideBySide, beside
+from hobble.measures.given import Json
+
+NAME = "recognition"
+
+
+def compared(all_measured: Sequence[Measured], published: Json) -> SideBySide:
+    """What each found, with the share that people named right beside it."""
+    return SideBySide(
+        entries=[{**m.found(NAME), "configuration": m.name} for m in all_measured],
+        beside=[row for m in all_measured for row in _beside_people(m, published["recognition"])],
+    )
+
+
+def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
+    """The confusion tables of all."""
+    found = [(entry["configuration"], row) for entry in compared[NAME] for row in rows(entry)]
+    return {NAME: [{"configuration": name, **row} for name, row in found]}
+
+
+def _beside_people(measured: Measured, people: Json) -> list[dict[str, Any]]:
+    found = measured.found(NAME)
+    if not found["applies"]:
+        return []
+    named, generated = {**people, "configuration": measured.name}, found["generated"]
+    shares = {"all severities": generated["right"]}
+    hurt = [row for row in generated["by_severity"] if row["severity"] > 0]
+    shares |= {f"severity {row['severity']:g}": row["right"] for row in hurt}
+    return [
+        beside(f"hurt part named right, {which}", named, people["share"], ours)
+        for which, ours in shares.items()
+    ]

@@ -1,0 +1,72 @@
+"""Whether one can tell what hurts: in the section on the response to injury."""
+
+from __future__ import annotations
+
+from hobble.measures.given import Json
+from hobble.report.charts import Chart, Trace
+from hobble.report.gather import Material
+from hobble.report.parts import Part, Section
+
+
+def section(found: Json, material: Material) -> Section:
+    """The chart, a guest of the section on the response."""
+    return Section("injury", [Part(30, recognition_chart(found))])
+
+
+def recognition_chart(found: Json) -> Chart | None:
+    """Confusion tables of the classifier that names what hurts."""
+    if not found.get("applies"):
+        return None
+    generated, captured = found["generated"], found["captured"]
+    tables = {
+        "generated walks, each named once": generated.get("by_walk"),
+        "generated walks, window by window": generated,
+        "captured clips, each left out in turn": captured.get("cross_validated"),
+        "captured clips kept from training": captured.get("held_out"),
+    }
+    options: dict[str, list[Trace]] = {}
+    for label, table in tables.items():
+        if not table or not table.get("confusion"):
+            continue
+        confusion = table["confusion"]
+        named = list(dict.fromkeys(name for row in confusion.values() for name in row))
+        hurt = list(confusion)
+        share = [[confusion[h].get(n, 0) / max(1, sum(confusion[h].values())) for n in named] for h in hurt]
+        title = f"{label}: {100 * table['right']:.0f} % right" if table.get("right") is not None else label
+        options[title] = [
+            {
+                "type": "heatmap",
+                "x": named,
+                "y": hurt,
+                "z": [[v or None for v in row] for row in share],
+                "customdata": [[confusion[h].get(n, 0) for n in named] for h in hurt],
+                "colorscale": [[0, "@sunken"], [1, "@accent"]],
+                "zmin": 0,
+                "zmax": 1,
+                "xgap": 2,
+                "ygap": 2,
+                "showscale": False,
+                "hovertemplate": "%{y} hurts, %{x} is named: %{customdata} (%{z:.0%})<extra></extra>",
+            }
+        ]
+    if not options:
+        return None
+    classes = len(found.get("classes") or ())
+    people = found.get("people")
+    beside = (
+        f" People named the part right {100 * people:.0f} % of the time (Ferre et al.)." if people else ""
+    )
+    return Chart(
+        "recognition",
+        "Can one tell what hurts?",
+        "A classifier of the captured clips names the hurt part of walks. Down: what hurts; across: what was "
+        f"named; the diagonal is right. Guessing would be right {100 * (found.get('chance') or 0):.0f} % of "
+        f"the time.{beside}",
+        layout={
+            "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
+            "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
+        },
+        height=max(300, 190 + 20 * classes),
+        choose="Of",
+        options=options,
+    )

@@ -1,0 +1,222 @@
+"""Whether it can be told what hurts: a classifier that knows captured motion looks at generated motion.
+
+It learns windows of the training clips, each labelled with the link that hurts. How well it names windows of
+captured motion that it has not seen is the ceiling; how well it names those of generated walks stands beside
+the share that people got right when shown figures (Ferre et al. 2019).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.section import Section
+from hobble.core.skeleton import Skeleton
+from hobble.evaluation.captured import Captured, captured_clips
+from hobble.evaluation.crowd import FPS, Stretch, severities
+from hobble.evaluation.crowd import run as run_walks
+from hobble.evaluation.discriminant import Discriminant, learn
+from hobble.evaluation.gait_features import features
+from hobble.measures.given import Given, Outcome
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.runtime.options import Runtime
+
+HEALTHY = "healthy"
+WINDOW = 60  # frames, about a cycle; captured motion that was left out is named less well by 75 or 90
+STEP = 15
+PARTS = 4  # of each stretch, left out of the learning in turn
+GENERATED = (3.0, 5.0, 7.0, 10.0)  # severities
+SPEEDS = (1.8, 2.2, 2.6)  # cm a frame asked for
+WALKED_IN, SHOWN = 4 * FPS, 6 * FPS  # frames of a generated walk that are left out, and that are looked at
+AHEAD = 0.9  # share of the root's speed that goes forward in a window that counts as walking
+LEAST = 0.5  # cm a frame
+REASON = "this network has no severity inputs"
+TOO_FEW = "fewer than two parts are hurt in the clips, or none of them walks"
+
+
+@dataclass(frozen=True)
+class Window:
+    """A stretch of walking: whose, which link hurts (or HEALTHY), how much at most, its features and part."""
+
+    clip: str
+    hurt: str
+    severity: float
+    values: Mapping[str, float]
+    part: int
+
+
+def recognition(
+    network: Network,
+    motion: Iterable[Captured],
+    splits: Mapping[str, str],
+    *,
+    configuration: str,
+    runtime: Runtime,
+    people: float,
+) -> dict[str, Any]:
+    """recognition.json: what a classifier of the captured clips `motion` makes of generated walks.
+
+    splits: clip -> "train" or "held_out". people: the published share. Returns `classes`; `captured`:
+    `cross_validated` (a quarter of every stretch left out in turn) and `held_out`; `generated`: windows of
+    walks with each class's link at severities 3, 5, 7 and 10, and `by_walk`, where each walk is named once.
+    All have `windows` (or `walks`), the share `right`, `by_severity`, and the `confusion`: counts of
+    hurt -> named. `applies` is false, with a `reason`, for networks and clips with which it cannot be tried.
+    """
+    head: dict[str, Any] = {"configuration": configuration, "people": people}
+    if not network.links or network.skeleton is None:
+        return {**head, "applies": False, "reason": REASON}
+    windows = [w for clip in motion for w in walking_windows(clip, network)]
+    known = [w for w in windows if splits[w.clip] == "train"]
+    classes = sorted({w.hurt for w in known})
+    if len(classes) < 2:
+        return {**head, "applies": False, "reason": TOO_FEW}
+    judge = learn(table(known), [w.hurt for w in known])
+    walks = generated(network, [c for c in classes if c != HEALTHY], HEALTHY in classes, runtime)
+    return {
+        **head,
+        "applies": True,
+        "classes": classes,
+        "features": list(known[0].values),
+        "chance": round(1 / len(classes), 5),
+        "captured": {
+            "cross_validated": _cross_validated(known),
+            "held_out": _judged(judge, [w for w in windows if splits[w.clip] == "held_out"]),
+        },
+        "generated": {**_judged(judge, walks), "by_walk": _by_walk(judge, walks)},
+    }
+
+
+def walking_windows(clip: Captured, network: Network) -> list[Window]:
+    """The windows of a captured stretch in which it walks ahead and the same link hurts throughout."""
+    assert network.skeleton is not None
+    walk = clip.gait[:, network.gaits.index("walk")]
+    hurts = clip.severity > 0
+    out = []
+    for part, start in product(range(PARTS), range(0, len(clip), STEP)):
+        first = part * len(clip) // PARTS + start
+        span = slice(first, first + WINDOW)
+        if span.stop > (part + 1) * len(clip) // PARTS:
+            continue
+        speed = np.hypot(*clip.velocity[span].mean(axis=0))
+        ahead = clip.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST
+        same = np.all(hurts[span] == hurts[first])
+        if walk[span].mean() > 0.5 and ahead and same:
+            names = [network.links[i] for i in np.flatnonzero(hurts[first])]
+            values = _values(network.skeleton, clip.local, clip.contacts, clip.root, span)
+            severity = float(clip.severity[span].max())
+            out.append(Window(clip.clip, " and ".join(names) or HEALTHY, severity, values, part))
+    return out
+
+
+def generated(network: Network, classes: Sequence[str], healthy: bool, runtime: Runtime) -> list[Window]:
+    """Windows of generated walks, each class at each severity and speed."""
+    assert network.skeleton is not None
+    asked = [(name, s, v) for name, s, v in product(classes, GENERATED, SPEEDS)]
+    asked += [(HEALTHY, 0.0, v) for v in SPEEDS] if healthy else []
+    hurt = [{} if name == HEALTHY else dict.fromkeys(name.split(" and "), s) for name, s, _ in asked]
+    script = Stretch(
+        WALKED_IN + SHOWN, ["walk"] * len(asked), severities(network, hurt), [v for *_, v in asked]
+    )
+    walks = run_walks(network, [script], runtime)
+    out = []
+    for i, (name, severity, speed) in enumerate(asked):
+        for start in range(WALKED_IN, WALKED_IN + SHOWN - WINDOW + 1, STEP):
+            span = slice(start, start + WINDOW)
+            values = _values(
+                network.skeleton, walks.local[:, i], walks.contacts[:, i], walks.root[:, i], span
+            )
+            out.append(Window(f"{name} {severity:g} {speed:g}", name, severity, values, 0))
+    return out
+
+
+def table(windows: Sequence[Window]) -> Array:
+    """(n, D) features."""
+    return np.array([list(w.values.values()) for w in windows])
+
+
+def rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The confusion tables as flat rows: of which motion, what hurts, what was named, how often."""
+    if not result["applies"]:
+        return []
+    tables = {**result["captured"], "generated": result["generated"]}
+    return [
+        {"motion": of, "hurt": hurt, "named": named, "windows": count}
+        for of, found in tables.items()
+        for hurt, row in found["confusion"].items()
+        for named, count in row.items()
+    ]
+
+
+def run(given: Given, options: Section) -> Outcome:
+    """recognition.json, and its confusion tables as one."""
+    result = recognition(
+        load_network(given.weights),
+        captured_clips(given.clips.values()),
+        given.splits,
+        configuration=given.configuration,
+        runtime=given.runtime,
+        people=given.published["recognition"]["share"],
+    )
+    right = f"named right: {result['generated']['right']} of generated windows" if result["applies"] else ""
+    return Outcome(result, {"confusion": rows(result)}, right or result["reason"])
+
+
+def _values(skeleton: Skeleton, local: Array, contacts: Array, root: Array, span: slice) -> dict[str, float]:
+    return features(skeleton, local[span], contacts[span], root[span])
+
+
+def _cross_validated(windows: Sequence[Window]) -> dict[str, Any]:
+    """Each part of the clips judged by what was learnt from the others."""
+    judged: list[Window] = []
+    named: list[str] = []
+    for part in range(PARTS):
+        rest = [w for w in windows if w.part != part]
+        asked = [w for w in windows if w.part == part]
+        if asked and len({w.hurt for w in rest}) > 1:
+            named += learn(table(rest), [w.hurt for w in rest]).names(table(asked))
+            judged += asked
+    return _confusion(sorted({w.hurt for w in windows}), judged, named)
+
+
+def _judged(judge: Discriminant, windows: Sequence[Window]) -> dict[str, Any]:
+    return _confusion(judge.classes, windows, judge.names(table(windows)) if windows else [])
+
+
+def _by_walk(judge: Discriminant, windows: Sequence[Window]) -> dict[str, Any]:
+    """Each walk named once, by what all its windows say together."""
+    scores = judge.scores(table(windows))
+    walks, named = [], []
+    for walk in dict.fromkeys(w.clip for w in windows):
+        mine = [i for i, w in enumerate(windows) if w.clip == walk]
+        walks.append(windows[mine[0]])
+        named.append(judge.classes[int(np.argmax(scores[mine].sum(axis=0)))])
+    return _confusion(judge.classes, walks, named, "walks")
+
+
+def _confusion(
+    classes: Sequence[str], windows: Sequence[Window], named: Sequence[str], what: str = "windows"
+) -> dict[str, Any]:
+    """Counts hurt -> named, a row for each class that is asked about and a column for each that is known."""
+    counts = {h: dict.fromkeys(classes, 0) for h in sorted({w.hurt for w in windows})}
+    right: dict[float, list[bool]] = {}
+    for w, name in zip(windows, named, strict=True):
+        counts[w.hurt][name] += 1
+        right.setdefault(w.severity, []).append(w.hurt == name)
+    return {
+        what: len(windows),
+        "right": _share([r for some in right.values() for r in some]),
+        "by_severity": [
+            {"severity": s, what: len(some), "right": _share(some)} for s, some in sorted(right.items())
+        ],
+        "confusion": counts,
+    }
+
+
+def _share(right: Sequence[bool]) -> float | None:
+    return round(sum(right) / len(right), 5) if right else None

@@ -1,0 +1,25 @@
+"""How the gait changes as the severity of each link is swept from 0 to 10 and back."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from hobble.core.section import PositiveFloat, Section
+from hobble.measures.measure import Cost, Measure
+from hobble.runtime.options import Runtime
+
+
+class Options(Section):
+    """Its keys of the section `evaluation`."""
+
+    seconds: PositiveFloat = Field(4.0, description="at each severity of the injury sweeps")
+
+
+MEASURE = Measure(
+    name="injury",
+    package=__name__,
+    inputs=("weights", "clips"),
+    options=Options,
+    runtime=tuple(Runtime.model_fields),
+    cost=Cost(memory_each=14, seconds_each=0.2, minutes=60),
+)

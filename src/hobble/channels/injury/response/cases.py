@@ -1,0 +1,160 @@
+"""Injury beside the sweep: a second one over a first, from walking into jogging, and divided severities."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from hobble.channels.injury.response.sweep import WALK_IN
+from hobble.core.quat import Array
+from hobble.evaluation.crowd import FPS, Stretch, Walks, run, severities
+from hobble.evaluation.motion_measures import gait_measures
+from hobble.evaluation.pose_distance import apart, mean_cycle
+from hobble.evaluation.spearman import spearman
+from hobble.models.network import Network
+from hobble.runtime.options import Runtime
+
+FIRST = 7.0  # severity of the injury that stays while a second one comes
+SECOND = (0.0, 2.5, 5.0, 7.5, 10.0)
+SCALES = (1.0, 2.0, 5.0)
+INTO_A_JOG = (0.0, 5.0, 10.0)
+ARRIVED = 0.9  # share of the final speed at which a figure counts as jogging
+
+
+def _frames(share: float, seconds: float) -> int:
+    return max(4, round(share * seconds * FPS))
+
+
+def _cycle(walks: Walks, stretch: int, figure: int) -> Array:
+    span = walks.measured(stretch, figure)
+    return mean_cycle(walks.local[span, figure], walks.phase[span, figure])
+
+
+def _from(walks: Walks, stretch: int, figure: int, cycle: Array) -> float:
+    span = walks.measured(stretch, figure)
+    return float(np.mean(apart(walks.local[span, figure], walks.phase[span, figure], cycle)))
+
+
+def _speed(network: Network, walks: Walks, stretch: int, figure: int) -> float:
+    assert network.skeleton is not None
+    span = walks.measured(stretch, figure)
+    local, contacts, root = (a[span, figure] for a in (walks.local, walks.contacts, walks.root))
+    return float(gait_measures(network.skeleton, local, contacts, root)["speed"] or 0.0)
+
+
+def second_injuries(
+    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
+) -> list[dict[str, Any]]:
+    """Every second link hurt more and more over every first one at severity 7, while walking.
+
+    `from_first_cm`: how far the second at 10 takes the walk from that of the first alone; `share`: of what
+    it does to a healthy body; `from_second_cm`: how far the walk of both is from that of the second alone, 0
+    where the second hides the first; `spearman` of the distance from the first with the second's severity.
+    """
+    pairs = [(a, b) for a, b in product([None, *links], links) if a != b]
+    gait = ["walk"] * len(pairs)
+
+    def hurt(second: float) -> Array:
+        each = [{**({a: FIRST} if a else {}), b: second} for a, b in pairs]
+        return severities(network, each)
+
+    healthy = severities(network, [{}] * len(pairs))
+    script = [Stretch(_frames(WALK_IN, seconds), gait, healthy)]
+    script += [Stretch(_frames(1, seconds), gait, hurt(s)) for s in SECOND]
+    walks = run(network, script, runtime)
+    last = len(SECOND)
+    alone = {b: i for i, (a, b) in enumerate(pairs) if a is None}
+    out = []
+    for i, (first, second) in enumerate(pairs):
+        if first is None:
+            continue
+        base, of_second = _cycle(walks, 1, i), _cycle(walks, last, alone[second])
+        away = [_from(walks, 1 + k, i, base) for k in range(last)]
+        j = alone[second]
+        normal = _from(walks, last, j, _cycle(walks, 1, j)) - _from(walks, 1, j, _cycle(walks, 1, j))
+        both = _from(walks, last, i, of_second) - _from(walks, last, j, of_second)
+        out.append(
+            {
+                "first": first,
+                "second": second,
+                "from_first_cm": round(away[-1] - away[0], 5),
+                "share": round((away[-1] - away[0]) / normal, 5) if normal > 0.05 else None,
+                "from_second_cm": round(both, 5),
+                "spearman": spearman(SECOND, away),
+            }
+        )
+    return out
+
+
+def into_a_jog(
+    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
+) -> list[dict[str, Any]]:
+    """From walking to jogging with each link at severities 0, 5 and 10.
+
+    `kept`: how far the jog is from the healthy jog, as a share of how far the walk was from the healthy walk:
+    0 where running forgets the injury. `reach_seconds`: from the call to nine tenths of the jog's speed.
+    """
+    each = [(link, s) for link, s in product(links, INTO_A_JOG) if s > 0]
+    figures: list[tuple[str | None, float]] = [(None, 0.0), *each]
+    hurt = severities(network, [{link: s} if link else {} for link, s in figures])
+    frames = _frames(1, seconds)
+    walk, jog = ["walk"] * len(figures), ["jog"] * len(figures)
+    walks = run(
+        network,
+        [Stretch(frames, walk, hurt), Stretch(frames, walk, hurt), Stretch(2 * frames, jog, hurt)],
+        runtime,
+    )
+    healthy = {stretch: _cycle(walks, stretch, 0) for stretch in (1, 2)}
+    own = {stretch: _from(walks, stretch, 0, healthy[stretch]) for stretch in (1, 2)}
+    at = int(walks.starts[2])
+    out = []
+    for i, (link, severity) in enumerate(figures):
+        walking, jogging = (_from(walks, s, i, healthy[s]) - own[s] for s in (1, 2))
+        speed = _speed(network, walks, 2, i)
+        going = np.linalg.norm(np.diff(walks.root[at:, i, ::2], axis=0), axis=1) * FPS
+        fast = np.flatnonzero(going >= ARRIVED * speed)
+        out.append(
+            {
+                "link": link,
+                "severity": severity,
+                "walk_speed": round(_speed(network, walks, 1, i), 5),
+                "jog_speed": round(speed, 5),
+                "reach_seconds": round(float(fast[0]) / FPS, 5) if len(fast) else None,
+                "walk_from_healthy_cm": round(walking, 5),
+                "jog_from_healthy_cm": round(jogging, 5),
+                "kept": round(jogging / walking, 5) if walking > 0.05 else None,
+                "largest_acceleration": round(float(walks.acceleration[at : at + frames, i].max()), 5),
+            }
+        )
+    return out
+
+
+def divided_severities(
+    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
+) -> list[dict[str, Any]]:
+    """The walk with severities divided by 1, 2 and 5: what is left of each link's effect."""
+    gait = ["walk"] * len(links)
+    script = [Stretch(_frames(WALK_IN, seconds), gait, severities(network, [{}] * len(links)))]
+    script += [
+        Stretch(_frames(1, seconds), gait, severities(network, [{link: s} for link in links])) for s in SECOND
+    ]
+    out = []
+    for scale in SCALES:
+        walks = run(network, script, runtime.model_copy(update={"severity_scale": scale}))
+        for i, link in enumerate(links):
+            healthy = _cycle(walks, 1, i)
+            own, speed = _from(walks, 1, i, healthy), _speed(network, walks, 1, i)
+            for k, severity in enumerate(SECOND):
+                out.append(
+                    {
+                        "scale": scale,
+                        "link": link,
+                        "severity": severity,
+                        "from_healthy_cm": round(_from(walks, 1 + k, i, healthy) - own, 5),
+                        "speed_share": round(_speed(network, walks, 1 + k, i) / max(speed, 1e-9), 5),
+                    }
+                )
+    return out

@@ -1,0 +1,60 @@
+"""The response to injury of configurations side by side."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hobble.report.parts import Part, Section, Words
+from hobble.report.side_by_side import Compared
+from hobble.report.tables import Column, Table
+
+INTRODUCTION = (
+    "One link at a time is hurt from severity 0 to 10 and back while the character walks or jogs; every "
+    "figure is the mean over the links that were hurt in training. ρ is Spearman's rank correlation: 1 or −1 "
+    "means that every further severity moves the measure further, 0 that it does not follow severity."
+)
+# Measures of the injury summary in words.
+INJURY = {
+    "from_healthy_cm": "pose from healthy at severity 10, cm a joint",
+    "speed_share": "share of the healthy speed at severity 10",
+    "spearman_from_healthy": "ρ of pose and severity",
+    "spearman_speed": "ρ of speed and severity",
+    "spearman_back_from_healthy": "ρ of pose and severity, healing",
+    "settle_seconds": "settles in, s",
+    "heal_seconds": "heals in, s",
+    "after_healing_cm": "left after healing, cm a joint",
+    "way_back_cm": "way back from way there, cm a joint",
+    "acceleration_share": "largest acceleration, of the healthy walk's",
+    "clip_acceleration_share": "largest acceleration, of the captured clips'",
+}
+
+
+def section(compared: Compared) -> Section:
+    """A table of means, where any configuration can be hurt."""
+    table = injury_table(compared)
+    words = Words(INTRODUCTION) if table else None
+    parts = [Part(0, words), Part(10, table, open=True, short=True)]
+    return Section("injury", parts, title="Injury response", at=20)
+
+
+def injury_table(compared: Compared) -> Table | None:
+    """What severities do, on average, in the configurations that know them."""
+    rows = [
+        (entry["configuration"], gait, summary)
+        for entry in compared["injury"]
+        if entry.get("applies")
+        for gait, summary in (entry.get("summary") or {}).items()
+    ]
+    if not rows:
+        return None
+    found = {key for *_, summary in rows for key in summary}
+    keys = [*(key for key in INJURY if key in found), *sorted(found - set(INJURY))]
+    columns = [Column("measure"), *(Column.number(f"{name}, {gait}") for name, gait, _ in rows)]
+    table: list[list[Any]] = [
+        [INJURY.get(key, key.replace("_", " ")), *(summary.get(key) for *_, summary in rows)] for key in keys
+    ]
+    right = {e["configuration"]: e["generated"]["right"] for e in compared["recognition"] if e.get("applies")}
+    if right:
+        row = ["share of hurt parts that a classifier names right", *(right.get(name) for name, *_ in rows)]
+        table.append(row)
+    return Table("compare-injury", columns, table, "Means over the links that were hurt in training")

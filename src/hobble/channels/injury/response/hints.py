@@ -1,0 +1,80 @@
+"""What the response to injury suggests, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hobble.measures.given import Json
+from hobble.report.formats import number
+from hobble.report.summary import Hint
+
+
+def injury_hints(found: Json) -> Iterator[Hint]:
+    """Whether each link is felt, steadily, and left again; next to how far an unhurt walk drifts."""
+    responses = [r for r in found.get("responses") or () if r["gait"] == "walk"]
+    walks = [r for r in responses if r.get("trained", True)]
+    if not walks:
+        return
+    drift, left = (_unhurt(responses, key) for key in ("from_healthy_cm", "after_healing_cm"))
+    if drift > 2:
+        yield Hint(
+            "warn",
+            f"A walk in which nothing hurts drifts as well, by {number(drift)} cm a joint.",
+            "What severity does can hardly be told from that: train for longer, or measure for longer.",
+        )
+    deaf = [r["link"] for r in walks if (r.get("from_healthy_cm") or 0) < max(0.5, 2 * drift)]
+    if deaf:
+        yield Hint(
+            "note",
+            f"{len(deaf)} of {_plural(len(walks), 'link')} hardly "
+            f"{'changes' if len(deaf) == 1 else 'change'} the walk at severity 10",
+            "(under half a centimetre a joint, or no different from an unhurt walk): "
+            f"{', '.join(deaf[:4])}{' …' if len(deaf) > 4 else ''}.",
+        )
+    rough = [r["link"] for r in walks if _rho(r) < 0.7 and r["link"] not in deaf]
+    if rough:
+        yield Hint(
+            "note",
+            f"The pose does not follow severity steadily for {', '.join(rough[:4])}.",
+            "See whether its curve jumps: then in-between severities are missing from the data.",
+        )
+    stuck = [
+        r["link"]
+        for r in walks
+        if r["link"] not in deaf and (r.get("after_healing_cm") or 0) > max(2, 2 * left)
+    ]
+    if stuck:
+        yield Hint(
+            "note",
+            f"After healing, the walk does not quite come back for {', '.join(stuck[:4])}.",
+            "The network is caught in a limp that it would see as a gait of its own.",
+        )
+    if not deaf and not rough:
+        yield Hint(
+            "good",
+            "Every link that was hurt in training shifts the walk with its severity, and steadily.",
+            "",
+        )
+
+
+def _unhurt(responses: Sequence[Mapping[str, Any]], key: str) -> float:
+    """What is measured of links that were never hurt in training: the drift of an unhurt walk."""
+    values = [r[key] for r in responses if not r.get("trained", True) and r.get(key) is not None]
+    return float(np.mean(values)) if values else 0.0
+
+
+def _plural(count: int, word: str) -> str:
+    """A count with its word.
+
+    >>> _plural(1, "link"), _plural(2, "link")
+    ('1 link', '2 links')
+    """
+    return f"{count} {word}{'' if count == 1 else 's'}"
+
+
+def _rho(response: Mapping[str, Any]) -> float:
+    value = (response.get("spearman") or {}).get("from_healthy")
+    return 0.0 if value is None else float(value)

@@ -1,0 +1,278 @@
+"""How the gait answers to injury: severity swept link by link."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any
+
+from markupsafe import Markup
+
+from hobble.channels.injury.response import page_cases as cases
+from hobble.channels.injury.response.hints import injury_hints
+from hobble.measures.given import Json
+from hobble.report.charts import Chart, Family, Trace, axis, line
+from hobble.report.gather import Material
+from hobble.report.parts import Pair, Part, Section, Words
+from hobble.report.summary import Hint, placed
+from hobble.report.tables import Column, Table
+
+NOTHING = Markup(
+    "This network has no severities among its inputs, so nothing can hurt it. The configuration "
+    "<code>injured</code> has."
+)
+UNTRAINED = "never hurt in training"
+GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
+HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
+SIDES = (("left", "@accent"), ("right", "@g2"))
+# Small charts: name, title, unit, lines as (column, label, colour), the least that the axis spans.
+PANELS: tuple[tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool], ...] = (
+    (
+        "pose",
+        "Pose",
+        "cm",
+        (("from_healthy", "from healthy", "@accent"), ("from_worst", "from severity 10", "@muted")),
+        2.0,
+        True,
+    ),
+    ("speed", "Speed", "cm/s", (("speed", "speed", "@accent"),), 20.0, True),
+    ("stance", "Time on each foot", "share", tuple((f"stance_{s}", s, c) for s, c in SIDES), 0.2, False),
+    ("step", "Step length", "cm", tuple((f"step_{s}", s, c) for s, c in SIDES), 15.0, False),
+    ("knee", "Range of the knee", "degrees", tuple((f"knee_{s}", s, c) for s, c in SIDES), 15.0, False),
+    ("arm", "Swing of the arm", "degrees", tuple((f"arm_{s}", s, c) for s, c in SIDES), 15.0, False),
+    (
+        "lean",
+        "Lean of the trunk",
+        "degrees",
+        (("lean_forward", "forward", "@accent"), ("lean_left", "to the left", "@g2")),
+        6.0,
+        False,
+    ),
+    ("hip", "Height of the hips", "cm", (("hip_height", "hips", "@accent"),), 5.0, False),
+    (
+        "rough",
+        "Largest acceleration of a joint",
+        "cm per frame²",
+        (("largest_acceleration", "joint", "@accent"),),
+        2.0,
+        True,
+    ),
+)
+
+
+def section(found: Json, material: Material) -> Section:
+    """Charts and tables, or that there are none for a network without severities."""
+    parts = _parts(found, material.name) if found.get("applies") else [Part(0, Words(NOTHING, empty=True))]
+    return Section("injury", parts, title="Injury response", at=20)
+
+
+def hints(found: Json, material: Material) -> Iterator[Hint]:
+    """What the response suggests."""
+    return placed(70, injury_hints(found))
+
+
+def _parts(found: Json, name: str) -> list[Part]:
+    rows, responses, second = (found.get(key) or [] for key in ("rows", "responses", "second"))
+    untrained = {r["link"] for r in responses if not r.get("trained", True)}
+    return [
+        Part(0, Pair(overview(responses))),
+        Part(10, response_table(name, responses)),
+        Part(20, curves(rows, found.get("back") or (), untrained) if rows else None),
+        Part(40, cases.second_chart(second)),
+        Part(50, cases.second_table(name, second)),
+        Part(
+            60,
+            Pair(
+                [
+                    cases.divided_chart(found.get("divided") or ()),
+                    cases.jog_chart(found.get("into_a_jog") or (), untrained),
+                ]
+            ),
+        ),
+        Part(70, sweep_table(name, rows)),
+    ]
+
+
+def curves(
+    rows: Sequence[Mapping[str, Any]],
+    back: Sequence[Mapping[str, Any]] = (),
+    untrained: Collection[str] = (),
+) -> Family:
+    """A small chart for each measure over severity, for a chosen gait and link; dotted: on the way back.
+
+    Links that are `untrained` come last, and say so.
+    """
+
+    def label_of(row: Mapping[str, Any]) -> str:
+        never = f" ({UNTRAINED})" if row["link"] in untrained else ""
+        return f"{row['link']}, {row['gait']}{never}"
+
+    sweeps: dict[str, list[Mapping[str, Any]]] = {}
+    for row in sorted(rows, key=lambda row: row["link"] in untrained):
+        sweeps.setdefault(label_of(row), []).append(row)
+    charts = []
+    for name, title, unit, lines, span, from_zero in PANELS:
+        options: dict[str, list[Trace]] = {}
+        for sweep, some in sweeps.items():
+            x = [row["severity"] for row in some]
+            traces = [
+                line(label, x, [row.get(column) for row in some], colour, mode="lines+markers")
+                | {"marker": {"size": 5}}
+                for column, label, colour in lines
+            ]
+            healing = [row for row in back if label_of(row) == sweep]
+            for column, label, colour in lines if healing else ():
+                x, y = [row["severity"] for row in healing], [row.get(column) for row in healing]
+                traces.append(
+                    line(f"{label}, healing", x, y, colour, width=1.3, dash="dot", showlegend=False)
+                )
+            options[sweep] = traces
+        layout = {
+            "xaxis": axis("severity", dtick=2, range=[-0.3, 10.3]),
+            "yaxis": axis(unit),
+            "showlegend": len(lines) > 1,
+        }
+        ranges = {
+            sweep: {
+                "yaxis": {"range": y_range(rows, some[0]["gait"], [c for c, *_ in lines], span, from_zero)}
+            }
+            for sweep, some in sweeps.items()
+        }
+        charts.append(
+            Chart(
+                f"sweep-{name}",
+                title,
+                "",
+                layout=layout,
+                height=230,
+                options=options,
+                option_layouts=ranges,
+            )
+        )
+    return Family(
+        "sweeps",
+        "One link, hurt more and more",
+        "Every point is a walk of its own, healthy for a quarter and measured over its last half. Look for "
+        "lines that bend smoothly from left to right (a gradient), for left and right that part (a limp), "
+        "and for jumps between neighbours (the network switches between two gaits it knows). Pose distances "
+        "are means over joints at the same phase. Dotted: on the way back to 0. A link that was never hurt "
+        "in training shows how much an unhurt walk changes by itself.",
+        charts,
+        "Link and gait",
+    )
+
+
+def y_range(
+    rows: Sequence[Mapping[str, Any]], gait: str, columns: Sequence[str], span: float, from_zero: bool
+) -> list[float] | None:
+    """One range for every link of a gait, so that links compare, and never so narrow that noise fills it."""
+    found = [row[c] for row in rows if row["gait"] == gait for c in columns if row.get(c) is not None]
+    if not found:
+        return None
+    low, high = (0.0 if from_zero else min(found)), max(found)
+    spare = max(span - (high - low), 0.08 * (high - low))
+    return [low if from_zero else low - spare / 2, high + spare / (1 if from_zero else 2)]
+
+
+def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
+    """What severity 10 does to pose and speed, link by link."""
+    charts = []
+    for name, key, title, label, least, caption in (
+        (
+            "injury-pose",
+            "from_healthy_cm",
+            "How far the pose goes",
+            "cm at severity 10",
+            2.0,
+            "Mean distance over joints, at the same phase, from the healthy walk. Hollow dots are links that "
+            "were never hurt in training: their severity does nothing, and they show how far an unhurt walk "
+            "drifts in the meantime. A link whose dot lies no further out is not felt.",
+        ),
+        (
+            "injury-speed",
+            "speed_share",
+            "What is left of the speed",
+            "share of the healthy speed",
+            1.0,
+            "At severity 10; 1 means that the hurt character is as fast as the healthy one. Hollow: links "
+            "that were never hurt in training.",
+        ),
+    ):
+        traces: list[Trace] = []
+        for gait, colour in GAIT_COLOURS.items():
+            for hurt in (True, False):
+                some = [
+                    r
+                    for r in responses[::-1]
+                    if r["gait"] == gait and r.get("trained", True) is hurt and r.get(key) is not None
+                ]
+                if some:
+                    marker = {"color": colour, "size": 9} if hurt else HOLLOW | {"color": colour}
+                    traces.append(
+                        {
+                            "type": "scatter",
+                            "mode": "markers",
+                            "name": gait if hurt else f"{gait}, {UNTRAINED}",
+                            "y": [r["link"] for r in some],
+                            "x": [r[key] for r in some],
+                            "marker": marker,
+                            "hovertemplate": "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>",
+                        }
+                    )
+        # What was hurt in training stands on top; plotly counts from below.
+        downwards = sorted(responses, key=lambda r: not r.get("trained", True))
+        links = list(dict.fromkeys(r["link"] for r in downwards))[::-1]
+        furthest = max((r[key] for r in responses if r.get(key) is not None), default=0.0)
+        across = axis(label, range=[0, 1.08 * max(least, furthest)])
+        rows = {"categoryorder": "array", "categoryarray": links, "automargin": True, "type": "category"}
+        if traces:
+            layout = {"xaxis": across, "yaxis": rows}
+            charts.append(Chart(name, title, caption, traces, layout, 150 + 21 * len(links)))
+    return charts
+
+
+def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
+    """A row per gait and link."""
+    columns = [
+        Column("gait"),
+        Column("link"),
+        Column("in training", lambda v: "hurt" if v else "never hurt"),
+        Column.number("pose at 10, cm"),
+        Column.number("speed share"),
+        Column.number("settles in, s"),
+        Column.number("heals in, s"),
+        Column.number("left after healing, cm"),
+        Column.number("way back, cm"),
+        Column.number("acceleration share"),
+        Column.number("ρ pose"),
+        Column.number("ρ speed"),
+    ]
+    rows = [
+        [
+            r["gait"],
+            r["link"],
+            r.get("trained", True),
+            r.get("from_healthy_cm"),
+            r.get("speed_share"),
+            r.get("settle_seconds"),
+            r.get("heal_seconds"),
+            r.get("after_healing_cm"),
+            r.get("way_back_cm"),
+            r.get("acceleration_share"),
+            (r.get("spearman") or {}).get("from_healthy"),
+            (r.get("spearman") or {}).get("speed"),
+        ]
+        for r in responses
+    ]
+    title = "Every link at severity 10, and how steadily it gets there (ρ: Spearman's rank correlation)"
+    return Table(f"{name}-injury-responses", columns, rows, title)
+
+
+def sweep_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+    """Every walk of the sweep, as in injury.csv."""
+    if not rows:
+        return None
+    keys = list(rows[0])
+    columns = [Column(k) if isinstance(rows[0][k], str) else Column.number(k.replace("_", " ")) for k in keys]
+    return Table(
+        f"{name}-injury", columns, [[row.get(k) for k in keys] for row in rows], "Every walk measured"
+    )

@@ -1,0 +1,123 @@
+"""More of the injury response: a second injury, a jog after a hurt walk, severities divided."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+from hobble.report.charts import Chart, Trace, axis, line
+from hobble.report.tables import Column, Table
+
+COLOURS = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0")
+
+
+def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
+    """What a second injury adds to a first one: every pair, as injury.json has them under `second`."""
+    if not rows:
+        return None
+    firsts, seconds = (list(dict.fromkeys(row[key] for row in rows)) for key in ("first", "second"))
+    by_pair = {(row["first"], row["second"]): row for row in rows}
+    shown = {"centimetres a joint": ("from_first_cm", ".1f"), "share of what it does alone": ("share", ".0%")}
+    options: dict[str, list[Trace]] = {}
+    for label, (key, form) in shown.items():
+        options[label] = [
+            {
+                "type": "heatmap",
+                "x": seconds,
+                "y": firsts,
+                "z": [[by_pair.get((a, b), {}).get(key) for b in seconds] for a in firsts],
+                "colorscale": [[0, "@sunken"], [1, "@accent"]],
+                "zmin": 0,
+                "xgap": 2,
+                "ygap": 2,
+                "texttemplate": f"%{{z:{form}}}",
+                "showscale": False,
+                "hovertemplate": f"%{{x}} over %{{y}}: %{{z:{form}}}<extra></extra>",
+            }
+        ]
+    return Chart(
+        "second-injury",
+        "A second injury over a first",
+        "Down: the first injury, at severity 7; across: the second, at 10. How far the second takes the walk "
+        "from that of the first alone, and how much that is of what it does to a healthy body. Pale is a "
+        "second injury that the first one hides.",
+        layout={
+            "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
+            "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
+        },
+        height=max(300, 190 + 24 * len(firsts)),
+        choose="In",
+        options=options,
+    )
+
+
+def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+    """Every walk with two injuries, as in injury_second.csv."""
+    if not rows:
+        return None
+    keys = [key for key, value in rows[0].items() if not isinstance(value, (dict, list))]
+    columns = [
+        Column(k.replace("_", " ")) if isinstance(rows[0][k], str) else Column.number(k.replace("_", " "))
+        for k in keys
+    ]
+    table = [[row.get(k) for k in keys] for row in rows]
+    return Table(f"{name}-second-injury", columns, table, "Every walk with two injuries")
+
+
+def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
+    """What dividing severities does."""
+    options: dict[str, list[Trace]] = {}
+    scales = sorted({row["scale"] for row in rows})
+    for link in dict.fromkeys(row["link"] for row in rows):
+        traces = []
+        for scale, colour in zip(scales, COLOURS, strict=False):
+            some = [row for row in rows if row["link"] == link and row["scale"] == scale]
+            x, y = [row["severity"] for row in some], [row["from_healthy_cm"] for row in some]
+            traces.append(line(f"divided by {scale:g}", x, y, colour, mode="lines+markers"))
+        options[link] = traces
+    if not options:
+        return None
+    return Chart(
+        "divided",
+        "Severities divided",
+        "The same severities, divided by a scale before the network sees them: distance of the pose from the "
+        "healthy walk.",
+        layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm a joint", rangemode="tozero")},
+        choose="Link",
+        options=options,
+    )
+
+
+def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()) -> Chart | None:
+    """How much of an injury is left when a walk becomes a jog; one line for all `untrained` links."""
+    links = [link for link in dict.fromkeys(row["link"] for row in rows) if link is not None]
+    hurt = [link for link in links if link not in untrained]
+    traces: list[Trace] = []
+    for i, link in enumerate(hurt):
+        some = [row for row in rows if row["link"] == link]
+        x, y = [row["severity"] for row in some], [row.get("jog_from_healthy_cm") for row in some]
+        dash = "solid" if i < len(COLOURS) else "dash"
+        traces.append(line(link, x, y, COLOURS[i % len(COLOURS)], dash=dash, mode="lines+markers", width=1.4))
+    found: dict[float, list[float]] = {}
+    for row in rows:
+        if row["link"] in untrained and row.get("jog_from_healthy_cm") is not None:
+            found.setdefault(row["severity"], []).append(row["jog_from_healthy_cm"])
+    if found:
+        means = [sum(values) / len(values) for values in found.values()]
+        traces.append(line("never hurt in training", list(found), means, "@muted", dash="dot", width=1.4))
+    if not traces:
+        return None
+    return Chart(
+        "into-a-jog",
+        "From a hurt walk into a jog",
+        "How far the jog that follows is from the healthy jog. Links that were never hurt in training share "
+        "the dotted line, their mean: so far two unhurt jogs differ. A line that is no higher is an injury "
+        "that is forgotten when the figure begins to jog.",
+        traces,
+        {
+            "xaxis": axis("severity", dtick=1),
+            "yaxis": axis("cm a joint", rangemode="tozero"),
+            "showlegend": True,
+        },
+        height=420,
+    )

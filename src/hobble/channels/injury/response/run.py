@@ -1,0 +1,148 @@
+"""The response to injury: every link of the body swept from healthy to fully hurt and back, in two gaits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hobble.channels.injury.response import Options
+from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
+from hobble.channels.injury.response.sweep import SEVERITIES, Sweep
+from hobble.evaluation.captured import Captured, captured_clips
+from hobble.evaluation.crowd import SPEEDS
+from hobble.measures.given import Given, Outcome
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.runtime.options import Runtime
+
+GAITS = tuple(SPEEDS)
+REASON = "this network has no severity inputs"
+SUMMARY = (
+    "from_healthy_cm",
+    "after_healing_cm",
+    "way_back_cm",
+    "speed_share",
+    "settle_seconds",
+    "heal_seconds",
+    "acceleration_share",
+    "clip_acceleration_share",
+)
+
+
+def injury_response(
+    network: Network,
+    motion: Iterable[Captured] = (),
+    *,
+    configuration: str,
+    runtime: Runtime,
+    seconds: float,
+    links: Sequence[str] | None = None,
+) -> dict[str, Any]:
+    """Sweep each of `links` (default: all).
+
+    motion: the captured clips, whose largest accelerations ours stand against. seconds: at each severity.
+    Returns `rows`, one for each gait, link and severity on the way up, `back` for the way back, `responses`
+    for each gait and link (see `Sweep.response`), `second`, `into_a_jog` and `divided` (see `cases`), and
+    `summary`: means over the links that were hurt in training (`trained`) and, apart, over those that were
+    not. `applies` is false for a network without severities.
+    """
+    if not network.links:
+        return {"configuration": configuration, "applies": False, "reason": REASON}
+    links = list(links or network.links)
+    trained = [link for link in links if link in network.hurt_links]
+    largest = largest_accelerations(motion, network)
+    rows: list[dict[str, Any]] = []
+    back: list[dict[str, Any]] = []
+    responses = []
+    for gait in GAITS:
+        sweep = Sweep(network, links, gait, seconds, runtime)
+        for figure, link in enumerate(links):
+            found = sweep.rows(figure)
+            rows += found[: len(SEVERITIES)]
+            back += found[len(SEVERITIES) :]
+            response = sweep.response(figure, found)
+            clips = largest.get((gait, link), largest.get((gait, None)))
+            responses.append(
+                {
+                    "gait": gait,
+                    "link": link,
+                    "trained": link in trained,
+                    **response,
+                    "clip_acceleration": clips,
+                    "clip_acceleration_of": "link" if (gait, link) in largest else "gait" if clips else None,
+                    "clip_acceleration_share": round(response["largest_acceleration"] / clips, 5)
+                    if clips
+                    else None,
+                }
+            )
+    return {
+        "configuration": configuration,
+        "applies": True,
+        "mode": runtime.mode,
+        "seconds": seconds,
+        "severities": SEVERITIES.tolist(),
+        "links": links,
+        "trained": trained,
+        "rows": rows,
+        "back": back,
+        "responses": responses,
+        "second": second_injuries(network, trained, seconds, runtime),
+        "into_a_jog": into_a_jog(network, links, seconds, runtime),
+        "divided": divided_severities(network, trained, seconds, runtime),
+        "summary": _summary([r for r in responses if r["trained"]]),
+        "summary_untrained": _summary([r for r in responses if not r["trained"]]),
+    }
+
+
+def largest_accelerations(
+    motion: Iterable[Captured], network: Network
+) -> dict[tuple[str, str | None], float]:
+    """(gait, link) -> the largest joint acceleration (cm per frame squared) captured in that gait with that
+    link hurt; (gait, None): in that gait at all."""
+    out: dict[tuple[str, str | None], float] = {}
+    for clip in motion:
+        for gait in GAITS:
+            going = clip.gait[:, network.gaits.index(gait)] > 0.5
+            hurt: list[tuple[str | None, Any]] = [(None, going)]
+            hurt += [(link, going & (clip.severity[:, i] > 0)) for i, link in enumerate(network.links)]
+            for link, chosen in hurt:
+                if np.any(chosen):
+                    found = round(float(clip.acceleration[chosen].max()), 5)
+                    out[gait, link] = max(found, out.get((gait, link), 0.0))
+    return out
+
+
+def _summary(responses: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Means over links, by gait; {} without links."""
+    out = {}
+    for gait in GAITS:
+        some = [r for r in responses if r["gait"] == gait]
+        if some:
+            out[gait] = {
+                "spearman_from_healthy": _mean([r["spearman"]["from_healthy"] for r in some]),
+                "spearman_speed": _mean([r["spearman"]["speed"] for r in some]),
+                "spearman_back_from_healthy": _mean([r["spearman_back"]["from_healthy"] for r in some]),
+                **{key: _mean([r[key] for r in some]) for key in SUMMARY},
+            }
+    return out
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [v for v in values if v is not None]
+    return round(float(np.mean(known)), 5) if known else None
+
+
+def run(given: Given, options: Options) -> Outcome:
+    """injury.json, and its sweeps as tables."""
+    result = injury_response(
+        load_network(given.weights),
+        captured_clips(given.clips.values()),
+        configuration=given.configuration,
+        runtime=given.runtime,
+        seconds=options.seconds,
+    )
+    tables = {name: result.get(name, []) for name in ("second", "into_a_jog", "divided")}
+    tables["sweep"] = [*result.get("rows", []), *result.get("back", [])]
+    return Outcome(result, tables, str(result.get("summary", result.get("reason"))))

@@ -1,0 +1,113 @@
+"""One gait while each link of a body in turn hurts more and more, and less and less again.
+
+A figure for each link walks side by side with the others: healthy until it is up to speed, then at severities
+0, 1, ..., 10, 9, ..., 0, some time at each. A second crowd is hurt in one go and healed in one go, which
+tells how fast the walk follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hobble.evaluation.crowd import FPS, Stretch, Walks, run, severities
+from hobble.evaluation.motion_measures import gait_measures
+from hobble.evaluation.pose_distance import apart, mean_cycle, period, settling
+from hobble.evaluation.spearman import spearman
+from hobble.models.network import Network
+from hobble.runtime.options import Runtime
+
+SEVERITIES = np.arange(11.0)
+WALK_IN = 0.75  # stretches until a figure that stood is up to speed
+HURT = 2  # stretches in which a figure hurt in one go settles, and then heals
+# Which of a row's columns say where it belongs and not how it walks.
+NAMES = ("gait", "link", "way", "severity")
+
+
+class Sweep:
+    """The walks of one gait, a figure for each of `links`; `seconds` at each severity."""
+
+    def __init__(
+        self, network: Network, links: Sequence[str], gait: str, seconds: float, runtime: Runtime
+    ) -> None:
+        assert network.skeleton is not None
+        self.skeleton, self.links, self.gait = network.skeleton, list(links), gait
+        names = [gait] * len(self.links)
+
+        def stretch(share: float, severity: float) -> Stretch:
+            hurt = severities(network, [{link: severity} for link in self.links])
+            return Stretch(max(4, round(share * seconds * FPS)), names, hurt)
+
+        self.steps = [*SEVERITIES, *SEVERITIES[-2::-1]]
+        self.walks = run(network, [stretch(WALK_IN, 0), *(stretch(1, s) for s in self.steps)], runtime)
+        self.at_once = run(
+            network, [stretch(WALK_IN, 0), stretch(1, 0), stretch(HURT, 10), stretch(HURT, 0)], runtime
+        )
+
+    def rows(self, figure: int) -> list[dict[str, Any]]:
+        """One row for each step: the gait's measures, distances of the pose from the healthy and from the
+        fully injured walk (cm, mean over joints at the same phase) and the largest acceleration of a joint.
+        """
+        walks = self.walks
+        spans = [walks.measured(1 + step, figure) for step in range(len(self.steps))]
+        cycles = [mean_cycle(walks.local[s, figure], walks.phase[s, figure]) for s in spans]
+        worst = len(SEVERITIES) - 1
+        rows = []
+        for step, (span, severity) in enumerate(zip(spans, self.steps, strict=True)):
+            local, phase = walks.local[span, figure], walks.phase[span, figure]
+            row: dict[str, Any] = {
+                "gait": self.gait,
+                "link": self.links[figure],
+                "way": "worse" if step <= worst else "better",
+                "severity": float(severity),
+            }
+            row |= gait_measures(self.skeleton, local, walks.contacts[span, figure], walks.root[span, figure])
+            row["from_healthy"] = float(np.mean(apart(local, phase, cycles[0])))
+            row["from_worst"] = float(np.mean(apart(local, phase, cycles[worst])))
+            # How far the walk is, at the same severity, from what it was on the way up.
+            same = cycles[step if step <= worst else 2 * worst - step]
+            row["from_way_up"] = float(np.mean(apart(local, phase, same)))
+            row["largest_acceleration"] = float(walks.acceleration[span, figure].max())
+            rows.append({k: round(v, 5) if isinstance(v, float) else v for k, v in row.items()})
+        return rows
+
+    def response(self, figure: int, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+        """How the measures answer to severity: Spearman's rho on the way up and back, None where a measure
+        does not change; at severity 10 distance from healthy (cm, less the healthy walk's own) and share of
+        the speed; what is left of that distance after healing, and the way back's distance from the way up;
+        seconds to settle when hurt, and healed, in one go; the largest joint acceleration of the whole sweep,
+        changes included, and its share of the healthy walk's.
+        """
+        worst = len(SEVERITIES) - 1
+        up, back = rows[: worst + 1], rows[worst:]
+        names = [k for k in rows[0] if k not in (*NAMES, "from_way_up")]
+        own = rows[0]["from_healthy"]
+        largest = float(self.walks.acceleration[int(self.walks.starts[1]) :, figure].max())
+        hurt, healed = self._settling(figure)
+        return {
+            "spearman": {n: spearman(SEVERITIES, [row[n] for row in up]) for n in names},
+            "spearman_back": {n: spearman(SEVERITIES[::-1], [row[n] for row in back]) for n in names},
+            "from_healthy_cm": round(up[-1]["from_healthy"] - own, 5),
+            "after_healing_cm": round(rows[-1]["from_healthy"] - own, 5),
+            "way_back_cm": round(max(row["from_way_up"] for row in back[1:]) - own, 5),
+            "speed_share": round(up[-1]["speed"] / up[0]["speed"], 5) if up[0]["speed"] > 0 else None,
+            "settle_seconds": hurt,
+            "heal_seconds": healed,
+            "largest_acceleration": round(largest, 5),
+            "acceleration_share": round(largest / max(rows[0]["largest_acceleration"], 1e-9), 5),
+        }
+
+    def _settling(self, figure: int) -> tuple[float | None, float | None]:
+        walks: Walks = self.at_once
+        local, phase = walks.local[:, figure], walks.phase[:, figure]
+        healthy = walks.measured(1, figure)
+        cycle = mean_cycle(local[healthy], phase[healthy])
+        distance = apart(local, phase, cycle)
+        normal = float(np.mean(distance[healthy]))
+        (a, b), (c, d) = (walks.starts[2:4], walks.starts[3:5])
+        late = slice((a + b) // 2, b)
+        hurt = settling(distance[a:b], normal, period(phase[late]))
+        healed = settling(distance[c:d], float(np.mean(distance[late])), period(phase[(c + d) // 2 : d]))
+        return hurt, healed

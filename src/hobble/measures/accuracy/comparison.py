@@ -1,0 +1,75 @@
+"""One-step accuracy of configurations side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
+
+from hobble.evaluation.measured import Measured
+from hobble.evaluation.side_by_side import SideBySide, beside, pair
+from hobble.measures.accuracy.run import SPLITS, clip_rows
+from hobble.measures.given import Json
+
+NAME = "accuracy"
+
+
+def compared(all_measured: Sequence[Measured], published: Json) -> SideBySide:
+    """What each measured, eq. 3.2 of each pair, and the published errors with ours."""
+    return SideBySide(
+        entries=[{"dataset": m.dataset, **m.found(NAME), "configuration": m.name} for m in all_measured],
+        about={m.name: {"joints": m.found(NAME)["joints"]} for m in all_measured},
+        differences=accuracy_differences(all_measured),
+        beside=[*_splits(all_measured, published), *_published_clips(all_measured, published)],
+    )
+
+
+def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
+    """Every clip of every configuration."""
+    rows = [
+        {"configuration": entry["configuration"], **row}
+        for entry in compared[NAME]
+        for row in clip_rows(entry)
+    ]
+    return {NAME: rows}
+
+
+def accuracy_differences(all_measured: Sequence[Measured]) -> list[dict[str, Any]]:
+    """Eq. 3.2 of each pair: over each split, and for each clip that both were measured on."""
+    out = []
+    for a, b in combinations(all_measured, 2):
+        ours = {**{s: a.found(NAME)[s] for s in ("train", "held_out")}, **_clips(a)}
+        theirs = {**{s: b.found(NAME)[s] for s in ("train", "held_out")}, **_clips(b)}
+        for over in ours:
+            if over in theirs and ours[over]["frames"] and theirs[over]["frames"]:
+                out.append({"a": a.name, "b": b.name, "over": over, **pair(ours[over], theirs[over])})
+    return out
+
+
+def _splits(all_measured: Sequence[Measured], published: Json) -> list[dict[str, Any]]:
+    found = {m.name: m for m in all_measured}
+    out = []
+    for row in published["accuracy"]:
+        m = found.get(row["configuration"])
+        for split in SPLITS:
+            ours = m.found(NAME)[split]["mean_of_clips"] if m else None
+            out.append(beside(f"relative error, {split} clips", row, row["mean"], ours))
+    return out
+
+
+def _published_clips(all_measured: Sequence[Measured], published: Json) -> list[dict[str, Any]]:
+    """Single clips that were published, where a clip of ours has the name."""
+    out = []
+    for row in published["clips"]:
+        for m in all_measured:
+            for clip in m.found(NAME)["clips"]:
+                if clip["clip"].removesuffix("_000") == row["clip"]:
+                    for source in ("segerstedt", "release"):
+                        named = {"configuration": m.name, "source": source}
+                        what = f"relative error, {clip['clip']}"
+                        out.append(beside(what, named, row[source], clip["mean"]))
+    return out
+
+
+def _clips(measured: Measured) -> dict[str, Any]:
+    return {entry["clip"]: entry for entry in measured.found(NAME)["clips"]}

@@ -1,0 +1,170 @@
+"""The errors of configurations side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from hobble.measures.accuracy.page import quantiles
+from hobble.report.charts import Chart, Trace, axis
+from hobble.report.compare_tables import difference_table
+from hobble.report.measured import Overview
+from hobble.report.parts import Part, Section
+from hobble.report.side_by_side import SPLITS, Compared, colours, dots, names
+from hobble.report.tables import Column
+
+
+def section(compared: Compared) -> Section:
+    """Spread, differences and single clips."""
+    return Section(
+        "accuracy",
+        [
+            Part(10, error_boxes(compared)),
+            Part(30, difference_map(compared)),
+            Part(40, difference_table(compared)),
+            Part(50, clip_dots(compared), tall=True),
+        ],
+        title="Accuracy",
+        at=10,
+        long=True,
+    )
+
+
+def columns(compared: Compared) -> Iterator[Overview]:
+    """The error of each split, and how many joints it is over."""
+    found = {entry["configuration"]: entry for entry in compared["accuracy"]}
+    for at, split, label in ((10, "held_out", "held-out error"), (20, "train", "training error")):
+        values = {name: entry[split]["mean"] for name, entry in found.items()}
+        yield Overview(at, Column(label, _percent, "n"), values)
+    yield Overview(70, Column.count("joints"), {name: entry["joints"] for name, entry in found.items()})
+
+
+def error_boxes(compared: Compared) -> Chart | None:
+    """The spread of the relative error of each configuration, over all frames of a split."""
+    options: dict[str, list[Trace]] = {}
+    for split, label in SPLITS.items():
+        traces: list[Trace] = []
+        for entry in compared["accuracy"]:
+            found = quantiles(entry[split])
+            if found is None:
+                continue
+            low, q1, median, q3, high = ([100 * value] for value in found)
+            colour = colours(compared)[entry["configuration"]]
+            traces.append(
+                {
+                    "type": "box",
+                    "name": entry["configuration"],
+                    "x": [entry["configuration"]],
+                    "lowerfence": low,
+                    "q1": q1,
+                    "median": median,
+                    "q3": q3,
+                    "upperfence": high,
+                    "mean": [100 * entry[split]["mean"]],
+                    "boxmean": True,
+                    "marker": {"color": colour},
+                    "line": {"width": 1.6, "color": colour},
+                }
+            )
+        if traces:
+            options[label] = traces
+    published = [row for row in compared["published"]["accuracy"] if row["configuration"] in names(compared)]
+    if not options:
+        return None
+    for traces in options.values():
+        if published:
+            traces.append(
+                {
+                    "type": "scatter",
+                    "mode": "markers",
+                    "name": "mean as published",
+                    "x": [row["configuration"] for row in published],
+                    "y": [100 * row["mean"] for row in published],
+                    "marker": {"symbol": "diamond-open", "size": 10, "color": "@ink"},
+                    "hovertemplate": "%{x}: %{y:.2f} % as published<extra></extra>",
+                }
+            )
+    return Chart(
+        "compare-boxes",
+        "Spread of the error",
+        "Each box holds the middle half of the relative errors (eq. 3.1 of Segerstedt) over all frames, the "
+        "line in it is the median, the dashed one the mean; whiskers reach from the 5th to the 95th "
+        "percentile. Diamonds are published means, measured on other data.",
+        layout={"yaxis": axis("relative error, %", rangemode="tozero"), "showlegend": False},
+        height=400,
+        choose="Over",
+        options=options,
+    )
+
+
+def clip_dots(compared: Compared) -> Chart | None:
+    """The mean error of every clip, a dot for each configuration."""
+    clips = {(row["split"], row["clip"]) for entry in compared["accuracy"] for row in entry["clips"]}
+    order = [
+        clip for _, clip in sorted(clips, key=lambda pair: (pair[0] == "held_out", pair[1]), reverse=False)
+    ]
+    if not order:
+        return None
+    traces = []
+    for entry in compared["accuracy"]:
+        rows = [row for row in entry["clips"] if row.get("mean") is not None]
+        traces.append(
+            dots(
+                entry["configuration"],
+                [100 * row["mean"] for row in rows],
+                [row["clip"] for row in rows],
+                colours(compared)[entry["configuration"]],
+                "%{y}: %{x:.2f} %",
+            )
+        )
+    layout = {
+        "xaxis": axis("relative error, %", rangemode="tozero"),
+        "yaxis": {"categoryorder": "array", "categoryarray": order, "automargin": True, "type": "category"},
+    }
+    caption = "Held-out clips stand on top. Where the dots of a row lie together, the configurations agree."
+    return Chart("compare-clips", "Error of each clip", caption, traces, layout, 130 + 19 * len(order))
+
+
+def difference_map(compared: Compared) -> Chart | None:
+    """Eq. 3.2 of every pair."""
+    order, options = names(compared), {}
+    for over, label in SPLITS.items():
+        found = {(r["a"], r["b"]): r["difference"] for r in compared["difference"] if r["over"] == over}
+        if not found:
+            continue
+        cells = [[found.get((a, b), found.get((b, a))) for b in order] for a in order]
+        options[label] = [
+            {
+                "type": "heatmap",
+                "x": order,
+                "y": order,
+                "z": cells,
+                "colorscale": [[0, "@sunken"], [1, "@accent"]],
+                "zmin": 0,
+                "texttemplate": "%{z:.2f}",
+                "xgap": 3,
+                "ygap": 3,
+                "showscale": False,
+                "hovertemplate": "%{y} and %{x}: %{z:.3f}<extra></extra>",
+            }
+        ]
+    if not options:
+        return None
+    layout = {
+        "xaxis": {"type": "category"},
+        "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
+    }
+    return Chart(
+        "compare-difference",
+        "How far apart two configurations are",
+        "Eq. 3.2 of Segerstedt: twice the distance of the means over the sum of the standard deviations. "
+        "Under 0.2 the two can hardly be told apart; 1 means that the means lie a standard deviation apart.",
+        layout=layout,
+        height=max(240, 90 + 42 * len(order)),
+        choose="Error over",
+        options=options,
+    )
+
+
+def _percent(value: Any) -> str:
+    return f"{100 * float(value):.2f} %"

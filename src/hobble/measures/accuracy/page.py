@@ -1,0 +1,262 @@
+"""How well the next pose is predicted, clip by clip."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from hobble.measures.given import Json
+from hobble.report.charts import Chart, axis, mark
+from hobble.report.formats import number
+from hobble.report.gather import Material
+from hobble.report.parts import Fragment, Part, Section, Words
+from hobble.report.summary import Figure, Hint, placed
+from hobble.report.tables import Column, Table
+
+INTRODUCTION = "One step ahead from the true input, on every frame that lies in a locomotion cycle."
+COLOURS = {"train": "@muted", "held_out": "@accent"}
+NAMES = {"train": "training", "held_out": "held out"}
+QUANTILES = ("p05", "p25", "p50", "p75", "p95")
+
+
+def _rows(found: Json) -> list[dict[str, Any]]:
+    rows = [row for row in found.get("clips", ()) if row.get("mean") is not None]
+    return sorted(rows, key=lambda row: (row["split"] != "held_out", row["mean"]))
+
+
+def _height(count: int) -> int:
+    return max(260, 110 + 21 * count)
+
+
+def clip_bars(found: Json, material: Material) -> Chart | None:
+    """Mean relative error of each clip, whiskers of one standard deviation, published means as lines."""
+    rows = _rows(found)[::-1]
+    if not rows:
+        return None
+    traces = []
+    for split in ("held_out", "train"):
+        chosen = [row for row in rows if row["split"] == split]
+        traces.append(
+            {
+                "type": "bar",
+                "orientation": "h",
+                "name": NAMES[split],
+                "y": [row["clip"] for row in chosen],
+                "x": [100 * row["mean"] for row in chosen],
+                "error_x": {
+                    "type": "data",
+                    "symmetric": False,
+                    "array": [100 * (row.get("sd") or 0) for row in chosen],
+                    "arrayminus": [0 for _ in chosen],
+                    "color": "@faint",
+                    "thickness": 1,
+                    "width": 2,
+                },
+                "marker": {"color": COLOURS[split]},
+                "hovertemplate": "%{y}: %{x:.2f} %<extra></extra>",
+            }
+        )
+    shapes, notes = [], []
+    theirs = material.beside("accuracy")
+    if theirs:
+        shape, note = mark(100 * theirs["mean"], f"{theirs['label']} as published")
+        shapes, notes = [shape], [note]
+    order = [row["clip"] for row in rows]
+    return Chart(
+        "accuracy-clips",
+        "Error of each clip",
+        "Bars: mean over frames and joints of the distance between predicted and true joint position, as a "
+        "share of the joint's distance from the root (eq. 3.1 of Segerstedt). Whiskers reach one standard "
+        "deviation further. Held-out clips, which the network never saw, stand first.",
+        traces,
+        {
+            "xaxis": axis("relative error, %", rangemode="tozero"),
+            "yaxis": {"categoryorder": "array", "categoryarray": order, "automargin": True},
+            "shapes": shapes,
+            "annotations": notes,
+            "bargap": 0.35,
+            "barmode": "overlay",
+        },
+        height=_height(len(rows)),
+    )
+
+
+def clip_boxes(found: Json) -> Chart | None:
+    """Quantiles of the error within each clip, where the evaluation gives them."""
+    rows = [row for row in _rows(found)[::-1] if quantiles(row)]
+    if not rows:
+        return None
+    traces = []
+    for split in ("held_out", "train"):
+        chosen = [row for row in rows if row["split"] == split]
+        if not chosen:
+            continue
+        values = [[100 * v for v in quantiles(row)] for row in chosen]  # type: ignore[union-attr]
+        low, q1, median, q3, high = (list(column) for column in zip(*values, strict=True))
+        traces.append(
+            {
+                "type": "box",
+                "orientation": "h",
+                "name": NAMES[split],
+                "y": [row["clip"] for row in chosen],
+                "lowerfence": low,
+                "q1": q1,
+                "median": median,
+                "q3": q3,
+                "upperfence": high,
+                "mean": [100 * row["mean"] for row in chosen],
+                "marker": {"color": COLOURS[split]},
+                "line": {"width": 1.4, "color": COLOURS[split] if split == "held_out" else "@faint"},
+                "fillcolor": "@accent-wash" if split == "held_out" else "@sunken",
+            }
+        )
+    return Chart(
+        "accuracy-boxes",
+        "Spread within each clip",
+        "Boxes hold the middle half of the errors of a clip, the line in them is the median; whiskers reach "
+        "from the 5th to the 95th percentile. A long whisker with a low box means a few hard moments in an "
+        "easy clip.",
+        traces,
+        {
+            "xaxis": axis("relative error, %", rangemode="tozero"),
+            "yaxis": {
+                "categoryorder": "array",
+                "categoryarray": [r["clip"] for r in rows],
+                "automargin": True,
+            },
+            "boxmode": "overlay",
+        },
+        height=_height(len(rows)),
+    )
+
+
+def quantiles(row: dict[str, Any]) -> list[float] | None:
+    """The 5th, 25th, 50th, 75th and 95th percentile of a clip's error, or None."""
+    found = [row[key] for key in QUANTILES if row.get(key) is not None]
+    return found if len(found) == len(QUANTILES) else None
+
+
+def accuracy_table(found: Json, name: str) -> Table:
+    """A row per clip."""
+    columns = [
+        Column("clip"),
+        Column("split", lambda value: NAMES.get(value, value)),
+        Column.count("frames"),
+        Column.number("mean"),
+        Column.number("sd"),
+        Column.number("position error, cm"),
+    ]
+    rows = [
+        [r["clip"], r["split"], r.get("frames"), r["mean"], r.get("sd"), r.get("position_error_cm")]
+        for r in _rows(found)
+    ]
+    return Table(f"{name}-accuracy", columns, rows)
+
+
+def beside_published(found: Json, material: Material) -> Table:
+    """Our two splits with the published means under them."""
+    rows: list[list[Any]] = []
+    for split in ("held_out", "train"):
+        part = found.get(split) or {}
+        if part.get("mean") is not None:
+            what = f"{material.name}, {NAMES[split]} clips"
+            rows.append([what, part["mean"], part.get("sd"), part.get("position_error_cm"), "this report"])
+    sources = material.published["sources"]
+    for entry in material.published["accuracy"]:
+        rows.append([entry["label"], entry["mean"], None, None, sources[entry["source"]]])
+    columns = [
+        Column("network"),
+        Column.number("mean"),
+        Column.number("sd"),
+        Column.number("position error, cm"),
+        Column("source", kind="long"),
+    ]
+    return Table(f"{material.name}-published", columns, rows, "Beside the published figures")
+
+
+def section(found: Json, material: Material) -> Section:
+    """The charts and tables; the figure beside the captured one is drawn by the page."""
+    return Section(
+        "accuracy",
+        [
+            Part(0, Words(INTRODUCTION)),
+            Part(10, beside_published(found, material), open=True, short=True),
+            Part(20, clip_bars(found, material), tall=True),
+            Part(30, clip_boxes(found), tall=True),
+            Part(60, accuracy_table(found, material.name)),
+            Part(90, Fragment("captured.html.j2")),
+        ],
+        title="Accuracy",
+        at=10,
+        long=True,
+    )
+
+
+def figures(found: Json, material: Material) -> Iterator[Figure]:
+    """The error of each split."""
+    for at, split, label in (
+        (10, "held_out", "Error on held-out clips"),
+        (11, "train", "Error on training clips"),
+    ):
+        part = found.get(split)
+        if part and part.get("mean") is not None:
+            error = part.get("position_error_cm")
+            beside = f"{number(error)} cm a joint on average" if error is not None else ""
+            theirs = material.beside("accuracy") if split == "held_out" else None
+            if theirs:
+                beside += f"; {theirs['label']} was published at {100 * theirs['mean']:.2f} %"
+            yield Figure(label, f"{100 * part['mean']:.2f}", "%", beside, at)
+
+
+def hints(found: Json, material: Material) -> Iterator[Hint]:
+    """How far it generalises, and which clip is hard."""
+    yield from placed(10, _generalisation(found))
+    yield from placed(30, _worst_clips(found))
+
+
+def _generalisation(found: Json) -> Iterator[Hint]:
+    train, held_out = (found.get(split) or {} for split in ("train", "held_out"))
+    if held_out.get("mean") is None:
+        yield Hint(
+            "warn",
+            "Nothing was held out.",
+            "The accuracy below says how well the clips were memorised. Name a few under held_out in the "
+            "data set.",
+        )
+        return
+    ratio = held_out["mean"] / train["mean"] if train.get("mean") else float("nan")
+    if ratio > 1.5:
+        yield Hint(
+            "warn",
+            f"Held-out clips are predicted {ratio:.1f} times worse than training clips.",
+            "The network has learnt these clips more than motion as such: add clips that differ "
+            "(speeds, turns, performers) before adding units or passes.",
+        )
+    elif ratio < 1.2:
+        yield Hint(
+            "good",
+            f"Held-out clips are predicted about as well as training clips ({ratio:.2f} times the error).",
+            "There is room for a larger network.",
+        )
+    else:
+        yield Hint(
+            "note", f"Held-out clips have {ratio:.2f} times the error of training clips.", "That is usual."
+        )
+
+
+def _worst_clips(found: Json) -> Iterator[Hint]:
+    rows = [row for row in found.get("clips", ()) if row.get("mean") is not None]
+    if len(rows) < 4:
+        return
+    median = float(np.median([row["mean"] for row in rows]))
+    worst = max(rows, key=lambda row: row["mean"])
+    if worst["mean"] > 1.8 * median:
+        yield Hint(
+            "note",
+            f"{worst['clip']} is the hardest clip,",
+            f"with {worst['mean'] / median:.1f} times the error of the middle one. "
+            "See in its label strip whether the labels are right, and among the repairs whether its frames "
+            "are whole.",
+        )

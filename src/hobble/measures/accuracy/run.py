@@ -1,0 +1,177 @@
+"""How near one-step predictions come to the truth, per clip and for training and held-out clips.
+
+Segerstedt (2021), eq. 3.1: the mean over frames and joints of |t - p| / |t|, Euclidean norms of joint
+positions in the root frame, with its standard deviation over the same. The network is given the true input
+of every frame.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.quat import Array
+from hobble.database.clip_rows import ClipRows, expanded, load_clip_rows
+from hobble.database.layout import RowLayout
+from hobble.database.statistics import Moments
+from hobble.measures.given import Given, Outcome
+from hobble.measures.joints import Joints
+from hobble.models.load import load_network
+from hobble.models.network import Network
+
+LEAST = 1e-3  # cm; below this a joint stands at the root itself and a relative error says nothing
+SPLITS = ("train", "held_out")
+REFERENCE = "holden31"
+QUANTILES = {"p05": 0.05, "p25": 0.25, "p50": 0.5, "p75": 0.75, "p95": 0.95}
+COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
+# Bins of the relative error, a fiftieth wide, from which quantiles are read: no error needs to be kept.
+EDGES = np.concatenate([[0.0], np.geomspace(1e-4, 1e2, 701)])
+
+log = logging.getLogger("hobble")
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Relative error and position error (cm) over `frames` frames; a frame's fits share its weight."""
+
+    frames: int = 0
+    moments: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
+    histogram: Array = field(default_factory=lambda: np.zeros(len(EDGES) - 1), repr=False)
+
+    def __add__(self, other: Errors) -> Errors:
+        return Errors(
+            self.frames + other.frames, self.moments + other.moments, self.histogram + other.histogram
+        )
+
+    def quantile(self, share: float) -> float:
+        """The relative error that `share` of frames and joints stay below, to a hundredth of itself."""
+        below = np.concatenate([[0.0], np.cumsum(self.histogram)])
+        return float(np.interp(share * below[-1], below, EDGES))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, with quantiles of the relative error; None where there was no frame."""
+        if not self.frames:
+            return {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}
+        mean, sd = self.moments.mean, self.moments.std
+        return {
+            "frames": self.frames,
+            "mean": float(mean[0]),
+            "sd": float(sd[0]),
+            "position_error_cm": float(mean[1]),
+            **{name: self.quantile(share) for name, share in QUANTILES.items()},
+        }
+
+
+def joint_errors(layout: RowLayout, truth: Array, predicted: Array, joints: Sequence[int]) -> Array:
+    """(n, joints, 2): |t - p| / |t| and |t - p| in cm, of outputs Y (n, Y)."""
+    block = layout.y_joint_position
+    t = truth[:, block].reshape(len(truth), -1, 3)[:, joints].astype(np.float64)
+    return relative_and_distance(t, predicted[:, block].reshape(len(truth), -1, 3)[:, joints])
+
+
+def relative_and_distance(truth: Array, predicted: Array) -> Array:
+    """(..., 2): |t - p| / |t| and |t - p| in cm, of positions (..., 3) in the root frame."""
+    distance = np.linalg.norm(truth - predicted, axis=-1)
+    return np.stack([distance / np.maximum(np.linalg.norm(truth, axis=-1), LEAST), distance], axis=-1)
+
+
+def clip_errors(network: Network, rows: ClipRows, joints: Sequence[int]) -> Errors:
+    """The errors over every frame and fit of a clip, a batch at a time."""
+    layout = network.layout
+    total, histogram = Moments.nothing(2), np.zeros(len(EDGES) - 1)
+    for pairs in expanded(rows, links=layout.links > 0):
+        errors = joint_errors(layout, pairs.y, network.predict(pairs.x, pairs.p), joints)
+        weights = np.repeat(pairs.weight / len(joints), len(joints))
+        errors = errors.reshape(-1, 2)
+        total = total + Moments.of(errors, weights)
+        histogram += np.histogram(np.minimum(errors[:, 0], EDGES[-1]), EDGES, weights=weights)[0]
+    return Errors(len(rows), total, histogram)
+
+
+def measure(
+    weights: str | Path,
+    clips: Mapping[str, str | Path],
+    splits: Mapping[str, str],
+    configuration: str,
+    equivalents: Sequence[str] | None = None,
+) -> dict[str, Any]:
+    """accuracy.json: `train` and `held_out` over their frames, and `clips`, one entry a clip in name order.
+
+    clips: name -> file of rows. equivalents: names of the joints to measure; all by default.
+    `mean_of_clips` is the mean over clips that the published tables print. Raises InputError where rows and
+    network differ.
+    """
+    network = load_network(weights)
+    joints = joint_indices(network, equivalents)
+    entries = []
+    totals = dict.fromkeys(SPLITS, Errors())
+    for name in sorted(clips):
+        rows = load_clip_rows(clips[name])
+        check_layout(clips[name], rows, network)
+        errors = clip_errors(network, rows, joints)
+        totals[splits[name]] += errors
+        entries.append({"clip": name, "split": splits[name], **errors.to_dict()})
+        log.info("%s: %s", name, entries[-1])
+    result: dict[str, Any] = {"configuration": configuration, "joints": len(joints), "clips": entries}
+    for split in SPLITS:
+        means = [e["mean"] for e in entries if e["split"] == split and e["frames"]]
+        result[split] = {**totals[split].to_dict(), "clips": len(means)}
+        result[split]["mean_of_clips"] = float(np.mean(means)) if means else None
+    return result
+
+
+def equivalent_joints(skeleton: Mapping[str, Any], of: str = REFERENCE) -> list[str] | None:
+    """Names of the joints that have a counterpart on the skeleton `of`; None (all) without such a map.
+
+    skeleton: as config/skeletons/<name>.yaml holds it.
+    """
+    counterparts = skeleton.get("maps", {}).get(of)
+    return None if counterparts is None else list(counterparts)
+
+
+def chosen_joints(given: Given, options: Joints) -> list[str] | None:
+    """Names of the joints that the options ask for; None where that is all."""
+    return equivalent_joints(given.skeleton) if options.joints == "equivalent" else None
+
+
+def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[int]:
+    """Indices of the joints to measure, in their order: those of `names`, all of them by default."""
+    if names is None:
+        return list(range(network.layout.joints))
+    if network.skeleton is None:
+        raise HobbleError("The network's file names no joints, so none can be chosen.")
+    chosen = [i for i, name in enumerate(network.skeleton.joints) if name in names]
+    if not chosen:
+        raise HobbleError(f"None of {', '.join(names)} is a joint of {network.skeleton.name}.")
+    return chosen
+
+
+def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
+    """Raise InputError, naming `where`, unless the network has learnt rows of this layout."""
+    layout = network.layout
+    same = (layout.joints, layout.window, layout.step) == (
+        rows.layout.joints,
+        rows.layout.window,
+        rows.layout.step,
+    )
+    if not same or layout.links not in (0, rows.layout.links):
+        raise InputError(where, f"its rows ({rows.layout}) are not those the network has learnt ({layout})")
+
+
+def clip_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The clips' entries as rows of equal keys."""
+    return [{key: clip.get(key) for key in COLUMNS} for clip in result["clips"]]
+
+
+def run(given: Given, options: Joints) -> Outcome:
+    """accuracy.json, and its `clips` as a table."""
+    result = measure(
+        given.weights, given.clips, given.splits, given.configuration, chosen_joints(given, options)
+    )
+    return Outcome(result, {"clips": clip_rows(result)})

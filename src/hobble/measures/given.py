@@ -1,0 +1,70 @@
+"""What a measurement is given when it is run, and what it gives back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from hobble.core.errors import HobbleError
+from hobble.core.files import read_json
+from hobble.core.untrusted import read_yaml
+from hobble.runtime.options import Runtime
+
+Json = Mapping[str, Any]  # what a JSON file holds
+Row = Mapping[str, Any]  # of a CSV table: column -> number, text or None
+
+
+@dataclass(frozen=True)
+class Given:
+    """The inputs of one measurement of one configuration; what it did not ask for is not there.
+
+    clips: clip -> its file of rows; splits: clip -> "train" or "held_out"; runtime: with the keys that it
+    asked for, the others at their defaults; measured: other measurement -> its JSON file.
+    """
+
+    configuration: str
+    files: Mapping[str, Path] = field(default_factory=dict, repr=False)
+    clips: Mapping[str, Path] = field(default_factory=dict, repr=False)
+    splits: Mapping[str, str] = field(default_factory=dict, repr=False)
+    runtime: Runtime = field(default_factory=Runtime)
+
+    def file(self, name: str) -> Path:
+        """The file of the input `name`. Raises HobbleError where the measurement did not ask for it."""
+        if name not in self.files:
+            raise HobbleError(f"a measurement reads {name!r}, which is not among its `inputs`")
+        return self.files[name]
+
+    @property
+    def weights(self) -> Path:
+        """The network's file."""
+        return self.file("weights")
+
+    @property
+    def skeleton(self) -> dict[str, Any]:
+        """The data set's skeleton, as config/skeletons/<name>.yaml holds it."""
+        return read_yaml(self.file("skeleton")) or {}
+
+    @property
+    def published(self) -> dict[str, Any]:
+        """The published figures."""
+        return yaml.safe_load(self.file("published").read_text(encoding="utf-8"))
+
+    def measured(self, name: str) -> Json:
+        """What another measurement found."""
+        return read_json(self.file(name))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a measurement found: `result` becomes <measure>.json, each of `tables` <measure>/<table>.csv.
+
+    says: a line for the log.
+    """
+
+    result: Json = field(repr=False)
+    tables: Mapping[str, Sequence[Row]] = field(default_factory=dict, repr=False)
+    says: str = ""

@@ -1,0 +1,164 @@
+"""What a frame costs in configurations side by side: times, sizes, and a line of the one over the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from typing import Any
+
+from hobble.evaluation.compare_tables import flat
+from hobble.evaluation.measured import Measured
+from hobble.evaluation.series import line
+from hobble.evaluation.side_by_side import SideBySide, beside, pair
+from hobble.measures.given import Json
+
+NAME = "responsivity"
+STEPS = ("prepare", "input", "insert", "predict", "output", "update", "total")
+COUNTS = ("true", "table_6_1", "table_6_1_as_printed")
+FLOAT = 4  # bytes of a stored weight
+PHASES = {"constant": 50, "linear": 10}  # whose weights the original stores
+
+
+def compared(all_measured: Sequence[Measured], published: Json) -> SideBySide:
+    """The laps of each mode, the counts of Table 6.1, and times beside the published ones."""
+    about = {m.name: _sizes(m) for m in all_measured}
+    return SideBySide(
+        entries=[entry for m in all_measured for entry in by_mode(m)],
+        about=about,
+        beside=_published_sizes(about, published),
+        milliseconds={
+            "difference": time_differences(all_measured),
+            "fit": fits(all_measured, published),
+            "beside": _published_times(all_measured, published),
+        },
+    )
+
+
+def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
+    """Every lap, and the lines of time over size."""
+    fit = compared["milliseconds"]["fit"]
+    return {
+        NAME: [lap for entry in compared[NAME] for lap in _laps(entry)],
+        "fit": [{k: v for k, v in row.items() if k not in ("x", "y")} for row in fit],
+    }
+
+
+def by_mode(measured: Measured) -> list[dict[str, Any]]:
+    """The responsivity of each phase mode that was run."""
+    found = measured.found(NAME)
+    return [{**entry, "configuration": measured.name} for entry in found.get("modes", [found])]
+
+
+def _sizes(measured: Measured) -> dict[str, Any]:
+    """Computations as Table 6.1 counts them, and bytes of the weights of so many phases."""
+    counts = measured.found(NAME)["parameters"]
+    phases = {**PHASES, "cubic": measured.resolved["configuration"]["network"].get("control_points", 1)}
+    return {
+        "computations": {key: counts[key] for key in COUNTS},
+        "weights_bytes": {mode: count * counts["true"] * FLOAT for mode, count in phases.items()},
+    }
+
+
+def time_differences(all_measured: Sequence[Measured]) -> list[dict[str, Any]]:
+    """Eq. 3.2 of the frame times of each pair, in the modes that both were run in."""
+    out = []
+    for a, b in combinations(all_measured, 2):
+        theirs = {entry["mode"]: entry for entry in by_mode(b)}
+        for entry in by_mode(a):
+            if entry["mode"] in theirs:
+                times = [
+                    {"mean": e["milliseconds"]["total"], "sd": e["milliseconds"]["spread"]["sd"]}
+                    for e in (entry, theirs[entry["mode"]])
+                ]
+                out.append({"a": a.name, "b": b.name, "over": entry["mode"], **pair(*times)})
+    return out
+
+
+def fits(all_measured: Sequence[Measured], published: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Lines of milliseconds a frame over computations: of ours for each mode and step, and as published.
+
+    `computations` says which of the counts, `step` what of a frame: the mean of `total`, as published, or of
+    `predict`, or the `median` of the total, which a busy machine moves least. Slope in milliseconds per
+    computation. Configurations that read another's network, and those of one size, are points like any other.
+    """
+    out = []
+    entries = [(m, entry) for m in all_measured for entry in by_mode(m)]
+    modes = list(dict.fromkeys(entry["mode"] for _, entry in entries))
+    for counts in COUNTS:
+        for mode in modes:
+            for step in ("total", "predict", "median"):
+                points = [
+                    (m.found(NAME)["parameters"][counts], _time(entry["milliseconds"], step))
+                    for m, entry in entries
+                    if entry["mode"] == mode
+                ]
+                out.append(_fit("hobble", mode, step, counts, points))
+    times = {row["configuration"]: row["milliseconds"] for row in published["responsivity"]}
+    for counts, key in (("true", "parameters"), ("table_6_1_as_printed", "table_6_1")):
+        points = [
+            (row[key], times[row["configuration"]])
+            for row in published["computations"]
+            if row["configuration"] in times
+        ]
+        out.append(_fit("published", None, "total", counts, points))
+    return out
+
+
+def _time(milliseconds: Mapping[str, Any], step: str) -> float:
+    return (milliseconds["spread"] if step == "median" else milliseconds)[step]
+
+
+def _fit(
+    whose: str, mode: str | None, step: str, counts: str, points: list[tuple[int, float]]
+) -> dict[str, Any]:
+    found = line([x for x, _ in points], [y for _, y in points])
+    return {
+        "whose": whose,
+        "mode": mode,
+        "step": step,
+        "computations": counts,
+        "x": [x for x, _ in points],
+        "y": [y for _, y in points],
+        **(found or {"slope": None, "intercept": None, "r2": None, "points": len(points)}),
+    }
+
+
+def _published_sizes(about: Mapping[str, Json], published: Json) -> list[dict[str, Any]]:
+    out = []
+    for row in published["computations"]:
+        counts = about.get(row["configuration"], {}).get("computations", {})
+        out.append(beside("computations of Table 6.1", row, row["table_6_1"], counts.get(COUNTS[2])))
+        out.append(beside("parameters of a phase", row, row["parameters"], counts.get("true")))
+    for row in published["sizes"]:
+        ours = about.get(row["configuration"], {}).get("weights_bytes", {}).get("constant")
+        out.append(beside("weights of 50 phases", row, row["weights"], ours, "bytes"))
+    return out
+
+
+def _published_times(all_measured: Sequence[Measured], published: Json) -> list[dict[str, Any]]:
+    found = {m.name: m for m in all_measured}
+    out = []
+    for row in published["responsivity"]:
+        m = found.get(row["configuration"])
+        ours = m.found(NAME)["milliseconds"]["total"] if m else None
+        out.append(beside("a frame", row, row["milliseconds"], ours, "ms"))
+    for row in published["modes"]:
+        for m in all_measured:
+            times = {entry["mode"]: entry["milliseconds"]["predict"] for entry in by_mode(m)}
+            if row["mode"] in times:
+                named = {**row, "configuration": m.name}
+                what = f"a prediction, {row['mode']}"
+                out.append(beside(what, named, row["milliseconds"], times[row["mode"]], "ms"))
+    return out
+
+
+def _laps(entry: Mapping[str, Any]) -> list[dict[str, Any]]:
+    head = {"configuration": entry["configuration"], "mode": entry["mode"]}
+    rows = []
+    for lap in entry["laps"]:
+        times = lap["milliseconds"]
+        row = {key: value for key, value in lap.items() if key != "milliseconds"}
+        row |= {f"milliseconds_{step}": times[step] for step in STEPS}
+        row |= {f"milliseconds_{step}_sd": sd for step, sd in times["sd"].items()}
+        rows.append({**head, **row, **{f"milliseconds_{k}": v for k, v in flat(times["spread"]).items()}})
+    return rows

@@ -1,0 +1,276 @@
+"""What a frame costs at run time, and how the track is followed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from hobble.measures.given import Json
+from hobble.report.charts import Chart, Trace, axis, mark
+from hobble.report.formats import number
+from hobble.report.gather import Material
+from hobble.report.parts import Numbers, Part, Section, Words
+from hobble.report.summary import Figure, Hint, placed
+from hobble.report.tables import Column, Table
+
+# The steps of a frame in their order, and their colours.
+STEPS = {
+    "prepare": "@g0",
+    "input": "@g3",
+    "insert": "@g5",
+    "predict": "@accent",
+    "output": "@g2",
+    "update": "@muted",
+}
+
+FEWEST_STEPS = 10  # under so many, what the feet did says nothing
+FRAME_BUDGET_MS = 1000 / 60
+TRACK = "The character is led around a track of six waypoints, walking, side-stepping, jogging and crouching."
+
+
+def section(found: Json, material: Material) -> Section:
+    """The laps, and their times beside the published ones."""
+    followed = track_figures(found)
+    return Section(
+        "speed",
+        [
+            Part(0, Words(TRACK) if followed else None),
+            Part(10, Numbers(followed) if followed else None),
+            Part(20, lap_chart(found, material)),
+            Part(30, speed_published(found, material), open=True, short=True),
+            Part(60, lap_table(found, material.name)),
+        ],
+        title="Speed and response",
+        at=30,
+        nav="Speed",
+    )
+
+
+def figures(found: Json, material: Material) -> Iterator[Figure]:
+    """The time for a frame."""
+    milliseconds = frame_milliseconds(found)
+    if milliseconds is not None:
+        theirs = material.beside("responsivity")
+        beside = f"median; {FRAME_BUDGET_MS / milliseconds:,.0f} characters at 60 Hz on one core"
+        if theirs:
+            beside += f"; mean {number(frame_mean(found), 2)} ms, published mean {theirs['milliseconds']} ms"
+        yield Figure("Time for a frame", number(milliseconds, 2), "ms", beside, 20)
+
+
+def hints(found: Json, material: Material) -> Iterator[Hint]:
+    """Whether a frame has time, and whether the track was followed."""
+    yield from placed(50, _speed(found))
+    yield from placed(60, _track(found))
+
+
+def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
+    """Milliseconds a frame of each step of a lap, without their total."""
+    value = lap.get("milliseconds")
+    if isinstance(value, dict):
+        return {k: v for k, v in value.items() if k not in ("total", "sd") and isinstance(v, (int, float))}
+    return {"frame": value} if isinstance(value, (int, float)) else {}
+
+
+def _place(step: str) -> int:
+    return list(STEPS).index(step) if step in STEPS else len(STEPS)
+
+
+def lap_chart(found: Json, material: Material) -> Chart | None:
+    """Milliseconds a frame of each step, stacked, lap by lap, for each way of looking up the phase."""
+    options = {}
+    for entry in found.get("modes") or [found]:
+        traces = _lap_bars(entry)
+        if traces:
+            options[f"{entry.get('mode', 'the')} phase"] = traces
+    if not options:
+        return None
+    own = f"{found.get('mode', 'the')} phase"
+    options = {name: options[name] for name in sorted(options, key=lambda name: name != own)}
+    shapes, notes = [], []
+    theirs = material.beside("responsivity")
+    if theirs:
+        shape, note = mark(theirs["milliseconds"], f"{theirs['label']}: mean as published", vertical=False)
+        shapes, notes = [shape], [note]
+    laps = max(len(trace["x"]) for traces in options.values() for trace in traces)
+    return Chart(
+        "laps",
+        "Milliseconds a frame, lap by lap",
+        "Each bar is one lap of the six-waypoint track; its parts are the steps of a frame, means over the "
+        "lap. Diamonds are medians of the whole frame. A few frames that another program held up raise a "
+        "bar and leave the diamond where it is. A frame at 60 Hz has 16.7 ms.",
+        layout={
+            "barmode": "stack",
+            "xaxis": axis("lap", dtick=1 if laps < 25 else None),
+            "yaxis": axis("ms a frame", rangemode="tozero"),
+            "shapes": shapes,
+            "annotations": notes,
+        },
+        choose="Looked up by" if len(options) > 1 else None,
+        options=options,
+    )
+
+
+def _lap_bars(entry: dict[str, Any]) -> list[Trace]:
+    laps = entry.get("laps")
+    laps = [lap for lap in laps if lap_steps(lap)] if isinstance(laps, list) else []
+    if not laps:
+        return []
+    numbers = [lap.get("lap", i + 1) for i, lap in enumerate(laps)]
+    bars: list[Trace] = [
+        {
+            "type": "bar",
+            "name": step,
+            "x": numbers,
+            "y": [lap_steps(lap).get(step) for lap in laps],
+            "marker": {"color": STEPS.get(step, "@g0")},
+            "hovertemplate": "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>",
+        }
+        for step in sorted(lap_steps(laps[0]), key=_place)
+    ]
+    medians = [lap_median(lap) for lap in laps]
+    if all(value is None for value in medians):
+        return bars
+    dots: Trace = {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "median",
+        "x": numbers,
+        "y": medians,
+        "marker": {"symbol": "diamond", "size": 8, "color": "@ink"},
+        "hovertemplate": "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>",
+    }
+    return [*bars, dots]
+
+
+def lap_median(lap: dict[str, Any]) -> float | None:
+    """The median of the milliseconds a frame of a lap, all steps together."""
+    value = lap.get("milliseconds")
+    return (value.get("spread") or {}).get("median") if isinstance(value, dict) else None
+
+
+def lap_table(found: Json, name: str) -> Table | None:
+    """The laps as numbers."""
+    laps = found.get("laps")
+    if not isinstance(laps, list) or not laps:
+        return None
+    plain = [k for k, v in laps[0].items() if k != "milliseconds" and isinstance(v, (int, float, str))]
+    steps = sorted(lap_steps(laps[0]), key=_place)
+    columns = [Column.number(k.replace("_", " "), 4) for k in plain] + [
+        Column.number(f"{s}, mean ms") for s in steps
+    ]
+    columns.append(Column.number("all, median ms"))
+    rows = [
+        [None if k == "foot_slide_cm" and _few(lap.get("steps")) else lap.get(k) for k in plain]
+        + [lap_steps(lap).get(s) for s in steps]
+        + [lap_median(lap)]
+        for lap in laps
+    ]
+    return Table(f"{name}-responsivity", columns, rows)
+
+
+def _few(steps: int | None) -> bool:
+    return steps is not None and steps < FEWEST_STEPS
+
+
+def track_figures(found: Json) -> list[Figure]:
+    """How the track was followed, in a few numbers."""
+    if not isinstance(found.get("laps"), list):
+        return []
+    spread = (found.get("milliseconds") or {}).get("spread") or {}
+    reached = f"{found.get('waypoints_reached')} of {found.get('waypoints')}"
+    steps = sum(lap.get("steps") or 0 for lap in found["laps"])
+    slide = None if _few(steps) else found.get("foot_slide_cm")
+    measured = f"of the toe in a stance, on average; {steps:,} steps were measured"
+    laps = f"{found.get('laps_finished')} of {len(found['laps'])} laps finished"
+    return [
+        Figure("Waypoints reached", reached, "", laps),
+        Figure("Furthest off the path", number(found.get("path_overshoot_cm")), "cm", "at the turns"),
+        Figure("Foot slide", number(slide), "cm" if slide is not None else "", measured),
+        Figure(
+            "Largest turn of a joint",
+            number(found.get("largest_turn_degrees")),
+            "°",
+            "from a frame to the next",
+        ),
+        Figure("Slow frames", number(spread.get("p99")), "ms", "one frame in a hundred is slower"),
+    ]
+
+
+def speed_published(found: Json, material: Material) -> Table | None:
+    """Our milliseconds with the published means under them."""
+    ours = frame_milliseconds(found)
+    if ours is None:
+        return None
+    sources = material.published["sources"]
+    mode = found.get("mode")
+    rows: list[list[Any]] = [
+        [
+            f"{material.name}, {mode} phase" if mode else material.name,
+            ours,
+            frame_mean(found),
+            "this report",
+        ]
+    ]
+    for entry in material.published["responsivity"]:
+        rows.append([entry["label"], None, entry["milliseconds"], sources[entry["source"]]])
+    for entry in material.published["modes"]:
+        rows.append(
+            [
+                f"prediction alone, {entry['mode']} phase",
+                None,
+                entry["milliseconds"],
+                sources[entry["source"]],
+            ]
+        )
+    columns = [
+        Column("network"),
+        Column.number("median, ms a frame"),
+        Column.number("mean, ms a frame"),
+        Column("source", kind="long"),
+    ]
+    return Table(f"{material.name}-published-speed", columns, rows, "Beside the published figures")
+
+
+def frame_milliseconds(found: Json) -> float | None:
+    """Milliseconds of one frame, all steps together: the median over all laps, which no outlier decides."""
+    value = found.get("milliseconds")
+    median = (value.get("spread") or {}).get("median") if isinstance(value, dict) else None
+    return frame_mean(found) if median is None else float(median)
+
+
+def frame_mean(found: Json) -> float | None:
+    """Likewise the mean, which is what was published."""
+    value = found.get("milliseconds")
+    if isinstance(value, dict):
+        value = value.get("total", sum(v for v in value.values() if isinstance(v, (int, float))))
+    return float(value) if isinstance(value, (int, float)) else None
+
+
+def _speed(found: Json) -> Iterator[Hint]:
+    milliseconds = frame_milliseconds(found)
+    if milliseconds is None:
+        return
+    if milliseconds > FRAME_BUDGET_MS:
+        yield Hint("warn", f"A frame takes {milliseconds:.1f} ms, too long for 60 Hz.", "Try mode: linear.")
+    else:
+        share = milliseconds / FRAME_BUDGET_MS
+        yield Hint(
+            "good", f"A frame uses {100 * share:.1f} % of its time at 60 Hz.", "Fast enough for a game."
+        )
+
+
+def _track(found: Json) -> Iterator[Hint]:
+    reached, asked = (found.get(key) for key in ("waypoints_reached", "waypoints"))
+    if asked and reached is not None and reached < asked:
+        yield Hint(
+            "warn",
+            f"The character reached {reached} of {asked} waypoints.",
+            "Where it does not arrive, it circles or stands: look at Speed and response, lap by lap.",
+        )
+    turn = found.get("largest_turn_degrees")
+    if turn is not None and turn > 60:
+        yield Hint(
+            "warn",
+            f"A joint turned by {turn:.0f} degrees in one frame.",
+            "That is a flip, and will be seen on a skinned figure.",
+        )

@@ -1,0 +1,196 @@
+"""Laps of the waypoint track: how long a frame takes, step by step, and how well the track is followed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.evaluation.motion_measures import foot_slide, largest_turn
+from hobble.measures.given import Given, Outcome
+from hobble.measures.responsivity import Options
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.controller import STEPS
+from hobble.runtime.options import Runtime
+from hobble.runtime.waypoints import TRACK, Waypoint
+
+FPS = 60
+WARM_UP = 60  # frames before the first lap, not measured: compiled code is loaded then
+
+
+def responsivity(
+    network: Network,
+    *,
+    configuration: str,
+    runtime: Runtime,
+    laps: int,
+    lap_seconds: float,
+    modes: Sequence[str] | None = None,
+    track: Sequence[Waypoint] = TRACK,
+) -> dict[str, Any]:
+    """Run `laps` laps of the track of Segerstedt 2021 in each of `modes` and in the runtime's own.
+
+    modes: by default all that the network has. A lap that takes longer than `lap_seconds` of simulated time
+    is ended there, its remaining waypoints not reached, and the next one starts from the beginning of the
+    track. `modes` holds the laps of each mode and what they come to; those of the runtime's own mode stand at
+    the top too. Measured times stand under "milliseconds" only, each with the steps' means, their `total`,
+    and `spread`: sd, median and 99th percentile of the total, and the mean of a whole call.
+    """
+    own = network.mode(runtime.mode)
+    found = {
+        mode: _laps(network, runtime.model_copy(update={"mode": mode}), track, laps, lap_seconds)
+        for mode in dict.fromkeys((*map(network.mode, network.modes if modes is None else modes), own))
+    }
+    return {
+        "configuration": configuration,
+        "track": {
+            "waypoints": len(track),
+            "metres": round(
+                sum(np.hypot(*(np.subtract(a.position, b.position))) for a, b in _closed(track)) / 100, 3
+            ),
+        },
+        "parameters": parameter_counts(network.sizes),
+        **found[own],
+        "modes": list(found.values()),
+    }
+
+
+def _laps(
+    network: Network, runtime: Runtime, track: Sequence[Waypoint], laps: int, lap_seconds: float
+) -> dict[str, Any]:
+    """All laps of one mode."""
+    animation = ProceduralAnimation(network, waypoints=track, **dict(runtime))
+    for _ in range(WARM_UP):
+        animation.next_pose()
+    animation.reset()
+    results, times = [], []
+    for number in range(1, laps + 1):
+        lap, seconds = _lap(animation, number, int(lap_seconds * FPS))
+        results.append(lap)
+        times.append(seconds)
+        if not lap["finished"]:
+            animation.reset()
+    return {
+        "mode": runtime.mode,
+        "laps": results,
+        "laps_finished": sum(lap["finished"] for lap in results),
+        "waypoints_reached": sum(lap["waypoints_reached"] for lap in results),
+        "waypoints": laps * len(track),
+        "mean_lap_seconds": _mean([lap["seconds"] for lap in results if lap["finished"]]),
+        "path_overshoot_cm": max(lap["path_overshoot_cm"] for lap in results),
+        "foot_slide_cm": _mean([lap["foot_slide_cm"] for lap in results]),
+        "largest_turn_degrees": max(lap["largest_turn_degrees"] for lap in results),
+        "milliseconds": _milliseconds(np.concatenate(times)),
+    }
+
+
+def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
+    """Weights and biases of one phase of layers `sizes`, truly and as Segerstedt's Table 6.1 counts them.
+
+    table_6_1: sum of n_l (1 + n_(l+1)) + n_out over the same layers; table_6_1_as_printed: with one hidden
+    layer fewer, as the text there states the layers.
+
+    >>> parameter_counts((342, 512, 512, 311))
+    {'true': 597815, 'table_6_1': 598157, 'table_6_1_as_printed': 335501}
+    """
+    fewer = [sizes[0], *sizes[2:]]
+    return {
+        "true": sum(a * b + b for a, b in pairwise(sizes)),
+        "table_6_1": sum(a * (1 + b) for a, b in pairwise(sizes)) + sizes[-1],
+        "table_6_1_as_printed": sum(a * (1 + b) for a, b in pairwise(fewer)) + sizes[-1],
+    }
+
+
+def lap_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The laps of every mode as flat rows for a CSV file; the times at the end, a step's `_sd` beside it."""
+    rows = []
+    for entry in result["modes"]:
+        for lap in entry["laps"]:
+            row = {"mode": entry["mode"]} | {k: v for k, v in lap.items() if k != "milliseconds"}
+            times = lap["milliseconds"]
+            row |= {f"milliseconds_{key}": v for key, v in times.items() if not isinstance(v, dict)}
+            row |= {f"milliseconds_{key}_sd": v for key, v in times["sd"].items()}
+            rows.append(row | {f"milliseconds_{key}": v for key, v in times["spread"].items()})
+    return rows
+
+
+def run(given: Given, options: Options) -> Outcome:
+    """responsivity.json, and its laps as a table."""
+    result = responsivity(
+        load_network(given.weights),
+        configuration=given.configuration,
+        runtime=given.runtime,
+        laps=options.laps,
+        lap_seconds=options.lap_seconds,
+        modes=options.modes,
+    )
+    says = [f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]]
+    return Outcome(result, {"laps": lap_rows(result)}, "; ".join(says))
+
+
+def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[dict[str, Any], Array]:
+    """One lap, and its times (F, steps + 1) in seconds, the whole call last."""
+    follower, skeleton = animation.follower, animation.skeleton
+    assert follower is not None
+    toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
+    start = int(follower.reached[0])
+    goal = start + len(follower.track)
+    positions, rotations, contacts, off = [], [], [], []
+    times: list[tuple[float, ...]] = []
+    while follower.reached[0] < goal and len(times) < longest:
+        before = perf_counter()
+        pose = animation.next_pose()
+        whole = perf_counter() - before
+        times.append((*animation.seconds, whole))
+        positions.append(pose.positions[toes])
+        rotations.append(pose.rotations.astype(np.float32))
+        contacts.append(pose.contacts)
+        off.append(follower.off_path[0])
+    slide = foot_slide(np.array(positions), np.array(contacts))
+    seconds = np.array(times)
+    lap = {
+        "lap": number,
+        "finished": bool(follower.reached[0] >= goal),
+        "frames": len(times),
+        "seconds": round(len(times) / FPS, 3),
+        "waypoints_reached": int(follower.reached[0]) - start,
+        "path_overshoot_cm": round(float(np.max(off)), 3),
+        "path_distance_cm": round(float(np.mean(off)), 3),
+        "foot_slide_cm": round(float(slide.mean()), 4) if len(slide) else None,
+        "steps": len(slide),
+        "largest_turn_degrees": round(largest_turn(np.array(rotations)), 3),
+        "milliseconds": _milliseconds(seconds),
+    }
+    return lap, seconds
+
+
+def _milliseconds(seconds: Array) -> dict[str, Any]:
+    ms = 1000 * seconds
+    total = ms[:, : len(STEPS)].sum(axis=1)
+    steps = {step: round(float(ms[:, i].mean()), 6) for i, step in enumerate(STEPS)}
+    return {
+        **steps,
+        "total": round(float(total.mean()), 6),
+        "sd": {step: round(float(ms[:, i].std()), 6) for i, step in enumerate(STEPS)},
+        "spread": {
+            "sd": round(float(total.std()), 6),
+            "median": round(float(np.median(total)), 6),
+            "p99": round(float(np.percentile(total, 99)), 6),
+            "whole_call": round(float(ms[:, -1].mean()), 6),
+        },
+    }
+
+
+def _closed(track: Sequence[Waypoint]) -> list[tuple[Waypoint, Waypoint]]:
+    return list(zip(track, [*track[1:], track[0]], strict=True))
+
+
+def _mean(values: list[float | None]) -> float | None:
+    known = [v for v in values if v is not None]
+    return round(float(np.mean(known)), 4) if known else None

@@ -1,0 +1,36 @@
+"""How far the figure strays from every clip when it is fed its own pose."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+from hobble.core.section import Positive
+from hobble.measures.joints import Joints
+from hobble.measures.measure import Cost, Measure
+
+
+def _some(lengths: tuple[int, ...]) -> tuple[int, ...]:
+    """At least one length: of none there is nothing to measure."""
+    if not lengths:
+        raise ValueError("must name at least one number of frames")
+    return lengths
+
+
+class Options(Joints):
+    """Its keys of the section `evaluation`."""
+
+    rollouts: Annotated[tuple[Positive, ...], AfterValidator(_some)] = Field(
+        (1, 10, 60, 300), description="frames for which the network is fed its own pose"
+    )
+
+
+MEASURE = Measure(
+    name="rollouts",
+    package=__name__,
+    inputs=("weights", "clips", "skeleton"),
+    options=Options,
+    runtime=("mode",),
+    cost=Cost(memory_each=27, seconds_each=0.6, minutes=30),
+)

@@ -1,0 +1,34 @@
+"""Roll-outs of configurations side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hobble.evaluation.measured import Measured
+from hobble.evaluation.side_by_side import SideBySide
+from hobble.measures.accuracy.run import SPLITS
+from hobble.measures.given import Json
+
+NAME = "rollouts"
+
+
+def compared(all_measured: Sequence[Measured], published: Json) -> SideBySide:
+    """An entry for each configuration and length."""
+    return SideBySide(
+        entries=[
+            {"configuration": m.name, **{k: v for k, v in entry.items() if k != "clips"}}
+            for m in all_measured
+            for entry in m.found(NAME)["lengths"]
+        ]
+    )
+
+
+def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
+    """Every configuration, length and split."""
+    rows = [
+        {"configuration": entry["configuration"], "length": entry["length"], "split": split, **entry[split]}
+        for entry in compared[NAME]
+        for split in SPLITS
+    ]
+    return {NAME: rows}

@@ -1,0 +1,271 @@
+"""How far the figure strays when fed its own pose, while the path and all else asked of it are the clip's.
+
+A roll-out starts at a captured frame and goes on for n frames as the runtime does: the joints of the input
+are those it made itself, positions meet half way between where velocities carry them and where they are
+predicted, and the phase advances by what is predicted. Trajectory, gait, ground and severities are the
+clip's own. All starts of a stretch go through the network side by side.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.database.clip_rows import ClipRows, load_clip_rows
+from hobble.database.layout import GAITS
+from hobble.database.statistics import Moments
+from hobble.evaluation.captured import turned, unbroken
+from hobble.measures.accuracy.run import (
+    SPLITS,
+    check_layout,
+    chosen_joints,
+    joint_indices,
+    relative_and_distance,
+)
+from hobble.measures.given import Given, Outcome
+from hobble.measures.rollouts import Options
+from hobble.models.load import load_network
+from hobble.models.network import Predictor
+
+LENGTHS = (1, 10, 60, 300)  # frames
+OVERLAP = 10  # roll-outs of one length that every frame lies in
+BATCH = 1024  # roll-outs side by side
+HALF = 0.5  # where a joint is carried by its velocity, and where it is predicted, meet
+
+log = logging.getLogger("hobble")
+
+
+@dataclass(frozen=True)
+class Strayed:
+    """Relative error and position error (cm) over `frames` frames of roll-outs.
+
+    last: over the last frame of those that came to their end, position error and how far the phase is off
+    (cycles).
+    """
+
+    frames: int = 0
+    starts: int = 0
+    moments: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
+    last: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
+
+    def __add__(self, other: Strayed) -> Strayed:
+        return Strayed(
+            self.frames + other.frames,
+            self.starts + other.starts,
+            self.moments + other.moments,
+            self.last + other.last,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data; None where there was no frame, or no roll-out that came to its end."""
+        known, ended = self.frames > 0, self.last.weight > 0
+        return {
+            "frames": self.frames,
+            "mean": float(self.moments.mean[0]) if known else None,
+            "sd": float(self.moments.std[0]) if known else None,
+            "position_error_cm": float(self.moments.mean[1]) if known else None,
+            "ended": int(self.last.weight),
+            "last_cm": float(self.last.mean[0]) if ended else None,
+            "last_phase": float(self.last.mean[1]) if ended else None,
+        }
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What a clip asks for in F consecutive frames, on one terrain fit.
+
+    x: (F, X) with the captured joints, y: (F, Y) the truth, both in raw units with heights less `mean` (F,);
+    phase: (F,); turn: (F,) and velocity: (F, 2) of the root on the way to the next frame; moving: (F,) the
+    share of its movement that a figure which does not stand keeps.
+    """
+
+    x: Array
+    y: Array
+    mean: Array
+    phase: Array
+    turn: Array
+    velocity: Array
+    moving: Array
+
+
+def inputs(rows: ClipRows, chosen: np.ndarray, links: bool) -> Inputs:
+    """Of the rows `chosen` (F,), on the first fit of each; severities only with `links`."""
+    layout = rows.layout
+    fit = rows.first_fit[chosen]
+    severity = rows.severity[chosen] if links else rows.severity[chosen, :0]
+    x = np.concatenate([rows.x[chosen], rows.heights[fit], severity], axis=1, dtype=np.float32)
+    y = rows.y[chosen].astype(np.float32)
+    for values, joints in ((x, layout.x_joint_position), (y, layout.y_joint_position)):
+        values[:, joints.start + 1 : joints.stop : 3] -= rows.mean[fit, None]
+    gait = x[:, layout.x_gait].reshape(len(x), len(GAITS), layout.samples)
+    stand = gait[:, GAITS.index("stand"), layout.samples // 2]
+    return Inputs(
+        x,
+        y,
+        rows.mean[fit].astype(np.float32),
+        rows.p[chosen].astype(float),
+        y[:, layout.y_turn][:, 0].astype(float),
+        y[:, layout.y_root_velocity].astype(float),
+        np.maximum(0.0, 1.0 - stand) ** 0.25,
+    )
+
+
+def roll_out(
+    predictor: Predictor, asked: Inputs, starts: np.ndarray, length: int
+) -> tuple[list[Array], Array]:
+    """Positions that roll-outs from frames `starts` (n,) make, and their phases at last.
+
+    Returns for each age 1 .. length the joints (n', J, 3) of the n' roll-outs that are still inside the
+    stretch, in the root frame of frame start + age - 1 with heights less that frame's mean, and phases (n,).
+    `starts` rise, so that the first n' are those.
+    """
+    layout = predictor.network.layout
+    joints = (len(starts), layout.joints, 3)
+    x = asked.x[starts]
+    place = x[:, layout.x_joint_position].reshape(joints).astype(float)
+    phase = asked.phase[starts].copy()
+    speed = np.zeros(joints)
+    made = []
+    for age in range(length):
+        alive = int(np.searchsorted(starts, len(asked.x) - age))
+        at = starts[:alive] + age
+        if not alive:
+            break
+        row = asked.x[at].copy()
+        if age:
+            # What it made of the frame before, in that frame's root, with heights less this frame's mean.
+            lower = place[:alive].copy()
+            lower[..., 1] += (asked.mean[at - 1] - asked.mean[at])[:, None]
+            row[:, layout.x_joint_position] = lower.reshape(alive, -1)
+            row[:, layout.x_joint_velocity] = speed[:alive].reshape(alive, -1)
+        y = predictor.predict(row, phase[:alive])
+        before = row[:, layout.x_joint_position].reshape(alive, -1, 3).astype(float)
+        speed[:alive] = y[:, layout.y_joint_velocity].reshape(alive, -1, 3)
+        guess = y[:, layout.y_joint_position].reshape(alive, -1, 3)
+        place[:alive] = HALF * (_carried(before, asked, at) + speed[:alive] + guess)
+        made.append(place[:alive].copy())
+        moved = (0.9 * asked.moving[at] + 0.1) * y[:, layout.y_phase_change][:, 0]
+        phase[:alive] = np.mod(phase[:alive] + moved, 1.0)
+    return made, phase
+
+
+def _carried(place: Array, asked: Inputs, at: np.ndarray) -> Array:
+    """Joints (n, J, 3) in the root frame of frames at - 1, as seen from those at `at`."""
+    out = place.copy()
+    level = place[..., ::2] - asked.velocity[at - 1][:, None]
+    out[..., ::2] = turned(level, asked.turn[at - 1][:, None])
+    return out
+
+
+def clip_roll_outs(
+    predictor: Predictor, rows: ClipRows, joints: Sequence[int], lengths: Sequence[int]
+) -> dict[int, Strayed]:
+    """Length -> how far roll-outs stray, over every frame of the clip.
+
+    A stretch's first frame has no frame before it that would say how its root came there, and starts none.
+    Roll-outs begin so often that every frame lies in OVERLAP of them (one where they are one frame long).
+    """
+    layout = predictor.network.layout
+    out = {length: Strayed() for length in lengths}
+    for chosen in unbroken(rows.frame):
+        asked = inputs(rows, chosen, layout.links > 0)
+        for length in lengths:
+            all_starts = np.arange(1, len(chosen), max(1, length // OVERLAP))
+            for first in range(0, len(all_starts), BATCH):
+                starts = all_starts[first : first + BATCH]
+                out[length] += _strayed(predictor, asked, starts, length, joints)
+    return out
+
+
+def _strayed(
+    predictor: Predictor, asked: Inputs, starts: np.ndarray, length: int, joints: Sequence[int]
+) -> Strayed:
+    layout = predictor.network.layout
+    truth = asked.y[:, layout.y_joint_position].reshape(len(asked.y), -1, 3)[:, joints]
+    made, phase = roll_out(predictor, asked, starts, length)
+    frames, moments = 0, Moments.nothing(2)
+    errors: Array = np.zeros((0, len(joints), 2))
+    for age, place in enumerate(made):
+        at = starts[: len(place)] + age
+        errors = relative_and_distance(truth[at].astype(float), place[:, joints])
+        weights = np.full(errors[..., 0].size, 1 / len(joints))
+        moments = moments + Moments.of(errors.reshape(-1, 2), weights)
+        frames += len(place)
+    # The phase is already that of the next frame, so that one has to be in the stretch too.
+    ended = int(np.searchsorted(starts, len(asked.x) - length))
+    if not ended:
+        return Strayed(frames, len(starts), moments)
+    off = np.abs(np.mod(phase[:ended] - asked.phase[starts[:ended] + length] + 0.5, 1.0) - 0.5)
+    last = np.stack([errors[:ended, :, 1].mean(axis=1), off], axis=1)
+    return Strayed(frames, len(starts), moments, Moments.of(last))
+
+
+def measure_roll_outs(
+    weights: str | Path,
+    clips: Mapping[str, str | Path],
+    splits: Mapping[str, str],
+    configuration: str,
+    equivalents: Sequence[str] | None = None,
+    lengths: Sequence[int] = LENGTHS,
+    mode: str = "cubic",
+) -> dict[str, Any]:
+    """rollouts.json: `lengths`, one entry for each, with `train`, `held_out` and `clips` in name order.
+
+    clips: name -> file of rows, one in memory at a time. equivalents: names of the joints to measure. mode:
+    how phase is looked up. Raises InputError where rows and network differ.
+    """
+    network = load_network(weights)
+    predictor = network.predictor(mode)
+    joints = joint_indices(network, equivalents)
+    total = {length: dict.fromkeys(SPLITS, Strayed()) for length in lengths}
+    entries: dict[int, list[dict[str, Any]]] = {length: [] for length in lengths}
+    for name in sorted(clips):
+        rows = load_clip_rows(clips[name])
+        check_layout(clips[name], rows, network)
+        for length, found in clip_roll_outs(predictor, rows, joints, lengths).items():
+            total[length][splits[name]] += found
+            entries[length].append({"clip": name, "split": splits[name], **found.to_dict()})
+        log.info("%s: %s", name, entries[lengths[-1]][-1])
+    return {
+        "configuration": configuration,
+        "joints": len(joints),
+        "mode": mode,
+        "lengths": [
+            {
+                "length": length,
+                **{split: total[length][split].to_dict() for split in SPLITS},
+                "clips": entries[length],
+            }
+            for length in lengths
+        ],
+    }
+
+
+def roll_out_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The clips' entries, and those of the splits with an empty `clip`, as flat rows."""
+    rows = []
+    for entry in result["lengths"]:
+        for split in SPLITS:
+            rows.append({"length": entry["length"], "clip": None, "split": split, **entry[split]})
+        rows += [{"length": entry["length"], **clip} for clip in entry["clips"]]
+    return rows
+
+
+def run(given: Given, options: Options) -> Outcome:
+    """rollouts.json, and its rows as a table."""
+    result = measure_roll_outs(
+        given.weights,
+        given.clips,
+        given.splits,
+        given.configuration,
+        chosen_joints(given, options),
+        options.rollouts,
+        given.runtime.mode,
+    )
+    return Outcome(result, {"lengths": roll_out_rows(result)})

@@ -1,0 +1,35 @@
+"""What charts of several configurations have in common: names, colours, dots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from hobble.report.charts import Trace
+
+Compared = Mapping[str, Any]
+PALETTE = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0", "@g1", "@predicted")
+SPLITS = {"held_out": "held-out clips", "train": "training clips"}
+
+
+def names(compared: Compared) -> list[str]:
+    """The configurations in their order."""
+    return [entry["configuration"] for entry in compared["configurations"]]
+
+
+def colours(compared: Compared) -> dict[str, str]:
+    """A colour for each configuration, the same in every chart."""
+    return {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(names(compared))}
+
+
+def dots(name: str, x: Sequence, y: Sequence, colour: str, hover: str) -> Trace:
+    """Dots of one configuration; hover: what stands beside one that is pointed at."""
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": name,
+        "x": list(x),
+        "y": list(y),
+        "marker": {"color": colour, "size": 9, "opacity": 0.85},
+        "hovertemplate": f"{hover}<extra>%{{fullData.name}}</extra>",
+    }

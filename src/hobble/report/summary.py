@@ -1,0 +1,35 @@
+"""What a page says first: figures, and sentences drawn from the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number that a reader should take away, and what it stands beside; at: its place among the others."""
+
+    label: str
+    value: str
+    unit: str = ""
+    beside: str = ""
+    at: int = 50
+
+
+@dataclass(frozen=True)
+class Hint:
+    """A plain sentence drawn from the numbers.
+
+    kind: "good", "warn" or "note". at: its place among those of its kind.
+    """
+
+    kind: str
+    head: str
+    text: str
+    at: int = 50
+
+
+def placed(at: int, hints: Iterable[Hint]) -> Iterator[Hint]:
+    """The same hints at that place."""
+    return (replace(hint, at=at) for hint in hints)

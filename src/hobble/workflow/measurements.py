@@ -1,0 +1,62 @@
+"""What each measurement of a configuration reads, and on which keys of the configuration it depends."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hobble.measures.registry import MEASURES, measure
+from hobble.workflow.clips import Clips
+from hobble.workflow.configurations import Configurations
+from hobble.workflow.package import Package
+
+NAMES = tuple(one.name for one in MEASURES)
+
+
+def found(configuration: str, name: str) -> str:
+    """The JSON of a measurement."""
+    return f"results/{configuration}/evaluation/{name}.json"
+
+
+class Measurements:
+    """The measurements of a project's configurations."""
+
+    def __init__(self, configurations: Configurations, clips: Clips, package: Package) -> None:
+        self.configurations, self.clips, self.package = configurations, clips, package
+
+    def inputs(self, configuration: str, name: str) -> dict[str, str | list[str]]:
+        """Input -> its file or files, for those that the measurement asks for."""
+        return {asked: self._input(configuration, asked) for asked in measure(name).inputs}
+
+    def _input(self, configuration: str, asked: str) -> str | list[str]:
+        configurations = self.configurations
+        if asked == "weights":
+            return configurations.network(configuration, "weights.npz")
+        if asked == "clips":
+            return configurations.of_dataset(configuration, "database/clips/{clip}.npz")
+        if asked == "skeleton":
+            return self.clips.skeleton_file(configurations.dataset(configuration))
+        if asked == "published":
+            return self.package.published()
+        return found(configuration, measure(asked).name)
+
+    def splits(self, configuration: str, name: str) -> dict[str, str]:
+        """Clip -> split, where the measurement reads clips."""
+        return self.configurations.splits(configuration) if "clips" in measure(name).inputs else {}
+
+    def options(self, configuration: str, name: str) -> dict[str, Any]:
+        """Its own keys of the section `evaluation`."""
+        keys = measure(name).options.model_fields
+        return self.configurations.section(configuration, "evaluation", *keys) if keys else {}
+
+    def runtime(self, configuration: str, name: str) -> dict[str, Any]:
+        """The keys of the section `runtime` that it depends on."""
+        keys = measure(name).runtime
+        return self.configurations.section(configuration, "runtime", *keys) if keys else {}
+
+    def package_of(self, name: str) -> str:
+        """Full name of its package."""
+        return measure(name).package
+
+    def code(self, name: str, *modules: str) -> str:
+        """Fingerprint of what it runs, and of other modules that it finds by name: of the network."""
+        return self.package.code("measure", measure(name).module("run"), *modules)

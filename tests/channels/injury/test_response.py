@@ -1,0 +1,281 @@
+"""The response to injury: sweeps, their numbers, and networks that feel nothing."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import spearmanr
+
+from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
+from hobble.channels.injury.response.run import GAITS, injury_response, largest_accelerations
+from hobble.channels.injury.response.sweep import SEVERITIES, Sweep
+from hobble.evaluation.captured import Captured
+from hobble.evaluation.crowd import SPEEDS, Stretch, run, severities
+from hobble.evaluation.pose_distance import mean_cycle, settling
+from hobble.evaluation.spearman import spearman
+from hobble.runtime.options import Runtime
+
+RUNTIME = Runtime(steering=1.0)
+KNEE = "LeftUpLeg-LeftLeg"
+
+
+def slowing(hurtable, links: tuple[str, ...] = (KNEE,)):
+    """A network whose root is the slower, and whose head the lower, the more `links` hurt, and nothing else.
+
+    One unit of each hidden layer carries 1 + severity / 10 through the ELU, where it is linear.
+    """
+    layout = hurtable.layout
+    weights = [np.zeros_like(w) for w in hurtable.weights]
+    biases = [np.zeros_like(b) for b in hurtable.biases]
+    for link in links:
+        weights[0][:, 0, layout.x_injury.start + hurtable.links.index(link)] = 2.0  # the inputs are over 20
+    biases[0][:, 0] = 1.0
+    weights[1][:, 0, 0] = 1.0
+    head = layout.y_joint_position.start + 3 * hurtable.skeleton.role("head") + 1
+    for column, effect in ((layout.y_root_velocity.start + 1, -0.5), (head, -4.0)):
+        weights[2][:, column, 0] = effect / hurtable.y_std[column]
+        biases[2][:, column] = -effect / hurtable.y_std[column]
+    return replace(
+        hurtable, weights=tuple(weights), biases=tuple(biases), x_mean=np.zeros_like(hurtable.x_mean)
+    )
+
+
+def response(network, **options: Any) -> dict[str, Any]:
+    options = {"configuration": "x", "runtime": RUNTIME, "seconds": 4.0, "links": [KNEE]} | options
+    return injury_response(network, **options)
+
+
+def test_a_network_without_severities(network) -> None:
+    result = response(network)
+    assert result == {
+        "configuration": "x",
+        "applies": False,
+        "reason": "this network has no severity inputs",
+    }
+
+
+def test_a_response_that_is_known(hurtable) -> None:
+    """Speed falls by .05 cm a frame and the head by .4 cm for each unit of severity.
+
+    Predicted joint velocities stay, so every joint also runs ahead of the slower root: half of the mismatch,
+    and half of that again, ..., .05 cm in all.
+    """
+    each = (30 * 0.05 + np.hypot(0.4, 0.05)) / 31
+    result = response(slowing(hurtable))
+    for rows, way in ((result["rows"], SEVERITIES), (result["back"], SEVERITIES[-2::-1])):
+        walk = [row for row in rows if row["gait"] == "walk"]
+        assert [row["severity"] for row in walk] == way.tolist()
+        np.testing.assert_allclose([r["speed"] for r in walk], 60 * (1.5 - 0.05 * way), rtol=0.01)
+        np.testing.assert_allclose([r["from_healthy"] for r in walk], each * way, atol=0.005)
+        np.testing.assert_allclose([r["from_worst"] for r in walk], each * (10 - way), atol=0.005)
+        np.testing.assert_allclose([r["from_way_up"] for r in walk], 0, atol=0.005)
+    for gait, found in zip(GAITS, result["responses"], strict=True):
+        assert found["gait"] == gait
+        assert found["link"] == KNEE
+        assert found["spearman"]["speed"] == found["spearman_back"]["speed"] == pytest.approx(-1)
+        assert found["spearman"]["from_healthy"] == found["spearman_back"]["from_healthy"] == pytest.approx(1)
+        assert found["speed_share"] == pytest.approx(2 / 3, rel=0.02)
+        assert found["after_healing_cm"] == pytest.approx(0, abs=1e-3)
+        assert found["way_back_cm"] == pytest.approx(0, abs=0.005)
+        assert found["from_healthy_cm"] == pytest.approx(10 * each, rel=0.02)
+        # The severity moves for a second, and a mean over a second follows it for another.
+        assert 0.9 < found["settle_seconds"] < 2.1
+        assert 0.9 < found["heal_seconds"] < 2.1
+    assert result["summary"]["walk"]["spearman_speed"] == pytest.approx(-1)
+    json.dumps(result, allow_nan=False)
+
+
+def test_a_link_that_is_not_felt_changes_nothing(hurtable) -> None:
+    result = response(slowing(hurtable), links=["Neck1-Head"], seconds=2.0)
+    found = result["responses"][0]
+    assert found["from_healthy_cm"] == pytest.approx(0, abs=1e-6)
+    assert found["spearman"]["speed"] is None
+    assert found["speed_share"] == pytest.approx(1)
+    assert found["settle_seconds"] is None
+    json.dumps(result, allow_nan=False)
+
+
+def test_every_link_is_swept_and_those_never_hurt_are_marked(hurtable) -> None:
+    seen = np.zeros_like(hurtable.x_mean)
+    start = hurtable.layout.x_injury.start
+    seen[start + 7] = seen[start + 2] = 0.1
+    result = response(replace(hurtable, x_mean=seen), links=None, seconds=0.2)
+    hurt = ["LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg"]
+    assert result["links"] == list(hurtable.links)
+    assert len(result["links"]) == 30
+    assert result["trained"] == hurt
+    assert len(result["rows"]) == 2 * 30 * 11
+    assert len(result["back"]) == 2 * 30 * 10
+    assert [r["link"] for r in result["responses"] if r["trained"]] == 2 * hurt
+    assert {(r["first"], r["second"]) for r in result["second"]} == {tuple(hurt), tuple(hurt[::-1])}
+    assert {r["link"] for r in result["into_a_jog"]} == {None, *hurtable.links}
+    assert set(result["summary"]) == set(result["summary_untrained"]) == set(GAITS)
+
+
+def test_the_same_numbers_each_time(hurtable) -> None:
+    assert response(hurtable, seconds=0.5) == response(hurtable, seconds=0.5)
+
+
+def test_a_second_injury_adds_to_the_first(hurtable) -> None:
+    """Both lower the head: by the same again, whatever the first is."""
+    other = "RightUpLeg-RightLeg"
+    found = second_injuries(slowing(hurtable, (KNEE, other)), [KNEE, other], 2.0, RUNTIME)
+    assert [(r["first"], r["second"]) for r in found] == [(KNEE, other), (other, KNEE)]
+    for row in found:
+        assert row["share"] == pytest.approx(1, rel=0.03)
+        assert row["spearman"] == pytest.approx(1)
+        # The first, at 7, is still seen beside the second at 10.
+        assert row["from_second_cm"] == pytest.approx(0.7 * row["from_first_cm"], rel=0.05)
+    # One that the network does not feel adds nothing.
+    deaf = second_injuries(slowing(hurtable), [KNEE, other], 2.0, RUNTIME)
+    assert deaf[0]["share"] is None
+    assert deaf[0]["from_first_cm"] == pytest.approx(0, abs=0.01)
+    assert deaf[1]["share"] == pytest.approx(1, rel=0.03)
+
+
+def test_an_injury_is_kept_from_walking_into_jogging(hurtable) -> None:
+    found = into_a_jog(slowing(hurtable), [KNEE, "Neck1-Head"], 2.0, RUNTIME)
+    rows = {(r["link"], r["severity"]): r for r in found}
+    assert list(rows) == [(None, 0.0), (KNEE, 5.0), (KNEE, 10.0), ("Neck1-Head", 5.0), ("Neck1-Head", 10.0)]
+    assert rows[KNEE, 10.0]["kept"] == pytest.approx(1, rel=0.05)
+    assert rows[KNEE, 5.0]["walk_speed"] == pytest.approx(60 * 1.25, rel=0.02)
+    assert rows["Neck1-Head", 10.0]["kept"] is None
+    assert rows[None, 0.0]["jog_from_healthy_cm"] == 0
+
+
+def test_each_gait_is_held_against_its_own_healthy_one(hurtable) -> None:
+    """A network whose jog is another motion than its walk."""
+    healthy, *hurt = into_a_jog(hurtable, [KNEE], 1.0, RUNTIME)
+    assert healthy["walk_from_healthy_cm"] == healthy["jog_from_healthy_cm"] == 0
+    assert all(row["jog_from_healthy_cm"] != row["walk_from_healthy_cm"] for row in hurt)
+
+
+def test_the_way_back_is_measured_on_its_own(hurtable) -> None:
+    """Rows whose way back is another than their way up."""
+    sweep = Sweep(hurtable, [KNEE], "walk", 0.2, RUNTIME)
+    rows = sweep.rows(0)
+    rng = np.random.default_rng(2)
+    for row in rows:
+        row["speed"], row["from_way_up"] = float(rng.integers(9)), 0.0
+    rows[15]["from_way_up"] = 4.0
+    found = sweep.response(0, rows)
+    up, back = ([row["speed"] for row in some] for some in (rows[:11], rows[10:]))
+    assert found["spearman"]["speed"] == pytest.approx(spearmanr(SEVERITIES, up).statistic, abs=1e-5)
+    assert found["spearman_back"]["speed"] == pytest.approx(
+        spearmanr(SEVERITIES[::-1], back).statistic, abs=1e-5
+    )
+    assert found["way_back_cm"] == pytest.approx(4.0 - rows[0]["from_healthy"])
+    assert found["after_healing_cm"] == pytest.approx(rows[20]["from_healthy"] - rows[0]["from_healthy"])
+
+
+def test_divided_severities_are_smaller_ones(hurtable) -> None:
+    found = divided_severities(slowing(hurtable), [KNEE], 2.0, RUNTIME)
+    away = {(r["scale"], r["severity"]): r["from_healthy_cm"] for r in found}
+    assert {scale for scale, _ in away} == {1, 2, 5}
+    assert away[2, 10] == pytest.approx(away[1, 5], rel=0.03)
+    assert away[2, 5] == pytest.approx(away[1, 2.5], rel=0.03)
+    assert away[5, 10] == pytest.approx(0.2 * away[1, 10], rel=0.03)
+
+
+def test_figures_of_a_crowd_do_not_mind_each_other(hurtable) -> None:
+    """Each walks as it would alone."""
+    hurt = severities(hurtable, [{}, {KNEE: 4.0}, {KNEE: 10.0}])
+    together = run(hurtable, [Stretch(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
+    for figure, gait in enumerate(("walk", "jog", "walk")):
+        alone = run(hurtable, [Stretch(30, [gait], hurt[figure : figure + 1])], RUNTIME)
+        np.testing.assert_allclose(together.local[:, figure], alone.local[:, 0], atol=2e-3)
+        np.testing.assert_allclose(together.root[:, figure], alone.root[:, 0], atol=2e-3)
+    assert SPEEDS["jog"] > SPEEDS["walk"]
+
+
+def test_whole_cycles_are_measured(hurtable) -> None:
+    walks = run(hurtable, [Stretch(n, ["walk"], np.zeros((1, 30))) for n in (20, 400, 10)], RUNTIME)
+    phase = np.zeros((430, 1))
+    phase[:, 0] = np.mod(0.013 * np.arange(430), 1)
+    known = replace(walks, phase=phase)
+    span = known.measured(1, 0)
+    assert span.stop == 420
+    assert span.start >= 120
+    turned = 0.013 * (span.stop - 1 - span.start)
+    assert turned == pytest.approx(np.round(turned), abs=0.014)
+    assert np.round(turned) == 3  # of the three quarters that are measured, 3.9 cycles
+    assert known.measured(2, 0) == slice(422, 430)  # less than a cycle: all but its beginning
+
+
+def test_largest_accelerations_are_of_the_gait_and_the_hurt_link(hurtable) -> None:
+    gait = np.zeros((6, 6))
+    gait[:4, hurtable.gaits.index("walk")] = gait[4:, hurtable.gaits.index("jog")] = 1
+    severity = np.zeros((6, 30))
+    severity[2:, hurtable.links.index(KNEE)] = 3
+    rough = np.array([9.0, 8, 2, 1, 5, 6])
+    clip = Captured(
+        "a",
+        *(np.zeros((6, 1, 3)), np.zeros((6, 4)), np.zeros(6)),
+        severity,
+        gait,
+        np.zeros((6, 2)),
+        np.zeros((6, 3)),
+        rough,
+        None,
+    )
+    assert largest_accelerations([clip, clip], hurtable) == {
+        ("walk", None): 9.0,
+        ("walk", KNEE): 2.0,
+        ("jog", None): 6.0,
+        ("jog", KNEE): 6.0,
+    }
+    found = injury_response(
+        hurtable, [clip], configuration="x", runtime=RUNTIME, seconds=0.2, links=[KNEE, "Neck1-Head"]
+    )
+    of = {
+        (r["gait"], r["link"]): (r["clip_acceleration"], r["clip_acceleration_of"])
+        for r in found["responses"]
+    }
+    assert of["walk", KNEE] == (2.0, "link")
+    assert of["jog", "Neck1-Head"] == (6.0, "gait")
+
+
+def test_settling_of_an_exponential() -> None:
+    distance = 5 * (1 - np.exp(-np.arange(600) / 60))
+    # A mean over w frames lags by half of them; within a tenth after ln 10 seconds.
+    assert settling(distance, 0.0, 1) == pytest.approx(np.log(10), abs=0.05)
+    assert settling(distance, 0.0, 60) == pytest.approx(np.log(10) + 0.5, abs=0.1)
+    assert settling(0 * distance, 0.05, 30) is None
+
+
+def test_a_cycle_bridges_what_was_not_seen() -> None:
+    phase = np.array([0.0, 0.5, 0.98])
+    local = np.arange(3.0)[:, None, None] * np.ones((3, 2, 3))
+    cycle = mean_cycle(local, phase)[:, 0, 0]
+    assert cycle[0] == 0
+    assert cycle[12] == cycle[10] == 1
+    assert cycle[23] == cycle[20] == 2
+    assert cycle[1] == 0
+
+
+def test_all_walk_healthy_before_the_onset(hurtable) -> None:
+    links = [KNEE, "Neck1-Head", "LowerBack-Spine"]
+    sweep = Sweep(hurtable, links, "walk", 0.5, RUNTIME)
+    for walks in (sweep.walks, sweep.at_once):
+        same = walks.local[: walks.starts[2]]
+        np.testing.assert_allclose(same, same[:, :1].repeat(3, axis=1), atol=1e-3)
+    worst = sweep.at_once.local[sweep.at_once.starts[3] - 1]
+    assert np.abs(worst - worst[:1]).max() > 1e-3
+
+
+@given(st.lists(st.one_of(st.none(), st.integers(-3, 3).map(float)), min_size=11, max_size=11))
+@settings(max_examples=40, deadline=None)
+def test_spearman_is_scipys(values: list[float | None]) -> None:
+    known = [i for i, v in enumerate(values) if v is not None]
+    found = spearman(SEVERITIES, values)
+    if len(known) < 3 or len({values[i] for i in known}) < 2:
+        assert found is None
+    else:
+        expected = spearmanr(SEVERITIES[known], [values[i] for i in known]).statistic
+        assert found == pytest.approx(expected, abs=1e-5)

@@ -1,0 +1,230 @@
+"""Accuracy: the published network on the published rows, and the formula on rows where it is known."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import HobbleError, InputError
+from hobble.database.clip_rows import ClipRows, expanded, save_clip_rows
+from hobble.database.layout import RowLayout
+from hobble.evaluation.tables import write_csv
+from hobble.measures.accuracy.run import (
+    QUANTILES,
+    Errors,
+    clip_errors,
+    clip_rows,
+    equivalent_joints,
+    joint_errors,
+    joint_indices,
+    measure,
+)
+from hobble.models.checks import NEEDED_ROLES
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.models.pfnn.forward import phase_shares, weights_at
+
+LAYOUT = RowLayout(3, links=1)
+SKELETON = {
+    "name": "stick",
+    "joints": {
+        n: {"parent": p, "offset": [0, 1, 0]} for n, p in (("Hips", None), ("Arm", "Hips"), ("Foot", "Hips"))
+    },
+    "roles": dict.fromkeys(NEEDED_ROLES, "Foot") | {"hips": "Hips"},
+    "links": [["Hips", "Arm"]],
+}
+
+
+def make_rows(clip: str, rows: int, fits: int, seed: int) -> ClipRows:
+    rng = np.random.default_rng(seed)
+    return ClipRows(
+        clip,
+        LAYOUT,
+        SKELETON,
+        rng.normal(size=(rows, LAYOUT.x_terrain.start)).astype(np.float32),
+        rng.normal(2, 5, (rows, LAYOUT.y_size)).astype(np.float32),
+        rng.random(rows).astype(np.float32),
+        rng.random((rows, 1)).astype(np.float32) * 10,
+        np.arange(rows),
+        np.zeros(rows, int),
+        np.full(rows, fits),
+        rng.normal(size=(rows * fits, 36)).astype(np.float32),
+        rng.normal(size=rows * fits).astype(np.float32),
+    )
+
+
+def make_network(
+    layers: int = 3, points: int = 4, seed: int = 0, layout: RowLayout = LAYOUT
+) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    sizes = [layout.x_size, *[16] * (layers - 1), layout.y_size]
+    arrays: dict[str, np.ndarray] = {}
+    for i, (a, b) in enumerate(pairwise(sizes)):
+        arrays[f"W{i}"] = rng.normal(0, 0.2, (points, b, a)).astype(np.float32)
+        arrays[f"b{i}"] = rng.normal(0, 0.1, (points, b)).astype(np.float32)
+    for name, size in (("X", layout.x_size), ("Y", layout.y_size)):
+        arrays[f"{name}mean"] = rng.normal(size=size).astype(np.float32)
+        arrays[f"{name}std"] = (rng.random(size) + 0.5).astype(np.float32)
+    meta = {"layout": layout.to_dict(), "skeleton": SKELETON, "links": ["Hips-Arm"][: layout.links]}
+    return {**arrays, "meta": np.array(json.dumps(meta))}
+
+
+@pytest.fixture
+def weights(tmp_path: Path) -> Path:
+    np.savez(tmp_path / "weights.npz", **make_network())
+    return tmp_path / "weights.npz"
+
+
+def slow(network: Network, x: np.ndarray, phase: float) -> np.ndarray:
+    """One row at a time, the weights blended first."""
+    h = (x.astype(float) - network.x_mean) / network.x_std
+    for i in range(len(network.weights)):
+        h = weights_at(network.weights[i], phase)[0] @ h + weights_at(network.biases[i], phase)[0]
+        if i < len(network.weights) - 1:
+            h = np.where(h > 0, h, np.exp(np.minimum(h, 0)) - 1)
+    return h * network.y_std + network.y_mean
+
+
+@pytest.mark.shared
+def test_the_released_network_on_the_original_rows(shared):
+    network = load_network(shared / "reference" / "pfnn_release_network.npz")
+    with np.load(shared / "reference" / "original_rows_LocomotionFlat09_000.npz") as file:
+        x, y, p, released = (file[name] for name in ("X", "Y", "P", "Y_release"))
+    predicted = network.predict(x, p, constant=True)
+    np.testing.assert_allclose(predicted, released, atol=1e-3)
+    errors = joint_errors(RowLayout(31), y, predicted, range(31))
+    assert round(float(errors[..., 0].mean()), 4) == 0.0438
+    assert 2.3 < errors[..., 1].mean() < 2.7
+    smooth = joint_errors(RowLayout(31), y, network.predict(x, p), range(31))
+    assert round(float(smooth[..., 0].mean()), 4) == 0.0436  # a phase of its own instead of the bin's
+
+
+@pytest.mark.parametrize(("layers", "points"), [(2, 4), (3, 4), (4, 6)])
+def test_a_batch_is_what_each_row_gives_with_its_weights_blended_first(tmp_path, layers, points):
+    np.savez(tmp_path / "w.npz", **make_network(layers, points))
+    network = load_network(tmp_path / "w.npz")
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(20, LAYOUT.x_size)).astype(np.float32)
+    phase = np.r_[0.0, 1.0, 0.25, 0.5, rng.random(16)]
+    expected = np.stack([slow(network, row, p) for row, p in zip(x, phase, strict=True)])
+    np.testing.assert_allclose(network.predict(x, phase), expected, atol=1e-4)
+
+
+def test_phase_shares_hit_the_control_points_and_sum_to_one():
+    np.testing.assert_allclose(
+        phase_shares(np.array([0, 0.25, 0.5, 0.75, 1.0]), 4), np.eye(4)[[0, 1, 2, 3, 0]]
+    )
+    shares = phase_shares(np.linspace(0, 1, 101), 5)
+    np.testing.assert_allclose(shares.sum(axis=1), 1)
+    np.testing.assert_allclose(shares[0], shares[-1], atol=1e-12)
+
+
+def test_the_formula_on_one_joint_that_is_off_by_a_tenth():
+    layout = RowLayout(2)
+    truth, predicted = np.zeros((2, 1, layout.y_size))
+    block = layout.y_joint_position
+    truth[0, block] = [0, 90, 0, 3, 0, 4]
+    predicted[0, block] = [0, 81, 0, 3, 0, 4.5]
+    errors = joint_errors(layout, truth, predicted, [0, 1])
+    np.testing.assert_allclose(errors[0], [[0.1, 9.0], [0.1, 0.5]])
+    np.testing.assert_allclose(joint_errors(layout, truth, predicted, [1])[0], [[0.1, 0.5]])
+    at_root = joint_errors(layout, np.zeros_like(truth), predicted, [0, 1])
+    assert np.isfinite(at_root).all()
+
+
+@pytest.mark.parametrize("fits", [1, 10])
+def test_a_clips_figures_are_those_of_all_its_pairs(weights, fits):
+    network = load_network(weights)
+    rows = make_rows("a", 37, fits, 5)
+    relative, distance = [], []
+    for pairs in expanded(rows, links=True):
+        errors = joint_errors(LAYOUT, pairs.y, network.predict(pairs.x, pairs.p), range(3))
+        relative.append(errors[..., 0])
+        distance.append(errors[..., 1])
+    got = clip_errors(network, rows, [0, 1, 2]).to_dict()
+    assert got["frames"] == 37
+    assert got["mean"] == pytest.approx(np.concatenate(relative).mean())
+    assert got["sd"] == pytest.approx(np.concatenate(relative).std())
+    assert got["position_error_cm"] == pytest.approx(np.concatenate(distance).mean())
+    for name, share in QUANTILES.items():
+        assert got[name] == pytest.approx(np.quantile(np.concatenate(relative), share), rel=0.05)
+
+
+def test_batches_do_not_show(weights, monkeypatch):
+    network, rows = load_network(weights), make_rows("a", 50, 10, 5)
+    whole = clip_errors(network, rows, [0, 1, 2]).to_dict()
+    monkeypatch.setattr(
+        "hobble.measures.accuracy.run.expanded", lambda rows, links: expanded(rows, links, batch=7)
+    )
+    assert clip_errors(network, rows, [0, 1, 2]).to_dict() == pytest.approx(whole)
+
+
+def test_accuracy_per_clip_and_split(weights, tmp_path):
+    clips = {}
+    for i, (name, n, fits) in enumerate((("b", 20, 1), ("a", 40, 10), ("c", 30, 1), ("none", 0, 1))):
+        clips[name] = tmp_path / f"{name}.npz"
+        save_clip_rows(clips[name], make_rows(name, n, fits, i))
+    splits = {"a": "train", "b": "train", "c": "held_out", "none": "held_out"}
+    result = measure(weights, clips, splits, "injured")
+    assert result["configuration"] == "injured"
+    assert [e["clip"] for e in result["clips"]] == ["a", "b", "c", "none"]
+    by_name = {e["clip"]: e for e in result["clips"]}
+    a, b, c = (by_name[n] for n in "abc")
+    assert result["train"]["frames"] == 60
+    for key in ("mean", "position_error_cm"):  # every frame counts the same, whatever its fits
+        assert result["train"][key] == pytest.approx((40 * a[key] + 20 * b[key]) / 60)
+    assert result["train"]["mean_of_clips"] == pytest.approx((a["mean"] + b["mean"]) / 2)
+    assert {k: result["held_out"][k] for k in ("frames", "mean", "sd")} == {
+        k: c[k] for k in ("frames", "mean", "sd")
+    }
+    assert by_name["none"]["mean"] is None
+    json.dumps(result, allow_nan=False)
+    write_csv(tmp_path / "clips.csv", clip_rows(result))
+    with open(tmp_path / "clips.csv", newline="") as file:
+        table = list(csv.DictReader(file))
+    assert [row["clip"] for row in table] == ["a", "b", "c", "none"]
+    assert float(table[2]["mean"]) == c["mean"]
+    assert result == measure(weights, clips, splits, "injured")
+
+
+def test_nothing_held_out_is_said_as_nothing():
+    assert Errors().to_dict() == {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}
+
+
+def test_only_equivalent_joints(weights, tmp_path):
+    assert equivalent_joints({"maps": {"holden31": {"Foot": "LeftFoot", "Hips": "Hips"}}}) == ["Foot", "Hips"]
+    assert equivalent_joints({"joints": {}}) is None
+    network = load_network(weights)
+    assert joint_indices(network, ["Foot", "Hips"]) == [0, 2]
+    assert joint_indices(network) == [0, 1, 2]
+    with pytest.raises(HobbleError, match="Tail"):
+        joint_indices(network, ["Tail"])
+    save_clip_rows(tmp_path / "a.npz", make_rows("a", 20, 1, 0))
+    some = measure(weights, {"a": tmp_path / "a.npz"}, {"a": "train"}, "ava-m", ["Foot", "Hips"])
+    assert some["joints"] == 2
+    direct = clip_errors(network, make_rows("a", 20, 1, 0), [0, 2]).to_dict()
+    assert some["clips"][0]["mean"] == pytest.approx(direct["mean"])
+
+
+def test_a_network_without_severities_reads_the_same_rows(tmp_path):
+    np.savez(tmp_path / "w.npz", **make_network(layout=replace(LAYOUT, links=0)))
+    save_clip_rows(tmp_path / "a.npz", make_rows("a", 20, 1, 0))
+    result = measure(tmp_path / "w.npz", {"a": tmp_path / "a.npz"}, {"a": "held_out"}, "holden")
+    assert result["held_out"]["frames"] == 20
+    assert result["train"]["mean"] is None
+
+
+def test_rows_of_another_layout_are_refused(weights, tmp_path):
+    other = make_rows("a", 0, 1, 0)
+    save_clip_rows(
+        tmp_path / "a.npz",
+        replace(other, layout=RowLayout(4, links=1), x=np.zeros((0, 144)), y=np.zeros((0, 68))),
+    )
+    with pytest.raises(InputError, match=r"a\.npz: its rows .* are not those the network has learnt"):
+        measure(weights, {"a": tmp_path / "a.npz"}, {"a": "train"}, "holden")

@@ -1,0 +1,154 @@
+"""Laps: ended by arriving or by the clock, and the same numbers each time but for the times."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.evaluation.tables import write_csv
+from hobble.measures.responsivity import run as module
+from hobble.measures.responsivity.run import lap_rows, parameter_counts, responsivity
+from hobble.runtime.controller import STEPS
+from hobble.runtime.options import Runtime
+from hobble.runtime.waypoints import Waypoint
+
+RUNTIME = Runtime(steering=1.0)
+# So near to each other that standing in their midst is arriving at each.
+NEAR = tuple(Waypoint((x, 0.0), "walk", 2.5) for x in (0.0, 30.0, 60.0))
+# Straight ahead of the start, 4 m away, where a figure that glides straight on comes by; then the start.
+AHEAD = (Waypoint((0.0, 400.0), "walk", 1.5), Waypoint((0.0, 0.0), "walk", 1.5))
+# Likewise, and then aside of the way that it glides on.
+ASIDE = (
+    Waypoint((0.0, 400.0), "walk", 1.5),
+    Waypoint((3000.0, 1400.0), "walk", 1.5),
+    Waypoint((0.0, 0.0), "walk", 1.5),
+)
+
+
+def without_times(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: without_times(v) for k, v in value.items() if k != "milliseconds"}
+    return [without_times(v) for v in value] if isinstance(value, list) else value
+
+
+def run(network, track, laps=2, seconds=10.0) -> dict[str, Any]:
+    return responsivity(
+        network, configuration="x", runtime=RUNTIME, laps=laps, lap_seconds=seconds, track=track
+    )
+
+
+def test_laps_that_are_finished(steady) -> None:
+    result = run(steady, NEAR)
+    assert result["laps_finished"] == 2
+    assert [lap["waypoints_reached"] for lap in result["laps"]] == [3, 3]
+    assert all(lap["finished"] and lap["frames"] < 20 for lap in result["laps"])
+    assert result["track"] == {"waypoints": 3, "metres": 1.2}
+
+
+def test_a_character_that_cannot_turn_is_ended_by_the_clock(steady) -> None:
+    result = run(steady, ASIDE, seconds=8.0)
+    for lap in result["laps"]:
+        assert lap["frames"] == 480
+        assert lap["seconds"] == 8.0
+        assert not lap["finished"]
+        # It passes the first waypoint after 200 frames of 1.5 cm, and never comes to the one aside.
+        assert lap["waypoints_reached"] == 1
+        past = 480 * 1.5 - 400
+        assert lap["path_overshoot_cm"] == pytest.approx(past * 3 / np.sqrt(3**2 + 1), abs=30)
+    assert result["waypoints_reached"] == 2
+    assert result["waypoints"] == 6
+    # The second lap begins where the first did.
+    np.testing.assert_allclose(
+        result["laps"][0]["path_distance_cm"], result["laps"][1]["path_distance_cm"], atol=1e-6
+    )
+
+
+def test_everything_but_the_times_is_reproducible(network) -> None:
+    first, second = run(network, AHEAD, seconds=3.0), run(network, AHEAD, seconds=3.0)
+    assert without_times(first) == without_times(second)
+    assert "milliseconds" not in json.dumps(without_times(first))
+    times = first["laps"][0]["milliseconds"]
+    assert set(times) == {*STEPS, "total", "sd", "spread"}
+    assert set(times["sd"]) == set(STEPS)
+    assert times["total"] == pytest.approx(sum(times[step] for step in STEPS), abs=1e-4)
+    assert times["spread"]["whole_call"] > times["total"] > 0
+    json.dumps(first, allow_nan=False)
+
+
+def test_each_mode_runs_its_own_laps(network) -> None:
+    result = run(network, AHEAD, laps=1, seconds=3.0)
+    modes = {entry["mode"]: entry for entry in result["modes"]}
+    assert list(modes) == ["constant", "linear", "cubic"]
+    assert result["mode"] == RUNTIME.mode == "cubic"
+    assert all(result[key] == value for key, value in modes["cubic"].items())
+    # Weights looked up otherwise move the figure a little otherwise.
+    ways = {mode: entry["laps"][0]["path_distance_cm"] for mode, entry in modes.items()}
+    assert len(set(ways.values())) == 3
+    some = responsivity(
+        network,
+        configuration="x",
+        runtime=RUNTIME.model_copy(update={"mode": "linear"}),
+        laps=1,
+        lap_seconds=3.0,
+        modes=(),
+        track=AHEAD,
+    )
+    assert [entry["mode"] for entry in some["modes"]] == ["linear"]
+    assert without_times(some["laps"]) == without_times(modes["linear"]["laps"])
+
+
+def test_times_of_steps_that_are_known() -> None:
+    """Two frames, of steps 1 .. 6 ms and of twice that; the whole call takes 1 ms more."""
+    steps = np.arange(1.0, 7.0)
+    times = np.array([[*steps, 22.0], [*(2 * steps), 43.0]]) / 1000
+    found = module._milliseconds(times)
+    assert [found[step] for step in STEPS] == pytest.approx(1.5 * steps)
+    assert [found["sd"][step] for step in STEPS] == pytest.approx(0.5 * steps)
+    assert found["total"] == pytest.approx(31.5)
+    assert found["spread"] == pytest.approx({"sd": 10.5, "median": 31.5, "p99": 41.79, "whole_call": 32.5})
+
+
+def test_a_lap_is_timed_step_by_step(steady) -> None:
+    """Means and deviations over laps are those of all their frames."""
+    result = run(steady, NEAR)
+    laps, whole = result["laps"], result["milliseconds"]
+    frames = np.array([lap["frames"] for lap in laps])
+    for step in STEPS:
+        means = np.array([lap["milliseconds"][step] for lap in laps])
+        assert whole[step] == pytest.approx((frames @ means) / frames.sum(), abs=1e-5)
+        squares = np.array([lap["milliseconds"]["sd"][step] ** 2 for lap in laps]) + means**2
+        expected = (frames @ squares) / frames.sum() - whole[step] ** 2
+        assert whole["sd"][step] == pytest.approx(max(expected, 0) ** 0.5, abs=1e-4)
+
+
+def test_rows_for_a_table(steady, tmp_path) -> None:
+    rows = lap_rows(run(steady, NEAR))
+    write_csv(tmp_path / "laps.csv", rows)
+    lines = (tmp_path / "laps.csv").read_text().splitlines()
+    assert len(lines) == 1 + 3 * 2
+    assert lines[0].startswith("mode,lap,finished,frames,")
+    assert "milliseconds_predict," in lines[0]
+    assert "milliseconds_predict_sd" in lines[0]
+    assert [line.split(",")[:2] for line in lines[1:]] == [
+        [m, n] for m in ("constant", "linear", "cubic") for n in ("1", "2")
+    ]
+    write_csv(tmp_path / "none.csv", [])
+    assert (tmp_path / "none.csv").read_text() == ""
+
+
+def test_published_counts() -> None:
+    published = {
+        (342, 512, 512, 311): (597_815, 335_501),
+        (342, 512, 512, 512, 311): (860_471, 598_157),
+    }
+    for sizes, (true, printed) in published.items():
+        counts = parameter_counts(sizes)
+        assert counts["true"] == true
+        assert counts["table_6_1_as_printed"] == printed
+    # AVA: 191 joints.
+    ava = parameter_counts((1302, 512, 512, 1751))
+    assert ava["true"] == 1_828_055
+    assert ava["table_6_1_as_printed"] == 1_566_701

@@ -1,0 +1,219 @@
+"""Roll-outs: the runtime's own frames come out of them, every frame is reached, errors are what they say."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.database.clip_rows import ClipRows, save_clip_rows
+from hobble.database.layout import RowLayout
+from hobble.evaluation.motion_measures import in_root_frame
+from hobble.measures.rollouts.run import (
+    Inputs,
+    clip_roll_outs,
+    inputs,
+    measure_roll_outs,
+    roll_out,
+    roll_out_rows,
+)
+from hobble.models.network import Network
+from hobble.models.pfnn.predictor import PfnnPredictor
+from hobble.runtime.animation import ProceduralAnimation
+
+
+def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:
+    return 8 * np.sin(x / 70) + 6 * np.cos(z / 50)
+
+
+def recorded(network: Network, frames: int, ground: Any) -> tuple[Inputs, np.ndarray]:
+    """What a figure of the runtime was asked in each frame, and its joints (F, J, 3) in the root frame."""
+    figure = ProceduralAnimation(network, foot_locking=False)
+    figure.next_pose((0.0, 2.0))
+    rows: dict[str, list[Any]] = {
+        key: [] for key in ("x", "y", "mean", "phase", "root", "yaw", "local", "stand")
+    }
+    controller, state = figure._controller, figure.state
+    for f in range(frames):
+        rows["phase"].append(float(state.phase[0]))
+        speed = 0.0 if 25 <= f < 45 else 2.5
+        wish = (speed * np.sin(f / 40), speed * np.cos(f / 40))
+        figure.next_pose(wish, injury={"LeftUpLeg-LeftLeg": 4}, terrain=ground)
+        root, yaw = controller.root[0].copy(), float(controller.yaw[0])
+        local = in_root_frame(state.joint_position[0], root, np.array(yaw))
+        rows["x"].append(controller.x[0].copy())
+        rows["y"].append(controller.y[0].copy())
+        rows["stand"].append(controller.x[0, network.layout.x_gait][network.layout.samples // 2])
+        for key, value in (("mean", root[1]), ("root", root[::2]), ("yaw", yaw), ("local", local)):
+            rows[key].append(value)
+    root, yaw = np.array(rows["root"]), np.array(rows["yaw"])
+    step = np.diff(root, axis=0, append=root[-1:])
+    sin, cos = np.sin(yaw), np.cos(yaw)
+    velocity = np.stack([step[:, 0] * cos - step[:, 1] * sin, step[:, 0] * sin + step[:, 1] * cos], axis=1)
+    asked = Inputs(
+        np.array(rows["x"]),
+        np.array(rows["y"]),
+        np.array(rows["mean"]),
+        np.array(rows["phase"]),
+        -np.diff(yaw, append=yaw[-1]),
+        velocity,
+        np.maximum(0, 1 - np.array(rows["stand"])) ** 0.25,
+    )
+    return asked, np.array(rows["local"])
+
+
+@pytest.mark.parametrize("ground", [None, hills])
+def test_a_roll_out_is_what_the_runtime_does(hurtable: Network, ground: Any) -> None:
+    """Fed what the runtime was asked, the joints and the phase go where they went there."""
+    scale = hurtable.x_std.copy()  # one that feels its own velocities and its phase
+    scale[hurtable.layout.x_joint_velocity] = 1.0
+    hurtable = replace(hurtable, x_std=scale, y_std=np.full_like(hurtable.y_std, 0.2))
+    asked, local = recorded(hurtable, 80, ground)
+    starts = np.array([1, 2, 17, 40, 79])
+    made, phase = roll_out(PfnnPredictor(hurtable), asked, starts, 60)
+    assert [len(place) for place in made] == [5] + [4] * 39 + [3] * 20
+    for age, place in enumerate(made):
+        np.testing.assert_allclose(place, local[starts[: len(place)] + age], atol=1e-3)
+    np.testing.assert_allclose(phase[:2], asked.phase[starts[:2] + 60], atol=1e-4)
+    # The pose is its own: a start from another pose stays another for a while.
+    other = Inputs(asked.x.copy(), *list(vars(asked).values())[1:])
+    other.x[1, hurtable.layout.x_joint_position] += 5
+    moved, _ = roll_out(PfnnPredictor(hurtable), other, starts[:1], 2)
+    assert np.abs(moved[0] - local[1]).max() > 1
+
+
+LAYOUT = RowLayout(31, links=30)
+
+
+def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) -> ClipRows:
+    """Rows as random as may be; with a `gap`, frames of another stretch from there on."""
+    rng = np.random.default_rng(seed)
+    assert network.skeleton is not None
+    frame = np.arange(rows) + 7
+    if gap is not None:
+        frame[gap:] += 20
+    return ClipRows(
+        "a",
+        LAYOUT,
+        network.skeleton.to_dict(),
+        rng.normal(size=(rows, LAYOUT.x_terrain.start)).astype(np.float32),
+        rng.normal(0, 1, (rows, LAYOUT.y_size)).astype(np.float32),
+        rng.random(rows).astype(np.float32),
+        rng.random((rows, 30)).astype(np.float32) * 10,
+        frame,
+        np.zeros(rows, int),
+        np.ones(rows, int),
+        rng.normal(size=(rows, 36)).astype(np.float32),
+        rng.normal(size=rows).astype(np.float32),
+    )
+
+
+def test_every_frame_is_reached_ten_times(hurtable: Network) -> None:
+    rows = clip_rows(hurtable, 240, 1, gap=90)
+    found = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1, 10, 20, 200))
+    # Of 90 and 150 frames in a row the first of each starts none.
+    assert found[1].frames == found[1].starts == 89 + 149
+    assert found[10].starts == 89 + 149
+    assert found[10].frames == sum(min(10, n - s) for n in (90, 150) for s in range(1, n))
+    assert found[20].frames == sum(min(20, n - s) for n in (90, 150) for s in range(1, n, 2))
+    assert found[20].to_dict()["ended"] == sum(s + 20 < n for n in (90, 150) for s in range(1, n, 2))
+    assert found[200].to_dict()["ended"] == 0
+    assert found[200].to_dict()["last_cm"] is None
+    # Each frame weighs as all its joints together.
+    assert found[10].moments.weight == pytest.approx(found[10].frames)
+
+
+def test_one_frame_is_half_the_prediction_and_half_the_pose_carried_on(hurtable: Network) -> None:
+    rows = clip_rows(hurtable, 40, 2)
+    asked = inputs(rows, np.arange(40), links=True)
+    layout = hurtable.layout
+    np.testing.assert_array_equal(asked.x[:, layout.x_injury], rows.severity)
+    y = PfnnPredictor(hurtable).predict(asked.x, asked.phase)
+    made, _ = roll_out(PfnnPredictor(hurtable), asked, np.arange(1, 40), 1)
+    before = asked.x[1:, layout.x_joint_position].reshape(39, 31, 3).astype(float)
+    a = asked.turn[:-1, None]
+    x, z = before[..., 0] - asked.velocity[:-1, :1], before[..., 2] - asked.velocity[:-1, 1:]
+    carried = np.stack(
+        [x * np.cos(a) + z * np.sin(a), before[..., 1], z * np.cos(a) - x * np.sin(a)], axis=-1
+    )
+    speed = y[1:, layout.y_joint_velocity].reshape(39, 31, 3)
+    guess = y[1:, layout.y_joint_position].reshape(39, 31, 3)
+    np.testing.assert_allclose(made[0], (carried + speed + guess) / 2, atol=1e-4)
+    truth = asked.y[1:, layout.y_joint_position].reshape(39, 31, 3)
+    found = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1,))[1].to_dict()
+    assert found["position_error_cm"] == pytest.approx(
+        np.linalg.norm(truth - made[0], axis=-1).mean(), rel=1e-5
+    )
+
+
+def test_splits_add_up_and_come_out_the_same(hurtable: Network, tmp_path: Path, monkeypatch) -> None:
+    weights = tmp_path / "weights.npz"
+    save(weights, hurtable)
+    clips = {}
+    for i, (name, count) in enumerate((("a", 60), ("b", 90), ("c", 40), ("none", 0))):
+        clips[name] = tmp_path / f"{name}.npz"
+        save_clip_rows(clips[name], clip_rows(hurtable, count, i))
+    splits = {"a": "train", "b": "train", "c": "held_out", "none": "held_out"}
+    result = measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30))
+    assert [entry["length"] for entry in result["lengths"]] == [1, 30]
+    for entry in result["lengths"]:
+        a, b, c, none = entry["clips"]
+        for key in ("mean", "position_error_cm"):
+            both = (a["frames"] * a[key] + b["frames"] * b[key]) / (a["frames"] + b["frames"])
+            assert entry["train"][key] == pytest.approx(both)
+            assert entry["held_out"][key] == c[key]
+        assert none["mean"] is None
+    rows = roll_out_rows(result)
+    assert len(rows) == 2 * (2 + 4)
+    assert rows[0]["clip"] is None
+    json.dumps(result, allow_nan=False)
+    # However many go side by side.
+    monkeypatch.setattr("hobble.measures.rollouts.run.BATCH", 7)
+    again = measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30))
+    for one, other in zip(rows, roll_out_rows(again), strict=True):
+        assert [one[k] for k in one if one[k] is None] == [other[k] for k in one if one[k] is None]
+        numbers = [k for k, value in one.items() if isinstance(value, float)]
+        assert [one[k] for k in numbers] == pytest.approx([other[k] for k in numbers], rel=1e-5)
+
+
+def test_rows_of_another_layout_are_refused(hurtable: Network, network: Network, tmp_path: Path) -> None:
+    save(tmp_path / "weights.npz", hurtable)
+    rows = clip_rows(hurtable, 0, 0)
+    layout = RowLayout(4, links=30)
+    other = ClipRows(
+        **{
+            **vars(rows),
+            "layout": layout,
+            "x": np.zeros((0, layout.x_terrain.start)),
+            "y": np.zeros((0, layout.y_size)),
+        }
+    )
+    save_clip_rows(tmp_path / "a.npz", other)
+    with pytest.raises(InputError, match=r"a\.npz: its rows"):
+        measure_roll_outs(tmp_path / "weights.npz", {"a": tmp_path / "a.npz"}, {"a": "train"}, "x")
+
+
+def save(path: Path, network: Network) -> None:
+    """Write a network as training does."""
+    arrays: dict[str, Any] = {}
+    for i, (w, b) in enumerate(zip(network.weights, network.biases, strict=True)):
+        arrays[f"W{i}"], arrays[f"b{i}"] = w, b
+    for name, value in zip(
+        ("Xmean", "Xstd", "Ymean", "Ystd"),
+        (network.x_mean, network.x_std, network.y_mean, network.y_std),
+        strict=True,
+    ):
+        arrays[name] = value
+    assert network.skeleton is not None
+    meta = {
+        "layout": network.layout.to_dict(),
+        "skeleton": network.skeleton.to_dict(),
+        "links": list(network.links),
+        "gaits": list(network.gaits),
+    }
+    np.savez(path, **arrays, meta=np.array(json.dumps(meta)))

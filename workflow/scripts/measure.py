@@ -1,0 +1,26 @@
+"""Creates <measure>.json and its tables (CSV) from what the measurement asks for."""
+
+import importlib
+from pathlib import Path
+
+from hobble.core.files import write_json
+from hobble.evaluation.tables import write_tables
+from hobble.measures.given import Given
+from hobble.runtime.options import Runtime
+from hobble.workflow.job import job
+
+with job(snakemake) as log:
+    # By name: which measurements there are beside this one is no reason to run it again.
+    measure = importlib.import_module(snakemake.params.package).MEASURE
+    files = {need: Path(file) for need, file in snakemake.input.items() if need != "clips"}
+    given = Given(
+        snakemake.params.configuration,
+        files,
+        {Path(file).stem: Path(file) for file in snakemake.input.get("clips", ())},
+        snakemake.params.splits,
+        Runtime.model_validate(snakemake.params.runtime),
+    )
+    found = measure.part("run").run(given, measure.options.model_validate(snakemake.params.options))
+    write_json(snakemake.output.json, found.result)
+    write_tables(snakemake.output.tables, found.tables)
+    log.info("%s", found.says)
