@@ -94,8 +94,9 @@ def test_standing_as_modelled_it_is_as_modelled(mesh: Mesh) -> None:
 
 def test_it_goes_where_its_bones_go_as_a_whole(mesh: Mesh) -> None:
     turn = quat.from_axis_angle(np.array([0.6, 0.0, 0.8]), 1.1)
-    moved = mesh.posed(quat.rotate(turn, mesh.positions) + [5, 6, 7], quat.mul(turn, mesh.rotations))
-    assert np.abs(moved - (quat.rotate(turn, mesh.corners) + [5, 6, 7])).max() < 1e-9
+    away = np.array([5.0, 6, 7])
+    moved = mesh.posed(quat.rotate(turn, mesh.positions) + away, quat.mul(turn, mesh.rotations))
+    assert np.abs(moved - (quat.rotate(turn, mesh.corners) + away)).max() < 1e-9
 
 
 def test_no_corner_goes_further_than_its_bones_carry_it(mesh: Mesh, holden31: Skeleton) -> None:

@@ -111,7 +111,8 @@ def test_the_page_moves_as_python_does(
         }}
         c.frame(velocity, facing, gait, hills);
         rig.take(c.pose, c.turns);
-        return [c.pose, c.phase, c.severity, c.turns, rig.places, rig.turns].map((v) => (v.length ? Array.from(v) : v));
+        const made = [c.pose, c.phase, c.severity, c.turns, rig.places, rig.turns];
+        return made.map((v) => (v.length ? Array.from(v) : v));
       }});
     }})()"""
     found, turning = tab.run(script), character["turning"]
@@ -265,7 +266,8 @@ def test_what_is_saved_as_bvh_is_what_was_played(
 
 
 LEFT_LEG = """(() => {{
-  const {{ view, actors: [actor] }} = Hobble.player, [hip, knee] = actor.spec.legs[0], {{ places }} = actor.rig;
+  const {{ view, actors: [actor] }} = Hobble.player, {{ places }} = actor.rig;
+  const [hip, knee] = actor.spec.legs[0];
   const at = (j) => [places[3 * j], places[3 * j + 1], places[3 * j + 2]], [a, b] = [at(hip), at(knee)];
   return [.2, .35, .5, .65, .8].map((t) => {{
     const [x, y] = view.project(a.map((v, i) => v + t * (b[i] - v)));
@@ -304,7 +306,9 @@ def test_the_camera_comes_round_behind_at_any_rate_of_pictures(tab: Any) -> None
     script = """((rate) => {
       const orbit = { yaw: 0 }, chase = Hobble.chase(orbit, document.createElement("canvas"));
       let eye;
-      for (let f = 0; f <= 3 * rate; f++) eye = chase.follow(1e6 + 1000 * f / rate, [0, 90, 150 * f / rate], [1, 0]);
+      for (let f = 0; f <= 3 * rate; f++) {
+        eye = chase.follow(1e6 + 1000 * f / rate, [0, 90, 150 * f / rate], [1, 0]);
+      }
       return [orbit.yaw, 450 - eye[2]];
     })"""
     fast, slow = tab.run(f"{script}(120)"), tab.run(f"{script}(12)")

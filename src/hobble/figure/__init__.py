@@ -1,1 +1,1 @@
-"""The body that a skeleton wears: one closed surface, which the joints' rotations move, and glTF files of it."""
+"""The body that a skeleton wears: one closed surface, moved by its joints' rotations."""

@@ -15,7 +15,7 @@ from hobble.figure.solids import Ball, Floor, Owner, Rod, Solid, Sweep
 
 LEG_LENGTH = 81.0  # hip to ankle of the body that the tables describe
 TOE_HEIGHT = 2.5  # of the ball of the foot above the sole
-# Heights of hip joints, chest, neck and head in the tables of trunk and head, which are moved to the skeleton's.
+# Heights of hip joints, chest, neck and head in the table of the trunk, which are moved to the skeleton's.
 LEVELS = (-8.0, 23.0, 38.0, 48.0)
 
 # height, half width, half depth, to the front, squareness

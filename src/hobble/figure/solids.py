@@ -58,6 +58,7 @@ class Sweep(Solid):
         object.__setattr__(self, "_third", np.cross(self.axis, self.across))
 
     def distance(self, x: Any, y: Any, z: Any) -> Array:
+        """As in `Solid`."""
         rows: Array = self._rows  # type: ignore[attr-defined]
         local = [x - self.start[0], y - self.start[1], z - self.start[2]]
         s, u, v = (
@@ -75,6 +76,7 @@ class Sweep(Solid):
         return np.where(end > 0, np.hypot(np.maximum(aside, 0), np.maximum(end, 0)), np.maximum(aside, end))
 
     def bounds(self) -> tuple[Array, Array]:
+        """As in `Solid`."""
         rows: Array = self._rows  # type: ignore[attr-defined]
         middle = (
             self.start + rows[:, :1] * self.axis + rows[:, 3:4] * self.across + rows[:, 4:5] * self._third  # type: ignore[attr-defined]
@@ -83,6 +85,7 @@ class Sweep(Solid):
         return (middle - reach).min(axis=0), (middle + reach).max(axis=0)
 
     def along(self, points: Array) -> Array:
+        """As in `Solid`."""
         return (points - self.start) @ self.axis
 
 
@@ -95,6 +98,7 @@ class Ball(Solid):
     axes: Array = field(default_factory=lambda: np.eye(3))
 
     def distance(self, x: Any, y: Any, z: Any) -> Array:
+        """As in `Solid`."""
         local = [x - self.centre[0], y - self.centre[1], z - self.centre[2]]
         parts = [sum(p * row[i] for i, p in enumerate(local)) for row in self.axes]
         k0 = np.sqrt(sum((p / r) ** 2 for p, r in zip(parts, self.radii, strict=True)))
@@ -102,6 +106,7 @@ class Ball(Solid):
         return np.where(k1 > 1e-9, k0 * (k0 - 1) / np.maximum(k1, 1e-9), -self.radii.min())
 
     def bounds(self) -> tuple[Array, Array]:
+        """As in `Solid`."""
         reach = np.sqrt(((self.axes * self.radii[:, None]) ** 2).sum(axis=0))
         return self.centre - reach, self.centre + reach
 
@@ -116,6 +121,7 @@ class Rod(Solid):
     thin: float
 
     def distance(self, x: Any, y: Any, z: Any) -> Array:
+        """As in `Solid`."""
         way = self.end - self.start
         local = [x - self.start[0], y - self.start[1], z - self.start[2]]
         t = np.clip(sum(p * way[i] for i, p in enumerate(local)) / max(way @ way, 1e-9), 0, 1)
@@ -123,6 +129,7 @@ class Rod(Solid):
         return off - (self.thick + (self.thin - self.thick) * t)
 
     def bounds(self) -> tuple[Array, Array]:
+        """As in `Solid`."""
         reach = max(self.thick, self.thin)
         return np.minimum(self.start, self.end) - reach, np.maximum(self.start, self.end) + reach
 
@@ -136,10 +143,12 @@ class Floor(Solid):
     reach: float
 
     def distance(self, x: Any, y: Any, z: Any) -> Array:
+        """As in `Solid`."""
         local = [x - self.place[0], y - self.place[1], z - self.place[2]]
         return sum(p * self.up[i] for i, p in enumerate(local)) + 0 * (x + y + z)
 
     def bounds(self) -> tuple[Array, Array]:
+        """As in `Solid`."""
         return self.place - self.reach, self.place + self.reach
 
 

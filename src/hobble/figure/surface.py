@@ -138,7 +138,8 @@ def settled(values: Array) -> Array:
 
 
 def nets(values: Array, axes: Sequence[Array]) -> tuple[Array, NDArray[np.int64]]:
-    """A corner in every cell of the grid that the surface crosses, a square around every edge that it does."""
+    """A corner in every cell that the surface crosses, and a square around every edge of the grid that it
+    does."""
     inside = values < 0
     shape = np.array(values.shape) - 1
     count = np.zeros(shape, np.int8)

@@ -140,8 +140,9 @@ def generate(network: Network, npz: str | Path, bvh: str | Path, **options: Any)
     """Run every scenario and write `npz` and, into the folder `bvh`, a BVH file each.
 
     npz: names (N,), joints (J,), parents (J,), fps; for scenario <name>: <name>/positions (F, J, 3) float32
-    cm, <name>/rotations (F, J, 4) world, w first, <name>/contacts (F, 4), <name>/phase (F,), <name>/gait (F,) str, <name>/target (F, 2), <name>/root (F,
-    3), <name>/severity (F,) float32, <name>/hurt: the hurt link or "".
+    cm, <name>/rotations (F, J, 4) world, w first, <name>/contacts (F, 4), <name>/phase (F,), <name>/gait (F,)
+    str, <name>/target (F, 2), <name>/root (F, 3), <name>/severity (F,) float32, <name>/hurt: the hurt link or
+    "".
     """
     assert network.skeleton is not None
     arrays: dict[str, Any] = {}

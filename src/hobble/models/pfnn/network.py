@@ -8,6 +8,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.models.checks import layers, numbers
