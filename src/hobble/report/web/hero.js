@@ -67,7 +67,7 @@ const createHero = (spec, asked) => {
     view.land.around([x, 0, z]);
     main.draw(false);
     if (ghost) { ghost.draw(null); ghost.figure.show(fade > .01, fade); }
-    view.land.under(main.figure.balls(12));
+    view.land.under(main.figure.balls(view.balls));
     if (now - told > 250) { told = now; tell(); }
   };
   const pace = ({ character: c }) => {

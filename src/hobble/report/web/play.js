@@ -28,7 +28,7 @@ const createPlay = (stage, playables) => {
     view.aim([eye[0], eye[1] - 8, eye[2]]);
     view.land.around(eye, land(), ground.value);
     player.actors.forEach((actor) => actor.draw());
-    view.land.under(player.actors.flatMap(({ figure }) => figure.balls()));
+    view.land.under(player.actors.flatMap(({ figure }) => figure.balls(view.balls / player.actors.length)));
     if (now - told > 100) { told = now; panels.forEach((panel) => panel.tell(view.milliseconds)); }
     view.ask();
   });

@@ -87,7 +87,7 @@ import { createView } from "./view.js";
     if (trails) { drawPath(s, focus, at); drawPrints(s, focus, at); }
     s.motion.show(figure, at);
     figure.pose((links) => severityColour(view.paint, severity(s, frame, links)));
-    view.land.under(figure.balls());
+    view.land.under(figure.balls(view.balls));
     tell(s, frame);
   };
 
