@@ -92,14 +92,16 @@ def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) 
 def test_the_page_moves_as_python_does(
     tab: Any, network: Network, character: dict[str, Any], examples: ModuleType
 ) -> None:
-    animation = ProceduralAnimation(network, storage="int16", **examples.RUNTIME)
+    animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
     expected = []
     for frame in range(FRAMES):
         asked = wish(frame)
         injury = {"LeftUpLeg-LeftLeg": 7.0, "Hips-LowerBack": 3.0} if asked["hurt"] else None
         pose = animation.next_pose(asked["velocity"], asked["facing"], asked["gait"], injury, hills)
         world, places = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
-        expected.append((pose.positions, pose.phase, pose.severity, pose.rotations, places[0], world[0]))
+        expected.append(
+            (pose.positions, pose.phase, pose.told["injury"], pose.rotations, places[0], world[0])
+        )
     links = network.links
     script = f"""(() => {{
       const spec = Hobble.material.playable.example, c = Hobble.character(spec), rig = Hobble.rig(spec);
@@ -347,7 +349,10 @@ def test_the_largest_network_leaves_room_in_the_page(
     examples.weights(tmp_path / "weights.npz", skeleton, units=512)
     network = load_network(tmp_path / "weights.npz")
     x_std = network.x_std.copy()
-    for block in (network.layout.x_joint_position, network.layout.x_joint_velocity):  # as training weighs them
+    for block in (
+        network.layout.x_joint_position,
+        network.layout.x_joint_velocity,
+    ):  # as training weighs them
         x_std[block].reshape(-1, 3)[[skeleton.index(name) for name in skeleton.unseen]] *= 1e10
     spec = playable(replace(network, x_std=x_std), examples.RUNTIME)
     assert len(embedded(spec)) < 13e6

@@ -2,11 +2,14 @@
 
 from hobble.models.load import load_network
 from hobble.report.stimuli import doubts, write_stimuli
+from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
     made = write_stimuli(
-        load_network(snakemake.input.weights), snakemake.output.folder, **snakemake.params.runtime
+        load_network(snakemake.input.weights),
+        snakemake.output.folder,
+        Runtime.model_validate(snakemake.params.runtime),
     )
     for doubt in doubts(made):
         log.warning("%s", doubt)

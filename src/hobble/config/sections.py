@@ -17,6 +17,7 @@ from hobble.core.section import (
 )
 from hobble.database.options import Database
 from hobble.evaluation.options import Evaluation
+from hobble.hurt.options import Hurt
 from hobble.labels.options import Labels
 from hobble.motion.options import Download, Motion
 from hobble.report.options import Report
@@ -34,6 +35,7 @@ __all__ = [
     "Gait",
     "Ground",
     "Heightmap",
+    "Hurt",
     "Inside",
     "Labels",
     "Motion",

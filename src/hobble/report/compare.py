@@ -10,11 +10,11 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.database.clip_rows import ClipRows, expanded, load_clip_rows
 from hobble.evaluation.captured import headings, root_path, turned, unbroken
 from hobble.figure.mesh import body, key
 from hobble.models.network import Network
 from hobble.report.scenes import FPS, UNIT, packed_motion
+from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
 
 CLIPS = 6  # that are shown at least, if there are so many; every held-out clip is
 MOST = 40
@@ -48,7 +48,7 @@ def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> 
     pose = slice(layout.y_joint_position.start, layout.y_joint_rotation.stop)
     truth, guess = np.zeros((2, len(rows), pose.stop - pose.start))
     seen = np.zeros(len(rows), bool)
-    for pairs in expanded(rows, links=network.layout.links > 0):
+    for pairs in expanded(rows, network.layout):
         row, first = np.unique(pairs.row, return_index=True)
         wanted = np.isin(row, chosen) & ~seen[row]
         row, first = row[wanted], first[wanted]

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hobble.core.skeleton import Skeleton
-from hobble.database.layout import RowLayout
 from hobble.figure.mesh import body, key
 from hobble.figure.pack import regions
 from hobble.models.network import Network, inverse
 from hobble.models.packing import packed
 from hobble.report.words import PARTS, spoken_links, way
+from hobble.rows.layout import RowLayout
 from hobble.runtime import animation, controller, feet, trajectory
+from hobble.runtime.options import Runtime
 
 UNSEEN = 1e-7  # an input that is scaled by less than this says nothing
 PRESETS = {
@@ -26,12 +27,11 @@ PRESETS = {
 }
 
 
-def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
+def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     """What the page's second implementation of the runtime needs; {} where the network has no skeleton.
 
-    runtime: that section of the configuration. Left out are inputs that weigh nothing (joints that a network
-    is not shown), and the rotations of joints that move no part of the body, such as fingers: these stay at
-    rest on the joint above.
+    Left out are inputs that weigh nothing (joints that a network is not shown), and the rotations of joints
+    that move no part of the body, such as fingers: these stay at rest on the joint above.
     """
     skeleton = network.skeleton
     if skeleton is None:
@@ -72,10 +72,10 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
         "body": key(skeleton),
         "regions": regions(skeleton, network.links),
         "spoken": spoken_links(skeleton, network.links),
-        "severityStep": runtime["severity_rate"] / 60,
-        "severityScale": runtime["severity_scale"],
-        "footLocking": runtime["foot_locking"],
-        "steering": runtime["steering"],
+        "severityStep": runtime.rates.get("injury", 10.0) / 60,
+        "severityScale": runtime.scales.get("injury", 1.0),
+        "footLocking": runtime.foot_locking,
+        "steering": runtime.steering,
         "parts": parts,
         "presets": [
             {"name": name, "severities": [[parts[label], value] for label, value in values.items()]}

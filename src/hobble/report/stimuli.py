@@ -23,9 +23,10 @@ from hobble.report.playable import PRESETS, body_parts
 from hobble.report.raster import GRID, Camera, Studio
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton, jointed
+from hobble.runtime.options import Runtime
 
 SEVERITY = 8.0
-# The study of Ferre et al. showed thirteen walks, and asked which part is hurt; in them nothing is coloured.
+# The study of Quentin Ferre (2019) showed thirteen walks, and asked which part is hurt; nothing is coloured.
 STUDY: dict[str, tuple[str, ...]] = {
     "healthy": (),
     "left-thigh": ("left thigh",),
@@ -62,7 +63,7 @@ class Loop:
 
 
 def write_stimuli(
-    network: Network, folder: str | Path, size: int = 400, **runtime: Any
+    network: Network, folder: str | Path, runtime: Runtime, size: int = 400
 ) -> list[dict[str, Any]]:
     """Write <name>.webp and <name>.bvh of each stimulus and preset into a folder, and stimuli.json.
 
@@ -77,9 +78,9 @@ def write_stimuli(
     skeleton = network.skeleton
     figure, rows = body(skeleton), []
     studio = Studio(figure, regions(skeleton, network.links))
-    healthy, trained = walk(network, {}, **runtime), hurt_in_training(network)
+    healthy, trained = walk(network, {}, runtime), hurt_in_training(network)
     for name, hurt, shown in wanted(network):
-        loop = walk(network, hurt, **runtime) if hurt else healthy
+        loop = walk(network, hurt, runtime) if hurt else healthy
         own = skeleton
         if "skeleton" not in network.meta:
             own = fitted_skeleton(skeleton, loop.positions, loop.rotations)
@@ -106,7 +107,7 @@ def write_stimuli(
 
 def hurt_in_training(network: Network) -> set[str]:
     """Links whose severity was above 0 somewhere in training, as the mean of the input tells."""
-    means = network.x_mean[network.layout.x_injury]
+    means = network.x_mean[network.layout.x_channel("injury")]
     return {link for link, mean in zip(network.links, means, strict=True) if mean > 0}
 
 
@@ -149,12 +150,12 @@ def wanted(network: Network) -> list[tuple[str, dict[str, float], bool]]:
     return out
 
 
-def walk(network: Network, injury: Mapping[str, float], **runtime: Any) -> Loop:
+def walk(network: Network, injury: Mapping[str, float], runtime: Runtime) -> Loop:
     """The character walking straight on, cut where a later moment is most like an earlier one."""
-    animation = ProceduralAnimation(network, **runtime)
+    animation = ProceduralAnimation(network, **dict(runtime))
     ahead = np.array([0.0, SPEED])
     poses = [
-        animation.next_pose(ahead, None, "walk", dict(injury) or None)
+        animation.next_pose(ahead, None, "walk", injury=dict(injury) or None)
         for _ in range(SETTLED + 60 + LONGEST + BLEND)
     ]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])

@@ -16,6 +16,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.section import PhaseMode
 from hobble.models.load import load_network
 from hobble.models.network import Network
+from hobble.runtime.options import Runtime
 from hobble.runtime.scenarios import write_motions
 
 
@@ -47,7 +48,7 @@ def _write(to: str, network: Network, target: str, mode: str) -> str:
     if to == "bvh":
         if network.skeleton is None:
             raise HobbleError("the network carries no skeleton: name one with --skeleton")
-        names = [track.scenario.name for track in write_motions(network, target, mode=mode)]
+        names = [track.scenario.name for track in write_motions(network, target, Runtime(mode=mode))]
         return f"{target}: {', '.join(names)}"
     return network.export(to, target, mode)
 
