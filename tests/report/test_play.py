@@ -97,7 +97,9 @@ def test_the_page_moves_as_python_does(
     for frame in range(FRAMES):
         asked = wish(frame)
         injury = {"LeftUpLeg-LeftLeg": 7.0, "Hips-LowerBack": 3.0} if asked["hurt"] else None
-        pose = animation.next_pose(asked["velocity"], asked["facing"], asked["gait"], injury, hills)
+        pose = animation.next_pose(
+            asked["velocity"], asked["facing"], asked["gait"], injury=injury, terrain=hills
+        )
         world, places = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
         expected.append(
             (pose.positions, pose.phase, pose.told["injury"], pose.rotations, places[0], world[0])
