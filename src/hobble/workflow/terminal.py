@@ -68,7 +68,7 @@ class Terminal:
             self._words(record)
 
     def close(self) -> None:
-        """The summary, where jobs have run; once, though Python's logging closes its handlers again at exit."""
+        """The summary, where jobs have run; once, though logging closes handlers again at exit."""
         self._wipe()
         if self.closed or self.dryrun or not (self.jobs or self.failed):
             return
