@@ -1,8 +1,8 @@
 """A million frames of random wishes, injuries and grounds, by many characters at once.
 
-    python benchmarks/soak.py results/injured/network [--characters 200] [--frames 5000] [--seed 1] [--skeleton FILE]
+    python benchmarks/soak.py results/injured/network [--characters 200] [--frames 5000] [--seed 1]
 
-Prints the worst that was seen, and ends with status 1 where it is beyond the limits of `hobble.evaluation.soak`.
+Prints the worst that was seen, and ends with status 1 where it is beyond `hobble.evaluation.soak.LIMITS`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--mode", default="constant", help="how phase is looked up")
     parser.add_argument("--without-locking", action="store_true", help="feet are only kept out of the ground")
-    parser.add_argument("--skeleton", default="config/skeletons/holden31.yaml", help="where the network has none")
+    parser.add_argument(
+        "--skeleton", default="config/skeletons/holden31.yaml", help="where the network has none"
+    )
     asked = parser.parse_args()
     try:
         network = load_network(asked.network, asked.skeleton)

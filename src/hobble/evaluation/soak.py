@@ -1,4 +1,4 @@
-"""Does any of many characters fall apart? Random wishes, injuries and grounds, for as many frames as one likes."""
+"""Does any of many characters fall apart? Random wishes, injuries and grounds for any number of frames."""
 
 from __future__ import annotations
 
@@ -58,9 +58,10 @@ class Wishes:
 
 
 def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array], Array]:
-    """Ground of C kinds side by side, `APART`: a quarter flat, the others hills, 5 to 40 cm high and 1 to 6 m long."""
-    height = rng.uniform(5, 40, characters) * (rng.random(characters) > 0.25)
-    pitch = 2 * np.pi / rng.uniform(100, 600, characters)
+    """Ground of C kinds side by side, `APART`: some flat, most hills of 2 to 8 m that rise by up to .35."""
+    length = rng.uniform(200, 800, characters)
+    height = rng.uniform(0.05, 0.35, characters) * length / np.pi * (rng.random(characters) > 0.25)
+    pitch = 2 * np.pi / length
 
     def heights(x: Array, z: Array) -> Array:
         k = np.clip(np.rint(x / APART), 0, characters - 1).astype(int)
@@ -71,7 +72,7 @@ def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array
 
 @dataclass
 class Slides:
-    """How far toes slide in each stance of C characters: sums over frames, as `motion_measures.foot_slide`."""
+    """How far toes slide in each stance of C characters, as `motion_measures.foot_slide`."""
 
     far: Array
     frames: np.ndarray
@@ -97,8 +98,8 @@ def soak(
 ) -> dict[str, Any]:
     """The worst of characters x frames; options: of ProceduralAnimation.
 
-    `finite`; `hips_lowest_cm` and `hips_highest_cm` above the mean ground of the path; `network_turn_degrees`,
-    the most that the network turned a joint in a frame, `turn_degrees` that of the pose, `added_turn_degrees`
+    `finite`; `hips_lowest_cm` and `hips_highest_cm` above the path's mean ground; `network_turn_degrees`, the
+    most that the network turned a joint in a frame, `turn_degrees` that of the pose, `added_turn_degrees`
     the most by which the pose turned further than the network in the same joint and frame; `slide_cm` a
     stance, mean; `toes_cm` and `knees_cm`, the most that these moved in a frame.
     """
@@ -117,9 +118,7 @@ def soak(
     finite, wild = True, 0
     for _ in range(frames):
         wishes.renew(rng)
-        pose = animation.next_pose(
-            wishes.velocity, wishes.facing, wishes.gait, terrain=ground, **wishes.told
-        )
+        pose = animation.next_pose(wishes.velocity, wishes.facing, wishes.gait, terrain=ground, **wishes.told)
         finite = finite and bool(np.isfinite(pose.positions).all() and np.isfinite(pose.rotations).all())
         height = pose.positions[:, hips, 1] - pose.root[:, 1]
         low, high = min(low, float(height.min())), max(high, float(height.max()))
