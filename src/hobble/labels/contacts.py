@@ -14,13 +14,15 @@ from hobble.labels.options import Labels
 
 FEET = ((0, 1), (2, 3))  # heel and toe of the left and of the right foot, in the order of CONTACT_ROLES
 
-# A joint comes into contact below LANDS and stays in contact up to LEAVES: its height above the stance, in
-# leg lengths, and its speed, in leg lengths a frame or as a share of the fastest moment of the swing beside
-# it, whichever is more. The share keeps the stance of a leg that is dragged. Set on the walks and runs of
-# `cmu`: a foot is then down for 55 to 65 % of a walking cycle and for less than half of a jogging one.
-LANDS_HEIGHT, LEAVES_HEIGHT = 0.03, 0.06
-LANDS_SPEED, LEAVES_SPEED = 0.010, 0.020
-LANDS_SHARE, LEAVES_SHARE = 0.18, 0.30
+# A joint comes into contact below the first limit and stays in contact up to the second. Heights are above
+# the joint's own stance, in leg lengths. Speeds are in leg lengths a frame, or a share of the fastest moment
+# of the swing beside it, whichever is more: the share keeps the stance of a leg that is dragged. Set on the
+# walks and runs of `cmu`: a foot is then down for 55 to 65 % of a walking cycle and for less than half of a
+# jogging one.
+HEEL_HEIGHTS, TOE_HEIGHTS = (0.015, 0.02), (0.02, 0.035)
+SPEEDS, SHARES = (0.010, 0.020), (0.18, 0.30)
+ON_TIPTOE = 0.03  # a heel so much higher above its toe than in the clip's flat stances is in the air
+DRAWN_UP, STRETCHED = 0.55, 0.8  # heights of hips over heels, in leg lengths
 
 
 def contacts(clip: Clip, options: Labels) -> np.ndarray:
@@ -51,35 +53,54 @@ def stance(clip: Clip, options: Labels) -> np.ndarray:
     in one piece from landing to toe-off. All limits are relative to the length of the leg.
     """
     leg = clip.skeleton.leg_length
-    feet, speed = foot_positions(clip), _centred_speeds(clip)
+    height, speed = foot_positions(clip)[..., 1] / leg, _centred_speeds(clip) / leg
     out = np.zeros(speed.shape, bool)
     for (heel, toe), relative in zip(FEET, relative_speeds(clip, options).T, strict=True):
-        peaks = swing_peaks(relative)
-        for joint in (heel, toe):
-            height = feet[:, joint, 1] / leg
-            out[:, joint] = _stance_of_joint(height, speed[:, joint] / leg, peaks)
-    return out
+        edges = np.unique([0, *swing_peaks(relative), len(clip)])
+        heel_level = _find_stances(height[:, heel], speed[:, heel], edges, HEEL_HEIGHTS, out[:, heel])
+        toe_level = _find_stances(height[:, toe], speed[:, toe], edges, TOE_HEIGHTS, out[:, toe])
+        lift = heel_level - toe_level
+        whole = lift[1:-1] if len(lift) > 3 else lift  # the first and the last stance may be cut off
+        flat = np.percentile(whole, 10)
+        for number in np.flatnonzero(lift > flat + ON_TIPTOE):
+            out[edges[number] : edges[number + 1], heel] = False
+    return out & ~_lifted(clip)
 
 
-def _stance_of_joint(height: Array, speed: Array, peaks: np.ndarray) -> np.ndarray:
-    """(F,) bool of a joint with `height` and `speed` (F,) in leg lengths; its foot is fastest at `peaks`."""
+def _lifted(clip: Clip) -> np.ndarray:
+    """(F, 4) bool: joints of a foot that is held up: its leg is drawn up, the other one is stretched."""
+    sides = ("left", "right")
+    hips, heels = (
+        clip.positions[:, [clip.skeleton.role(f"{s}_{r}") for s in sides], 1] for r in ("hip", "heel")
+    )
+    reach = (hips - heels) / clip.skeleton.leg_length
+    return np.repeat((reach < DRAWN_UP) & (reach[:, ::-1] > STRETCHED), 2, axis=1)
+
+
+def _find_stances(
+    height: Array, speed: Array, edges: np.ndarray, heights: tuple[float, float], down: np.ndarray
+) -> Array:
+    """Fill `down` (F,) from a joint's height and speed (F,) in leg lengths; returns each stance's height.
+
+    edges: (S + 1,) the clip's ends and the fastest frames of the swings between them; one stance lies between
+    two of them. heights: the limits above a stance, for landing and for leaving.
+    """
     lands, stays = np.zeros(len(speed), bool), np.zeros(len(speed), bool)
-    for a, b in itertools.pairwise([0, *peaks, len(speed)]):
-        if b <= a:
-            continue
-        swing = min((speed[p] for p in (a, b) if p in peaks), default=0.0)
-        slow = max(LANDS_SPEED, LANDS_SHARE * swing)
+    levels = []
+    for a, b in itertools.pairwise(edges):
+        swing = min((speed[p] for p in (a, b) if 0 < p < len(speed)), default=0.0)
+        slow, leaves = (max(limit, share * swing) for limit, share in zip(SPEEDS, SHARES, strict=True))
         h, v = height[a:b], speed[a:b]
-        level = h[v <= max(slow, 1.2 * v.min())].min()
-        lands[a:b] = (h < level + LANDS_HEIGHT) & (v < slow)
-        stays[a:b] = (h < level + LEAVES_HEIGHT) & (v < max(LEAVES_SPEED, LEAVES_SHARE * swing))
-    return _stretches_with(stays | lands, lands)
+        levels.append(h[v <= max(slow, 1.2 * v.min())].min())
+        lands[a:b] = (h < levels[-1] + heights[0]) & (v < slow)
+        stays[a:b] = (h < levels[-1] + heights[1]) & (v < leaves)
+    down[:] = _stretches_with(stays | lands, lands)
+    return np.array(levels)
 
 
 def _stretches_with(stays: np.ndarray, lands: np.ndarray) -> np.ndarray:
     """The stretches of `stays` (F,) in which `lands` (F,) is true at least once."""
-    begins = np.diff(stays, prepend=False) & stays
-    number = np.cumsum(begins)
+    number = np.cumsum(np.diff(stays, prepend=False) & stays)
     return stays & np.isin(number, number[lands & stays])
 
 

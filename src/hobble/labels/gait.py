@@ -20,12 +20,14 @@ CROUCHED_HEAD = 0.8
 CROUCHED_HIPS = 0.85
 
 # Log odds of jog against walk, a fit to the hand-made labels of the original release and of Ferre et al. and
-# to the descriptions of `cmu`. All four measures are free of units, so that they hold for any size of body.
-JOG_SPRING = 4.1  # hips that are lowest over the standing foot (a spring), not between two steps (a pendulum)
-JOG_FLIGHT = 3.2  # share of the time in which no foot is down
-JOG_DOUBLE_SUPPORT = -4.4  # share of the time in which both are
-JOG_BOUNCE = 13.0  # vertical acceleration of the hips, g
-JOG_CONSTANT = -3.6
+# to the descriptions of `cmu`. All measures are free of units, so that they hold for any size of body.
+JOG_SPRING = 3.7  # hips that are lowest over the standing foot (a spring), not between two steps (a pendulum)
+JOG_FLIGHT = 9.0  # share of the time in which no foot is down
+JOG_DOUBLE_SUPPORT = -6.0  # share of the time in which both are
+JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g
+JOG_FROUDE = 6.0  # above FASTEST_WALK, in Froude numbers: people walk no faster than that for long
+FASTEST_WALK = 0.5
+JOG_CONSTANT = -3.4
 CERTAIN_ODDS = 2.0  # log odds that count as full evidence
 DATA_SET_ODDS = 0.6  # what the data set says of the clip's main gait counts for so much
 SWITCH_COST = 18.0  # frames of full evidence that a change of gait takes
@@ -67,11 +69,14 @@ def jog_odds(clip: Clip, down: np.ndarray) -> Array:
     left, right = down[:, :2].any(axis=1), down[:, 2:].any(axis=1)
     flight = gaussian((~left & ~right).astype(float), 20.0)
     double_support = gaussian((left & right).astype(float), 20.0)
+    # Froude number: the square of the speed over gravity times the length of the leg.
+    froude = _speed(clip) ** 2 / (GRAVITY * clip.skeleton.leg_length)
     return (
         JOG_SPRING * _spring(clip)
         + JOG_FLIGHT * flight
         + JOG_DOUBLE_SUPPORT * double_support
         + JOG_BOUNCE * _bounce(clip)
+        + JOG_FROUDE * np.clip(froude - FASTEST_WALK, 0.0, 1.0)
         + JOG_CONSTANT
     )
 
