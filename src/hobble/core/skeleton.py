@@ -157,6 +157,15 @@ class Skeleton:
         return [i for i, p in enumerate(self.parents) if p == joint]
 
 
+def rest_positions(skeleton: Skeleton) -> Array:
+    """(J, 3) joint positions with every rotation at identity and the root at the origin."""
+    out = np.zeros_like(skeleton.offsets, dtype=float)
+    for j, p in enumerate(skeleton.parents):
+        if p >= 0:
+            out[j] = out[p] + skeleton.offsets[j]
+    return out
+
+
 def forward_kinematics(
     skeleton: Skeleton, rotations: Array, root: Array, translations: Array | None = None
 ) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton
+from hobble.core.skeleton import Skeleton, rest_positions
 
 FLIP = np.array([-1.0, 1.0, 1.0])
 MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
@@ -41,25 +41,25 @@ def nearest_axis(direction: Array) -> tuple[str, float]:
 
 
 def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array]:
-    """Unit vectors (..., 3) to the left, up the trunk and, by the feet, forward; positions (..., J, 3)."""
+    """Unit vectors (..., 3) to the left, up the trunk and, by feet or knees, forward, of (..., J, 3)."""
     at = {role: positions[..., skeleton.role(role), :] for role in skeleton.roles}
     left = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
     up = at["head"] - at["hips"]
-    feet = at["left_toe"] - at["left_heel"] + at["right_toe"] - at["right_heel"]
-    return _unit(left), _unit(up), _unit(feet)
+    ahead = _foot(at, "left") + _foot(at, "right")
+    return _unit(left), _unit(up), _unit(ahead)
+
+
+def _foot(at: dict[str, Array], side: str) -> Array:
+    """Where a foot points; on a rig without toes, where the knee does."""
+    if f"{side}_toe" in at:
+        return at[f"{side}_toe"] - at[f"{side}_heel"]
+    hip, knee, heel = (at[f"{side}_{part}"] for part in ("hip", "knee", "heel"))
+    line = _unit(heel - hip)
+    return knee - hip - line * np.sum((knee - hip) * line, axis=-1, keepdims=True)
 
 
 def _unit(v: Array) -> Array:
     return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
-
-
-def rest_positions(skeleton: Skeleton) -> Array:
-    """(J, 3) joint positions with every rotation at identity and the root at the origin."""
-    out = np.zeros_like(skeleton.offsets, dtype=float)
-    for j, p in enumerate(skeleton.parents):
-        if p >= 0:
-            out[j] = out[p] + skeleton.offsets[j]
-    return out
 
 
 def rest_frame(skeleton: Skeleton) -> Array:
@@ -76,14 +76,16 @@ def rest_frame(skeleton: Skeleton) -> Array:
     return quat.from_matrix(axes)
 
 
-def straighten(clip: Clip, up: str, handedness: str) -> tuple[Clip, Axes, list[str]]:
+def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> tuple[Clip, Axes, list[str]]:
     """The clip right-handed with Y up, its rest pose facing +Z where that is a matter of whole axes.
+
+    standing: whether anybody could stand in the rest pose, which else says nothing of what is up.
 
     up: "auto", "Y" or "Z". handedness: "auto", "right" or "left". What is `auto` is read off the motion: up
     goes from the hips to the head and from the feet to the hips, unless the figure crawls, and the feet point
     forward. Returns notes, too: a sentence where motion and rest pose do not agree on what is up.
     """
-    name, notes = _up_of(clip) if up == "auto" else (f"+{up}", [])
+    name, notes = _up_of(clip, standing) if up == "auto" else (f"+{up}", [])
     if handedness == "auto":
         handedness = _hand_of(clip)
     if handedness == "left":
@@ -97,13 +99,13 @@ def straighten(clip: Clip, up: str, handedness: str) -> tuple[Clip, Axes, list[s
     return _turned(clip, world, turn), axes, notes
 
 
-def _up_of(clip: Clip) -> tuple[str, list[str]]:
+def _up_of(clip: Clip, standing: bool) -> tuple[str, list[str]]:
     """The axis that is up, and a sentence where the rest pose stands along another than the motion."""
     body, rest = (
         nearest_axis(_along_body(clip.skeleton, positions).mean(axis=0))[0]
         for positions in (clip.positions, rest_positions(clip.skeleton)[None])
     )
-    if body == rest:
+    if body == rest or not standing:
         return body, []
     up, why = (rest, "it goes that way, as in a crawl") if _crawls(clip, body) else (body, "it moves so")
     return up, [
@@ -114,8 +116,9 @@ def _up_of(clip: Clip) -> tuple[str, list[str]]:
 
 def _along_body(skeleton: Skeleton, positions: Array) -> Array:
     """(F, 3) from the feet over the hips to the head, both parts of equal weight; positions (F, J, 3)."""
-    names = ("head", "hips", "left_toe", "right_toe")
-    head, hips, left, right = (positions[:, skeleton.role(name)] for name in names)
+    feet = [f"{side}_{part}" for side in ("left", "right") for part in ("toe", "heel")]
+    feet = [next(role for role in feet[i : i + 2] if role in skeleton.roles) for i in (0, 2)]
+    head, hips, left, right = (positions[:, skeleton.role(name)] for name in ("head", "hips", *feet))
     return _unit(head - hips) + _unit(hips - 0.5 * (left + right))
 
 

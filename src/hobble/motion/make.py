@@ -13,47 +13,19 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.motion.axes import Axes, straighten, turned
-from hobble.motion.decode import Decoded, frame_rate
-from hobble.motion.defects import flips, repair
-from hobble.motion.floor import on_floor
-from hobble.motion.fold import below_hips, decode_below
+from hobble.motion.axes import turned
 from hobble.motion.loop import loop_clip
 from hobble.motion.read import MOST_POSES, Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.retarget import plan, retarget_clip
-from hobble.motion.rig import (
-    Match,
-    Target,
-    clean_names,
-    find_hips,
-    leg_length,
-    load_skeleton,
-    match_rig,
-    missing_bone,
-    unit_of,
-)
+from hobble.motion.rig import Match, load_skeleton
 from hobble.motion.root import facing
+from hobble.motion.source import FOUND, Source, load_source
 
-STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
 SAME = 1e-3  # cm: offsets this near to the skeleton's are the skeleton's
 
 KEPT = "What joints move in their parents was kept."
 DROPPED = "What joints move in their parents was dropped, since the clip was put on other bone lengths."
-
-
-@dataclass(frozen=True)
-class Source:
-    """A file's motion in centimetres, right-handed, Y up, at its own frame rate, on its own rig."""
-
-    clip: Clip
-    match: Match
-    unit: float
-    unit_name: str
-    axes: Axes
-    first_frame: int
-    repairs: list[str]
-    notes: list[str]
 
 
 def make_clip(
@@ -78,7 +50,7 @@ def make_clip(
     source = load_source(file, target, maps, options)
     _check_length(file, source.clip, target.skeleton, options)
     resampled = resample(source.clip, options["fps"])
-    fitted = fit_skeleton(resampled, source.match, target.skeleton, options["proportions"])
+    fitted = fit_skeleton(resampled, source.match, target.skeleton, options["proportions"], source.moving)
     made, said, loops = fitted.clip, source.repairs + fitted.repairs, options["loops"]
     if loops > 1:
         made = loop_clip(made, loops, options["heading"])
@@ -127,74 +99,6 @@ def first_facing(clip: Clip) -> float:
     return float(np.arctan2(ahead[0], ahead[2]))
 
 
-def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[str, Any]) -> Source:
-    """A file's motion in centimetres and Y up on its own rig, checked and where allowed repaired."""
-    repairs = _frame_count(file, options["defects"])
-    hips = find_hips(clean_names(file.names), target, maps)
-    rig = _rig(below_hips(file, hips))
-    match = match_rig(file.path, rig, target, maps)
-    rig = replace(rig, roles=match.roles)
-    unit, unit_name = _unit(file.path, rig, options["unit"])
-    decoded = decode_below(file, hips, STILL / unit)
-    repairs += decoded.repairs
-    fps = options["source_fps"] or frame_rate(file.frame_time, file.frame_time_text)
-    clip = _scaled(file.path.stem, rig, decoded, fps, unit)
-    if bone := missing_bone(clip.skeleton):
-        raise InputError(
-            file.path,
-            f"the bone from {bone} has no length",
-            fix="Check its OFFSET and its position channels, and export the clip again.",
-        )
-    clip, axes, unsure = straighten(clip, options["up"], options["handedness"])
-    repaired = repair(clip)
-    flat = options.get("ground", "flat") == "flat"
-    clip, moved, uneven = on_floor(repaired.clip) if flat else (repaired.clip, [], [])
-    mended = repaired.sentences + moved
-    if mended and options["defects"] == "refuse":
-        raise InputError(file.path, mended[0], fix="Set motion.defects: repair to mend it so.")
-    notes = decoded.notes + unsure + uneven + flips(clip, repaired.first)
-    return Source(clip, match, unit, unit_name, axes, repaired.first, repairs + mended, notes)
-
-
-def _rig(file: Bvh) -> Skeleton:
-    names = clean_names(file.names)
-    short = dict(zip(file.names, names, strict=True))
-    ends = {short[name]: sites[0] for name, sites in file.end_sites.items()}
-    return Skeleton(file.path.stem, names, file.parents, file.offsets, end_sites=ends)
-
-
-def _frame_count(file: Bvh, defects: str) -> list[str]:
-    if len(file) == file.declared:
-        return []
-    problem = f"declares {file.declared} frames and holds {len(file)}"
-    if defects == "refuse":
-        raise InputError(file.path, problem, fix="Export the clip again, or set motion.defects: repair.")
-    return [f"The file {problem}; those it holds are used."]
-
-
-def _unit(path: Path, rig: Skeleton, unit: str | float) -> tuple[float, str]:
-    if unit != "auto":
-        return float(unit), f"{float(unit):g} cm (given)"
-    leg = leg_length(rig)
-    found = unit_of(leg)
-    if found is None:
-        raise InputError(
-            path,
-            f"no unit makes this rig a person: thigh and shank together are {leg:g} units long",
-            fix="Set motion.unit in the data set to the centimetres per unit.",
-        )
-    return found
-
-
-def _scaled(name: str, rig: Skeleton, decoded: Decoded, fps: float, unit: float) -> Clip:
-    offsets = decoded.offsets * unit
-    offsets[0] = 0.0
-    ends = {joint: (x * unit, y * unit, z * unit) for joint, (x, y, z) in rig.end_sites.items()}
-    skeleton = replace(rig, offsets=offsets, end_sites=ends)
-    translations = None if decoded.translations is None else decoded.translations * unit
-    return Clip(name, skeleton, fps, decoded.rotations, decoded.root * unit, translations)
-
-
 def resample(clip: Clip, fps: float) -> Clip:
     """The clip at another frame rate; every frame that falls on one of the old is that frame exactly."""
     if clip.fps == fps:
@@ -218,9 +122,11 @@ class Fitted:
     repairs: list[str]
 
 
-def fit_skeleton(clip: Clip, match: Match, target: Skeleton, proportions: str) -> Fitted:
-    """The clip's motion on the target skeleton, or on its joints with the clip's own bone lengths."""
-    moving = clip.translations is not None
+def fit_skeleton(clip: Clip, match: Match, target: Skeleton, proportions: str, moving: bool) -> Fitted:
+    """The clip's motion on the target skeleton, or on its joints with the clip's own bone lengths.
+
+    moving: whether joints move in their parents, which is to be said.
+    """
     if match.same:
         own = _reordered(clip, np.array([clip.skeleton.index(name) for name in target.joints]), target)
         same = np.abs(own.skeleton.offsets - target.offsets).max() <= SAME
@@ -230,7 +136,8 @@ def fit_skeleton(clip: Clip, match: Match, target: Skeleton, proportions: str) -
     how = plan(clip.skeleton, target, match.sources)
     repairs = [DROPPED] if moving else []
     if proportions == "clip":
-        repairs.append(f"Its rig is {match.rig}, so that it was put on the bone lengths of {target.name}.")
+        rig = "another" if match.rig == FOUND else match.rig
+        repairs.append(f"Its rig is {rig}, so that it was put on the bone lengths of {target.name}.")
     return Fitted(retarget_clip(clip, how), round(how.scale, 6), repairs)
 
 
@@ -259,4 +166,6 @@ def _report(file: Bvh, source: Source, made: Clip) -> dict[str, Any]:
         "handedness": source.axes.handedness,
         "rest_facing": source.axes.facing,
         "rig": source.match.rig,
+        "stance": source.stance,
+        "roles": dict(source.match.roles),
     }

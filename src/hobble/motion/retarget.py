@@ -20,8 +20,8 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.ik import aim, two_bone_knee
 from hobble.core.quat import Array
-from hobble.core.skeleton import Skeleton, local_rotations
-from hobble.motion.axes import rest_frame, rest_positions
+from hobble.core.skeleton import Skeleton, local_rotations, rest_positions
+from hobble.motion.axes import rest_frame
 from hobble.motion.feet import level_heels
 from hobble.motion.rig import leg_length, missing_bone
 

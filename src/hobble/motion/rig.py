@@ -4,20 +4,24 @@ is."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hobble.core.errors import InputError
-from hobble.core.skeleton import Skeleton
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.core.untrusted import read_yaml
 
 # Centimetres per unit of the file; the CMU files count in inches / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
 LEG = 80.0  # thigh and shank of an adult of ordinary size, cm
 KNOWN = 0.75  # share of a clip's joints that a skeleton must know by name to be its rig
+# Degrees by which bones of two rest poses may differ that are taken for one, by the role at the bone's end.
+LIKE = {"elbow": 20.0, "wrist": 25.0, "knee": 35.0, "heel": 35.0, "toe": 35.0}
 LEG_RANGE = (50.0, 125.0)
 LIMBS = ("shoulder", "hip", "knee", "heel", "toe")
 MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") for part in LIMBS))
@@ -76,44 +80,61 @@ def find_hips(names: Sequence[str], target: Target, folder: str | Path) -> int:
     return names.index(hips) if hips in names else 0
 
 
-def match_rig(path: Path, rig: Skeleton, target: Target, folder: str | Path) -> Match:
+def match_rig(rig: Skeleton, target: Target, folder: str | Path) -> Match | None:
     """Find out which known skeleton a clip's rig is, and how it gets onto the target.
 
-    rig: the clip's joints. folder: where the skeleton files lie, for their maps.
-    Raises InputError that names what differs where the rig is neither the target nor mapped to it.
+    rig: the clip's joints. folder: where the skeleton files lie, for their maps. None where no skeleton file
+    has the rig's names. Where its rest pose is not that of its skeleton file, or no map leads to the target,
+    the match has roles and no sources.
     """
-    differences = _differences(rig, target.skeleton)
-    if not differences:
-        return Match(
-            target.skeleton.name, target.skeleton.roles, True, {name: name for name in target.skeleton.joints}
-        )
-    best, known = _share(rig, target.skeleton), None
+    if not _differences(rig, target.skeleton):
+        roles = target.skeleton.roles
+        alike = rest_alike(replace(rig, roles=roles), target.skeleton)
+        sources = {name: name for name in target.skeleton.joints} if alike else {}
+        return Match(target.skeleton.name, roles, alike, sources)
+    best, known = _share(rig, target.skeleton), target
     for file in sorted(Path(folder).glob("*.yaml")):
         other = load_skeleton(file)
         if _share(rig, other.skeleton) > best:
             best, known = _share(rig, other.skeleton), other
-    if known is None or best < KNOWN:
-        raise _refusal(path, f"another skeleton than {target.skeleton.name}", differences)
-    differences = _unfit(rig, known.skeleton)
-    if differences:
-        raise _refusal(path, f"looks like the rig {known.skeleton.name}, but", differences)
+    if best < KNOWN or _unfit(rig, known.skeleton):
+        return None
+    roles = _roles(rig, known.skeleton)
     sources = {a: b for a, b in joint_pairs(known, target).items() if b in rig.joints}
-    if not sources:
-        raise InputError(
-            path,
-            f"its rig is {known.skeleton.name}, which no map leads from to {target.skeleton.name}",
-            fix="Add a map to config/skeletons/.",
-        )
-    return Match(known.skeleton.name, _roles(rig, known.skeleton), False, sources)
+    if not rest_alike(replace(rig, roles=roles), known.skeleton):
+        sources = {}
+    return Match(known.skeleton.name, roles, False, sources)
 
 
-def _refusal(path: Path, problem: str, differences: list[str]) -> InputError:
-    more = f"; and {len(differences) - 4} more" if len(differences) > 4 else ""
-    return InputError(
-        path,
-        f"{problem}: {'; '.join(differences[:4])}{more}",
-        fix="Name the right skeleton in the data set, or describe this rig in config/skeletons/.",
-    )
+def rest_alike(rig: Skeleton, known: Skeleton) -> bool:
+    """Whether the bones of two rest poses point the same way, however the bodies are turned or mirrored."""
+    mine, theirs = (_bones(skeleton) for skeleton in (rig, known))
+    for bone, wanted in theirs.items():
+        if bone in mine and mine[bone] @ wanted < np.cos(np.radians(LIKE[bone[1].partition("_")[2]])):
+            return False
+    return True
+
+
+def _bones(skeleton: Skeleton) -> dict[tuple[str, str], Array]:
+    """Role and role -> direction of the bone between them, to the body's left, upward and forward."""
+    at = rest_positions(skeleton)
+    place = {role: at[skeleton.role(role)] for role in skeleton.roles}
+    left = place["left_hip"] - place["right_hip"] + place["left_shoulder"] - place["right_shoulder"]
+    up = place["head"] - place["hips"]
+    feet = sum(place[f"{side}_toe"] - place[f"{side}_heel"] for side in ("left", "right"))
+    axes: list[Array] = []
+    for axis in (left, up, feet):
+        for other in axes:
+            axis = axis - other * (axis @ other)
+        axes.append(axis / max(float(np.linalg.norm(axis)), 1e-9))
+    out = {}
+    for side in ("left", "right"):
+        for chain in (("shoulder", "elbow", "wrist"), ("hip", "knee", "heel", "toe")):
+            for a, b in pairwise(f"{side}_{part}" for part in chain):
+                if a in place and b in place:
+                    bone = np.array(axes) @ (place[b] - place[a])
+                    out[a, b] = bone / max(float(np.linalg.norm(bone)), 1e-9)
+    return out
 
 
 def _share(rig: Skeleton, known: Skeleton) -> float:

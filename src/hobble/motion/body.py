@@ -1,0 +1,130 @@
+"""The parts of a body on a rig: which joints are its trunk, its limbs, its head."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+
+SIDES = ("left", "right")
+REACH = 0.2  # share of the trunk by which a joint may lie above the one that follows it
+
+
+@dataclass(frozen=True)
+class Body:
+    """Joints of a rig, by index, parents first.
+
+    hips: what carries both thighs. trunk: from the first joint above the hips to the chest, which carries
+    both arms; empty where the hips do. neck: between chest and head. arms: side -> clavicle or None,
+    shoulder, elbow, wrist. legs: side -> hip, knee, heel (the ankle), toe (the ball of the foot) or None.
+    """
+
+    hips: int
+    trunk: tuple[int, ...]
+    neck: tuple[int, ...]
+    head: int
+    arms: Mapping[str, tuple[int | None, int, int, int]]
+    legs: Mapping[str, tuple[int, int, int, int | None]]
+
+    @property
+    def chest(self) -> int:
+        """What carries the arms."""
+        return self.trunk[-1] if self.trunk else self.hips
+
+    def roles(self, names: Sequence[str]) -> dict[str, str]:
+        """Role -> joint, as a skeleton file says it."""
+        out = {"hips": names[self.hips]}
+        if self.trunk:
+            out |= {"spine": names[self.trunk[max(0, len(self.trunk) - 2)]], "chest": names[self.chest]}
+        if self.neck:
+            out["neck"] = names[self.neck[-1]]
+        out["head"] = names[self.head]
+        for side in SIDES:
+            parts = zip(("shoulder", "elbow", "wrist"), self.arms[side][1:], strict=True)
+            legs = zip(("hip", "knee", "heel", "toe"), self.legs[side], strict=True)
+            out |= {f"{side}_{part}": names[j] for part, j in (*parts, *legs) if j is not None}
+        return out
+
+
+def body_of(parents: Sequence[int], roles: Mapping[str, int]) -> Body:
+    """The body whose roles are given; what lies between them, the hierarchy tells.
+
+    roles: role -> joint; hips, head and of both sides shoulder, elbow, wrist, hip, knee and heel are needed.
+    """
+    hips = roles["hips"]
+    shoulders = [roles[f"{side}_shoulder"] for side in SIDES]
+    chest = roles.get("chest", common(parents, shoulders))
+    trunk = [j for j in path(parents, hips, chest) if j != hips]
+    neck = [j for j in path(parents, chest, roles["head"]) if j not in (chest, roles["head"], hips, *trunk)]
+    arms: dict[str, tuple[int | None, int, int, int]] = {}
+    legs: dict[str, tuple[int, int, int, int | None]] = {}
+    for side, shoulder in zip(SIDES, shoulders, strict=True):
+        between = [j for j in path(parents, chest, shoulder) if j not in (chest, shoulder, *trunk, *neck)]
+        clavicle = between[-1] if between else None
+        arms[side] = (clavicle, shoulder, roles[f"{side}_elbow"], roles[f"{side}_wrist"])
+        hip, knee, heel = (roles[f"{side}_{part}"] for part in ("hip", "knee", "heel"))
+        legs[side] = (hip, knee, heel, roles.get(f"{side}_toe"))
+    return Body(hips, tuple(trunk), tuple(neck), roles["head"], arms, legs)
+
+
+def above(parents: Sequence[int], joint: int) -> list[int]:
+    """The joint and all above it, the root last."""
+    out = [joint]
+    while parents[out[-1]] >= 0:
+        out.append(parents[out[-1]])
+    return out
+
+
+def common(parents: Sequence[int], joints: Iterable[int]) -> int:
+    """The nearest joint that lies above each of `joints`, or is one of them."""
+    first, *others = (above(parents, j) for j in joints)
+    return next(j for j in first if all(j in other for other in others))
+
+
+def path(parents: Sequence[int], start: int, end: int) -> list[int]:
+    """The joints from `start` to `end`, both included: up to what they have in common, and down again."""
+    meet = common(parents, (start, end))
+    up = above(parents, start)
+    down = above(parents, end)
+    return up[: up.index(meet) + 1] + down[: down.index(meet)][::-1]
+
+
+def pairs(source: Skeleton, own: Body, target: Skeleton, theirs: Body) -> dict[str, str]:
+    """Target joint -> source joint that it follows, part by part.
+
+    The joints of a trunk are paired by their height: each follows the highest of the source's that is not
+    above it by more than a fifth of the trunk, and the chest the chest.
+    """
+    out: dict[int, int] = {theirs.hips: own.hips, theirs.head: own.head}
+    out |= _along(target, (theirs.hips, *theirs.trunk), source, (own.hips, *own.trunk))
+    if own.neck:
+        out |= _along(
+            target, (theirs.chest, *theirs.neck, theirs.head), source, (own.chest, *own.neck, own.head)
+        )
+    for side in SIDES:
+        for mine, other in zip(theirs.arms[side], own.arms[side], strict=True):
+            if mine is not None and other is not None:
+                out[mine] = other
+        for mine, other in zip(theirs.legs[side], own.legs[side], strict=True):
+            if mine is not None and other is not None:
+                out[mine] = other
+    return {target.joints[a]: source.joints[b] for a, b in sorted(out.items())}
+
+
+def _along(target: Skeleton, mine: Sequence[int], source: Skeleton, theirs: Sequence[int]) -> dict[int, int]:
+    here, there = _shares(target, mine), _shares(source, theirs)
+    out = {mine[-1]: theirs[-1]}
+    for joint, share in zip(mine[1:-1], here[1:-1], strict=True):
+        below = [j for j, s in zip(theirs[:-1], there[:-1], strict=True) if s <= share + REACH]
+        out[joint] = below[-1]
+    return out
+
+
+def _shares(skeleton: Skeleton, joints: Sequence[int]) -> Array:
+    """How far along the way from the first to the last each joint lies, 0 to 1."""
+    lengths = np.concatenate([[0.0], np.linalg.norm(skeleton.offsets[list(joints[1:])], axis=-1)])
+    return np.cumsum(lengths) / max(float(lengths.sum()), 1e-9)

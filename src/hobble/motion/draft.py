@@ -1,0 +1,72 @@
+"""A draft of a rig file: what was found of a rig, to be corrected where it is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.motion.body import SIDES
+from hobble.motion.find_body import Doubt
+from hobble.motion.names import limb_parts, part_of, side_of
+from hobble.motion.read import Bvh
+
+LIMBS = ("shoulder", "elbow", "wrist", "hip", "knee", "heel", "toe")
+ROLES = ("hips", "spine", "chest", "neck", "head", *(f"{side}_{part}" for side in SIDES for part in LIMBS))
+OPTIONAL = ("spine", "chest", "neck", "left_toe", "right_toe")
+
+
+def refusal(file: Bvh, rig: Skeleton, doubt: Doubt) -> InputError:
+    """The one message that asks what cannot be told, with a draft to correct."""
+    roles = guessed(rig) | {role: rig.joints[j] for role, j in doubt.roles.items()}
+    text = draft(rig, roles)
+    return InputError(
+        file.path,
+        f"what is what on this rig is in doubt: {doubt}",
+        fix="Put the right joints into this draft, save it as config/skeletons/<name>.yaml, and run again "
+        f"(`python -m hobble.motion rig {file.path.name}` writes it):\n\n{text}",
+    )
+
+
+def draft(rig: Skeleton, roles: Mapping[str, str]) -> str:
+    """A rig file in YAML: the joints as the file has them, and their roles, `?` where there is none."""
+    lines = ["# What a joint is for; ? is for you to fill in, what the rig has not is left out.", "roles:"]
+    for role in ROLES:
+        if role in roles:
+            lines.append(f"  {role}: {_quoted(roles[role])}")
+        elif role not in OPTIONAL:
+            lines.append(f"  {role}: '?'")
+    lines.append("joints:")
+    for name, p, offset in zip(rig.joints, rig.parents, rig.offsets, strict=True):
+        parent = "null" if p < 0 else _quoted(rig.joints[p])
+        place = ", ".join(f"{x + 0.0:.6g}" for x in (offset if p >= 0 else 0 * offset))
+        lines.append(f"  {_quoted(name)}: {{parent: {parent}, offset: [{place}]}}")
+    return "\n".join(lines) + "\n"
+
+
+def guessed(rig: Skeleton) -> dict[str, str]:
+    """Roles by names alone."""
+    out: dict[str, str] = {}
+    for name in rig.joints:
+        part = part_of(name)
+        if side_of(name) is None and part in ("hips", "spine", "chest", "neck", "head") and part not in out:
+            out[part] = name
+    roles = {"upperarm": "shoulder", "forearm": "elbow", "hand": "wrist"}
+    roles |= {"thigh": "hip", "shank": "knee", "foot": "heel", "toe": "toe"}
+    for side in SIDES:
+        names = [name for name in rig.joints if side_of(name) == side]
+        arm = [
+            n
+            for n in names
+            if part_of(n) in ("clavicle", "shoulder", "upperarm", "arm", "forearm", "wrist", "hand")
+        ]
+        leg = [n for n in names if part_of(n) in ("hip", "thigh", "leg", "shank", "ankle", "foot", "toe")]
+        for limb in (arm, leg):
+            for part, place in limb_parts(limb).items():
+                if part in roles:
+                    out[f"{side}_{roles[part]}"] = limb[place]
+    return out
+
+
+def _quoted(name: str) -> str:
+    return "'" + name.replace("'", "''") + "'"

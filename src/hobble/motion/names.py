@@ -1,0 +1,131 @@
+"""What the name of a joint says: its side, and which part of the body it is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+LEFT = {
+    "left",
+    "l",
+    "lft",
+    "lt",
+    "lf",
+    "links",
+    "linke",
+    "linker",
+    "linkes",
+    "gauche",
+    "izquierda",
+    "izquierdo",
+}
+LEFT |= {"izquierdo", "sinistra", "sinistro", "sx", "hidari", "esq", "esquerda", "izq"}
+RIGHT = {"right", "r", "rgt", "rt", "rght", "rechts", "rechte", "rechter", "rechtes", "droite", "droit"}
+RIGHT |= {"derecha", "derecho", "destra", "destro", "dx", "migi", "dir", "direita", "der"}
+# Longer words first, since "forearm" holds "arm". What `shoulder`, `arm`, `hip` and `leg` mean, the other
+# joints of the limb tell: see `limb_parts`.
+WORDS = (
+    ("twist", ("twist", "roll", "tweak", "helper", "corrective", "muscle")),
+    (
+        "finger",
+        ("finger", "thumb", "index", "middle", "ring", "pinky", "pinkie", "little", "palm", "metacarp"),
+    ),
+    ("finger", ("carpal", "inhand")),
+    ("toe", ("toe", "ball", "orteil", "zeh")),
+    ("clavicle", ("clavicle", "collar", "scapula", "clav")),
+    ("forearm", ("forearm", "lowerarm", "lowarm", "loarm", "elbow", "armlower", "radius", "ulna")),
+    ("upperarm", ("upperarm", "uparm", "upprarm", "armupper", "shldr", "humerus", "bicep")),
+    (
+        "shank",
+        ("lowerleg", "lowleg", "loleg", "leglower", "calf", "shin", "shank", "knee", "tibia", "fibula"),
+    ),
+    ("thigh", ("thigh", "upperleg", "upleg", "legupper", "upprleg", "femur")),
+    ("ankle", ("ankle", "heel")),
+    ("wrist", ("wrist",)),
+    ("hand", ("hand",)),
+    ("foot", ("foot", "feet")),
+    ("shoulder", ("shoulder",)),
+    ("head", ("head", "skull", "kopf")),
+    ("neck", ("neck", "cervical", "hals")),
+    ("chest", ("chest", "thorax", "ribcage", "sternum", "torso")),
+    ("hips", ("hips", "pelvis", "cog")),
+    ("spine", ("spine", "back", "abdomen", "waist", "lumbar", "belly", "stomach", "vertebra")),
+    ("arm", ("arm",)),
+    ("leg", ("leg",)),
+    ("hip", ("hip", "buttock", "femoral")),
+)
+ENDS = ("end", "nub", "site", "tip", "top")  # joints that only say where a bone ends
+
+
+def words(name: str) -> list[str]:
+    """The words of a name in small letters: parted at capitals, digits and signs.
+
+    >>> words("mixamorig:LeftUpLeg"), words("Bip01 L Thigh"), words("DEF-shin.R.001"), words("lShin")
+    (['mixamorig', 'left', 'up', 'leg'], ['bip', 'l', 'thigh'], ['def', 'shin', 'r'], ['l', 'shin'])
+    """
+    return [w.lower() for w in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", name.replace("ß", "ss"))]
+
+
+def side_of(name: str) -> str | None:
+    """ "left", "right" or None.
+
+    >>> side_of("LeftUpLeg"), side_of("thigh.R"), side_of("rForeArm"), side_of("LLeg"), side_of("Spine")
+    ('left', 'right', 'right', 'left', None)
+    """
+    found = words(name)
+    left, right = any(w in LEFT for w in found), any(w in RIGHT for w in found)
+    if not left and not right:
+        text = name.lower()
+        left, right = "left" in text, "right" in text
+    if not left and not right and (glued := re.match(r"([LR])[A-Z][a-z]", name)):
+        left, right = glued[1] == "L", glued[1] == "R"
+    return None if left == right else "left" if left else "right"
+
+
+def part_of(name: str) -> str | None:
+    """Which part of the body a name means, one of the words of WORDS, or None.
+
+    >>> part_of("LeftForeArm"), part_of("RightShoulder"), part_of("Bip01 R Calf"), part_of("qwertz")
+    ('forearm', 'shoulder', 'shank', None)
+    """
+    text = "".join(w for w in words(name) if w not in LEFT | RIGHT)
+    for part, known in WORDS:
+        if any(word in text for word in known):
+            return part
+    return None
+
+
+def is_end(name: str) -> bool:
+    """Whether a name says that the joint only ends a bone, as HeadTop_End does."""
+    return any(w in ENDS for w in words(name))
+
+
+def limb_parts(names: Sequence[str]) -> dict[str, int]:
+    """Which of the joints along a limb, from the trunk outward, is which; by their names alone.
+
+    Returns thigh, shank, foot and toe, or clavicle, upperarm, forearm and hand, as far as the names tell,
+    each with its place in `names`.
+    """
+    parts = [part_of(name) for name in names]
+    out: dict[str, int] = {}
+    for i, part in enumerate(parts):
+        before, after = parts[:i], parts[i + 1 :]
+        if part == "shoulder":
+            part = "clavicle" if {"upperarm", "arm"} & set(after) else "upperarm"
+        elif part == "arm":
+            part = "forearm" if "upperarm" in before else "upperarm"
+        elif part in ("hip", "hips"):
+            part = None if {"thigh", "leg"} & set(after) else "thigh"
+        elif part == "leg":
+            part = "shank" if {"thigh", "hip"} & set(before) or "leg" in before else "thigh"
+        elif part == "ankle":
+            part = "foot"
+        elif part == "foot":
+            part = "toe" if "ankle" in before else "foot"
+        elif part == "wrist":
+            part = "hand"
+        elif part == "hand":
+            part = "finger" if "wrist" in before else "hand"
+        if part is not None and part not in out and not (is_end(names[i]) and part in ("hand", "foot")):
+            out[part] = i
+    return out

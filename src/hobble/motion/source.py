@@ -1,0 +1,255 @@
+"""A file's motion in centimetres, right-handed, Y up, on a rig whose rest pose stands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton, rest_positions
+from hobble.motion.axes import Axes, straighten
+from hobble.motion.body import SIDES, Body, body_of, pairs
+from hobble.motion.decode import Decoded, decode, frame_rate
+from hobble.motion.defects import flips, repair
+from hobble.motion.draft import refusal
+from hobble.motion.find_body import Doubt, Found, find_body
+from hobble.motion.floor import on_floor
+from hobble.motion.fold import below_hips, decode_below
+from hobble.motion.read import Bvh
+from hobble.motion.rig import (
+    Match,
+    Target,
+    clean_names,
+    find_hips,
+    leg_length,
+    match_rig,
+    missing_bone,
+    unit_of,
+)
+from hobble.motion.stance import stands, upright
+
+STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
+FOUND = "found"  # what a report calls a rig that no skeleton file describes
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file's motion at its own frame rate, on its own rig, or on the parts of its body.
+
+    stance: where its rest pose is from, in words. moving: whether joints below the hips move in their
+    parents.
+    """
+
+    clip: Clip
+    match: Match
+    unit: float
+    unit_name: str
+    axes: Axes
+    first_frame: int
+    repairs: list[str]
+    notes: list[str]
+    stance: str
+    moving: bool
+
+
+def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[str, Any]) -> Source:
+    """A file's motion, checked and where allowed repaired.
+
+    maps: the folder of the skeleton files. A rig that one of them describes, in a rest pose like its own, is
+    taken as that; of any other the parts of the body are found, and a rest pose that stands.
+    Raises InputError for a file in which no body can be told, and for what is broken beyond repair.
+    """
+    repairs = _frame_count(file, options["defects"])
+    hips = find_hips(clean_names(file.names), target, maps)
+    known = match_rig(_rig(below_hips(file, hips)), target, maps)
+    if known is not None and known.sources:
+        return _known(file, hips, known, repairs, options)
+    return _unknown(file, target, known, repairs, options)
+
+
+def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: Mapping[str, Any]) -> Source:
+    """The source of a file on a rig that a skeleton file describes."""
+    rig = replace(_rig(below_hips(file, hips)), roles=match.roles)
+    unit, unit_name = _unit(file.path, leg_length(rig), options["unit"])
+    decoded = decode_below(file, hips, STILL / unit)
+    clip = _scaled(file, rig, decoded, unit, options)
+    if bone := missing_bone(clip.skeleton):
+        raise _boneless(file, bone)
+    clip, axes, unsure = straighten(clip, options["up"], options["handedness"])
+    moving = decoded.translations is not None
+    notes = decoded.notes + unsure
+    return _mended(
+        file,
+        clip,
+        match,
+        (unit, unit_name),
+        axes,
+        repairs + decoded.repairs,
+        notes,
+        "its zero pose",
+        moving,
+        options,
+    )
+
+
+def _unknown(
+    file: Bvh, target: Target, known: Match | None, repairs: list[str], options: Mapping[str, Any]
+) -> Source:
+    """The source of a file on any other rig: its parts are found, and a rest pose that stands."""
+    rig = _rig(file)
+    reach = float(np.linalg.norm(file.offsets[1:], axis=-1).max(initial=0.0))
+    decoded = decode(file, 1e-3 * reach)
+    raw = Clip(file.path.stem, rig, 1.0, decoded.rotations, decoded.root, decoded.translations)
+    found = _found(file, rig, raw, known, options)
+    body = found.body
+    for a, b in (pair for leg in body.legs.values() for pair in pairwise(leg[:3])):
+        if np.median(np.linalg.norm(raw.positions[:, b] - raw.positions[:, a], axis=-1)) < 1e-6:
+            raise _boneless(file, f"{rig.joints[a]} to {rig.joints[b]}")
+    unit, unit_name = _unit(file.path, _leg(raw, body), options["unit"])
+    rig = replace(rig, roles=body.roles(rig.joints))
+    clip = _scaled(file, rig, decoded, unit, options)
+    standing = stands(body, rest_positions(rig)) is None
+    clip, axes, unsure = straighten(clip, options["up"], options["handedness"], standing)
+    axes = axes if standing else replace(axes, facing="+Z")
+    told = upright(clip, body)
+    theirs = body_of(target.skeleton.parents, {r: target.skeleton.role(r) for r in target.skeleton.roles})
+    match = Match(
+        known.rig if known else FOUND,
+        told.clip.skeleton.roles,
+        False,
+        pairs(told.clip.skeleton, told.body, target.skeleton, theirs),
+    )
+    notes = decoded.notes + unsure + ([] if known else _said(rig, found))
+    moving = _moving(decoded, body, unit)
+    return _mended(
+        file,
+        told.clip,
+        match,
+        (unit, unit_name),
+        axes,
+        repairs + decoded.repairs,
+        notes,
+        told.rest,
+        moving,
+        options,
+    )
+
+
+def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: Mapping[str, Any]) -> Found:
+    if known is not None:
+        return Found(
+            body_of(rig.parents, {role: rig.index(name) for role, name in known.roles.items()}), True
+        )
+    try:
+        found = find_body(rig.joints, rig.parents, raw.positions)
+    except Doubt as doubt:
+        raise refusal(file, rig, doubt) from None
+    if not found.sided and options["handedness"] == "left":
+        body = found.body
+        arms = {a: body.arms[b] for a, b in (SIDES, SIDES[::-1])}
+        legs = {a: body.legs[b] for a, b in (SIDES, SIDES[::-1])}
+        return Found(replace(body, arms=arms, legs=legs), False)
+    return found
+
+
+def _said(rig: Skeleton, found: Found) -> list[str]:
+    """Sentences on what was found, and on what names did not tell."""
+    out = ["No skeleton file describes this rig: its parts were found from structure, motion and names."]
+    if not found.sided:
+        out.append(
+            "No name tells its left side from its right; its coordinates were taken to be right-handed "
+            "(motion.handedness: left overrules it)."
+        )
+    return out
+
+
+def _mended(
+    file: Bvh,
+    clip: Clip,
+    match: Match,
+    unit: tuple[float, str],
+    axes: Axes,
+    repairs: list[str],
+    notes: list[str],
+    stance: str,
+    moving: bool,
+    options: Mapping[str, Any],
+) -> Source:
+    """The source, without what is broken in it, its floor at height zero."""
+    repaired = repair(clip)
+    flat = options.get("ground", "flat") == "flat"
+    clip, moved, uneven = on_floor(repaired.clip) if flat else (repaired.clip, [], [])
+    mended = repaired.sentences + moved
+    if mended and options["defects"] == "refuse":
+        raise InputError(file.path, mended[0], fix="Set motion.defects: repair to mend it so.")
+    notes = notes + uneven + flips(clip, repaired.first)
+    return Source(clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving)
+
+
+def _rig(file: Bvh) -> Skeleton:
+    names = clean_names(file.names)
+    short = dict(zip(file.names, names, strict=True))
+    ends = {short[name]: sites[0] for name, sites in file.end_sites.items()}
+    return Skeleton(file.path.stem, names, file.parents, file.offsets, end_sites=ends)
+
+
+def _boneless(file: Bvh, bone: str) -> InputError:
+    return InputError(
+        file.path,
+        f"the bone from {bone} has no length",
+        fix="Check its OFFSET and its position channels, and export the clip again.",
+    )
+
+
+def _frame_count(file: Bvh, defects: str) -> list[str]:
+    if len(file) == file.declared:
+        return []
+    problem = f"declares {file.declared} frames and holds {len(file)}"
+    if defects == "refuse":
+        raise InputError(file.path, problem, fix="Export the clip again, or set motion.defects: repair.")
+    return [f"The file {problem}; those it holds are used."]
+
+
+def _leg(clip: Clip, body: Body) -> float:
+    """Length of thigh and shank together, mean of both sides."""
+    bones = [pair for leg in body.legs.values() for pair in pairwise(leg[:3])]
+    apart = [np.linalg.norm(clip.positions[:, b] - clip.positions[:, a], axis=-1) for a, b in bones]
+    return float(np.median(sum(apart)) / 2)
+
+
+def _moving(decoded: Decoded, body: Body, unit: float) -> bool:
+    """Whether joints of the body other than its hips move in their parents."""
+    if decoded.translations is None:
+        return False
+    parts = [j for limbs in (body.arms, body.legs) for limb in limbs.values() for j in limb if j is not None]
+    local = decoded.translations[:, [*body.trunk, *body.neck, body.head, *parts]]
+    return bool(np.abs(local - np.median(local, axis=0)).max() * unit > STILL)
+
+
+def _unit(path: Path, leg: float, unit: str | float) -> tuple[float, str]:
+    if unit != "auto":
+        return float(unit), f"{float(unit):g} cm (given)"
+    found = unit_of(leg)
+    if found is None:
+        raise InputError(
+            path,
+            f"no unit makes this rig a person: thigh and shank together are {leg:g} units long",
+            fix="Set motion.unit in the data set to the centimetres per unit.",
+        )
+    return found
+
+
+def _scaled(file: Bvh, rig: Skeleton, decoded: Decoded, unit: float, options: Mapping[str, Any]) -> Clip:
+    fps = options["source_fps"] or frame_rate(file.frame_time, file.frame_time_text)
+    offsets = decoded.offsets * unit
+    offsets[0] = 0.0
+    ends = {joint: (x * unit, y * unit, z * unit) for joint, (x, y, z) in rig.end_sites.items()}
+    skeleton = replace(rig, offsets=offsets, end_sites=ends)
+    translations = None if decoded.translations is None else decoded.translations * unit
+    return Clip(file.path.stem, skeleton, fps, decoded.rotations, decoded.root * unit, translations)

@@ -1,0 +1,65 @@
+"""Real rigs that no skeleton file describes, and one whose zero pose nobody could stand in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hobble.core.clip import Clip
+from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.motion.decode import decode
+from hobble.motion.read import read_bvh
+
+STYLES = ("walk_normal_001", "walk_old_001", "dash_angry_001", "walk-back_tired_001", "walk-left_happy_001")
+PATIENTS = ("A1_Cycle1", "A11_Cycle2", "B1_Cycle1", "D4_Cycle2")
+LIMBS = {"arm": ("shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "heel")}
+
+
+def seen(path) -> dict[str, np.ndarray]:
+    """Where the file's own joints are, by its own numbers alone, at its own rate."""
+    file = read_bvh(path)
+    decoded = decode(file, 1e-3)
+    skeleton = Skeleton("seen", file.names, file.parents, decoded.offsets)
+    _, places = forward_kinematics(skeleton, decoded.rotations, decoded.root, decoded.translations)
+    return {name: places[:, j] for j, name in enumerate(file.names)}
+
+
+def bend(a, b, c):
+    """Degrees by which a limb is bent at b."""
+    u, v = b - a, c - b
+    return np.degrees(np.arccos(np.sum(u * v, -1) / np.linalg.norm(u, axis=-1) / np.linalg.norm(v, axis=-1)))
+
+
+def same_bends(path, clip: Clip, names: dict[str, str]) -> None:
+    """Knees and elbows bend as they do in the file: in the middle of their range, and how far."""
+    places, fps = seen(path), 1 / read_bvh(path).frame_time
+    at = np.minimum(np.round(np.arange(len(clip)) / 60 * fps).astype(int), len(places[names["hips"]]) - 1)
+    for side in ("left", "right"):
+        for kind, limb in LIMBS.items():
+            roles = [f"{side}_{part}" for part in limb]
+            before = bend(*(places[names[role]][at] for role in roles))
+            after = bend(*(clip.positions[:, clip.skeleton.role(role)] for role in roles))
+            assert np.abs(after - before).mean() < (12 if kind == "leg" else 3), (path.name, side, kind)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("name", STYLES)
+def test_a_rig_whose_zero_pose_is_a_line_comes_out_upright(shared, make, name):
+    path = shared / f"mocap/styles/dataset-1_{name}.bvh"
+    clip, report = make(path)
+    assert report["stance"].startswith("its motion, since in its zero pose")
+    same_bends(path, clip, report["roles"])
+    left, right = (clip.positions[:, clip.skeleton.role(f"{side}_hip"), 1] for side in ("left", "right"))
+    assert np.ptp(left - right) < 8
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("name", PATIENTS)
+def test_a_rig_without_a_file_is_found(shared, make, name):
+    path = shared / f"mocap/patients/Subject{name}.bvh"
+    clip, report = make(path)
+    assert (report["rig"], report["stance"]) == ("found", "its zero pose")
+    roles = report["roles"]
+    assert (roles["chest"], roles["head"], roles["left_shoulder"]) == ("Spine1", "HEad", "LeftArm")
+    assert "neck" not in roles
+    same_bends(path, clip, roles)
