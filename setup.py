@@ -5,5 +5,4 @@ from setuptools import find_packages, setup
 setup(
     packages=[*find_packages("src"), "hobble.skeletons"],
     package_dir={"": "src", "hobble.skeletons": "config/skeletons"},
-    package_data={"hobble.skeletons": ["*.yaml"]},
 )
