@@ -65,7 +65,7 @@ def write_labels(
         batch.skeleton_folder(),
         clip=name,
         skeleton_name=ON,
-        options=Motion(source_fps=source_fps),
+        options=Motion(source_fps=source_fps).model_dump(mode="json"),
     )
     labels, told = label_clip(clip, [], report, gait, "rocky", Labels())
     time = SourceTime(report["source_frames"], report["source_fps"], report["source_start"])

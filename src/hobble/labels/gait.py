@@ -23,13 +23,14 @@ CROUCHED_HIPS = 0.85
 # to the descriptions of `cmu`. All measures are free of units, so that they hold for any size of body.
 JOG_SPRING = 3.7  # hips that are lowest over the standing foot (a spring), not between two steps (a pendulum)
 JOG_FLIGHT = 9.0  # share of the time in which no foot is down
-JOG_DOUBLE_SUPPORT = -6.0  # share of the time in which both are
-JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g
+JOG_DOUBLE_SUPPORT = -9.0  # share of the time in which both are
+JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g, up to MOST_BOUNCE: a happy walk bounces too
+MOST_BOUNCE = 0.5
 JOG_FROUDE = 6.0  # above FASTEST_WALK, in Froude numbers: people walk no faster than that for long
 FASTEST_WALK = 0.5
-JOG_CONSTANT = -3.4
+JOG_CONSTANT = -3.2
 CERTAIN_ODDS = 2.0  # log odds that count as full evidence
-DATA_SET_ODDS = 0.6  # what the data set says of the clip's main gait counts for so much
+DATA_SET_ODDS = 1.0  # what the data set says of the clip's main gait counts for so much
 SWITCH_COST = 18.0  # frames of full evidence that a change of gait takes
 FADE_FRAMES = 31
 LONGEST_START = 180  # a doubtful walk between a stand and a jog belongs to the jog, if no longer than this
@@ -75,7 +76,7 @@ def jog_odds(clip: Clip, down: np.ndarray) -> Array:
         JOG_SPRING * _spring(clip)
         + JOG_FLIGHT * flight
         + JOG_DOUBLE_SUPPORT * double_support
-        + JOG_BOUNCE * _bounce(clip)
+        + JOG_BOUNCE * np.minimum(_bounce(clip), MOST_BOUNCE)
         + JOG_FROUDE * np.clip(froude - FASTEST_WALK, 0.0, 1.0)
         + JOG_CONSTANT
     )
