@@ -5,6 +5,7 @@ from pathlib import Path
 
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import modules
+from hobble.workflow import lifetime
 from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
@@ -21,6 +22,9 @@ try:
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 
+lifetime.announce()
+lifetime.clear_stale_lock()
+
 # What the rules ask; each part is a module of hobble.workflow.
 catalogue = project.catalogue
 clips = project.clips
@@ -30,6 +34,16 @@ comparison = project.comparison
 package = project.package
 measurements = project.measurements
 demands = Demands(project)
+
+
+# A clip that a data set lists or its folder holds: no mirror, no hurt version.
+OWN = r"[^/]+(?<!_mirror)(?<!_hurt[1-9])"
+
+
+onstart:
+    if workflow.is_main_process:
+        lifetime.own_lock()
+        lifetime.end_jobs_with_run()
 
 
 wildcard_constraints:
@@ -60,6 +74,7 @@ include: "workflow/rules/synthetic.smk"
 include: "workflow/rules/motion.smk"
 include: "workflow/rules/labels.smk"
 include: "workflow/rules/injury.smk"
+include: "workflow/rules/hurt.smk"
 include: "workflow/rules/terrain.smk"
 include: "workflow/rules/database.smk"
 include: "workflow/rules/training.smk"

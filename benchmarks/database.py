@@ -256,25 +256,26 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     comes first changes from round to round. So both meet the same machine, and neither profits from what was
     read in the other's time.
     """
-    from hobble.config.sections import Network, Training
+    from hobble.config.sections import Training
+    from hobble.models.pfnn.options import PfnnOptions
     from hobble.training.batches import HostRows
     from hobble.training.start import fresh, step_for, use_threads
     from hobble.training.update import update_for
 
     use_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
-    options = Training(memory_mb=memory_mb).model_dump(mode="json")
+    options = Training(memory_mb=memory_mb)
     disk, memory = (Database.open(folder / "db", mb) for mb in (memory_mb, 1 << 20))
-    state = fresh(disk, Network().model_dump(mode="json"), options)
+    state = fresh(disk, PfnnOptions(), options)
     device = state.network.flat.device
-    update = update_for(step_for(state.network, options), state.adam, options["batch"])
-    rows = disk.block_rows(options["batch"])
+    update = update_for(step_for(state.network, options), state.adam, options.batch)
+    rows = disk.block_rows(options.batch)
     stretch = WINDOWS * disk.window("train", rows) * disk.manifest.chunks["train"][0].rows
     stretch = min(stretch, disk.section_pairs("train", 0, 10))
 
     def turn(db: Database, section: int) -> tuple[float, float]:
         """Samples a second over one stretch, by the clock and by processor time, that of all threads."""
         start, used, done = time.perf_counter(), time.process_time(), 0
-        for batch in HostRows(db, device).batches(0, section % 10, 10, 1, options["batch"]):
+        for batch in HostRows(db, device).batches(0, section % 10, 10, 1, options.batch):
             loss = update(*batch[:3], 1.0)
             done += len(batch.p)
             if done >= stretch:

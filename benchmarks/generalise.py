@@ -24,11 +24,12 @@ import hobble.training  # noqa: F401 - first, since it says how threads wait
 import torch
 import yaml
 
-from hobble.config.sections import Network, Training
+from hobble.config.sections import Training
 from hobble.database.reader import Database
 from hobble.measures.responsivity.run import responsivity
 from hobble.measures.rollouts.run import measure_roll_outs
-from hobble.runtime.network import load_network
+from hobble.models.load import load_network
+from hobble.models.pfnn.options import PfnnOptions
 from hobble.training.held_out import HeldOut
 from hobble.training.train import train
 from hobble.training.weights import write_weights
@@ -37,8 +38,8 @@ LENGTHS = (1, 10, 60)
 
 
 def measured(database: Database, recipe: dict, threads: int) -> str:
-    network = Network().model_dump(mode="json")
-    training = Training(**recipe).model_dump(mode="json")
+    network = PfnnOptions()
+    training = Training(**recipe)
     clips = {c["clip"]: c["split"] for c in database.manifest.clips if c["split"] == "held_out" and c["rows"]}
     files = {name: database.path.parent / "clips" / f"{name}.npz" for name in clips}
     with tempfile.TemporaryDirectory() as folder:

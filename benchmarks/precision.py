@@ -16,10 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hobble.config.sections import Network, Training
+from hobble.config.sections import Training
 from hobble.database.manifest import Manifest
 from hobble.database.merge import write_database
 from hobble.measures.accuracy.run import measure
+from hobble.models.pfnn.options import PfnnOptions
 from hobble.training.run import run
 
 DTYPES = ("float32", "float16", "bfloat16")
@@ -32,8 +33,8 @@ def trained(database: Path, folder: Path, passes: int, seed: int, threads: int) 
     run(
         database,
         configuration="precision",
-        network=Network().model_dump(mode="json"),
-        training=Training(passes=passes, seed=seed).model_dump(mode="json"),
+        network=PfnnOptions(),
+        training=Training(passes=passes, seed=seed),
         checkpoints=folder / "checkpoints",
         threads=threads,
         start=None,

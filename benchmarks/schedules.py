@@ -60,9 +60,9 @@ class CpuSeconds(logging.Handler):
 
 def trained(name: str, database: Path, threads: int) -> Curve:
     configuration = Catalogue(ROOT / "config").configuration(name)
-    network = configuration.network.model_dump(mode="json")
-    training = configuration.training.model_dump(mode="json")
-    data = Database.open(database, training["memory_mb"])
+    network = configuration.network
+    training = configuration.training
+    data = Database.open(database, training.memory_mb)
     log, clock = logging.getLogger("hobble.training"), CpuSeconds()
     log.setLevel(logging.INFO)
     log.addHandler(clock)

@@ -225,4 +225,4 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
     assert catalogue.configuration("ava-m").network_of == "ava"
     assert catalogue.configuration("injured").injury
     assert catalogue.dataset("synthetic").terrain.fits == 10
-    assert catalogue.dataset("synthetic").synthetic.frames == 20_000
+    assert catalogue.dataset("synthetic").synthetic.frames == 11_412

@@ -21,6 +21,7 @@ from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import Heightmap
+from hobble.terrain.options import Sampling
 from hobble.terrain.patches import draw_patches
 
 NAME = "LocomotionFlat09_000"
@@ -79,7 +80,9 @@ def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrai
     ground, database = options("terrain", **terrain), options("database")
     any_map = Heightmap("any", np.zeros((200, 200)), ground["cell"])
     drawn = {name: ground[name] for name in ("cell", "size", "highest", "seed")}
-    fits = clip_fits(clip, labels, draw_patches([any_map], count=10, **drawn), "flat", ground, database)
+    patches = draw_patches([any_map], count=10, **drawn)
+    sampling = Sampling(**{name: database[name] for name in Sampling.model_fields})
+    fits = clip_fits(clip, labels, patches, "flat", sections.Terrain(**ground), sampling)
     severity = np.zeros((len(clip), len(clip.skeleton.links)), np.float32)
     window = {name: database[name] for name in OPTIONS}
     return clip_rows(NAME, clip, labels, severity, vars(fits), **window)

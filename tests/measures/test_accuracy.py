@@ -14,7 +14,6 @@ import pytest
 from hobble.core.errors import HobbleError, InputError
 from hobble.database.clip_rows import ClipRows, expanded, save_clip_rows
 from hobble.database.layout import RowLayout
-from hobble.evaluation.predict import phase_shares, predict
 from hobble.evaluation.tables import write_csv
 from hobble.measures.accuracy.run import (
     QUANTILES,
@@ -26,7 +25,10 @@ from hobble.measures.accuracy.run import (
     joint_indices,
     measure,
 )
-from hobble.runtime.network import Network, load_network, weights_at
+from hobble.models.checks import NEEDED_ROLES
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.models.pfnn.forward import phase_shares, weights_at
 
 LAYOUT = RowLayout(3, links=1)
 SKELETON = {
@@ -34,7 +36,7 @@ SKELETON = {
     "joints": {
         n: {"parent": p, "offset": [0, 1, 0]} for n, p in (("Hips", None), ("Arm", "Hips"), ("Foot", "Hips"))
     },
-    "roles": {"hips": "Hips"},
+    "roles": dict.fromkeys(NEEDED_ROLES, "Foot") | {"hips": "Hips"},
     "links": [["Hips", "Arm"]],
 }
 
@@ -94,12 +96,12 @@ def test_the_released_network_on_the_original_rows(shared):
     network = load_network(shared / "reference" / "pfnn_release_network.npz")
     with np.load(shared / "reference" / "original_rows_LocomotionFlat09_000.npz") as file:
         x, y, p, released = (file[name] for name in ("X", "Y", "P", "Y_release"))
-    predicted = predict(network, x, p, constant=True)
+    predicted = network.predict(x, p, constant=True)
     np.testing.assert_allclose(predicted, released, atol=1e-3)
     errors = joint_errors(RowLayout(31), y, predicted, range(31))
     assert round(float(errors[..., 0].mean()), 4) == 0.0438
     assert 2.3 < errors[..., 1].mean() < 2.7
-    smooth = joint_errors(RowLayout(31), y, predict(network, x, p), range(31))
+    smooth = joint_errors(RowLayout(31), y, network.predict(x, p), range(31))
     assert round(float(smooth[..., 0].mean()), 4) == 0.0436  # a phase of its own instead of the bin's
 
 
@@ -111,7 +113,7 @@ def test_a_batch_is_what_each_row_gives_with_its_weights_blended_first(tmp_path,
     x = rng.normal(size=(20, LAYOUT.x_size)).astype(np.float32)
     phase = np.r_[0.0, 1.0, 0.25, 0.5, rng.random(16)]
     expected = np.stack([slow(network, row, p) for row, p in zip(x, phase, strict=True)])
-    np.testing.assert_allclose(predict(network, x, phase), expected, atol=1e-4)
+    np.testing.assert_allclose(network.predict(x, phase), expected, atol=1e-4)
 
 
 def test_phase_shares_hit_the_control_points_and_sum_to_one():
@@ -142,7 +144,7 @@ def test_a_clips_figures_are_those_of_all_its_pairs(weights, fits):
     rows = make_rows("a", 37, fits, 5)
     relative, distance = [], []
     for pairs in expanded(rows, links=True):
-        errors = joint_errors(LAYOUT, pairs.y, predict(network, pairs.x, pairs.p), range(3))
+        errors = joint_errors(LAYOUT, pairs.y, network.predict(pairs.x, pairs.p), range(3))
         relative.append(errors[..., 0])
         distance.append(errors[..., 1])
     got = clip_errors(network, rows, [0, 1, 2]).to_dict()

@@ -15,6 +15,7 @@ from hobble.core.files import save_npz, write_json, write_text
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.database.clip_rows import ClipRows, save_clip_rows
 from hobble.database.layout import RowLayout
+from hobble.runtime.options import Runtime
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 STAGES = (
@@ -30,13 +31,7 @@ STAGES = (
 )
 CLIPS = ("walk_straight", "walk_turns", "jog", "crouch", "stand", "strafe", "hurt_left_knee", "hurt_back")
 LINKS = ("LeftUpLeg-LeftLeg", "RightLeg-RightFoot", "Hips-LowerBack")
-RUNTIME = {
-    "mode": "cubic",
-    "severity_rate": 10.0,
-    "severity_scale": 1.0,
-    "foot_locking": True,
-    "steering": 1.0,
-}
+RUNTIME = Runtime(steering=1.0)
 HELD_OUT = ("walk_turns", "hurt_back")
 
 
@@ -480,7 +475,7 @@ def write_all(
     }
     resolved = {
         "name": "example",
-        "configuration": {"training": {"passes": 20}, "runtime": RUNTIME},
+        "configuration": {"training": {"passes": 20}, "runtime": RUNTIME.model_dump()},
         "dataset": {"name": "made_up"},
     }
     write_text(folder / "configuration.yaml", yaml.safe_dump(resolved))

@@ -9,10 +9,10 @@ import pytest
 
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import headings, root_path
+from hobble.models.network import Network
 from hobble.report.body import body
 from hobble.report.compare import in_world
 from hobble.report.scenes import UNIT
-from hobble.runtime.network import Network
 
 
 def positions(clip: dict[str, Any], table: str, joints: int) -> np.ndarray:

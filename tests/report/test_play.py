@@ -15,13 +15,14 @@ import pytest
 import yaml
 
 from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.motion.decode import decode, frame_rate
 from hobble.motion.read import read_bvh
 from hobble.report.formats import embedded
 from hobble.report.loft import vertices
 from hobble.report.playable import PARTS, body_parts, playable
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.network import Network, load_network
 
 FRAMES = 120
 
@@ -39,12 +40,12 @@ def test_parts_are_the_links_of_their_roles(holden31: Skeleton) -> None:
 
 
 def test_weights_are_kept_to_a_part_in_sixty_thousand(network: Network, character: dict[str, Any]) -> None:
-    layer = character["layers"][0]
+    layer = character["network"]["layers"][0]
     integers = np.frombuffer(base64.b64decode(layer["weights"]), "<i2").reshape(network.weights[0].shape)
     scale = np.frombuffer(base64.b64decode(layer["scale"]), "<f4").reshape(network.weights[0].shape[:2])
     error = np.abs(integers * scale[..., None] - network.weights[0])
     assert np.all(error <= 0.501 * scale[..., None])
-    assert character["layers"][-1]["rows"] == network.layout.y_joint_rotation.start
+    assert character["network"]["layers"][-1]["rows"] == network.layout.y_joint_rotation.start
 
 
 def wish(frame: int) -> dict[str, Any]:
@@ -71,7 +72,7 @@ def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) 
 
 
 def test_the_page_moves_as_python_does(tab: Any, network: Network, examples: ModuleType) -> None:
-    animation = ProceduralAnimation(network, storage="int16", **examples.RUNTIME)
+    animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
     expected = []
     for frame in range(FRAMES):
         asked = wish(frame)

@@ -110,9 +110,21 @@ def test_strips_carry_what_hurts(material: Material) -> None:
 
 
 def test_stages_beside_the_published(material: Material) -> None:
-    rows = {row[0]: row for row in cost_section.stage_table(material).rows}
-    assert rows["training"][-2:] == [154800, 122.0e6]
-    assert rows["labels"][-2:] == [None, None]
+    """A published time or size stands beside the configuration that it is of, and no other."""
+    nothing, patches = [None, None], [1680, 606.0e6]
+    known = {
+        "holden": {"terrain": patches, "database": [5400, 7.12e9], "training": [43 * 3600, 122.0e6]},
+        "holden-xl": {"training": [47 * 3600, 176.0e6]},
+        "holden-xt": {"training": [91 * 3600, None]},
+        "ava": {"database": [55 * 60, 10.4e9], "training": [31 * 3600, 374.0e6]},
+        "ferre": {"training": [50 * 3600, None]},
+        "example": {},
+    }
+    for name, theirs in known.items():
+        table = cost_section.stage_table(replace(material, name=name))
+        assert {row[0]: row[-2:] for row in table.rows} == {
+            stage["stage"]: theirs.get(stage["stage"], nothing) for stage in material.pipeline["stages"]
+        }
 
 
 def test_steps_of_a_frame_in_their_order(material: Material) -> None:

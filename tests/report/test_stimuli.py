@@ -13,11 +13,12 @@ from PIL import Image
 
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.motion.read import read_bvh
 from hobble.report import stimuli
 from hobble.report.body import body
 from hobble.report.raster import BODY, Camera, Studio
-from hobble.runtime.network import Network, load_network
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +135,7 @@ def test_files_of_a_loop(network: Network, examples: ModuleType, tmp_path: Path,
     x_mean = network.x_mean.copy()
     x_mean[network.layout.x_injury][network.links.index("LeftFoot-LeftToeBase")] = 0.5
     network = replace(network, x_mean=x_mean)  # a network that learnt from a hurt left foot, and nothing else
-    stimuli.write_stimuli(network, tmp_path / "a", size=64, **examples.RUNTIME)
+    stimuli.write_stimuli(network, tmp_path / "a", examples.RUNTIME, size=64)
     names = {"healthy", "left-foot", "preset-bad-back"}
     assert {p.name for p in (tmp_path / "a").iterdir()} == {"stimuli.json"} | {
         f"{n}.{kind}" for n in names for kind in ("webp", "bvh")
@@ -157,5 +158,5 @@ def test_a_network_that_cannot_be_hurt_says_which_can(
 ) -> None:
     examples.weights(tmp_path / "weights.npz", holden31, links=False)
     with pytest.raises(HobbleError, match="`injured`"):
-        stimuli.write_stimuli(load_network(tmp_path / "weights.npz"), tmp_path / "out", **examples.RUNTIME)
+        stimuli.write_stimuli(load_network(tmp_path / "weights.npz"), tmp_path / "out", examples.RUNTIME)
     assert not (tmp_path / "out").exists()

@@ -15,10 +15,10 @@ from hobble.core import quat
 from hobble.core.errors import InputError
 from hobble.core.skeleton import forward_kinematics
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
+from hobble.models.load import load_network
 from hobble.runtime import Pose, ProceduralAnimation
 from hobble.runtime.axes import MATRICES, Axes
 from hobble.runtime.ground import CELL, Heightmap
-from hobble.runtime.network import load_network
 from hobble.runtime.waypoints import Waypoint
 
 KNEE = "LeftUpLeg-LeftLeg"

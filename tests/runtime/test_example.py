@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hobble.runtime.network import STATISTICS
+from hobble.models.checks import STATISTICS
 
 
 def test_the_game_loop(

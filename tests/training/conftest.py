@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +14,8 @@ from hobble.database.clip_rows import ClipRows
 from hobble.database.layout import RowLayout
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.models.pfnn.options import PfnnOptions
+from hobble.training.options import Training
 
 SPLITS = {"walk": "train", "hop": "train", "turn": "held_out"}
 
@@ -70,27 +74,17 @@ def data(small_database: Path) -> Database:
 
 
 @pytest.fixture
-def network() -> dict[str, int]:
-    return {"hidden_layers": 2, "units": 24, "control_points": 4}
+def network() -> PfnnOptions:
+    return PfnnOptions(hidden_layers=2, units=24, control_points=4)
+
+
+class Recipe(Training):
+    """A training section that a test changes with `|`, as one does with mappings."""
+
+    def __or__(self, changes: Mapping[str, Any]) -> Recipe:
+        return Recipe.model_validate(self.model_dump() | dict(changes))
 
 
 @pytest.fixture
-def training() -> dict[str, object]:
-    return {
-        "passes": 2,
-        "sections": 3,
-        "batch": 32,
-        "learning_rate": 1e-3,
-        "beta1": 0.9,
-        "beta2": 0.999,
-        "dropout": 0.3,
-        "l1": 0.01,
-        "schedule": "constant",
-        "warm_up": 0.0,
-        "rollout": 1,
-        "seed": 1,
-        "memory_mb": 64,
-        "continues": None,
-        "device": "cpu",
-        "precision": "auto",
-    }
+def training() -> Recipe:
+    return Recipe(passes=2, sections=3, learning_rate=1e-3, memory_mb=64, device="cpu")

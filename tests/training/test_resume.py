@@ -32,8 +32,12 @@ PROCESS = """
 import json, sys
 from pathlib import Path
 from hobble.database.reader import Database
+from hobble.models import options
+from hobble.training.options import Training
 from hobble.training.train import train
-train(Database.open(sys.argv[1], 64), checkpoints=Path(sys.argv[2]), threads=2, **json.loads(sys.argv[3]))
+sections = json.loads(sys.argv[3])
+typed = {"network": options(sections["network"]), "training": Training(**sections["training"])}
+train(Database.open(sys.argv[1], 64), checkpoints=Path(sys.argv[2]), threads=2, **typed)
 """
 
 
@@ -41,8 +45,9 @@ def test_killed_at_any_moment_it_ends_at_the_same_bits(
     small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
     settings = {"network": network, "training": training | {"passes": 15}}
+    plain = {name: section.model_dump(mode="json") for name, section in settings.items()}
     killed = tmp_path / "killed"
-    command = [sys.executable, "-c", PROCESS, str(small_database), str(killed), json.dumps(settings)]
+    command = [sys.executable, "-c", PROCESS, str(small_database), str(killed), json.dumps(plain)]
     for wait in (0.02, 0.0):
         before = _sections(killed)
         process = subprocess.Popen(command)
@@ -287,7 +292,7 @@ def test_a_checkpoint_of_another_network_is_refused(
     ):
         train(
             data,
-            network=network | {"units": 30},
+            network=network.model_copy(update={"units": 30}),
             training=training,
             checkpoints=tmp_path / "b",
             start=tmp_path / "other.npz",
@@ -315,7 +320,7 @@ def test_the_name_of_a_training_says_what_determines_it(
     name = recipe_hash(network, training, data, "code")
     assert name == recipe_hash(network, training | {"passes": 99, "continues": "x"}, data, "code")
     others = [
-        recipe_hash(network | {"units": 25}, training, data, "code"),
+        recipe_hash(network.model_copy(update={"units": 25}), training, data, "code"),
         recipe_hash(network, training | {"learning_rate": 0.1}, data, "code"),
         recipe_hash(network, training, data, "other code"),
         recipe_hash(network, training | {"sections": 4}, data, "code"),

@@ -108,7 +108,7 @@ def test_a_data_folder_that_is_not_there(mine) -> None:
     ],
 )
 def test_a_bad_configuration_ends_before_the_dag(workflow, override: str, message: str) -> None:
-    text = workflow.run("-n", "results/test/report.html", "--config", override, ok=False)
+    text = workflow.run("-np", "results/test/report.html", "--config", override, ok=False)
     assert message in text
     assert "Building DAG" not in text
     assert "Traceback" not in text

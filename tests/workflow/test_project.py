@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -132,8 +133,8 @@ def test_a_listed_clip_without_its_file_is_told(base: Path) -> None:
 
 def test_the_walkers_frames_are_shared_out(root: Path) -> None:
     project = Project(root, {})
-    total = sum(project.datasets.frames("synthetic", clip) for clip in project.clips.of("synthetic"))
-    assert abs(total - 20_000) < 20
+    total = sum(project.datasets.frames("synthetic", clip) for clip in project.clips.own("synthetic"))
+    assert abs(total - 11_412) < 20
 
 
 def test_networks_that_others_make_are_read_where_they_lie(root: Path) -> None:
@@ -350,6 +351,10 @@ def test_what_the_folder_lacks_is_downloaded(base: Path) -> None:
         ("{clip}", "{name}", r"download: url: 'name'"),
         ("{clip}", "a", r"download: url: \{clip\} must stand in it"),
         ("{clip}", "{clip.x}", "download: url: "),
+        ("{clip}", "{clip:a>400000000}", "only a width of up to 99 may stand behind a name"),
+        ("{clip}", "{clip:{subject}}", "only a width of up to 99"),
+        ("{clip}", "{clip!r}", "only a width of up to 99"),
+        ("https://host/", "https://host/\u202e", "must be an address like"),
         ("{clip}", "{clip", "download: url: "),
         ("far.sha256", "../far.sha256", "checksums: must be relative"),
         ("clips: {'2_1': }\n", "", "lists them and names a `folder`"),
@@ -371,10 +376,10 @@ def test_a_manifest_that_does_not_read_is_told_with_its_line(base: Path) -> None
 def test_every_clip_of_the_cmu_set_has_a_checksum_and_an_address(root: Path) -> None:
     project = Project(root, {"mocap": "nowhere"})
     check(project, ["results/datasets/cmu/motion/02_01.npz"])
-    assert len(project.clips.of("cmu")) == 69
+    assert len(project.clips.own("cmu")) == 69
     assert project.clips.download("cmu", "02_01")["url"].endswith("/cmu-mocap/master/data/002/02_01.bvh")
     assert project.clips.download("cmu", "105_16")["url"].endswith("/105/105_16.bvh")
-    assert all(len(project.clips.download("cmu", clip)["sha256"]) == 64 for clip in project.clips.of("cmu"))
+    assert all(len(project.clips.download("cmu", clip)["sha256"]) == 64 for clip in project.clips.own("cmu"))
 
 
 @pytest.mark.shared
@@ -382,7 +387,7 @@ def test_the_checksums_are_those_of_the_files(root: Path, shared: Path) -> None:
     import hashlib
 
     project = Project(root, {})
-    for clip in project.clips.of("cmu"):
+    for clip in project.clips.own("cmu"):
         data = (shared / f"mocap/cmu/{clip}.bvh").read_bytes()
         assert project.clips.download("cmu", clip)["sha256"] == hashlib.sha256(data).hexdigest()
 
@@ -435,3 +440,20 @@ def test_sections_may_be_asked_for_some_of_their_keys(root: Path) -> None:
     assert project.datasets.options("tiny", "database", "window", "step") == {"window": 60, "step": 10}
     with pytest.raises(KeyError):
         project.configurations.section("test", "training", "passes", "learning_rat")
+
+
+@pytest.mark.parametrize("name", ["a.bvh", "map.txt"])
+def test_a_pipe_is_no_file_to_wait_for(base: Path, name: str) -> None:
+    """Refused when the run is planned: Snakemake would wait for it to end."""
+    text = DATASET + "terrain: {heightmaps: [{kind: file, path: mine/map.txt}]}\n"
+    (base / "config/datasets/mine.yaml").write_text(text)
+    (base / f"data/mine/{name}").unlink(missing_ok=True)
+    os.mkfifo(base / f"data/mine/{name}")
+    clips = Project(base, {}).clips
+    with pytest.raises(HobbleError, match=f"mine/{name}: a device or a pipe, not a file"):
+        (clips.of if name == "a.bvh" else clips.heightmap_files)("mine")
+    listed = text + "clips: {a: , b: }\n"
+    (base / "config/datasets/mine.yaml").write_text(listed)
+    if name == "a.bvh":
+        with pytest.raises(HobbleError, match=f"mine/{name}: a device or a pipe"):
+            Project(base, {}).clips.source("mine", "a")

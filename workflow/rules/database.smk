@@ -1,3 +1,6 @@
+from hobble.database.options import Merging, Rows
+
+
 rule database_clip:
     """The rows of X, Y and P of one clip."""
     input:
@@ -17,7 +20,7 @@ rule database_clip:
         runtime=lambda w, attempt: demands.minutes(w.dataset, w.rows, 0.15, attempt),
     params:
         clip=lambda w: w.rows,
-        options=lambda w: datasets.options(w.dataset, "database"),
+        options=lambda w: datasets.part(w.dataset, "database", Rows),
         code=package.code("database_clip"),
     script:
         "../scripts/database_clip.py"
@@ -45,7 +48,7 @@ rule database_merge:
     params:
         splits=lambda w: datasets.selected(w.dataset, w.selection),
         injury=lambda w: w.selection == "all",
-        options=lambda w: datasets.options(w.dataset, "database"),
+        options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=package.code("database_merge"),
     script:
         "../scripts/database_merge.py"

@@ -11,6 +11,8 @@ rule injury_clip:
         "results/datasets/{dataset}/logs/injury/injury_clip/{clip}.log",
     benchmark:
         "results/datasets/{dataset}/benchmarks/injury/injury_clip/{clip}.tsv"
+    wildcard_constraints:
+        clip=OWN,
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 4, attempt),

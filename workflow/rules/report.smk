@@ -117,7 +117,9 @@ rule report:
         dataset=lambda w: configurations.dataset(w.configuration),
         splits=lambda w: configurations.splits(w.configuration),
         title=lambda w: catalogue.configuration(w.configuration).report.title,
-        code=package.code("report", *modules("page")),
+        code=lambda w: package.code(
+            "report", configurations.kind(w.configuration), *modules("page")
+        ),
     script:
         "../scripts/report.py"
 
@@ -161,6 +163,6 @@ rule stimuli:
         runtime=15,
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=package.code("stimuli"),
+        code=lambda w: package.code("stimuli", configurations.kind(w.configuration)),
     script:
         "../scripts/stimuli.py"

@@ -1,8 +1,8 @@
 """Creates the severities of a clip from its status file, or from what its data set says of it."""
 
+from hobble.channels.injury.severity import clip_severity, save_injury, write_report
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
-from hobble.channels.injury.severity import clip_severity, save_injury, write_report
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

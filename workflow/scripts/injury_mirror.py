@@ -1,8 +1,8 @@
 """Creates the severities of a mirrored clip from those of its original."""
 
+from hobble.channels.injury.severity import load_injury, mirror_severity, save_injury, write_report
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
-from hobble.channels.injury.severity import load_injury, mirror_severity, save_injury, write_report
 from hobble.workflow.job import job
 
 with job(snakemake):

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, create_model, model_validator
 
 from hobble.config import sections as s
 from hobble.core.clip_files import NAMES, can_be_called
+from hobble.models import DEFAULT, model
+from hobble.models.options import Options
 
 
 def _clip_name(name: str) -> str:
@@ -64,6 +67,7 @@ class Dataset(s.Section):
     synthetic: s.Synthetic | None = None
     motion: s.Motion = s.Motion()
     labels: s.Labels = s.Labels()
+    hurt: s.Hurt | None = Field(None, description="hurt versions of the healthy clips, as further clips")
     terrain: s.Terrain = s.Terrain()
     database: s.Database = s.Database()
 
@@ -99,11 +103,18 @@ class Configuration(s.Section):
     dataset: Name = "synthetic"
     injury: bool = Field(False, description="severities as inputs and all clips; else the healthy clips only")
     network_of: Name | None = Field(None, description="read another configuration's network, train none")
-    network: s.Network = s.Network()
+    network: Options = model(DEFAULT).options()()  # of its kind; see `configuration_of`
     training: s.Training = s.Training()
     runtime: s.Runtime = s.Runtime()
     evaluation: s.Evaluation = s.Evaluation()
     report: s.Report = s.Report()
+
+
+@functools.cache
+def configuration_of(kind: str) -> type[Configuration]:
+    """`Configuration` with the keys that a network of this kind has, one of MODELS."""
+    of_network = model(kind).options()
+    return create_model("Configuration", __base__=Configuration, network=(of_network, of_network()))
 
 
 class JointEntry(s.Section):

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import explained, save_npz
+from hobble.core.files import explained, save_npz, sync_folder
 from hobble.core.quat import Array
 from hobble.database.buckets import INDEX, Buckets
 from hobble.database.chunks import Chunk, write_chunk
@@ -234,6 +234,7 @@ def _publish(path: Path, work: Path, manifest: Manifest) -> None:
     if final.exists():  # the same rows were built before: put each file in its place, whole or damaged
         for file in sorted(p for p in work.rglob("*") if p.is_file()):
             os.replace(file, final / file.relative_to(work))
+        sync_folder(final)
     else:
         os.rename(work, final)
     manifest.save(path)

@@ -9,8 +9,8 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import in_root_frame
+from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.network import Network
 from hobble.runtime.options import Runtime
 
 FPS = 60

@@ -11,10 +11,10 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.database.clip_rows import ClipRows, expanded, load_clip_rows
 from hobble.evaluation.captured import headings, root_path, turned, unbroken
-from hobble.evaluation.predict import predict
+from hobble.models.network import Network
+from hobble.models.packing import packed
 from hobble.report.body import body
-from hobble.report.scenes import FPS, UNIT, pack_positions, packed
-from hobble.runtime.network import Network
+from hobble.report.scenes import FPS, UNIT, pack_positions
 
 CLIPS = 6  # that are shown at least, if there are so many; every held-out clip is
 MOST = 40
@@ -52,7 +52,7 @@ def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> 
         wanted = np.isin(row, chosen) & ~seen[row]
         row, first = row[wanted], first[wanted]
         if len(row):
-            made = predict(network, pairs.x[first], pairs.p[first])
+            made = network.predict(pairs.x[first], pairs.p[first])
             truth[row], guess[row] = pairs.y[first][:, y_position], made[:, y_position]
             seen[row] = True
     true, predicted = (v[chosen].reshape(len(chosen), -1, 3) for v in (truth, guess))

@@ -26,9 +26,8 @@ def lead(material: Material) -> str:
     passes = _recipe(material).get("passes")
     network = material.network
     text = (
-        f"A phase-functioned network of {len(network['sizes']) - 2} hidden layers and "
-        f"{network['control_points']} control points, with {network['sizes'][0]} inputs and "
-        f"{network['sizes'][-1]} outputs, trained"
+        f"A {network['described']}, with {network['sizes'][0]} inputs and {network['sizes'][-1]} outputs, "
+        "trained"
     )
     text += f" for {passes} passes" if passes else ""
     text += f" on {len(clips) - kept} clips of {material.dataset}"

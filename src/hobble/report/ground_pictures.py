@@ -10,8 +10,8 @@ import numpy as np
 
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
+from hobble.models.packing import packed
 from hobble.report.body import body
-from hobble.report.scenes import packed
 
 STEPS_PER_CM = 10  # everything is kept in 16-bit steps of a millimetre
 MOST = 24

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 
-from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.models.network import Network, inverse
+from hobble.models.packing import packed
 from hobble.report.body import body
-from hobble.report.scenes import packed
 from hobble.runtime import animation, feet, trajectory
-from hobble.runtime.network import Network
+from hobble.runtime.options import Runtime
 
 # Parts of the body that have a slider and a key of their own: label, roles of the ends, key.
 PARTS = (
@@ -34,10 +34,10 @@ PRESETS = {
 }
 
 
-def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
+def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     """What the page's second implementation of the runtime needs; {} where the network has no skeleton.
 
-    runtime: that section of the configuration. Joint rotations are left out of the outputs: the page draws
+    Joint rotations are left out of the outputs: the page draws
     positions only.
     """
     skeleton = network.skeleton
@@ -45,17 +45,13 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
         return {}
     layout = network.layout
     outputs = layout.y_joint_rotation.start
-    weights, biases = list(network.weights), list(network.biases)
-    weights[-1], biases[-1] = weights[-1][:, :outputs], biases[-1][:, :outputs]
     legs = feet.leg_joints(skeleton)
     parts = body_parts(skeleton, network.links, network.hurt_links)
     sole = feet.sole_heights(network, legs).tolist()
     return {
-        "layers": [_layer(w, b) for w, b in zip(weights, biases, strict=True)],
+        "network": {"kind": network.kind, **network.page(outputs)},
         "xMean": packed(network.x_mean.astype(np.float32)),
-        "xScale": packed(
-            np.where(network.x_std > 0, 1 / np.maximum(network.x_std, 1e-30), 0).astype(np.float32)
-        ),
+        "xScale": packed(inverse(network.x_std).astype(np.float32)),
         "yMean": packed(network.y_mean[:outputs].astype(np.float32)),
         "yStd": packed(network.y_std[:outputs].astype(np.float32)),
         "joints": layout.joints,
@@ -73,17 +69,17 @@ def playable(network: Network, runtime: Mapping[str, Any]) -> dict[str, Any]:
         "carried": [np.flatnonzero(row).tolist() for row in feet.carried(skeleton, legs)],
         "sole": sole,
         "body": {**body(skeleton.joints, skeleton.parents, skeleton.roles, network.links), "sole": sole},
-        "severityStep": runtime["severity_rate"] / 60,
-        "severityScale": runtime["severity_scale"],
-        "footLocking": runtime["foot_locking"],
-        "steering": runtime["steering"],
+        "severityStep": runtime.severity_rate / 60,
+        "severityScale": runtime.severity_scale,
+        "footLocking": runtime.foot_locking,
+        "steering": runtime.steering,
         "parts": parts,
         "presets": [
             {"name": name, "severities": [[parts[label], value] for label, value in values.items()]}
             for name, values in PRESETS.items()
             if all(label in parts for label in values)
         ],
-        "constants": _constants(),
+        "constants": {**_constants(), "side": network.terrain_side},
     }
 
 
@@ -124,23 +120,9 @@ def _constants() -> dict[str, float]:
         "strafeFrom": float(animation.STRAFE_FROM),
         "turnInPlace": float(animation.TURN_IN_PLACE),
         "jogFrom": animation.JOG_FROM,
-        "side": 25.0,
         "lockAt": feet.LOCK_AT,
         "release": feet.RELEASE,
         "tooFar": feet.TOO_FAR,
         "heightMix": feet.HEIGHT_MIX,
         "floating": feet.FLOATING,
-    }
-
-
-def _layer(weights: Array, biases: Array) -> dict[str, Any]:
-    """Control points (K, out, in) as integers of -32767..32767, with a factor for each row."""
-    scale = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30).astype(np.float32)
-    return {
-        "points": weights.shape[0],
-        "rows": weights.shape[1],
-        "columns": weights.shape[2],
-        "weights": packed(np.round(weights / scale[..., None]).astype(np.int16)),
-        "scale": packed(scale),
-        "biases": packed(biases.astype(np.float32)),
     }

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
+from hobble.models.packing import packed
 from hobble.report.body import body
 
 FPS = 30
@@ -96,9 +95,3 @@ def readable(name: str) -> str:
     'Stop and go'
     """
     return name.replace("_", " ").capitalize()
-
-
-def packed(array: NDArray[Any]) -> str:
-    """The little-endian bytes of an array as base64."""
-    array = np.ascontiguousarray(array)
-    return base64.b64encode(array.astype(array.dtype.newbyteorder("<")).tobytes()).decode("ascii")

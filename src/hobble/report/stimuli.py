@@ -14,15 +14,16 @@ from PIL import Image
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_json
 from hobble.core.quat import Array
+from hobble.models.network import Network
 from hobble.report.body import body
 from hobble.report.playable import PRESETS, body_parts
 from hobble.report.raster import GRID, Camera, Studio
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton
-from hobble.runtime.network import Network
+from hobble.runtime.options import Runtime
 
 SEVERITY = 8.0
-# The study of Ferre et al. showed thirteen walks, and asked which part is hurt; in them nothing is coloured.
+# The study of Quentin Ferre (2019) showed thirteen walks, and asked which part is hurt; nothing is coloured.
 STUDY: dict[str, tuple[str, ...]] = {
     "healthy": (),
     "left-thigh": ("left thigh",),
@@ -59,7 +60,7 @@ class Loop:
 
 
 def write_stimuli(
-    network: Network, folder: str | Path, size: int = 400, **runtime: Any
+    network: Network, folder: str | Path, runtime: Runtime, size: int = 400
 ) -> list[dict[str, Any]]:
     """Write <name>.webp and <name>.bvh of each stimulus and preset into a folder, and stimuli.json.
 
@@ -74,9 +75,9 @@ def write_stimuli(
     skeleton = network.skeleton
     dressed = body(skeleton.joints, skeleton.parents, skeleton.roles, network.links)
     studio, rows = Studio(dressed), []
-    healthy, trained = walk(network, {}, **runtime), hurt_in_training(network)
+    healthy, trained = walk(network, {}, runtime), hurt_in_training(network)
     for name, hurt, shown in wanted(network):
-        loop = walk(network, hurt, **runtime) if hurt else healthy
+        loop = walk(network, hurt, runtime) if hurt else healthy
         own = skeleton
         if "skeleton" not in network.meta:
             own = fitted_skeleton(skeleton, loop.positions, loop.rotations)
@@ -146,9 +147,9 @@ def wanted(network: Network) -> list[tuple[str, dict[str, float], bool]]:
     return out
 
 
-def walk(network: Network, injury: Mapping[str, float], **runtime: Any) -> Loop:
+def walk(network: Network, injury: Mapping[str, float], runtime: Runtime) -> Loop:
     """The character walking straight on, cut where a later moment is most like an earlier one."""
-    animation = ProceduralAnimation(network, **runtime)
+    animation = ProceduralAnimation(network, **dict(runtime))
     ahead = np.array([0.0, SPEED])
     poses = [
         animation.next_pose(ahead, None, "walk", dict(injury) or None)

@@ -13,17 +13,16 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.runtime.axes import Axes
 from hobble.runtime.character import Character, standing
 from hobble.runtime.controller import Controller
 from hobble.runtime.ground import as_ground
-from hobble.runtime.network import Network, load_network
-from hobble.runtime.predictor import Predictor
 from hobble.runtime.trajectory import STILL
 from hobble.runtime.waypoints import Follower, Waypoint
 
 JOG_FROM = 5.0  # cm a frame: between walking at 2.5 and jogging at 7.5
-TERRAIN_SIDE = 25.0  # centimetres from the path to the side heights, where a network does not tell
 BLIND = "this network has no severity inputs; train a configuration with `injury: true`"
 TURN_IN_PLACE = np.radians(20)  # a standing figure steps around to face what is further aside than this
 
@@ -102,9 +101,9 @@ class ProceduralAnimation:
             "severity_rate": severity_rate,
             "foot_locking": foot_locking,
             "steering": steering,
-            "side": float(network.meta.get("terrain_side", TERRAIN_SIDE)),
+            "side": network.terrain_side,
         }
-        self._predictor = Predictor(network, mode, storage)
+        self._predictor = network.predictor(mode, storage)
         self._waypoints = list(waypoints) if waypoints is not None else None
         self._links = {name: i for i, name in enumerate(network.links)}
         self._gaits = {name: i for i, name in enumerate(network.gaits)}

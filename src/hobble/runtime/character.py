@@ -8,7 +8,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.runtime.network import Network
+from hobble.models.network import Network
 
 
 @dataclass

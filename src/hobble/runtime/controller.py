@@ -19,9 +19,9 @@ import numpy as np
 from numba import njit
 
 from hobble.core.quat import Array
+from hobble.models.network import Predictor
 from hobble.runtime import feet, trajectory
 from hobble.runtime.character import Character
-from hobble.runtime.predictor import Predictor
 
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60

@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import functools
 import os
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from urllib.parse import quote
 
 from hobble.config.load import Catalogue
-from hobble.config.models import ClipEntry
+from hobble.config.models import ClipEntry, hurts
 from hobble.core.clip_files import NAMES, can_be_called, find_clips, the_file
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.untrusted import MOST_TEXT, check_regular, read_bytes
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 
 DATASETS = "results/datasets"
 MIRROR = "_mirror"
+HURT = re.compile(r"_hurt([1-9])$")  # at the end of a hurt version's name
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
+
+
+def original(clip: str) -> str:
+    """The clip that a mirror, a hurt version, or the mirror of one is made from; else itself."""
+    return HURT.sub("", clip.removesuffix(MIRROR))
 
 
 class Clips:
@@ -27,19 +35,53 @@ class Clips:
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def of(self, dataset: str) -> dict[str, ClipEntry]:
-        """The clips of a data set by name, without mirrors. Raises HobbleError where there are none."""
+        """The clips of a data set by name, hurt versions among them, without mirrors.
+
+        Raises HobbleError where there are none.
+        """
+        own = self.own(dataset)
+        return {**own, **{version: own[original(version)] for version in self.versions(dataset)}}
+
+    @functools.cache  # noqa: B019
+    def own(self, dataset: str) -> dict[str, ClipEntry]:
+        """The clips that the data set lists or its folder holds."""
         listed = self.catalogue.dataset(dataset).clips or dict.fromkeys(self._scanned(dataset))
         if odd := [name for name in listed if name.endswith(MIRROR)]:
             raise HobbleError(
                 f"data set {dataset}: {', '.join(odd)}: only a mirror is called so, which `mirror: true` "
                 "makes from its original. Take it out, or rename its file."
             )
+        if odd := [name for name in listed if HURT.search(name)]:
+            raise HobbleError(
+                f"data set {dataset}: {', '.join(odd)}: only a hurt version is called so, which `hurt` makes "
+                "from its original. Take it out, or rename its file."
+            )
         return {name: entry or ClipEntry() for name, entry in listed.items()}
 
+    @functools.cache  # noqa: B019
+    def versions(self, dataset: str) -> dict[str, int]:
+        """The hurt versions of the healthy clips by name, and which turn each has among them, from 0."""
+        options = self.catalogue.dataset(dataset).hurt
+        healthy = (
+            [clip for clip in self.own(dataset) if not self.is_injured(dataset, clip)] if options else []
+        )
+        many = options.versions if options else 0
+        names = [f"{clip}_hurt{version + 1}" for version in range(many) for clip in healthy]
+        return {name: turn for turn, name in enumerate(names)}
+
+    def is_injured(self, dataset: str, clip: str) -> bool:
+        """Whether anything hurts in a clip: a hurt version, or by the configuration or its status file."""
+        if HURT.search(clip.removesuffix(MIRROR)) or self.entry(dataset, clip).is_injured:
+            return True
+        if self.catalogue.dataset(dataset).synthetic is not None:
+            return False
+        files = self.status_files(dataset, clip)
+        return any(hurts(read_bytes(file, MOST_TEXT).decode("latin-1")) for file in files)
+
     def entry(self, dataset: str, clip: str) -> ClipEntry:
-        """What the data set says of a clip or of the original of a mirror."""
-        clips = self.of(dataset)
-        name = clip.removesuffix(MIRROR)
+        """What the data set says of a clip, or of the original of a mirror or of a hurt version."""
+        clips = self.own(dataset)
+        name = original(clip)
         if name not in clips:
             raise HobbleError(f"data set {dataset} has no clip {name!r}; it has: {', '.join(clips)}")
         return clips[name]
@@ -120,7 +162,10 @@ class Clips:
     def heightmap_files(self, dataset: str) -> list[str]:
         """Heightmaps that are files, in the order of the configuration."""
         maps = self.catalogue.dataset(dataset).terrain.heightmaps
-        return [str(self.mocap / m.path) for m in maps if m.path]
+        files = [self.mocap / m.path for m in maps if m.path]
+        for file in filter(Path.exists, files):
+            check_regular(file)
+        return [str(file) for file in files]
 
     def skeleton_file(self, dataset: str) -> str:
         """Path of the data set's skeleton."""

@@ -60,6 +60,10 @@ class Configurations:
         """The configuration whose network it reads: itself, or another."""
         return self.catalogue.configuration(configuration).network_of or configuration
 
+    def kind(self, configuration: str) -> str:
+        """The package of the kind of network that it trains or reads: hobble.models.pfnn."""
+        return f"hobble.models.{self.catalogue.configuration(self.owner(configuration)).network.kind}"
+
     def network(self, configuration: str, file: str) -> str:
         """A file of the configuration's network, or of the network it reads."""
         return f"results/{self.owner(configuration)}/network/{file}"

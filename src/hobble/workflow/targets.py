@@ -13,7 +13,7 @@ from hobble.workflow.comparison import COMPARE
 from hobble.workflow.project import Project
 
 if TYPE_CHECKING:
-    from hobble.config.models import ClipEntry, Configuration, SkeletonFile
+    from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 
 PAGE = "page"  # under results/: what all reports share
 
@@ -68,9 +68,10 @@ def _goes_on(name: str, model: Configuration, start: Configuration) -> None:
 def _dataset(project: Project, name: str) -> None:
     model = project.catalogue.dataset(name)
     skeleton = project.catalogue.skeleton(model.skeleton)
-    for clip, entry in project.clips.of(name).items():
+    for clip, entry in project.clips.own(name).items():
         project.clips.rig_files(name, clip)
         _entry(f"data set {name}: clips.{clip}", entry, [f"{a}-{b}" for a, b in skeleton.links])
+    _hurt(name, model, [f"{a}-{b}" for a, b in skeleton.links])
     project.datasets.selected(name, "all")
     if model.mirror:
         _mirrored(model.skeleton, skeleton)
@@ -94,6 +95,20 @@ def _entry(where: str, entry: ClipEntry, links: Sequence[str]) -> None:
                 f"no such recipe: {entry.recipe:.80}",
                 fix=f"There are {', '.join(RECIPES)}.",
             )
+
+
+def _hurt(name: str, model: Dataset, links: Sequence[str]) -> None:
+    """What a data set says of hurt versions: links that there are."""
+    if model.hurt is None or not model.hurt.versions:
+        return
+    if not links:
+        raise HobbleError(
+            f"data set {name}: hurt: skeleton {model.skeleton} has no links. List `links` there."
+        )
+    if odd := [link for link in model.hurt.links if link not in links]:
+        raise HobbleError(
+            f"data set {name}: hurt.links: no such link: {', '.join(odd)}. There are {', '.join(links)}."
+        )
 
 
 def _mirrored(name: str, skeleton: SkeletonFile) -> None:

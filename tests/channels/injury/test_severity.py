@@ -10,9 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.core.clip import Clip
-from hobble.core.errors import InputError
-from hobble.core.skeleton import Skeleton
 from hobble.channels.injury.severity import (
     clip_severity,
     load_injury,
@@ -24,6 +21,9 @@ from hobble.channels.injury.severity import (
     write_report,
 )
 from hobble.channels.injury.status import Spell, Status, read_status
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
 from hobble.motion.resample import sample_times
 
 THIGH, ARM = "LeftUpLeg-LeftLeg", "LeftArm-LeftForeArm"

@@ -7,9 +7,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from hobble.channels.injury.table import write_statuses
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import read_yaml
-from hobble.channels.injury.table import write_statuses
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels.injury.status import Spell, Status, parse_links, read_status
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz, write_json
 from hobble.core.quat import Array
-from hobble.channels.injury.status import Spell, Status, parse_links, read_status
 
 FPS = 60.0  # of every clip
 

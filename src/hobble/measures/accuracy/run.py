@@ -20,10 +20,10 @@ from hobble.core.quat import Array
 from hobble.database.clip_rows import ClipRows, expanded, load_clip_rows
 from hobble.database.layout import RowLayout
 from hobble.database.statistics import Moments
-from hobble.evaluation.predict import predict
 from hobble.measures.given import Given, Outcome
 from hobble.measures.joints import Joints
-from hobble.runtime.network import Network, load_network
+from hobble.models.load import load_network
+from hobble.models.network import Network
 
 LEAST = 1e-3  # cm; below this a joint stands at the root itself and a relative error says nothing
 SPLITS = ("train", "held_out")
@@ -86,7 +86,7 @@ def clip_errors(network: Network, rows: ClipRows, joints: Sequence[int]) -> Erro
     layout = network.layout
     total, histogram = Moments.nothing(2), np.zeros(len(EDGES) - 1)
     for pairs in expanded(rows, links=layout.links > 0):
-        errors = joint_errors(layout, pairs.y, predict(network, pairs.x, pairs.p), joints)
+        errors = joint_errors(layout, pairs.y, network.predict(pairs.x, pairs.p), joints)
         weights = np.repeat(pairs.weight / len(joints), len(joints))
         errors = errors.reshape(-1, 2)
         total = total + Moments.of(errors, weights)

@@ -30,8 +30,8 @@ from hobble.measures.accuracy.run import (
 )
 from hobble.measures.given import Given, Outcome
 from hobble.measures.rollouts import Options
-from hobble.runtime.network import load_network
-from hobble.runtime.predictor import Predictor
+from hobble.models.load import load_network
+from hobble.models.network import Predictor
 
 LENGTHS = (1, 10, 60, 300)  # frames
 OVERLAP = 10  # roll-outs of one length that every frame lies in
@@ -221,7 +221,7 @@ def measure_roll_outs(
     how phase is looked up. Raises InputError where rows and network differ.
     """
     network = load_network(weights)
-    predictor = Predictor(network, mode)
+    predictor = network.predictor(mode)
     joints = joint_indices(network, equivalents)
     total = {length: dict.fromkeys(SPLITS, Strayed()) for length in lengths}
     entries: dict[int, list[dict[str, Any]]] = {length: [] for length in lengths}

@@ -1,11 +1,11 @@
 // The character: the controller of `hobble.runtime` once more, for one figure. The same steps in the same order, so
 // that one set of vectors tests both. Centimetres, 60 Hz, yaw 0 faces +Z and grows toward +X.
-import { createNetwork } from "./network.js";
+import { networks } from "networks"; // by kind; the bundle gathers them from the folders of hobble.models
 import { bytes, dot, minus } from "./numbers.js";
 
 export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const { joints: J, step, x: X, y: Y, gaits, constants: k } = spec, T = 2 * spec.window, M = spec.window;
-  const S = T / step, F = M / step, G = gaits.length, L = spec.links.length, predict = createNetwork(spec);
+  const S = T / step, F = M / step, G = gaits.length, L = spec.links.length, predict = networks[spec.network.kind](spec);
   const { atan2, sin, cos, hypot, floor, min, max, abs, sqrt, PI } = Math;
   const wrap = (angle) => angle - 2 * PI * floor((angle + PI) / (2 * PI));
   const mean = new Float32Array(bytes(spec.yMean)), x = new Float32Array(X.size);

@@ -2,7 +2,7 @@
 
 It learns windows of the training clips, each labelled with the link that hurts. How well it names windows of
 captured motion that it has not seen is the ceiling; how well it names those of generated walks stands beside
-the share that people got right when shown figures (Ferre et al. 2019).
+the share that people got right when shown figures (Ferre 2019).
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.discriminant import Discriminant, learn
 from hobble.evaluation.gait_features import features
 from hobble.measures.given import Given, Outcome
-from hobble.runtime.network import Network, load_network
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 HEALTHY = "healthy"

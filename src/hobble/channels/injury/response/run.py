@@ -13,7 +13,8 @@ from hobble.channels.injury.response.sweep import SEVERITIES, Sweep
 from hobble.evaluation.captured import Captured, captured_clips
 from hobble.evaluation.crowd import SPEEDS
 from hobble.measures.given import Given, Outcome
-from hobble.runtime.network import Network, load_network
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 GAITS = tuple(SPEEDS)
