@@ -3,6 +3,7 @@ import os
 import sys
 from pathlib import Path
 
+from hobble.channels import NAMES, modules_of
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import modules
 from hobble.workflow import lifetime
@@ -11,6 +12,7 @@ from hobble.workflow.demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check
+from hobble.workflow.told import told_by
 
 try:
     # Relative, so that a checkout can be moved without making anything again.
@@ -51,7 +53,8 @@ wildcard_constraints:
     dataset=r"[^/]+",
     clip=r"[^/]+(?<!_mirror)",
     rows=r"[^/]+",
-    selection="healthy|all",
+    channel="|".join(NAMES),
+    told=r"plain|[a-z_+]+(?<!clips)",
     measure="|".join(MEASURES),
 
 
@@ -73,8 +76,13 @@ rule all:
 include: "workflow/rules/synthetic.smk"
 include: "workflow/rules/motion.smk"
 include: "workflow/rules/labels.smk"
-include: "workflow/rules/injury.smk"
+include: "workflow/rules/channels.smk"
 include: "workflow/rules/hurt.smk"
+
+
+ruleorder: hurt_clip > channel_clip
+
+
 include: "workflow/rules/terrain.smk"
 include: "workflow/rules/database.smk"
 include: "workflow/rules/training.smk"

@@ -24,10 +24,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hobble.database.clip_rows import ClipRows, save_clip_rows
-from hobble.database.layout import RowLayout
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.layout import RowLayout
 
 CLIP_ROWS = 3000
 BATCH = 512
@@ -39,7 +39,7 @@ SECONDS = 6.0  # of reading, per measurement
 
 def made_up(folder: Path, size: int, joints: int) -> dict[str, Path]:
     """Files of random rows, about `size` bytes in all."""
-    layout = RowLayout(joints, links=30)
+    layout = RowLayout(joints, channels=(("injury", 30),))
     skeleton = {"name": "made up", "joints": {f"j{i}": {} for i in range(joints)}}
     files, total, rng = {}, 0, np.random.default_rng(0)
     while total < size:
@@ -48,15 +48,17 @@ def made_up(folder: Path, size: int, joints: int) -> dict[str, Path]:
             "x": (CLIP_ROWS, layout.x_terrain.start),
             "y": (CLIP_ROWS, layout.y_size),
             "p": (CLIP_ROWS,),
-            "severity": (CLIP_ROWS, 30),
             "heights": (CLIP_ROWS * fits, 36),
             "mean": (CLIP_ROWS * fits,),
         }
         arrays = {name: rng.standard_normal(shape, np.float32) for name, shape in shapes.items()}
+        told = {"injury": rng.standard_normal((CLIP_ROWS, 30), np.float32)}
         count = np.full(CLIP_ROWS, fits)
         frame = np.arange(CLIP_ROWS)
         name = f"clip{len(files):04d}"
-        rows = ClipRows(name, layout, skeleton, frame=frame, cycle=frame // 60, fits=count, **arrays)
+        rows = ClipRows(
+            name, layout, skeleton, frame=frame, cycle=frame // 60, fits=count, channels=told, **arrays
+        )
         files[name] = folder / f"{name}.npz"
         save_clip_rows(files[name], rows)
         total += files[name].stat().st_size
@@ -178,7 +180,7 @@ def task_build(folder: Path, clips: str) -> None:
     files = {file.stem: file for file in sorted(Path(clips).glob("*.npz"))}
     splits = dict.fromkeys(files, "train")
     before, start = status("VmRSS"), time.perf_counter()
-    write_database(folder / "db", files, splits, injury=True, joint_weight=0.1)
+    write_database(folder / "db", files, splits, channels=["injury"], joint_weight=0.1)
     print(time.perf_counter() - start, status("VmHWM") >> 20, before >> 20)
 
 
@@ -320,7 +322,7 @@ def main() -> None:
     try:
         small = made_up(folder / "one", 1, args.joints)
         splits = dict.fromkeys(small, "train")
-        write_database(folder / "small", small, splits, injury=True, joint_weight=0.1)
+        write_database(folder / "small", small, splits, channels=["injury"], joint_weight=0.1)
         db = build(args, folder)
         if args.only != "training":
             reading(db, folder, args)

@@ -2,7 +2,7 @@
 
     python benchmarks/generalise.py DATABASE < recipes
 
-DATABASE is results/datasets/<dataset>/database/healthy, beside the `clips` it was made from. Each line of the
+DATABASE is results/datasets/<dataset>/database/plain, beside the `clips` it was made from. Each line of the
 input is one recipe, in keys of the training section: `passes: 2, batch: 256, dropout: 0.1`. For each, the
 mean squared error of the last section of its training (with dropout and roll-outs) and of every held-out row;
 how far joints are from the recorded ones over roll-outs of 1, 10 and 60 frames, cm, as the evaluation stage

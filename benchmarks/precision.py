@@ -51,7 +51,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--threads", type=int, default=2)
     asked = parser.parse_args()
-    made = Manifest.load(asked.folder / "database/healthy")
+    made = Manifest.load(asked.folder / "database/plain")
     splits = {clip["clip"]: clip["split"] for clip in made.clips}
     clips = {name: asked.folder / f"database/clips/{name}.npz" for name in splits}
     frames = f"{made.rows('train'):,} frames to learn from, {made.rows('held_out'):,} held out"
@@ -61,7 +61,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         for dtype in DTYPES:
             database = Path(name, dtype)
-            options = {"injury": False, "joint_weight": made.joint_weight, "dtype": dtype}
+            options = {"channels": [], "joint_weight": made.joint_weight, "dtype": dtype}
             manifest = write_database(database, clips, splits, **options)
             for seed in asked.seeds:
                 weights = trained(database, Path(name, f"{dtype}-{seed}"), asked.passes, seed, asked.threads)

@@ -18,12 +18,12 @@ import numpy as np
 import yaml
 
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.database.layout import RowLayout
 from hobble.models.load import load_network
 from hobble.models.network import STORAGES
 from hobble.models.pfnn.forward import weights_at
 from hobble.models.pfnn.network import Pfnn
 from hobble.models.pfnn.predictor import MODES, PfnnPredictor
+from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 
 SKELETON = Path(__file__).parents[1] / "config/skeletons/holden31.yaml"

@@ -2,7 +2,7 @@
 
     python benchmarks/schedules.py DATABASE [--configurations holden,fast] [--plot curves.png] [--threads 2]
 
-DATABASE is a database folder, such as results/datasets/synthetic/database/healthy. Each configuration is
+DATABASE is a database folder, such as results/datasets/synthetic/database/plain. Each configuration is
 trained on it from nothing, the first one to its end, the others likewise. The curves are the held-out errors
 of history.csv over its seconds, which count everything from the first batch on, measuring and checkpoints
 too. CPU seconds of the process are given beside wall time: they change less with what else the machine does.

@@ -83,7 +83,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         files = made_up(Path(folder), options.size_mb << 20, joints=31)
         write_database(
-            Path(folder) / "database", files, dict.fromkeys(files, "train"), injury=False, joint_weight=0.1
+            Path(folder) / "database", files, dict.fromkeys(files, "train"), channels=[], joint_weight=0.1
         )
         rows = DeviceRows(Database.open(Path(folder) / "database"), device)
     layout = rows.database.layout

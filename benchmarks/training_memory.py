@@ -87,7 +87,7 @@ def main() -> None:
         try:
             files = made_up(folder, size << 20, joints=31)
             splits = dict.fromkeys(files, "train") | {next(iter(files)): "held_out"}
-            write_database(folder / "database", files, splits, injury=False, joint_weight=0.1)
+            write_database(folder / "database", files, splits, channels=[], joint_weight=0.1)
             command = [sys.executable, __file__, "--child", str(folder / "database")]
             command += ["--configuration", options.configuration]
             done = subprocess.run(command, check=True, capture_output=True, text=True)

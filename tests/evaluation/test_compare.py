@@ -90,7 +90,7 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
         paths[key].write_text(json.dumps(value))
     paths["configuration"], paths["history"] = folder / "configuration.yaml", folder / "history.csv"
     network = {"hidden_layers": len(sizes) - 2, "units": 512, "control_points": 4}
-    model = {"dataset": f"of-{name}", "injury": False, "network": network, "training": {"passes": 20}}
+    model = {"dataset": f"of-{name}", "channels": [], "network": network, "training": {"passes": 20}}
     paths["configuration"].write_text(yaml.safe_dump({"configuration": model}))
     blocks = "pass,train_mse,held_out_turn" if name == "ava" else "pass,train_mse,held_out_mse"
     paths["history"].write_text(f"{blocks}\n1,0.5,0.25\n2,0.4,\n")

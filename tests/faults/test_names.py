@@ -54,7 +54,7 @@ def test_no_name_reaches_a_shell(lab: Lab, tiny_bvh: str) -> None:
 
 def test_a_name_that_cannot_be_one_ends_before_the_first_job(lab: Lab, tiny_bvh: str) -> None:
     (lab.run / "mocap/mine/a\ntouch pwned\n.bvh").write_text(tiny_bvh)
-    status, said = run(lab, "-np", "results/datasets/mine/database/all")
+    status, said = run(lab, "-np", "results/datasets/mine/database/injury")
     assert status == 1
     assert "mocap/mine: a clip is called" in said
     assert "Building DAG" not in said
@@ -111,7 +111,7 @@ def as_nobody(read: Callable[[], object]) -> str:
 def test_what_decides_on_the_jobs_but_may_not_be_read_is_named(reachable: Path, closed: str) -> None:
     for path, text in {
         "config/datasets/mine.yaml": DATASET,
-        "config/test.yaml": "dataset: mine\ninjury: true\n",
+        "config/test.yaml": "dataset: mine\nchannels: [injury]\n",
         "config/skeletons/holden31.yaml": SKELETON.read_text(),
         "mocap/mine/a.bvh": "HIERARCHY",
         "mocap/mine/a_injuries.txt": "frames:9\n",

@@ -12,8 +12,6 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.database.clip_rows import ClipRows, expanded, save_clip_rows
-from hobble.database.layout import RowLayout
 from hobble.evaluation.tables import write_csv
 from hobble.measures.accuracy.run import (
     QUANTILES,
@@ -29,8 +27,10 @@ from hobble.models.checks import NEEDED_ROLES
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn.forward import phase_shares, weights_at
+from hobble.rows.clip_rows import ClipRows, expanded, save_clip_rows
+from hobble.rows.layout import RowLayout
 
-LAYOUT = RowLayout(3, links=1)
+LAYOUT = RowLayout(3, channels=(("injury", 1),))
 SKELETON = {
     "name": "stick",
     "joints": {
@@ -50,7 +50,7 @@ def make_rows(clip: str, rows: int, fits: int, seed: int) -> ClipRows:
         rng.normal(size=(rows, LAYOUT.x_terrain.start)).astype(np.float32),
         rng.normal(2, 5, (rows, LAYOUT.y_size)).astype(np.float32),
         rng.random(rows).astype(np.float32),
-        rng.random((rows, 1)).astype(np.float32) * 10,
+        {"injury": rng.random((rows, 1)).astype(np.float32) * 10},
         np.arange(rows),
         np.zeros(rows, int),
         np.full(rows, fits),
@@ -71,7 +71,8 @@ def make_network(
     for name, size in (("X", layout.x_size), ("Y", layout.y_size)):
         arrays[f"{name}mean"] = rng.normal(size=size).astype(np.float32)
         arrays[f"{name}std"] = (rng.random(size) + 0.5).astype(np.float32)
-    meta = {"layout": layout.to_dict(), "skeleton": SKELETON, "links": ["Hips-Arm"][: layout.links]}
+    told = {"injury": ["Hips-Arm"]} if layout.channels else {}
+    meta = {"layout": layout.to_dict(), "skeleton": SKELETON, "channels": told}
     return {**arrays, "meta": np.array(json.dumps(meta))}
 
 
@@ -143,7 +144,7 @@ def test_a_clips_figures_are_those_of_all_its_pairs(weights, fits):
     network = load_network(weights)
     rows = make_rows("a", 37, fits, 5)
     relative, distance = [], []
-    for pairs in expanded(rows, links=True):
+    for pairs in expanded(rows, rows.layout):
         errors = joint_errors(LAYOUT, pairs.y, network.predict(pairs.x, pairs.p), range(3))
         relative.append(errors[..., 0])
         distance.append(errors[..., 1])
@@ -160,7 +161,7 @@ def test_batches_do_not_show(weights, monkeypatch):
     network, rows = load_network(weights), make_rows("a", 50, 10, 5)
     whole = clip_errors(network, rows, [0, 1, 2]).to_dict()
     monkeypatch.setattr(
-        "hobble.measures.accuracy.run.expanded", lambda rows, links: expanded(rows, links, batch=7)
+        "hobble.measures.accuracy.run.expanded", lambda rows, layout: expanded(rows, layout, batch=7)
     )
     assert clip_errors(network, rows, [0, 1, 2]).to_dict() == pytest.approx(whole)
 
@@ -213,7 +214,7 @@ def test_only_equivalent_joints(weights, tmp_path):
 
 
 def test_a_network_without_severities_reads_the_same_rows(tmp_path):
-    np.savez(tmp_path / "w.npz", **make_network(layout=replace(LAYOUT, links=0)))
+    np.savez(tmp_path / "w.npz", **make_network(layout=replace(LAYOUT, channels=())))
     save_clip_rows(tmp_path / "a.npz", make_rows("a", 20, 1, 0))
     result = measure(tmp_path / "w.npz", {"a": tmp_path / "a.npz"}, {"a": "held_out"}, "holden")
     assert result["held_out"]["frames"] == 20
@@ -224,7 +225,9 @@ def test_rows_of_another_layout_are_refused(weights, tmp_path):
     other = make_rows("a", 0, 1, 0)
     save_clip_rows(
         tmp_path / "a.npz",
-        replace(other, layout=RowLayout(4, links=1), x=np.zeros((0, 144)), y=np.zeros((0, 68))),
+        replace(
+            other, layout=RowLayout(4, channels=(("injury", 1),)), x=np.zeros((0, 144)), y=np.zeros((0, 68))
+        ),
     )
     with pytest.raises(InputError, match=r"a\.npz: its rows .* are not those the network has learnt"):
         measure(weights, {"a": tmp_path / "a.npz"}, {"a": "train"}, "holden")

@@ -12,7 +12,7 @@ from hobble.core.section import Positive, Section
 from hobble.evaluation.options import together
 from hobble.measures.joints import Joints
 from hobble.measures.measure import INPUTS, Measure
-from hobble.measures.registry import MEASURES, measure, modules
+from hobble.measures.registry import MEASURES, measure, modules, of_channels
 
 NAMES = [one.name for one in MEASURES]
 # Part -> its functions and what they are given.
@@ -50,17 +50,23 @@ def test_asks_for_what_there_is_and_has_the_parts_that_are_called(one: Measure) 
             assert len(inspect.signature(getattr(module, name)).parameters) == functions[name], (part, name)
 
 
+def test_channels_bring_their_own() -> None:
+    brought = [one.name for one in MEASURES if one.package.startswith("hobble.channels.")]
+    assert brought == ["injury", "recognition"] == [one.name for one in of_channels()]
+
+
 def test_names_are_unique() -> None:
     assert len(set(NAMES)) == len(NAMES)
     assert not set(NAMES) & set(INPUTS)
     assert len(modules("run")) == len(NAMES)
 
 
-def test_the_list_is_read_without_what_measures() -> None:
-    """It is read before anything is planned, in every job of a cluster."""
-    code = "import sys, hobble.measures.registry; print([m for m in sys.modules if m.endswith('.run')])"
+def test_the_list_and_the_options_are_read_without_what_measures() -> None:
+    """They are read before anything is planned, and again in every job of a cluster."""
+    code = "import sys, hobble.measures.registry, hobble.config.sections; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    loaded = done.stdout.split()
+    assert [name for name in loaded if name in ("numpy", "numba", "torch") or name.endswith(".run")] == []
 
 
 def test_options_of_all_are_one_section() -> None:

@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.database.clip_rows import ClipRows, save_clip_rows
-from hobble.database.layout import RowLayout
 from hobble.evaluation.motion_measures import in_root_frame
 from hobble.measures.rollouts.run import (
     Inputs,
@@ -24,6 +22,8 @@ from hobble.measures.rollouts.run import (
 )
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
+from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 
 
@@ -87,7 +87,7 @@ def test_a_roll_out_is_what_the_runtime_does(hurtable: Network, ground: Any) -> 
     assert np.abs(moved[0] - local[1]).max() > 1
 
 
-LAYOUT = RowLayout(31, links=30)
+LAYOUT = RowLayout(31, channels=(("injury", 30),))
 
 
 def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) -> ClipRows:
@@ -104,7 +104,7 @@ def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) ->
         rng.normal(size=(rows, LAYOUT.x_terrain.start)).astype(np.float32),
         rng.normal(0, 1, (rows, LAYOUT.y_size)).astype(np.float32),
         rng.random(rows).astype(np.float32),
-        rng.random((rows, 30)).astype(np.float32) * 10,
+        {"injury": rng.random((rows, 30)).astype(np.float32) * 10},
         frame,
         np.zeros(rows, int),
         np.ones(rows, int),
@@ -130,9 +130,9 @@ def test_every_frame_is_reached_ten_times(hurtable: Network) -> None:
 
 def test_one_frame_is_half_the_prediction_and_half_the_pose_carried_on(hurtable: Network) -> None:
     rows = clip_rows(hurtable, 40, 2)
-    asked = inputs(rows, np.arange(40), links=True)
+    asked = inputs(rows, np.arange(40), rows.layout)
     layout = hurtable.layout
-    np.testing.assert_array_equal(asked.x[:, layout.x_injury], rows.severity)
+    np.testing.assert_array_equal(asked.x[:, layout.x_channel("injury")], rows.channels["injury"])
     y = PfnnPredictor(hurtable).predict(asked.x, asked.phase)
     made, _ = roll_out(PfnnPredictor(hurtable), asked, np.arange(1, 40), 1)
     before = asked.x[1:, layout.x_joint_position].reshape(39, 31, 3).astype(float)
@@ -184,7 +184,7 @@ def test_splits_add_up_and_come_out_the_same(hurtable: Network, tmp_path: Path, 
 def test_rows_of_another_layout_are_refused(hurtable: Network, network: Network, tmp_path: Path) -> None:
     save(tmp_path / "weights.npz", hurtable)
     rows = clip_rows(hurtable, 0, 0)
-    layout = RowLayout(4, links=30)
+    layout = RowLayout(4, channels=(("injury", 30),))
     other = ClipRows(
         **{
             **vars(rows),
@@ -213,7 +213,7 @@ def save(path: Path, network: Network) -> None:
     meta = {
         "layout": network.layout.to_dict(),
         "skeleton": network.skeleton.to_dict(),
-        "links": list(network.links),
+        "channels": {"injury": list(network.links)},
         "gaits": list(network.gaits),
     }
     np.savez(path, **arrays, meta=np.array(json.dumps(meta)))

@@ -150,7 +150,7 @@ ANSWER = b"HTTP/1.1 200 OK\r\n"
 
 
 class Babbler(threading.Thread):
-    """A server that says `begin`, and then `more` every hundredth of a second until the other side is gone."""
+    """A server that says `begin`, then `more` a hundred times a second until the other side is gone."""
 
     def __init__(self, begin: bytes, more: bytes) -> None:
         super().__init__(daemon=True)
@@ -187,7 +187,7 @@ def test_a_server_that_dribbles_is_given_up_in_the_end(tmp_path, begin: bytes, m
 @pytest.mark.parametrize("announces", [True, False])
 def test_of_a_file_that_is_too_large_nothing_is_kept(server, fetch, announces: bool):
     server.announces = announces
-    with pytest.raises(InputError, match=r"larger than 0\.05 MB, which is the most that a clip may be\. "):
+    with pytest.raises(InputError, match=r"larger than 0\.05 MB, which is the most that a clip may be"):
         fetch(most=50_000)
     assert list(fetch.part.parent.iterdir()) == []
     assert len(server.asked) == 1

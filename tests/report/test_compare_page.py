@@ -30,7 +30,7 @@ def compared(material: Material) -> dict[str, Any]:
     resolved = {
         "configuration": {
             "dataset": "made_up",
-            "injury": True,
+            "channels": ["injury"],
             "network": {"hidden_layers": 2, "units": 16, "control_points": 4},
             "training": {"passes": 3},
         }

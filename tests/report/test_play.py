@@ -78,7 +78,7 @@ def test_the_page_moves_as_python_does(tab: Any, network: Network, examples: Mod
         asked = wish(frame)
         injury = {"LeftUpLeg-LeftLeg": 7.0, "Hips-LowerBack": 3.0} if asked["hurt"] else None
         pose = animation.next_pose(asked["velocity"], asked["facing"], asked["gait"], injury, hills)
-        expected.append((pose.positions, pose.phase, pose.severity))
+        expected.append((pose.positions, pose.phase, pose.told["injury"]))
     links = network.links
     script = f"""(() => {{
       const spec = Hobble.material.playable.example, c = Hobble.character(spec);

@@ -133,7 +133,7 @@ def test_files_of_a_loop(network: Network, examples: ModuleType, tmp_path: Path,
     monkeypatch.setattr(stimuli, "STUDY", {"healthy": (), "left-foot": ("left foot",)})
     monkeypatch.setattr(stimuli, "PRESETS", {"Bad back": {"lower back": 8}})
     x_mean = network.x_mean.copy()
-    x_mean[network.layout.x_injury][network.links.index("LeftFoot-LeftToeBase")] = 0.5
+    x_mean[network.layout.x_channel("injury")][network.links.index("LeftFoot-LeftToeBase")] = 0.5
     network = replace(network, x_mean=x_mean)  # a network that learnt from a hurt left foot, and nothing else
     stimuli.write_stimuli(network, tmp_path / "a", examples.RUNTIME, size=64)
     names = {"healthy", "left-foot", "preset-bad-back"}

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.database.layout import RowLayout
 from hobble.models.pfnn.network import Pfnn
+from hobble.rows.layout import RowLayout
 
 MakeNetwork = Callable[..., Pfnn]
 
@@ -45,7 +45,7 @@ def make_network(holden31: Skeleton) -> MakeNetwork:
         control_points: int = 4,
         skeleton: Skeleton = holden31,
     ) -> Pfnn:
-        layout = RowLayout(len(skeleton.joints), links=links)
+        layout = RowLayout(len(skeleton.joints), channels=(("injury", links),) if links else ())
         rng = np.random.default_rng(5)
         sizes = (layout.x_size, 23, 17, layout.y_size)
         shapes = list(zip(sizes[1:], sizes, strict=False))
@@ -65,7 +65,7 @@ def make_network(holden31: Skeleton) -> MakeNetwork:
             y_std=np.full(layout.y_size, 0.05, np.float32),
             layout=layout,
             skeleton=skeleton,
-            links=skeleton.link_names[:links],
+            channels={"injury": skeleton.link_names[:links]} if links else {},
         )
 
     return make
@@ -88,5 +88,5 @@ def hurtable(make_network: MakeNetwork) -> Pfnn:
     """A network of random weights with 30 severities, of which all were seen in training."""
     made = make_network(links=30)
     mean = made.x_mean.copy()
-    mean[made.layout.x_injury] = 0.5
+    mean[made.layout.x_channel("injury")] = 0.5
     return replace(made, x_mean=mean)

@@ -128,7 +128,7 @@ def test_which_link_each_scenario_hurts(hurtable, network) -> None:
     }
     assert hurt_links(network) == {}
     mean = np.zeros_like(hurtable.x_mean)
-    mean[hurtable.layout.x_injury.start + hurtable.links.index("LowerBack-Spine")] = 0.1
+    mean[hurtable.layout.x_channel("injury").start + hurtable.links.index("LowerBack-Spine")] = 0.1
     trained = hurt_links(replace(hurtable, x_mean=mean))
     assert trained["lower_back"] == "LowerBack-Spine"
     assert trained["left_knee"] == "LeftUpLeg-LeftLeg"

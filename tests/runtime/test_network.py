@@ -156,7 +156,7 @@ def test_weights_file_round_trip(tmp_path: Path, hurtable: Network, holden31) ->
     meta = {
         "layout": hurtable.layout.to_dict(),
         "skeleton": holden31.to_dict(),
-        "links": list(hurtable.links),
+        "channels": {"injury": list(hurtable.links)},
         "gaits": list(hurtable.gaits),
     }
     np.savez(tmp_path / "weights.npz", **arrays(hurtable), meta=np.array(json.dumps(meta)))
@@ -181,7 +181,7 @@ def test_a_file_without_meta_tells_its_layout(tmp_path: Path, hurtable: Network,
 def test_hurt_links_are_those_of_training(make_network) -> None:
     network = make_network(links=30)
     assert network.hurt_links == network.links
-    network.x_mean[network.layout.x_injury.start + 3] = 0.2
+    network.x_mean[network.layout.x_channel("injury").start + 3] = 0.2
     assert network.hurt_links == network.links[3:4]
 
 

@@ -13,12 +13,12 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.database.layout import RowLayout
 from hobble.models.load import load_network
 from hobble.models.pfnn.forward import weights_at
 from hobble.models.pfnn.onnx_export import OPSET, TOLERANCE, check_onnx, export_onnx, write_checked
 from hobble.models.pfnn.predictor import MODES, PfnnPredictor
 from hobble.models.pfnn.release import write_release
+from hobble.rows.layout import RowLayout
 from hobble.runtime.__main__ import main
 
 

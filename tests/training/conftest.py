@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton
-from hobble.database.clip_rows import ClipRows
-from hobble.database.layout import RowLayout
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
 from hobble.models.pfnn.options import PfnnOptions
+from hobble.rows.clip_rows import ClipRows
+from hobble.rows.layout import RowLayout
 from hobble.training.options import Training
 
 SPLITS = {"walk": "train", "hop": "train", "turn": "held_out"}
@@ -29,7 +29,7 @@ def figure() -> Skeleton:
 def clip_rows(name: str, rows: int, fits: int, seed: int) -> ClipRows:
     """Rows whose Y is a smooth function of two columns of X and of the phase, with some noise."""
     skeleton = figure()
-    layout = RowLayout(joints=4, links=1)
+    layout = RowLayout(joints=4, channels=(("injury", 1),))
     rng = np.random.default_rng(seed)
     columns = layout.x_terrain.start
     x = rng.normal(0, 2, (rows, columns)).astype(np.float32)
@@ -45,7 +45,7 @@ def clip_rows(name: str, rows: int, fits: int, seed: int) -> ClipRows:
         x,
         (y + rng.normal(0, 0.05, y.shape)).astype(np.float32),
         p,
-        rng.uniform(0, 10, (rows, 1)).astype(np.float32),
+        {"injury": rng.uniform(0, 10, (rows, 1)).astype(np.float32)},
         np.arange(60, 60 + rows),
         np.arange(rows) // 40,
         np.full(rows, fits),
@@ -64,7 +64,7 @@ def small_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "hop": clip_rows("hop", 80, 10, 2),
         "turn": clip_rows("turn", 70, 1, 3),
     }
-    write_database(path, clips, SPLITS, injury=True, joint_weight=0.1)
+    write_database(path, clips, SPLITS, channels=["injury"], joint_weight=0.1)
     return path
 
 

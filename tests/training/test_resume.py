@@ -16,8 +16,8 @@ import torch
 
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
-from hobble.database.layout import CONTACTS, GAITS, RowLayout
 from hobble.database.reader import Database
+from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 from hobble.training import checkpoint
 from hobble.training import run as run_module
 from hobble.training.checkpoint import State, pack
@@ -257,16 +257,19 @@ def test_weights_are_all_that_a_runtime_needs(
 ) -> None:
     files = {name: tmp_path / name for name in ("weights", "history", "checkpoint")}
     settings = {"network": network, "training": training, "threads": 2, "start": None, "code": None}
-    run(small_database, configuration="small", checkpoints=tmp_path / "c", **settings, **files)
+    settings |= {"configuration": "small", "terrain_side": 31.0}
+    run(small_database, checkpoints=tmp_path / "c", **settings, **files)
     first = files["weights"].read_bytes()
-    run(small_database, configuration="small", checkpoints=tmp_path / "d", **settings, **files)
+    run(small_database, checkpoints=tmp_path / "d", **settings, **files)
     assert files["weights"].read_bytes() == first
     weights = load_npz(files["weights"])
     meta = json.loads(str(weights["meta"]))
     assert RowLayout.from_dict(meta["layout"]) == data.layout
     assert list(meta["skeleton"]["joints"]) == list(data.skeleton["joints"])
     assert (meta["gaits"], meta["contacts"]) == (list(GAITS), list(CONTACTS))
-    assert (meta["links"], meta["configuration"]) == (["Hips-LeftLeg"], "small")
+    assert (meta["channels"], meta["configuration"]) == ({"injury": ["Hips-LeftLeg"]}, "small")
+    assert (meta["kind"], meta["terrain_side"]) == ("pfnn", 31.0)
+    assert meta["network"].startswith("y = W2 elu(W1 elu(W0 x + b0) + b1) + b2 on")
     assert weights["W0"].shape == (4, 24, data.layout.x_size)
     assert weights["b2"].shape == (4, data.layout.y_size)
     block = next(data.blocks("held_out", 0, 0, data.manifest.visits, 0))

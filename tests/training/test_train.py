@@ -72,7 +72,14 @@ def test_rows_on_a_device_are_those_of_the_reader(tmp_path: Path, dtype: str) ->
     """Of several chunks, in every type that a database has."""
     clips = {"walk": clip_rows("walk", 150, 1, 1), "hop": clip_rows("hop", 80, 10, 2)}
     write_database(
-        tmp_path, clips, SPLITS, injury=True, joint_weight=0.1, dtype=dtype, chunk_bytes=30_000, seed=1
+        tmp_path,
+        clips,
+        SPLITS,
+        channels=["injury"],
+        joint_weight=0.1,
+        dtype=dtype,
+        chunk_bytes=30_000,
+        seed=1,
     )
     data = Database.open(tmp_path, 64)
     assert len(data.manifest.chunks["train"]) > 2

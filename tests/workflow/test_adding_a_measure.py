@@ -31,7 +31,7 @@ MEASURE = Measure(
     cost=Cost(memory_each=10, minutes=1),
 )
 '''
-RUN = """from hobble.database.clip_rows import load_clip_rows
+RUN = """from hobble.rows.clip_rows import load_clip_rows
 from hobble.evaluation.captured import captured
 from hobble.measures.given import Given, Outcome
 from hobble.measures.hips import Options

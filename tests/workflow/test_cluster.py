@@ -36,7 +36,9 @@ def bvh(path: Path, rows: int, promised: int, frame_time: str = "0.01") -> Path:
 @pytest.mark.workflow
 def test_thousands_of_clips_make_a_hundred_jobs(root, workflow, tmp_path) -> None:
     (workflow.checkout / "config/datasets/many.yaml").write_text(MANY)
-    (workflow.checkout / "config/many.yaml").write_text("extends: holden\ndataset: many\ninjury: true\n")
+    (workflow.checkout / "config/many.yaml").write_text(
+        "extends: holden\ndataset: many\nchannels: [injury]\n"
+    )
     (tmp_path / "many").mkdir()
     for number in range(CLIPS):
         bvh(tmp_path / f"many/clip-{number:02}.bvh", 100, 100)

@@ -27,7 +27,7 @@ def base(tmp_path: Path) -> Path:
     """A checkout with one configuration and a data set of three clips, one hurt by its status file."""
     (tmp_path / "config/datasets").mkdir(parents=True)
     (tmp_path / "config/one.yaml").write_text("dataset: mine\n")
-    (tmp_path / "config/hurt.yaml").write_text("extends: one\ninjury: true\n")
+    (tmp_path / "config/hurt.yaml").write_text("extends: one\nchannels: [injury]\n")
     (tmp_path / "config/datasets/mine.yaml").write_text(DATASET)
     folder = tmp_path / "data/mine"
     folder.mkdir(parents=True)
@@ -44,21 +44,21 @@ def test_mirrors_go_with_their_originals_and_hurt_clips_to_injured_networks(base
     healthy = {"a": "train", "a_mirror": "train", "b": "held_out", "b_mirror": "held_out"}
     assert project.configurations.splits("one") == healthy
     assert project.configurations.splits("hurt") == {**healthy, "c": "train", "c_mirror": "train"}
-    assert project.configurations.database("one").endswith("mine/database/healthy")
-    assert project.configurations.database("hurt").endswith("mine/database/all")
+    assert project.configurations.database("one").endswith("mine/database/plain")
+    assert project.configurations.database("hurt").endswith("mine/database/injury")
 
 
 def test_files_beside_a_clip_are_found_and_no_others(base: Path) -> None:
     project = Project(base, {})
     assert [Path(f).name for f in project.clips.label_files("mine", "b")] == ["b_gait.txt"]
     assert project.clips.label_files("mine", "c") == []
-    assert [Path(f).name for f in project.clips.status_files("mine", "c")] == ["c_injuries.txt"]
+    assert [Path(f).name for f in project.datasets.told.files("mine", "c", "injury")] == ["c_injuries.txt"]
 
 
 def test_a_status_in_the_configuration_takes_the_place_of_the_file(base: Path) -> None:
-    text = DATASET + "clips: {a: , b: , c: {status: 'LeftArm-LeftForeArm[3]'}}\n"
+    text = DATASET + "clips: {a: , b: , c: {channels: {injury: 'LeftArm-LeftForeArm[3]'}}}\n"
     (base / "config/datasets/mine.yaml").write_text(text)
-    assert Project(base, {}).clips.status_files("mine", "c") == []
+    assert Project(base, {}).datasets.told.files("mine", "c", "injury") == []
 
 
 def test_severities_of_0_hurt_nobody(base: Path) -> None:
@@ -68,10 +68,22 @@ def test_severities_of_0_hurt_nobody(base: Path) -> None:
     (base / "data/mine/c_injuries.txt").write_text(
         "frames:9\n1-4 LeftLeg-LeftFoot[0];\n5-9 LeftLeg-LeftFoot[.5];\n"
     )
-    assert [Project(base, {}).datasets.is_injured("mine", clip) for clip in "abc"] == [False, False, True]
-    text = DATASET + "clips: {a: {status: 'LeftLeg-LeftFoot[2]'}, b: {status: 'LeftLeg-LeftFoot[0]'}, c: }\n"
+    assert [Project(base, {}).datasets.told.neutral("mine", clip, "injury") for clip in "abc"] == [
+        True,
+        True,
+        False,
+    ]
+    text = (
+        DATASET
+        + "clips: {a: {channels: {injury: 'LeftLeg-LeftFoot[2]'}}, "
+        + "b: {channels: {injury: 'LeftLeg-LeftFoot[0]'}}, c: }\n"
+    )
     (base / "config/datasets/mine.yaml").write_text(text)
-    assert [Project(base, {}).datasets.is_injured("mine", clip) for clip in "abc"] == [True, False, True]
+    assert [Project(base, {}).datasets.told.neutral("mine", clip, "injury") for clip in "abc"] == [
+        False,
+        True,
+        False,
+    ]
 
 
 @pytest.mark.parametrize("name", ["Walk Forward", "walk, slow (2)", "gå+走"])
@@ -90,7 +102,7 @@ def test_a_clip_can_be_configured_whatever_its_file_is_called(base: Path, name: 
     [
         (DATASET + "clips: {b: , a_mirror: }\n", "a_mirror: only a mirror is called so"),
         (DATASET.replace("[b]", "[z]"), "held_out names no clip: z"),
-        (DATASET.replace("[b]", "[a, b, c]"), "no healthy clip is left to train on"),
+        (DATASET.replace("[b]", "[a, b, c]"), "no clip that is told nothing of injury is left to train on"),
         ("skeleton: s\nfolder: empty\n", "empty: no such folder"),
     ],
 )
@@ -109,8 +121,8 @@ def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
 @pytest.mark.parametrize(
     ("target", "message"),
     [
-        ("results/one/stimuli", "`injury: false`.*Ask for results/injured/stimuli"),
-        ("results/eyes/stimuli/", "configuration one has `injury: false`"),
+        ("results/one/stimuli", "configuration one is not told injury.*Ask for results/injured/stimuli"),
+        ("results/eyes/stimuli/", "configuration one is not told injury"),
         ("results/hurt/export/cubik.onnx", "export/cubik.onnx: there are constant, linear, cubic"),
     ],
 )
@@ -160,15 +172,15 @@ WALKER = "skeleton: s\nsynthetic: {frames: 600}\nclips: {b: {%s}}\n"
     ("text", "message"),
     [
         (
-            LISTED % "status: 'LeftLeg-LeftFoot[11]'",
-            "clips.b.status: severity 11 of LeftLeg-LeftFoot is not in 0",
+            LISTED % "channels: {injury: 'LeftLeg-LeftFoot[11]'}",
+            "clips.b.channels.injury: severity 11 of LeftLeg-LeftFoot is not in 0",
         ),
         (
-            LISTED % "status: 'LeftLeg-NoSuch[4]'",
+            LISTED % "channels: {injury: 'LeftLeg-NoSuch[4]'}",
             "no such link: LeftLeg-NoSuch. Did you mean LeftLeg-LeftFoot",
         ),
-        (LISTED % "status: 'left knee 8'", "'left knee 8' does not read as Joint-Joint"),
-        (LISTED % "status: ''", "clips.b.status: names no link"),
+        (LISTED % "channels: {injury: 'left knee 8'}", "'left knee 8' does not read as Joint-Joint"),
+        (LISTED % "channels: {injury: ''}", "clips.b.channels.injury: names no link"),
         (WALKER % "recipe: wlak", "clips.b.recipe: no such recipe: wlak. There are walk-straight, walk, "),
         (
             WALKER % "injured: LeftUpLeg-LeftLg",
@@ -201,7 +213,7 @@ def test_a_skeleton_without_a_mirror_image_is_told_before_anything_runs(complete
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("injury: true", "its injury has to be False, not True"),
+        ("channels: [injury]", r"its channels has to be \[\], not"),
         ("network: {units: 9}", "its network has to be .*512.*, not .*9"),
         ("training: {sections: 5}", r"its training\.sections has to be 10, not 5"),
         ("training: {passes: 19}", r"which ends after 20 passes, to training\.passes: 19; give more"),
@@ -278,7 +290,7 @@ def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(bas
     assert list(project.clips.of("mine")) == ["a", "b", "c", "d"]
     assert project.clips.source("mine", "d") == str(below / "d.BVH")
     assert project.clips.label_files("mine", "d") == [str(below / "d_gait.txt")]
-    assert project.clips.status_files("mine", "d") == [str(below / "d_injuries.txt")]
+    assert project.datasets.told.files("mine", "d", "injury") == [str(below / "d_injuries.txt")]
 
 
 def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path) -> None:
@@ -294,7 +306,9 @@ def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path)
     project = Project(base, {})
     assert list(project.clips.of("mine")) == ["a", "b", "c", "d"]
     assert project.clips.source("mine", "d") == str(base / "data/mine/first/day 1/d.bvh")
-    assert project.clips.status_files("mine", "d") == [str(base / "data/mine/first/day 1/d_injuries.txt")]
+    assert project.datasets.told.files("mine", "d", "injury") == [
+        str(base / "data/mine/first/day 1/d_injuries.txt")
+    ]
 
 
 @pytest.mark.parametrize("mirror", [True, False])
@@ -331,7 +345,9 @@ def test_what_the_folder_lacks_is_downloaded(base: Path) -> None:
     (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'B' * 64} *2_2.bvh\n\n")
     project = Project(base, {})
     assert project.clips.source("far", "2_1") == str(base / "data/downloaded/far/2_1.bvh")
-    assert project.clips.label_files("far", "2_1") == project.clips.status_files("far", "2_1") == []
+    assert (
+        project.clips.label_files("far", "2_1") == project.datasets.told.files("far", "2_1", "injury") == []
+    )
     assert project.clips.download("far", "2_2") == {
         "url": "https://host/002/2_2.bvh",
         "sha256": "b" * 64,

@@ -90,7 +90,7 @@ def test_editing_labels_reruns_from_labels_on(copied) -> None:
     module.write_text(module.read_text() + "\n_EDITED = 1\n")
     planned = copied.planned(TARGET)
     assert {"labels_clip", "terrain_fits", "database_clip", "database_merge", "training"} <= set(planned)
-    assert not {"synthetic_clip", "motion_clip", "injury_clip", "terrain_patches"} & set(planned)
+    assert not {"synthetic_clip", "motion_clip", "channel_clip", "terrain_patches"} & set(planned)
 
 
 def test_editing_a_comment_of_the_page_remakes_only_the_report(copied) -> None:

@@ -130,12 +130,12 @@ def test_a_dry_run_is_its_table_once_and_the_reasons() -> None:
 
 @pytest.mark.workflow
 def test_a_whole_run_takes_few_lines(workflow) -> None:
-    target = "results/datasets/tiny/injury/walk-straight-1.npz"
+    target = "results/datasets/tiny/channels/injury/walk-straight-1.npz"
     dry = workflow.run("-n", target)
     assert len(dry.splitlines()) < 20
     text = workflow.run("-c2", target)
     lines = [line for line in text.splitlines() if not line.startswith("Using workflow specific profile")]
-    assert lines[0] == "3 jobs: 1 synthetic_clip, 1 motion_clip, 1 injury_clip"
+    assert lines[0] == "3 jobs: 1 synthetic_clip, 1 motion_clip, 1 channel_clip"
     assert re.fullmatch(r"3 of 3 jobs done in .*\.", lines[-1])
     assert len(lines) <= 4
     assert "Error in rule" not in text

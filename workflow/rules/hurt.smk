@@ -10,8 +10,8 @@ rule hurt_clip:
         report="results/datasets/{dataset}/motion/{clip}_hurt{version}.json",
         labels="results/datasets/{dataset}/labels/{clip}_hurt{version}.npz",
         label_report="results/datasets/{dataset}/labels/{clip}_hurt{version}.json",
-        injury="results/datasets/{dataset}/injury/{clip}_hurt{version}.npz",
-        injury_report="results/datasets/{dataset}/injury/{clip}_hurt{version}.json",
+        injury="results/datasets/{dataset}/channels/injury/{clip}_hurt{version}.npz",
+        injury_report="results/datasets/{dataset}/channels/injury/{clip}_hurt{version}.json",
     log:
         "results/datasets/{dataset}/logs/motion/hurt_clip/{clip}_hurt{version}.log",
     benchmark:

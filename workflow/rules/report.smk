@@ -88,9 +88,15 @@ rule report:
         labels=lambda w: configurations.of_dataset(
             w.configuration, "labels/{clip}.json"
         ),
-        injuries=lambda w: configurations.of_dataset(
-            w.configuration, "injury/{clip}.json"
-        ),
+        told=lambda w: [
+            file
+            for channel in datasets.told.channels(
+                configurations.dataset(w.configuration)
+            )
+            for file in configurations.of_dataset(
+                w.configuration, f"channels/{channel}/{{clip}}.json"
+            )
+        ],
         rows=lambda w: configurations.of_dataset(
             w.configuration, "database/clips/{clip}.npz"
         ),

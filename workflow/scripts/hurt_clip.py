@@ -1,7 +1,7 @@
 """Creates a hurt version of a healthy clip: its motion, labels and severities, and their reports."""
 
-from hobble.channels.injury.severity import save_injury
-from hobble.channels.injury.severity import write_report as write_injury_report
+from hobble.channels.files import save_values
+from hobble.channels.files import write_report as write_channel_report
 from hobble.core.clip import load_clip, save_clip
 from hobble.core.files import read_json, write_json
 from hobble.hurt.options import Hurt
@@ -30,6 +30,6 @@ with job(snakemake) as log:
     )
     save_labels(snakemake.output.labels, hurt.labels)
     write_report(snakemake.output.label_report, report, hurt.labels, hurt.clip)
-    save_injury(snakemake.output.injury, hurt.severity, links)
-    write_injury_report(snakemake.output.injury_report, hurt.clip, hurt.severity, links, [])
+    save_values(snakemake.output.injury, hurt.severity, links)
+    write_channel_report(snakemake.output.injury_report, "injury", hurt.clip, hurt.severity, links, [])
     log.info("%s: %d frames from %d of %s", hurt.clip.name, len(hurt.clip), len(clip), clip.name)

@@ -26,7 +26,7 @@ with job(snakemake):
         weights=given.weights,
         motion=given.motion,
         labels=given.labels,
-        injuries=given.injuries,
+        told=given.told,
         terrain=given.terrain,
         rows=given.rows,
     )

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.untrusted import read_text
+from hobble.core.untrusted import check_regular, read_text
 
 MOST_INFLATED = 1 << 30  # bytes that a file's compressed arrays may become; our own are not compressed
 MOST_JSON = 1 << 30
@@ -141,6 +141,7 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
     the file can fill.
     """
     try:
+        check_regular(path)
         with zipfile.ZipFile(path) as archive:
             if _entries(path, archive) != len(archive.infolist()):
                 raise zipfile.BadZipFile("its directory has lost an entry")

@@ -66,7 +66,7 @@ def describe(measured: Measured, found: Iterable[SideBySide]) -> dict[str, Any]:
         "configuration": measured.name,
         "dataset": measured.dataset,
         "network_of": model.get("network_of"),
-        "injury": bool(model.get("injury")),
+        "channels": list(model.get("channels") or ()),
         "hidden_layers": model["network"].get("hidden_layers"),
         "units": model["network"].get("units"),
         "passes": model["training"]["passes"],

@@ -13,7 +13,8 @@ from hobble.hurt.amounts import amounts
 from hobble.hurt.parts import LEFT, RIGHT, part_of_link
 
 HIGHEST = 10.0
-POWER = 0.85  # of the strength over severity: 3 is .36, 5 is .55, 7 is .74
+POWER = 0.8  # of the strength over severity: 3 is .38, 5 is .57, 7 is .75
+LEAST = 0.02  # a ratio
 SETTLING = 0.3  # seconds, of the Gaussian over which a change of severity sets in
 TOGETHER = 3.0  # how two injuries add: 1 would be their sum, infinity the worse one
 WHOLE = ("speed", "stride", "back", "head", "forward", "nod")  # of the body, not of a side
@@ -56,7 +57,7 @@ class Effects:
 
     def ratio(self, name: str) -> Array:
         """(F,) or (F, 2) factor that a ratio is."""
-        return np.exp(self.whole[name] if name in self.whole else self.sided[name])
+        return np.maximum(1.0 + (self.whole[name] if name in self.whole else self.sided[name]), LEAST)
 
 
 def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:

@@ -14,9 +14,9 @@ from hobble.hurt.effects import Effects
 from hobble.hurt.parts import LEFT, RIGHT
 from hobble.hurt.source import Source
 
-SQUEEZE = 0.68  # of the time between two events of a leg that is left to it at least
+SQUEEZE = 0.6  # of the time between two events of a leg that is left to it at least
 JOG_STRIDE = 0.15  # share of a longer stride's time that a jog takes on: its flight cannot last longer
-MOST_SHIFT = 0.13  # cycles
+MOST_SHIFT = 0.17  # cycles
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Timing:
 
 def retime(source: Source, effects: Effects) -> Timing:
     """Slow the cadence, and shift each foot's landing and leaving within the cycle."""
-    stride = np.exp(effects.whole["stride"] * (1 - (1 - JOG_STRIDE) * source.jog))
+    stride = 1 + effects.whole["stride"] * (1 - (1 - JOG_STRIDE) * source.jog)
     begins = np.concatenate([[0.0], np.cumsum((stride[1:] + stride[:-1]) / 2)])
     unit = source.cycle * stride
     new = np.arange(int(begins[-1] + 1e-6) + 1, dtype=float)

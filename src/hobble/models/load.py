@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels import NAMES, channel, every
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz
 from hobble.core.skeleton import Skeleton
 from hobble.core.untrusted import read_yaml
-from hobble.database.layout import GAITS, RowLayout
 from hobble.models import DEFAULT, MODELS, checks, model
 from hobble.models.network import TERRAIN_SIDE, Network
+from hobble.rows.layout import GAITS, RowLayout
 
 MOST_META = 1 << 22  # characters
 WIDEST = 1e4  # centimetres from the path to the heights at its sides
@@ -62,7 +63,7 @@ def network_from_arrays(
     if kind not in MODELS:
         raise InputError(path, f"is a network of kind {kind!a:.40}; there are: {', '.join(MODELS)}")
     statistics = checks.statistics(path, arrays)
-    layout = _layout(path, meta, len(statistics["x_mean"]), len(statistics["y_mean"]))
+    layout = _layout(path, meta, len(statistics["x_mean"]), len(statistics["y_mean"]), skeleton)
     if meta.get("skeleton"):
         skeleton = checks.skeleton(path, meta["skeleton"])
     if skeleton is not None and len(skeleton.joints) != layout.joints:
@@ -74,7 +75,7 @@ def network_from_arrays(
         "layout": layout,
         "skeleton": skeleton,
         "gaits": _gaits(path, meta),
-        "links": _links(path, meta, layout, skeleton),
+        "channels": {name: _labels(path, name, meta, layout, skeleton) for name, _ in layout.channels},
         "terrain_side": checks.length(path, "terrain_side", meta.get("terrain_side", TERRAIN_SIDE), WIDEST),
         "meta": meta,
     }
@@ -98,30 +99,46 @@ def _meta(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Any]:
         raise InputError(path, f"meta is not valid JSON: {error}") from None
 
 
-def _layout(path: str | Path, meta: Mapping[str, Any], x_size: int, y_size: int) -> RowLayout:
+def _layout(
+    path: str | Path, meta: Mapping[str, Any], x_size: int, y_size: int, skeleton: Skeleton | None
+) -> RowLayout:
     """The columns that the file states, which have to be as many as it has."""
     if "layout" not in meta:
-        layout = _guess_layout(x_size, y_size)
+        layout = _guess_layout(x_size, y_size, skeleton)
     else:
         given = checks.mapping(path, "layout", meta["layout"])
-        known = {"joints": (1, y_size), "window": (1, x_size), "step": (1, x_size), "links": (0, x_size)}
-        if set(given) != set(known):
+        known = {"joints": (1, y_size), "window": (1, x_size), "step": (1, x_size)}
+        if not set(known) <= set(given):
             keys = ", ".join(map(ascii, given))[:80]
-            raise InputError(path, f"layout has the keys {keys}, not {', '.join(known)}")
+            raise InputError(path, f"layout has the keys {keys}, not {', '.join(known)} and channels")
         for key, (least, most) in known.items():
             checks.whole(path, f"layout.{key}", given[key], least, most)
         if given["window"] % given["step"]:
             raise InputError(path, f"layout: a window of {given['window']} is no multiple of {given['step']}")
-        layout = RowLayout.from_dict(given)
+        try:
+            layout = RowLayout.from_dict(given)
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(path, f"its layout cannot be understood: {error}") from None
+        for name, columns in layout.channels:
+            if name not in NAMES:
+                raise InputError(
+                    path, f"is told {name!a:.40}, a channel that is not here: {', '.join(NAMES)}"
+                )
+            checks.whole(path, f"layout.channels.{name}", columns, 0, x_size)
     if (layout.x_size, layout.y_size) != (x_size, y_size):
         raise InputError(path, f"{x_size} inputs and {y_size} outputs do not fit {layout}")
     return layout
 
 
-def _guess_layout(x_size: int, y_size: int) -> RowLayout:
-    """The layout of a file without one: the default window, joints from Y, links from what X has left."""
+def _guess_layout(x_size: int, y_size: int, skeleton: Skeleton | None) -> RowLayout:
+    """The layout of a file without one: the default window, joints from Y, and what X has left is the first
+    channel of so many columns."""
     joints = max(1, (y_size - RowLayout(0).y_size) // 9)
-    return RowLayout(joints, links=max(0, x_size - RowLayout(joints).x_size))
+    left = x_size - RowLayout(joints).x_size
+    if left <= 0:
+        return RowLayout(joints)
+    fitting = (one.name for one in every() if skeleton is not None and len(one.columns(skeleton)) == left)
+    return RowLayout(joints, channels=((next(fitting, NAMES[0]), left),))
 
 
 def _gaits(path: str | Path, meta: Mapping[str, Any]) -> tuple[str, ...]:
@@ -131,15 +148,18 @@ def _gaits(path: str | Path, meta: Mapping[str, Any]) -> tuple[str, ...]:
     return gaits
 
 
-def _links(
-    path: str | Path, meta: Mapping[str, Any], layout: RowLayout, skeleton: Skeleton | None
+def _labels(
+    path: str | Path, name: str, meta: Mapping[str, Any], layout: RowLayout, skeleton: Skeleton | None
 ) -> tuple[str, ...]:
-    """The names of the severity columns; those of the skeleton where the file has none."""
-    given = meta.get("links") or (skeleton.link_names if skeleton is not None else ())
-    links = checks.names(path, "links", given)[: layout.links]
-    if len(links) != layout.links:
-        raise InputError(path, f"{layout.links} severity inputs, but {len(links)} links named")
-    return links
+    """The labels of a channel, by the file, else by the skeleton. Raises InputError where they do not fit."""
+    said = checks.mapping(path, "channels", meta.get("channels", {})).get(name)
+    given = said or next((meta[key] for key in channel(name).former if meta.get(key)), None)
+    if given is None and skeleton is not None:
+        given = channel(name).columns(skeleton)
+    labels, columns = checks.names(path, f"channel {name}", given or ()), dict(layout.channels)[name]
+    if len(labels) != columns:
+        raise InputError(path, f"{columns} inputs of channel {name}, but {len(labels)} are named")
+    return labels
 
 
 def _try(path: str | Path, network: Network) -> None:

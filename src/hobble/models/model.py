@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hobble.database.layout import RowLayout
+from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
     import numpy as np

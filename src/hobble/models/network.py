@@ -13,7 +13,7 @@ import numpy as np
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.database.layout import GAITS, RowLayout
+from hobble.rows.layout import GAITS, RowLayout
 
 TERRAIN_SIDE = 25.0  # centimetres from the path to the side heights, where a file does not tell
 STORAGES = ("float32", "int16")
@@ -48,8 +48,8 @@ class Network(ABC):
 
     x_mean, x_std, y_mean, y_std: what standardises X and restores Y.
     layout: the columns; gaits: the order of the gait blocks; skeleton: None where the file carries none.
-    links: names of the severity columns, in order. terrain_side: centimetres from the path to the heights at
-    its sides. meta: what else the file says.
+    channels: name -> labels of its columns, of each channel that it is told. terrain_side: centimetres from
+    the path to the heights at its sides. meta: what else the file says.
     """
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
@@ -63,15 +63,28 @@ class Network(ABC):
     layout: RowLayout
     skeleton: Skeleton | None = field(default=None, repr=False)
     gaits: tuple[str, ...] = GAITS
-    links: tuple[str, ...] = ()
+    channels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     terrain_side: float = TERRAIN_SIDE
     meta: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
+    def trained(self, channel: str) -> tuple[str, ...]:
+        """Labels of a channel's columns that told something in training, as the means of their inputs say.
+
+        All where none says so; () for a channel that the network is not told.
+        """
+        labels = self.channels.get(channel, ())
+        means = self.x_mean[self.layout.x_channel(channel)] if labels else ()
+        return tuple(label for label, mean in zip(labels, means, strict=True) if mean > 0) or labels
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Labels of the injury channel."""
+        return self.channels.get("injury", ())
+
     @property
     def hurt_links(self) -> tuple[str, ...]:
-        """Links that were hurt in training, as the means of their inputs tell; all where none tells."""
-        means = self.x_mean[self.layout.x_injury]
-        return tuple(name for name, mean in zip(self.links, means, strict=True) if mean > 0) or self.links
+        """Links that were hurt in training; see `trained`."""
+        return self.trained("injury")
 
     @classmethod
     def mode(cls, wanted: str | None) -> str:

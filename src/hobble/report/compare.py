@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.database.clip_rows import ClipRows, expanded, load_clip_rows
 from hobble.evaluation.captured import headings, root_path, turned, unbroken
 from hobble.models.network import Network
 from hobble.models.packing import packed
 from hobble.report.body import body
 from hobble.report.scenes import FPS, UNIT, pack_positions
+from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
 
 CLIPS = 6  # that are shown at least, if there are so many; every held-out clip is
 MOST = 40
@@ -47,7 +47,7 @@ def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> 
     y_position = network.layout.y_joint_position
     truth, guess = np.zeros((2, len(rows), y_position.stop - y_position.start))
     seen = np.zeros(len(rows), bool)
-    for pairs in expanded(rows, links=network.layout.links > 0):
+    for pairs in expanded(rows, network.layout):
         row, first = np.unique(pairs.row, return_index=True)
         wanted = np.isin(row, chosen) & ~seen[row]
         row, first = row[wanted], first[wanted]

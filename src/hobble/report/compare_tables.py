@@ -38,10 +38,10 @@ def configuration_table(compared: Compared) -> Table:
     def of(key: str) -> dict[str, Any]:
         return {name: entry[key] for name, entry in entries.items()}
 
-    told = {name: "inputs" if injury else "none" for name, injury in of("injury").items()}
+    told = {name: ", ".join(channels) or "none" for name, channels in of("channels").items()}
     columns = [
         *compared_columns(compared),
-        Overview(50, Column("severities"), told),
+        Overview(50, Column("told"), told),
         Overview(60, Column("data set"), of("dataset")),
         Overview(80, Column.count("layers"), of("hidden_layers")),
         Overview(90, Column.count("units"), of("units")),

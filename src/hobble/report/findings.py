@@ -124,7 +124,7 @@ def _coverage(material: Material) -> Iterator[Hint]:
 
 def _repairs(material: Material) -> Iterator[Hint]:
     repaired = [report["clip"] for report in material.motion if report.get("repairs")]
-    warned = {r["clip"] for r in (*material.labels, *material.injuries) if r.get("warnings")}
+    warned = {r["clip"] for r in (*material.labels, *material.told) if r.get("warnings")}
     if repaired or warned:
         yield Hint(
             "note",

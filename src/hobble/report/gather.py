@@ -26,8 +26,9 @@ class Material:
     """What one configuration left behind.
 
     measured: measurement -> its JSON.
-    history: column -> values, one per section of training; None where a cell is empty. motion, labels,
-    injuries: the reports of the clips, in one order. terrain, rows: paths of their fits and of their rows.
+    history: column -> values, one per section of training; None where a cell is empty. motion, labels: the
+    reports of the clips, in one order; told: those of their channels. terrain, rows: paths of their fits and
+    of their rows.
     splits: clip -> "train" or "held_out".
     """
 
@@ -42,7 +43,7 @@ class Material:
     network: Mapping[str, Any] = field(repr=False)
     motion: list[dict[str, Any]] = field(repr=False)
     labels: list[dict[str, Any]] = field(repr=False)
-    injuries: list[dict[str, Any]] = field(repr=False)
+    told: list[dict[str, Any]] = field(repr=False)
     terrain: list[str] = field(repr=False)
     rows: list[str] = field(repr=False)
     published: Mapping[str, Any] = field(repr=False)
@@ -79,7 +80,7 @@ def gather(
     weights: str,
     motion: Iterable[str],
     labels: Iterable[str],
-    injuries: Iterable[str],
+    told: Iterable[str],
     terrain: Iterable[str] = (),
     rows: Iterable[str] = (),
 ) -> Material:
@@ -96,7 +97,7 @@ def gather(
         network=describe_network(weights),
         motion=[read_json(path) for path in motion],
         labels=[read_json(path) for path in labels],
-        injuries=[read_json(path) for path in injuries],
+        told=[read_json(path) for path in told],
         terrain=list(terrain),
         rows=list(rows),
         published=read_yaml(PUBLISHED),

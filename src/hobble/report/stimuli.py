@@ -104,7 +104,7 @@ def write_stimuli(
 
 def hurt_in_training(network: Network) -> set[str]:
     """Links whose severity was above 0 somewhere in training, as the mean of the input tells."""
-    means = network.x_mean[network.layout.x_injury]
+    means = network.x_mean[network.layout.x_channel("injury")]
     return {link for link, mean in zip(network.links, means, strict=True) if mean > 0}
 
 
@@ -152,7 +152,7 @@ def walk(network: Network, injury: Mapping[str, float], runtime: Runtime) -> Loo
     animation = ProceduralAnimation(network, **dict(runtime))
     ahead = np.array([0.0, SPEED])
     poses = [
-        animation.next_pose(ahead, None, "walk", dict(injury) or None)
+        animation.next_pose(ahead, None, "walk", injury=dict(injury) or None)
         for _ in range(SETTLED + 60 + LONGEST + BLEND)
     ]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])

@@ -19,6 +19,7 @@ from hobble.runtime.options import Runtime
 
 Wish = tuple[Array, Array | None, str]  # velocity, facing, gait
 
+HURTS = "injury"  # the channel that they sweep
 # The hurt of the injury scenarios: name -> links, by the roles of their ends.
 HURT = {
     "left_knee": ("left_hip", "left_knee"),
@@ -104,11 +105,11 @@ def run_scenario(network: Network, scenario: Scenario, options: Runtime) -> Trac
     poses, targets, gaits, severity = [], [], [], np.zeros(scenario.frames, np.float32)
     for f in range(scenario.frames):
         velocity, facing, gait = scenario.wish(f)
-        injury = None
+        told = {}
         if scenario.hurt:
             severity[f] = 10.0 * f / max(1, scenario.frames - 1)
-            injury = {scenario.hurt: float(severity[f])}
-        poses.append(animation.next_pose(velocity, facing, gait, injury))
+            told = {HURTS: {scenario.hurt: float(severity[f])}}
+        poses.append(animation.next_pose(velocity, facing, gait, **told))
         targets.append(velocity)
         gaits.append(gait)
     return Track(

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from hobble.database.layout import RowLayout
+from hobble.rows.layout import RowLayout
 
 STEERING_LIMIT = 2.0  # with 1, a network that saw few starts stands for seconds before it sets off
 TARGET_MIX = 0.9
@@ -145,9 +145,10 @@ def sample_points(position: Any, direction: Any, step: int, side: float, points:
 def prepare(
     wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
     velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
-    owed: Any, severity: Any, severity_target: Any, severity_step: float, step: int, side: float, points: Any,
+    owed: Any, told: Any, told_target: Any, told_step: Any, step: int, side: float, points: Any,
 ) -> None:  # fmt: skip
-    """All of the above in one call, and severities (C, L) move toward their targets, at most by a step.
+    """All of the above in one call, and what is told (C, K) moves toward its target, at most by told_step
+    (K,).
 
     In this file because compiled code kept on disk is renewed when its own file changes, not its callees'.
     """
@@ -157,10 +158,10 @@ def prepare(
     )  # fmt: skip
     blend_future(velocity, target, strafe, position, direction, gait)
     sample_points(position, direction, step, side, points)
-    for c in range(severity.shape[0]):
-        for k in range(severity.shape[1]):
-            change = severity_target[c, k] - severity[c, k]
-            severity[c, k] += min(max(change, -severity_step), severity_step)
+    for c in range(told.shape[0]):
+        for k in range(told.shape[1]):
+            change = told_target[c, k] - told[c, k]
+            told[c, k] += min(max(change, -told_step[k]), told_step[k])
 
 
 @njit(cache=True)

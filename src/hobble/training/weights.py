@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels import channel
 from hobble.core.files import save_npz
-from hobble.database.layout import CONTACTS, GAITS
+from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.models.trainable import Trainable
+from hobble.rows.layout import CONTACTS, GAITS
 
-UNITS = (
-    "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z forward, +X left, "
-    "severities 0 to 10"
-)
+UNITS = "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z forward, +X left"
 
 
 def write_weights(
@@ -35,7 +34,8 @@ def write_weights(
 
 def meta(network: Trainable, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
     """What the columns mean and where the network comes from, as JSON; the joints keep their order."""
-    links = ["-".join(link) for link in database.skeleton["links"]] if database.layout.links else []
+    rig = Skeleton.from_dict(database.skeleton)
+    channels = [channel(name) for name, _ in database.layout.channels]
     return json.dumps(
         {
             "kind": network.kind,
@@ -44,8 +44,8 @@ def meta(network: Trainable, database: Database, configuration: str, facts: Mapp
             "skeleton": database.skeleton,
             "gaits": list(GAITS),
             "contacts": list(CONTACTS),
-            "links": links,
-            "units": UNITS,
+            "channels": {one.name: one.columns(rig) for one in channels},
+            "units": "; ".join([UNITS, *(f"{one.value} 0 to {one.highest:g}" for one in channels)]),
             **network.about,
             **facts,
         }

@@ -10,15 +10,18 @@ from pathlib import Path
 from urllib.parse import quote
 
 from hobble.config.load import Catalogue
-from hobble.config.models import ClipEntry, hurts
+from hobble.config.models import ClipEntry
 from hobble.core.clip_files import NAMES, can_be_called, find_clips, the_file
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.untrusted import MOST_TEXT, check_regular, read_bytes
+from hobble.core.untrusted import check_regular
+from hobble.synthetic.links import WRITES
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
+from hobble.workflow.told import Told
 
 DATASETS = "results/datasets"
 MIRROR = "_mirror"
 HURT = re.compile(r"_hurt([1-9])$")  # at the end of a hurt version's name
+HURTS = "injury"  # the channel that hurt versions are told
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 
 
@@ -32,6 +35,7 @@ class Clips:
 
     def __init__(self, base: Path, mocap: Path, catalogue: Catalogue) -> None:
         self.base, self.mocap, self.catalogue = base, mocap, catalogue
+        self.told = Told(catalogue, self)
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def of(self, dataset: str) -> dict[str, ClipEntry]:
@@ -58,25 +62,28 @@ class Clips:
             )
         return {name: entry or ClipEntry() for name, entry in listed.items()}
 
+    versions_of = HURTS
+
+    @staticmethod
+    def original(clip: str) -> str:
+        """The clip that a mirror or a hurt version is made from; see `original`."""
+        return original(clip)
+
+    @staticmethod
+    def is_version(clip: str) -> bool:
+        """Whether it is a hurt version of a clip, or the mirror of one."""
+        return HURT.search(clip.removesuffix(MIRROR)) is not None
+
     @functools.cache  # noqa: B019
     def versions(self, dataset: str) -> dict[str, int]:
         """The hurt versions of the healthy clips by name, and which turn each has among them, from 0."""
         options = self.catalogue.dataset(dataset).hurt
         healthy = (
-            [clip for clip in self.own(dataset) if not self.is_injured(dataset, clip)] if options else []
+            [clip for clip in self.own(dataset) if self.told.neutral(dataset, clip, HURTS)] if options else []
         )
         many = options.versions if options else 0
         names = [f"{clip}_hurt{version + 1}" for version in range(many) for clip in healthy]
         return {name: turn for turn, name in enumerate(names)}
-
-    def is_injured(self, dataset: str, clip: str) -> bool:
-        """Whether anything hurts in a clip: a hurt version, or by the configuration or its status file."""
-        if HURT.search(clip.removesuffix(MIRROR)) or self.entry(dataset, clip).is_injured:
-            return True
-        if self.catalogue.dataset(dataset).synthetic is not None:
-            return False
-        files = self.status_files(dataset, clip)
-        return any(hurts(read_bytes(file, MOST_TEXT).decode("latin-1")) for file in files)
 
     def entry(self, dataset: str, clip: str) -> ClipEntry:
         """What the data set says of a clip, or of the original of a mirror or of a hurt version."""
@@ -142,18 +149,14 @@ class Clips:
             return self.beside(dataset, clip, ("_footsteps.txt", "_gait.txt"))
         return self.beside(dataset, clip, LABEL_FILES) if self._reads_labels(dataset) else []
 
-    def status_files(self, dataset: str, clip: str) -> list[str]:
-        """The status file beside the clip, if there is one and the data set gives no status of its own."""
-        if self.catalogue.dataset(dataset).synthetic is None and self.entry(dataset, clip).status:
-            return []
-        return self.beside(dataset, clip, ("_injuries.txt",))
-
     def beside(self, dataset: str, clip: str, suffixes: Iterable[str]) -> list[str]:
         """The files called as the clip is, with one of `suffixes` after its name.
 
         Those of the embedded walker are named whether they exist or not, since it makes them all.
         """
         made = self.catalogue.dataset(dataset).synthetic is not None
+        if made:
+            suffixes = [suffix for suffix in suffixes if suffix in WRITES]
         stem = self.folder(dataset) / clip
         if not made and clip in (files := self._files(dataset)):
             stem = files[clip][0].with_suffix("")

@@ -9,6 +9,7 @@ from typing import Any
 from hobble.config.load import Catalogue
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.datasets import Datasets
+from hobble.workflow.told import folder
 
 
 class Configurations:
@@ -41,13 +42,13 @@ class Configurations:
         """The name of the data set that it learns from."""
         return self.catalogue.configuration(configuration).dataset
 
-    def selection(self, configuration: str) -> str:
-        """Which clips it trains on: `healthy`, or `all` with severities as inputs."""
-        return "all" if self.catalogue.configuration(configuration).injury else "healthy"
+    def channels(self, configuration: str) -> tuple[str, ...]:
+        """The channels that its network is told."""
+        return self.catalogue.configuration(configuration).channels
 
     def splits(self, configuration: str) -> dict[str, str]:
         """Clip -> split."""
-        return self.datasets.selected(self.dataset(configuration), self.selection(configuration))
+        return self.datasets.selected(self.dataset(configuration), self.channels(configuration))
 
     def of_dataset(self, configuration: str, pattern: str) -> list[str]:
         """`pattern` (with {clip} in it, or not) under the configuration's data set, for each of its clips."""
@@ -70,7 +71,7 @@ class Configurations:
 
     def database(self, configuration: str) -> str:
         """The database that the configuration learns from."""
-        return f"{DATASETS}/{self.dataset(configuration)}/database/{self.selection(configuration)}"
+        return f"{DATASETS}/{self.dataset(configuration)}/database/{folder(self.channels(configuration))}"
 
     def start(self, configuration: str) -> list[str]:
         """The checkpoint that training goes on from, if it continues another configuration's."""

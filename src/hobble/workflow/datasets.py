@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from hobble.config.load import Catalogue
@@ -14,7 +15,7 @@ class Datasets:
     """The data sets of a project, with the clips that lie in its folders."""
 
     def __init__(self, catalogue: Catalogue, clips: Clips) -> None:
-        self.catalogue, self.clips = catalogue, clips
+        self.catalogue, self.clips, self.told = catalogue, clips, clips.told
 
     def options(self, dataset: str, section: str, *keys: str) -> dict[str, Any]:
         """Plain values of one section of a data set: of those `keys`, or of all where none is named."""
@@ -38,23 +39,30 @@ class Datasets:
         total = sum(entry.share for entry in self.clips.own(dataset).values())
         return round(synthetic.frames * self.clips.entry(dataset, clip).share / total)
 
-    def is_injured(self, dataset: str, clip: str) -> bool:
-        """Whether anything hurts in the clip, by the configuration, its status file, or as a hurt version."""
-        return self.clips.is_injured(dataset, clip)
+    def selected(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
+        """Clip -> "train" or "held_out", of the clips that no other channel tells anything.
 
-    def selected(self, dataset: str, selection: str) -> dict[str, str]:
-        """Clip -> "train" or "held_out", of the `healthy` or of `all` clips; mirrors go with originals."""
+        channels: those that the network is told. Mirrors go with originals. Raises HobbleError where the data
+        set lacks one of `channels`, or no clip is left to train on.
+        """
+        there = self.told.channels(dataset)
+        if lacking := [name for name in channels if name not in there]:
+            raise HobbleError(
+                f"data set {dataset} says nothing of {', '.join(lacking)}: give it a section "
+                f"`channels: {{{lacking[0]}: ...}}`, or take another data set"
+            )
+        others = [name for name in there if name not in channels]
         model, clips = self.catalogue.dataset(dataset), self.clips.of(dataset)
         held_out = set(model.held_out)
         if missing := held_out - set(self.clips.own(dataset)):
             raise HobbleError(f"data set {dataset}: held_out names no clip: {', '.join(sorted(missing))}")
         splits = {}
         for clip in clips:
-            if selection == "healthy" and self.is_injured(dataset, clip):
+            if not all(self.told.neutral(dataset, clip, name) for name in others):
                 continue
             for name in (clip, clip + MIRROR) if model.mirror else (clip,):
                 splits[name] = "held_out" if original(clip) in held_out else "train"
         if "train" not in splits.values():
-            kind = "healthy clip" if selection == "healthy" else "clip"
-            raise HobbleError(f"data set {dataset}: no {kind} is left to train on")
+            only = f" that is told nothing of {' or '.join(others)}" if others else ""
+            raise HobbleError(f"data set {dataset}: no clip{only} is left to train on")
         return splits

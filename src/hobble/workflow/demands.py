@@ -13,9 +13,10 @@ import os
 import re
 from pathlib import Path
 
-from hobble.database.layout import RowLayout
+from hobble.channels import channel
 from hobble.measures.registry import measure
 from hobble.models import model
+from hobble.rows.layout import RowLayout
 from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 
@@ -109,8 +110,8 @@ class Demands:
         chosen = self.project.catalogue.configuration(configuration)
         skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(chosen.dataset).skeleton)
         of_rows = self.project.datasets.options(chosen.dataset, "database", "window", "step")
-        links = len(skeleton.links) if chosen.injury else 0
-        return RowLayout(joints=len(skeleton.joints), links=links, **of_rows)
+        told = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
+        return RowLayout(joints=len(skeleton.joints), channels=told, **of_rows)
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
     def all_thousands(self, dataset: str) -> float:

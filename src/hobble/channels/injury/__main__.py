@@ -1,4 +1,4 @@
-"""Write status files from a table: python -m hobble.channels.injury TABLE.csv FOLDER --skeleton SKELETON.yaml."""
+"""Status files from a table: python -m hobble.channels.injury TABLE.csv FOLDER --skeleton SKELETON.yaml."""
 
 from __future__ import annotations
 

@@ -67,9 +67,12 @@ def _splits(all_measured: Sequence[Measured], published: Json) -> list[dict[str,
             ours = m.found(NAME)[split]["mean_of_clips"] if m else None
             out.append(beside(f"relative error, {split} clips", row, row["mean"], ours))
             if "sd" in row:
+                in_text = {**row, "table": None}
                 means = clip_means(m.found(NAME), split) if m else []
                 sd = float(np.std(means)) if len(means) > 1 else None
-                out.append(beside(f"standard deviation of the means of {split} clips", row, row["sd"], sd))
+                out.append(
+                    beside(f"standard deviation of the means of {split} clips", in_text, row["sd"], sd)
+                )
     return out
 
 

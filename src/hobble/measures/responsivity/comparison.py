@@ -156,9 +156,10 @@ def _published_times(all_measured: Sequence[Measured], published: Json) -> list[
         ours = m.found(NAME)["milliseconds"]["total"] if m else None
         out.append(beside("a frame", row, row["milliseconds"], ours, "ms"))
         if "sd" in row:
+            in_text = {**row, "table": None}
             means = lap_means(m.found(NAME)) if m else []
             sd = float(np.std(means)) if len(means) > 1 else None
-            out.append(beside("standard deviation of the means of laps", row, row["sd"], sd, "ms"))
+            out.append(beside("standard deviation of the means of laps", in_text, row["sd"], sd, "ms"))
     for row in published["modes"]:
         m = found.get(row["configuration"])
         times = {e["mode"]: e["milliseconds"]["predict"] for e in by_mode(m)} if m else {}

@@ -17,8 +17,6 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.database.clip_rows import ClipRows, load_clip_rows
-from hobble.database.layout import GAITS
 from hobble.database.statistics import Moments
 from hobble.evaluation.captured import turned, unbroken
 from hobble.measures.accuracy.run import (
@@ -32,6 +30,8 @@ from hobble.measures.given import Given, Outcome
 from hobble.measures.rollouts import Options
 from hobble.models.load import load_network
 from hobble.models.network import Predictor
+from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
+from hobble.rows.layout import GAITS, RowLayout
 
 LENGTHS = (1, 10, 60, 300)  # frames
 OVERLAP = 10  # roll-outs of one length that every frame lies in
@@ -94,15 +94,10 @@ class Inputs:
     moving: Array
 
 
-def inputs(rows: ClipRows, chosen: np.ndarray, links: bool) -> Inputs:
-    """Of the rows `chosen` (F,), on the first fit of each; severities only with `links`."""
-    layout = rows.layout
+def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
+    """Of the rows `chosen` (F,), on the first fit of each, laid out as the network's `layout`."""
     fit = rows.first_fit[chosen]
-    severity = rows.severity[chosen] if links else rows.severity[chosen, :0]
-    x = np.concatenate([rows.x[chosen], rows.heights[fit], severity], axis=1, dtype=np.float32)
-    y = rows.y[chosen].astype(np.float32)
-    for values, joints in ((x, layout.x_joint_position), (y, layout.y_joint_position)):
-        values[:, joints.start + 1 : joints.stop : 3] -= rows.mean[fit, None]
+    x, y, *_ = pairs(rows, layout, chosen, fit)
     gait = x[:, layout.x_gait].reshape(len(x), len(GAITS), layout.samples)
     stand = gait[:, GAITS.index("stand"), layout.samples // 2]
     return Inputs(
@@ -174,7 +169,7 @@ def clip_roll_outs(
     layout = predictor.network.layout
     out = {length: Strayed() for length in lengths}
     for chosen in unbroken(rows.frame):
-        asked = inputs(rows, chosen, layout.links > 0)
+        asked = inputs(rows, chosen, layout)
         for length in lengths:
             all_starts = np.arange(1, len(chosen), max(1, length // OVERLAP))
             for first in range(0, len(all_starts), BATCH):

@@ -7,8 +7,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hobble.database.layout import RowLayout
 from hobble.models.model import Model
+from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
     import numpy as np

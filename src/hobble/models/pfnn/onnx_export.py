@@ -126,7 +126,7 @@ def _about(network: Pfnn, mode: str) -> dict[str, Any]:
         "mode": mode,
         "layout": network.layout.to_dict(),
         "gaits": list(network.gaits),
-        "links": list(network.links),
+        "channels": {name: list(labels) for name, labels in network.channels.items()},
         "skeleton": network.skeleton.to_dict() if network.skeleton is not None else None,
         **{key: network.meta[key] for key in keys if key in network.meta},
     }

@@ -49,7 +49,7 @@ def read_release(folder: str | Path) -> Mapping[str, Array]:
     """
     folder = Path(folder)
     arrays = {name: _read(folder / f"{name}.bin") for name in STATISTICS}
-    layers = sum(1 for _ in folder.glob("b*_000.bin"))
+    layers = sum(1 for _ in folder.glob("b[0-9]*_000.bin"))
     if not 0 < layers <= MOST_LAYERS:
         raise InputError(
             folder, f"{layers} layers of weights b0_000.bin, b1_000.bin, ...; there are 1 to {MOST_LAYERS}"

@@ -143,7 +143,7 @@ def divided_severities(
     ]
     out = []
     for scale in SCALES:
-        walks = run(network, script, runtime.model_copy(update={"severity_scale": scale}))
+        walks = run(network, script, runtime.model_copy(update={"scales": {"injury": scale}}))
         for i, link in enumerate(links):
             healthy = _cycle(walks, 1, i)
             own, speed = _from(walks, 1, i, healthy), _speed(network, walks, 1, i)

@@ -13,21 +13,24 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
-from hobble.database.layout import RowLayout
+from hobble.rows.compose import body_columns, compose, of_frame
+from hobble.rows.layout import RowLayout
 
+CHANNEL = "channel_"  # before the names of the channels' arrays in a file
 HINT = "Delete it; the next run makes it again."
 
 
 @dataclass(frozen=True)
 class ClipRows:
-    """R rows of a clip, factorised. S is the sum of `fits`, L the skeleton's links.
+    """R rows of a clip, factorised. S is the sum of `fits`.
 
-    x: (R, columns of X without terrain and injury); y: (R, Y). Joint heights are above the world's zero.
-    p: (R,) phase. severity: (R, L). frame, cycle, fits: (R,) int; `fits` counts the terrain fits of a row.
+    x: (R, columns of X without terrain and channels); y: (R, Y). Joint heights are above the world's zero.
+    p: (R,) phase. channels: name -> (R, its columns). frame, cycle, fits: (R,) int; `fits` counts the terrain
+    fits of a row.
     heights: (S, 3 * samples) less the mean of their centre ones; mean: (S,) that mean, to be taken off the
     joint heights. The fits of a row lie together, in the order of the rows.
     visits: how often each row counts in a pass over the data; a row of one fit is used with it so often.
-    layout: of the rows with every link of the skeleton.
+    layout: of the rows with every channel of the data set.
     """
 
     clip: str
@@ -36,7 +39,7 @@ class ClipRows:
     x: Array = field(repr=False)
     y: Array = field(repr=False)
     p: Array = field(repr=False)
-    severity: Array = field(repr=False)
+    channels: Mapping[str, Array] = field(repr=False)
     frame: np.ndarray = field(repr=False)
     cycle: np.ndarray = field(repr=False)
     fits: np.ndarray = field(repr=False)
@@ -56,24 +59,26 @@ class ClipRows:
         """Raise InputError, naming `where`, unless all shapes agree, fits are there and values are finite."""
         layout, rows, fits = self.layout, len(self.p), int(np.sum(self.fits))
         expected = {
-            "x": (rows, layout.x_terrain.start),
+            "x": (rows, body_columns(layout)),
             "y": (rows, layout.y_size),
-            "severity": (rows, layout.links),
             "frame": (rows,),
             "cycle": (rows,),
             "fits": (rows,),
             "heights": (fits, 3 * layout.samples),
             "mean": (fits,),
         }
+        if set(self.channels) != set(dict(layout.channels)):
+            raise InputError(where, "it has other channels than its layout says", fix=HINT)
+        tables = {name: getattr(self, name) for name in expected} | dict(self.channels)
+        expected |= {name: (rows, columns) for name, columns in layout.channels}
         for name, shape in expected.items():
-            if getattr(self, name).shape != shape:
-                got = getattr(self, name).shape
-                raise InputError(where, f"{name} is {got} where {shape} belongs", fix=HINT)
+            if tables[name].shape != shape:
+                raise InputError(where, f"{name} is {tables[name].shape} where {shape} belongs", fix=HINT)
         if rows and np.min(self.fits) < 1:
             frame = int(self.frame[np.argmin(self.fits)])
             raise InputError(where, "a row has no terrain fit", frame=frame)
-        for name in ("x", "y", "p", "severity"):
-            finite = np.isfinite(getattr(self, name))
+        for name in ("x", "y", "p", *self.channels):
+            finite = np.isfinite(self.p if name == "p" else tables[name])
             bad = ~(finite if finite.ndim == 1 else finite.all(axis=1))
             if bad.any():
                 raise InputError(where, f"{name} is not a number", frame=int(self.frame[np.argmax(bad)]))
@@ -94,28 +99,34 @@ class Pairs(NamedTuple):
     weight: Array
 
 
-def expanded(rows: ClipRows, links: bool, batch: int = 2048) -> Iterator[Pairs]:
-    """A clip's (frame, fit) pairs in raw units, `batch` or so at a time; severities only with `links`."""
-    layout = rows.layout
+def expanded(rows: ClipRows, layout: RowLayout, batch: int = 2048) -> Iterator[Pairs]:
+    """A clip's (frame, fit) pairs in raw units, `batch` or so at a time, laid out as `layout`.
+
+    layout: the rows' own, or one with fewer of its channels.
+    """
     first = rows.first_fit
     start = 0
     while start < len(rows):
         stop = max(start + 1, int(np.searchsorted(first, first[start] + batch)))
         fits = rows.fits[start:stop]
         row = np.repeat(np.arange(start, stop), fits)
-        ground = slice(int(first[start]), int(first[stop - 1] + fits[-1]))
-        severity = rows.severity[row] if links else rows.severity[row, :0]
-        x = np.concatenate([rows.x[row], rows.heights[ground], severity], axis=1, dtype=np.float32)
-        y = rows.y[row].astype(np.float32)
-        for values, joints in ((x, layout.x_joint_position), (y, layout.y_joint_position)):
-            values[:, joints.start + 1 : joints.stop : 3] -= rows.mean[ground, None]
-        yield Pairs(x, y, rows.p[row], row, 1.0 / rows.fits[row])
+        yield pairs(rows, layout, row, np.arange(first[start], first[stop - 1] + fits[-1]))
         start = stop
+
+
+def pairs(rows: ClipRows, layout: RowLayout, row: np.ndarray, fit: np.ndarray) -> Pairs:
+    """The pairs of rows `row` (n,) with the fits `fit` (n,) of `heights`, in raw units."""
+    x = np.empty((len(row), layout.x_size), np.float32)
+    y = rows.y[row].astype(np.float32)
+    told = {name: rows.channels[name][row] for name, _ in layout.channels}
+    compose(layout, of_frame(layout, rows.x[row], told), rows.heights[fit], rows.mean[fit, None], x, y)
+    return Pairs(x, y, rows.p[row], row, 1.0 / rows.fits[row])
 
 
 def save_clip_rows(path: str | Path, rows: ClipRows) -> None:
     """Write rows as one npz, floats as float32."""
-    floats = {n: getattr(rows, n).astype(np.float32) for n in ("x", "y", "p", "severity", "heights", "mean")}
+    floats = {n: getattr(rows, n).astype(np.float32) for n in ("x", "y", "p", "heights", "mean")}
+    floats |= {CHANNEL + name: values.astype(np.float32) for name, values in rows.channels.items()}
     integers = {n: getattr(rows, n).astype(np.int32) for n in ("frame", "cycle", "fits")}
     save_npz(
         path,
@@ -157,6 +168,8 @@ def load_clip_rows(path: str | Path) -> ClipRows:
         data["layout"] = RowLayout.from_dict(json.loads(str(data["layout"])))
         data["skeleton"] = json.loads(str(data["skeleton"]))
         data["visits"] = int(data["visits"])
+        named = [key for key in data if key.startswith(CHANNEL)]
+        data["channels"] = {key.removeprefix(CHANNEL): data.pop(key) for key in named}
         rows = ClipRows(**data)
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(path, f"not a file of rows ({error})", fix=HINT) from error

@@ -33,8 +33,10 @@ class Discriminant:
         return [self.classes[k] for k in np.argmax(self.scores(values), axis=1)]
 
 
-def learn(values: Array, labels: Sequence[str]) -> Discriminant:
+def learn(values: Array, labels: Sequence[str], shrinkage: float = SHRINKAGE) -> Discriminant:
     """From values (n, D) and their labels. Raises ValueError for fewer than two classes.
+
+    shrinkage: of the covariance towards its diagonal, 0 to 1.
 
     Fisher's linear discriminant with the pooled covariance of standardised values; each class counts the
     same, however many examples it has.
@@ -51,7 +53,7 @@ def learn(values: Array, labels: Sequence[str]) -> Discriminant:
     spread = np.maximum(np.sqrt(share @ rest**2), NARROWEST * overall)
     told = overall > CONSTANT * (1 + np.abs(values).max(axis=0))
     scaled = rest[:, told] / spread[told]
-    covariance = (1 - SHRINKAGE) * (scaled * share[:, None]).T @ scaled + SHRINKAGE * np.eye(told.sum())
+    covariance = (1 - shrinkage) * (scaled * share[:, None]).T @ scaled + shrinkage * np.eye(told.sum())
     weights = np.zeros((values.shape[1], len(classes)))
     weights[told] = np.linalg.solve(covariance, (means[:, told] / spread[told]).T) / spread[told, None]
     return Discriminant(classes, weights, -0.5 * np.sum(means.T * weights, axis=0))

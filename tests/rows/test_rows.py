@@ -14,11 +14,11 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.database.clip_rows import ClipRows, expanded
-from hobble.database.layout import GAITS, RowLayout
-from hobble.database.rows import clip_rows, cycle_frames, cycle_phase, phase_change
 from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
+from hobble.rows.build import clip_rows, cycle_frames, cycle_phase, phase_change
+from hobble.rows.clip_rows import ClipRows, expanded
+from hobble.rows.layout import GAITS, RowLayout
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import Heightmap
 from hobble.terrain.options import Sampling
@@ -85,7 +85,7 @@ def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrai
     fits = clip_fits(clip, labels, patches, "flat", sections.Terrain(**ground), sampling)
     severity = np.zeros((len(clip), len(clip.skeleton.links)), np.float32)
     window = {name: database[name] for name in OPTIONS}
-    return clip_rows(NAME, clip, labels, severity, vars(fits), **window)
+    return clip_rows(NAME, clip, labels, {"injury": severity}, vars(fits), **window)
 
 
 @pytest.fixture(scope="module")
@@ -95,8 +95,8 @@ def rows(shared: Path, root: Path) -> ClipRows:
 
 @pytest.mark.shared
 def test_the_original_rows_column_by_column(rows, original):
-    layout = replace(rows.layout, links=0)
-    (pairs,) = expanded(rows, links=False)
+    layout = replace(rows.layout, channels=())
+    (pairs,) = expanded(rows, rows.layout.told(()))
     np.testing.assert_array_equal(np.bincount(rows.cycle), original["cycle_length"])
     np.testing.assert_allclose(pairs.p, original["P"], atol=1e-6)
     differing = []
@@ -176,11 +176,11 @@ def terrain(labels) -> dict[str, np.ndarray]:
 
 def test_a_stiff_turning_figure_in_closed_form(walk, labels, terrain):
     severity = np.random.default_rng(0).random((300, 2)) * 10
-    rows = clip_rows("walk", walk, labels, severity, terrain, **{**OPTIONS, "facing_sigma": 0.0})
+    rows = clip_rows("walk", walk, labels, {"injury": severity}, terrain, **{**OPTIONS, "facing_sigma": 0.0})
     layout, frame = rows.layout, rows.frame
-    assert layout == RowLayout(5, links=2)
+    assert layout == RowLayout(5, channels=(("injury", 2),))
     np.testing.assert_array_equal(frame, np.r_[60:101, 100:131, 200:240])
-    (pairs,) = expanded(rows, links=True)
+    (pairs,) = expanded(rows, rows.layout)
     x, y = ({n: v[:, s] for n, s in layout.blocks(p).items()} for p, v in (("x", pairs.x), ("y", pairs.y)))
     ahead = np.arange(-60, 60, 10)
     turned = 0.01 * frame[:, None]  # facing (sin, 0, cos); the root's x axis is (cos, 0, -sin)
@@ -228,9 +228,11 @@ def test_fits_of_a_row_share_its_frame_and_differ_in_the_ground(walk, labels, te
     rng = np.random.default_rng(1)
     n = len(terrain["frame"])
     hilly = {**terrain, "fits": np.full(n, 10), "heights": rng.normal(0, 9, (10 * n, 36))}
-    rows = clip_rows("walk", walk, labels, np.zeros((300, 2)), hilly, **OPTIONS)
+    rows = clip_rows("walk", walk, labels, {"injury": np.zeros((300, 2))}, hilly, **OPTIONS)
     layout = rows.layout
-    x, y = (np.concatenate(parts) for parts in list(zip(*expanded(rows, links=False), strict=True))[:2])
+    x, y = (
+        np.concatenate(parts) for parts in list(zip(*expanded(rows, rows.layout.told(())), strict=True))[:2]
+    )
     centre = hilly["heights"][:, 12:24].mean(axis=1)
     np.testing.assert_allclose(x[:, layout.x_terrain], hilly["heights"] - centre[:, None], atol=1e-4)
     hips = y[:, layout.y_joint_position.start + 1]
@@ -241,11 +243,16 @@ def test_fits_of_a_row_share_its_frame_and_differ_in_the_ground(walk, labels, te
 def test_a_clip_without_cycles_has_no_rows(walk, labels):
     nothing = {**labels, "cycles": np.zeros((0, 2), int)}
     rows = clip_rows(
-        "walk", walk, nothing, np.zeros((300, 2)), flat_terrain(nothing["cycles"], np.zeros(0)), **OPTIONS
+        "walk",
+        walk,
+        nothing,
+        {"injury": np.zeros((300, 2))},
+        flat_terrain(nothing["cycles"], np.zeros(0)),
+        **OPTIONS,
     )
     rows.check("walk")
     assert len(rows) == 0
-    assert list(expanded(rows, links=True)) == []
+    assert list(expanded(rows, rows.layout)) == []
 
 
 @pytest.mark.parametrize(
@@ -257,17 +264,17 @@ def test_a_clip_without_cycles_has_no_rows(walk, labels):
 )
 def test_files_that_do_not_belong_together_are_refused(walk, labels, terrain, change, message):
     with pytest.raises(InputError, match=f"^walk: .*{message}"):
-        clip_rows("walk", walk, {**labels, **change}, np.zeros((300, 2)), terrain, **OPTIONS)
+        clip_rows("walk", walk, {**labels, **change}, {"injury": np.zeros((300, 2))}, terrain, **OPTIONS)
 
 
 def test_severities_and_cycles_that_do_not_fit_are_refused(walk, labels, terrain):
-    with pytest.raises(InputError, match="severities of 3 links for a skeleton of 2"):
-        clip_rows("walk", walk, labels, np.zeros((300, 3)), terrain, **OPTIONS)
+    with pytest.raises(InputError, match="injury of 3 columns for a skeleton of 2"):
+        clip_rows("walk", walk, labels, {"injury": np.zeros((300, 3))}, terrain, **OPTIONS)
     for cycle, frame in (([0, 40], 0), ([260, 299], 299)):
         near = {**labels, "cycles": np.array([cycle])}
         ground = flat_terrain(near["cycles"], np.zeros(1))
         with pytest.raises(InputError, match=f"walk, frame {frame}: a cycle has no frame before it or none"):
-            clip_rows("walk", walk, near, np.zeros((300, 2)), ground, **OPTIONS)
+            clip_rows("walk", walk, near, {"injury": np.zeros((300, 2))}, ground, **OPTIONS)
 
 
 def test_past_the_ends_of_the_clip_the_root_goes_straight_on_and_the_gait_is_held(walk, labels):
@@ -275,7 +282,7 @@ def test_past_the_ends_of_the_clip_the_root_goes_straight_on_and_the_gait_is_hel
     ends = {**labels, "cycles": np.array([[1, 40], [260, 298]])}
     still = replace(walk, rotations=np.tile(walk.rotations[:1], (300, 1, 1)))
     once = clip_rows(
-        "a", still, ends, np.zeros((300, 2)), flat_terrain(ends["cycles"], np.zeros(2)), **OPTIONS
+        "a", still, ends, {"injury": np.zeros((300, 2))}, flat_terrain(ends["cycles"], np.zeros(2)), **OPTIONS
     )
     n = np.arange(-70, 370)
     longer = replace(
@@ -286,7 +293,12 @@ def test_past_the_ends_of_the_clip_the_root_goes_straight_on_and_the_gait_is_hel
     held = {name: values[np.clip(n, 0, 299)] for name, values in labels.items() if len(values) == 300}
     held["cycles"] = ends["cycles"] + 70
     twice = clip_rows(
-        "a", longer, held, np.zeros((440, 2)), flat_terrain(held["cycles"], np.zeros(2)), **OPTIONS
+        "a",
+        longer,
+        held,
+        {"injury": np.zeros((440, 2))},
+        flat_terrain(held["cycles"], np.zeros(2)),
+        **OPTIONS,
     )
     np.testing.assert_allclose(once.x, twice.x, atol=1e-4)
     np.testing.assert_allclose(once.y, twice.y, atol=1e-4)

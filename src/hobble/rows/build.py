@@ -9,12 +9,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from hobble.channels import channel
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.database.clip_rows import ClipRows
-from hobble.database.layout import RowLayout
 from hobble.motion.root import RootFrames, continued, local_pose, points_to_root, root_frames, vectors_to_root
+from hobble.rows.clip_rows import ClipRows
+from hobble.rows.layout import RowLayout
 
 Arrays = Mapping[str, np.ndarray]
 
@@ -23,7 +24,7 @@ def clip_rows(
     name: str,
     clip: Clip,
     labels: Arrays,
-    severity: Array,
+    channels: Arrays,
     terrain: Arrays,
     *,
     window: int,
@@ -32,14 +33,16 @@ def clip_rows(
 ) -> ClipRows:
     """The rows of a clip's locomotion cycles, one after another, factorised.
 
-    labels, terrain: the arrays that docs/artefacts.md lists for these stages. severity: (F, L). window, step,
-    facing_sigma: frames. Past the clip's ends the root goes on as `continued` has it and the gait is held.
-    Raises InputError where the files do not belong together or a cycle lacks a frame before or after it.
+    labels, terrain: the arrays that docs/artefacts.md lists for these stages. channels: name -> values (F,
+    columns). window, step, facing_sigma: frames. Past the clip's ends the root goes on as `continued` has it
+    and the gait is held. Raises InputError where the files do not belong together or a cycle lacks a frame
+    before or after it.
     """
     skeleton = clip.skeleton
-    layout = RowLayout(len(skeleton.joints), window, step, len(skeleton.links))
+    told = tuple((name, values.shape[1]) for name, values in channels.items())
+    layout = RowLayout(len(skeleton.joints), window, step, told)
     frame, cycle = cycle_frames(labels["cycles"])
-    _check(name, clip, labels, severity, terrain, frame)
+    _check(name, clip, labels, channels, terrain, frame)
     root = root_frames(clip, facing_sigma)
     path, here = continued(root, window), frame + window
     position, velocity, rotation = local_pose(clip, root)
@@ -69,7 +72,7 @@ def clip_rows(
         x=_table(x, len(frame)),
         y=_table(y, len(frame)),
         p=cycle_phase(labels["phase"], labels["cycles"]),
-        severity=severity[frame],
+        channels={name: values[frame] for name, values in channels.items()},
         frame=frame,
         cycle=cycle,
         fits=terrain["fits"],
@@ -137,18 +140,20 @@ def _check(
     name: str,
     clip: Clip,
     labels: Arrays,
-    severity: Array,
+    channels: Arrays,
     terrain: Arrays,
     frame: np.ndarray,
 ) -> None:
     where = name
-    lengths = {"labels": len(labels["phase"]), "severities": len(severity)}
+    lengths = {"labels": len(labels["phase"]), **{name: len(values) for name, values in channels.items()}}
     for what, length in lengths.items():
         if length != len(clip):
             raise InputError(where, f"{what} of {length} frames for a clip of {len(clip)}")
-    if severity.shape[1] != len(clip.skeleton.links):
-        links = len(clip.skeleton.links)
-        raise InputError(where, f"severities of {severity.shape[1]} links for a skeleton of {links}")
+    for channel_name, values in channels.items():
+        columns = len(channel(channel_name).columns(clip.skeleton))
+        if values.shape[1] != columns:
+            problem = f"{channel_name} of {values.shape[1]} columns for a skeleton of {columns}"
+            raise InputError(where, problem)
     if not np.array_equal(terrain["frame"], frame):
         raise InputError(
             where,
