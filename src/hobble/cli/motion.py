@@ -12,16 +12,17 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 from hobble.cli import batch
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.motion.loop import loop_clip
-from hobble.motion.make import fit_skeleton, load_source, resample
+from hobble.motion.make import make_clip, resample
 from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import Motion
 from hobble.motion.read import read_bvh
-from hobble.motion.rig import Target
+from hobble.motion.source import load_source
 
 ROLES_FROM = "holden31"  # names the joints of a rig where no skeleton is asked for
 
@@ -45,12 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Convert every clip; returns the exit status."""
-    keys = Motion(source_fps=options.source_fps, defects="refuse" if options.refuse else "repair")
-    target = batch.skeleton(options.skeleton or ROLES_FROM)
 
     def convert(name: str, file: Path) -> list[str]:
-        clip, notes = converted(file, target, keys, options)
-        clip = replace(clip, name=name)
+        clip, notes = converted(name, file, options)
         write_bvh(options.out / f"{name}.bvh", clip)
         if options.mirror:
             write_bvh(options.out / f"{name}_mirror.bvh", mirror_clip(clip, f"{name}_mirror"))
@@ -60,15 +58,18 @@ def run(options: argparse.Namespace) -> int:
     return batch.for_each(batch.clips_in(options.folder), convert)
 
 
-def converted(
-    file: Path, target: Target, keys: Motion, options: argparse.Namespace
-) -> tuple[Clip, list[str]]:
+def converted(name: str, file: Path, options: argparse.Namespace) -> tuple[Clip, list[str]]:
     """The clip of a file as asked for, and what was repaired or noted. Raises InputError for a bad file."""
-    source = load_source(read_bvh(file), target, batch.skeleton_folder(), keys)
-    clip, notes = resample(source.clip, options.fps), source.repairs + source.notes
+    defects: Literal["repair", "refuse"] = "refuse" if options.refuse else "repair"
+    keys = Motion(source_fps=options.source_fps, defects=defects, loops=options.loops)
+    folder = batch.skeleton_folder()
     if options.skeleton:
-        fitted = fit_skeleton(clip, source.match, target.skeleton, "skeleton")
-        clip, notes = fitted.clip, notes + fitted.repairs
+        target = batch.skeleton_file(options.skeleton)
+        values = keys.model_dump(mode="json")
+        clip, report = make_clip(file, target, folder, clip=name, skeleton_name=target.stem, options=values)
+        return resample(clip, options.fps), report["repairs"] + report["notes"]
+    source = load_source(read_bvh(file), batch.skeleton(ROLES_FROM), folder, keys.model_dump(mode="json"))
+    clip = resample(source.clip, options.fps)
     if options.loops > 1:
         clip = loop_clip(clip, options.loops, None)
-    return clip, notes
+    return replace(clip, name=name), source.repairs + source.notes

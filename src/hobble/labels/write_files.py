@@ -47,7 +47,7 @@ def gait_text(labels: Labels, time: SourceTime) -> str:
     gaits = labels.gait.argmax(axis=1).tolist()
     changes = [i for i in range(1, len(gaits)) if gaits[i] != gaits[i - 1]]
     keys: list[tuple[int, int]] = [(0, gaits[0])]
-    for at, following in zip(changes, [*changes[1:], len(gaits)], strict=True):
+    for at, following in itertools.pairwise([*changes, len(gaits)]):
         first = max(at - HALF_FADE, keys[-1][0] + 1)
         last = max(min(at + HALF_FADE, (at + following) // 2), first + 1)
         keys += [(first, gaits[at - 1]), (last, gaits[at])]

@@ -17,7 +17,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numba import njit
+from hobble.core.compiled import njit
 
 from hobble.core.quat import Array
 from hobble.models.network import Predictor

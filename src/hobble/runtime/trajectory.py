@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+from hobble.core.compiled import njit
 
 from hobble.rows.layout import RowLayout
 
