@@ -22,7 +22,7 @@ from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import load_skeleton
 from hobble.motion.root import facing
 from hobble.motion.source import FOUND, Source, load_source
-from hobble.motion.stance import upright
+from hobble.motion.stance import Spine, upright
 
 SAME = 1e-3  # cm: offsets this near to the skeleton's are the skeleton's
 
@@ -139,7 +139,8 @@ def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str)
     sources = match.sources
     if not source.told:
         wanted = {clip.skeleton.index(name) for name in sources.values()}
-        clip = upright(clip, body_by_roles(clip.skeleton), wanted).clip
+        spine = Spine.of(target, body_by_roles(target))
+        clip = upright(clip, body_by_roles(clip.skeleton), spine, wanted).clip
         sources = {mine: theirs for mine, theirs in sources.items() if theirs in clip.skeleton.joints}
     how = plan(clip.skeleton, target, sources)
     repairs = [DROPPED] if source.moving else []

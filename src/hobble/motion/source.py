@@ -32,7 +32,7 @@ from hobble.motion.rig import (
     missing_bone,
     unit_of,
 )
-from hobble.motion.stance import stands, upright
+from hobble.motion.stance import Spine, stands, upright
 
 STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
 FOUND = "found"  # what a report calls a rig that no skeleton file describes
@@ -119,8 +119,8 @@ def _unknown(
     standing = stands(body, rest_positions(rig)) is None
     clip, axes, unsure = straighten(clip, options["up"], options["handedness"], standing)
     axes = axes if standing else replace(axes, facing="+Z")
-    told = upright(clip, body)
     theirs = body_by_roles(target.skeleton)
+    told = upright(clip, body, Spine.of(target.skeleton, theirs))
     match = Match(
         known.rig if known else FOUND,
         told.clip.skeleton.roles,

@@ -20,11 +20,11 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations, rest_positions
-from hobble.motion.body import SIDES, Body, above
+from hobble.motion.axes import rest_frame
+from hobble.motion.body import REACH, SIDES, Body, above
 
 UP, AHEAD, LEFT = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 LEG, TRUNK, HEAD, FOOT = 40.0, 40.0, 50.0, 50.0  # degrees off the straight at which a person still stands
-NECK = np.array([0.0, 0.99, 0.11])  # a neck leans forward a little
 STEADY = 0.15  # share of frames, those in which a foot is lowest and slowest, that tell how it stands
 SAMPLES = 400
 FLEXED = 0.05  # mean sine of the bend of a knee or an elbow from which on it tells where the front is
@@ -33,6 +33,7 @@ BALL = np.array([0.0, -0.045, 0.14])  # from the ankle, to the length of the leg
 TRUSTED = (
     30.0  # degrees between what zero pose and motion say of a joint, from which on the motion is believed
 )
+ROLLED = np.radians(10.0)
 NO_STANCE = 45.0  # degrees: a foot that motion says to be turned so far was never seen standing
 AGREE = np.radians(25.0)  # joints of a trunk that are turned no further from each other have one rest pose
 SHORT = 2.0  # cm: a bone shorter than this has no direction
@@ -48,6 +49,40 @@ class Upright:
     clip: Clip = field(repr=False)
     body: Body
     rest: str
+
+
+@dataclass(frozen=True)
+class Spine:
+    """Where the bones of a trunk and a neck point in a rest pose that stands, facing +Z.
+
+    shares: (N,) how far up from hips (0) to chest (1) the bones begin. axes: (N, 3). neck: (3,) to the head.
+    """
+
+    shares: Array
+    axes: Array
+    neck: Array
+
+    @classmethod
+    def of(cls, skeleton: Skeleton, body: Body) -> Spine:
+        """The spine of a skeleton, whose rest pose stands; what comes to it should point as it does."""
+        rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
+        chain = (body.hips, *body.trunk, *body.neck, body.head)
+        long = [j for k, j in enumerate(chain[1:]) if np.linalg.norm(rest[j] - rest[chain[k]]) > SHORT]
+        long = [body.hips, *long]
+        way = np.concatenate(
+            [[0.0], np.cumsum([np.linalg.norm(rest[b] - rest[a]) for a, b in pairwise(long)])]
+        )
+        axes = np.array([_unit(rest[b] - rest[a]) for a, b in pairwise(long)])
+        chest = max(
+            float(np.linalg.norm(np.diff(rest[list(chain[: len(body.trunk) + 1])], axis=0), axis=-1).sum()),
+            1e-9,
+        )
+        below = way[:-1] <= chest * 1.001
+        return cls(way[:-1][below] / chest, axes[below], axes[-1])
+
+    def at(self, share: float) -> Array:
+        """(3,) where the bone points that begins nearest below a share of the way, or little above it."""
+        return self.axes[max(0, int(np.searchsorted(self.shares, share + REACH, side="right")) - 1)]
 
 
 def stands(body: Body, rest: Array) -> str | None:
@@ -82,8 +117,10 @@ def stands(body: Body, rest: Array) -> str | None:
     return None
 
 
-def upright(clip: Clip, body: Body, others: Collection[int] = ()) -> Upright:
+def upright(clip: Clip, body: Body, spine: Spine, others: Collection[int] = ()) -> Upright:
     """The motion of a body on a rig that stands in its rest pose. clip: centimetres, right-handed, Y up.
+
+    spine: where the bones of a trunk point in that pose.
 
     Where the bones point decides alone how trunk, limbs and feet are turned, so that the same motion comes
     out of any rig alike; a zero pose that stands adds what no bone shows: how head, clavicles and hands are
@@ -93,7 +130,7 @@ def upright(clip: Clip, body: Body, others: Collection[int] = ()) -> Upright:
     ends = {
         side: clip.skeleton.end_sites.get(clip.skeleton.joints[leg[2]]) for side, leg in body.legs.items()
     }
-    seen = _Seen(body, clip.positions[every], clip.global_rotations[every], ends)
+    seen = _Seen(body, clip.positions[every], clip.global_rotations[every], ends, spine)
     rest = rest_positions(clip.skeleton)
     frames, problem = seen.from_motion(), stands(body, rest)
     if problem is None:
@@ -104,7 +141,7 @@ def upright(clip: Clip, body: Body, others: Collection[int] = ()) -> Upright:
         else:
             _add_rest(frames, zero, off, body)
     said = "its zero pose" if problem is None else f"its motion, since in its zero pose {problem}"
-    kept = _kept(clip.skeleton.parents, body, others, frames, problem is None)
+    kept = _kept(clip, seen, others, frames)
     clip, body = _with_balls(clip, body, frames)
     return Upright(*_told_anew(clip, body, [*body.joints, *kept], frames), said)
 
@@ -118,27 +155,35 @@ def _add_rest(frames: dict[int, Array], zero: dict[int, Array], off: dict[int, f
         if clavicle is not None and off[clavicle] < TRUSTED:
             frames[clavicle] = frames[body.chest]
         frames[wrist] = zero[wrist]
-        for joint in body.legs[side][2:]:
-            if joint is not None and off[joint] > NO_STANCE:
-                frames[joint] = zero[joint]
+        heel, toe = body.legs[side][2:]
+        apart = 2.0 * quat.log(quat.mul(quat.inv(zero[heel]), frames[heel]))
+        # Feet of a rig whose legs are splayed at rest are rolled there; how they stand shows by how much.
+        rolled = off[heel] < NO_STANCE and abs(apart[2]) > ROLLED
+        roll = quat.from_axis_angle(AHEAD, apart[2] if rolled else 0.0)
+        for joint in (heel, toe):
+            if joint is not None:
+                frames[joint] = quat.mul(zero[joint], roll)
 
 
-def _kept(
-    parents: Sequence[int], body: Body, others: Collection[int], frames: dict[int, Array], straight: bool
-) -> list[int]:
+def _kept(clip: Clip, seen: _Seen, others: Collection[int], frames: dict[int, Array]) -> list[int]:
     """Those of the other joints that can be kept, with their frames put into `frames`.
 
-    straight: whether the zero pose is a straight body; else nothing tells how fingers are turned.
+    Each is turned, on average, as the part of the body that it hangs from; the base of a finger points along it.
     """
+    body, parents = seen.body, clip.skeleton.parents
     out = []
     for joint in sorted(set(others) - set(body.joints)):
-        carrier = next((j for j in above(parents, joint)[1:] if j in body.joints), body.hips)
-        for _, _, elbow, wrist in body.arms.values():
-            if carrier == wrist:
-                carrier = elbow if straight else -1
-        if carrier >= 0:
-            frames[joint] = frames[carrier]
-            out.append(joint)
+        carrier = next((j for j in above(parents, joint)[1:] if j in body.joints), None)
+        if carrier is None:
+            continue
+        part = quat.mul(seen.turned[:, carrier], frames[carrier])
+        frames[joint] = _mean(quat.mul(quat.inv(seen.turned[:, joint]), part))
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            tips = [j for j in others if joint in above(parents, j)[1:]]
+            bones = [bone for j in tips if np.linalg.norm(bone := seen.bone(joint, j)) > SHORT]
+            if carrier == body.arms[side][3] and bones:
+                frames[joint] = _pointed(frames[joint], sign * LEFT, bones[0])
+        out.append(joint)
     return out
 
 
@@ -155,8 +200,9 @@ class _Seen:
         positions: Array,
         rotations: Array,
         ends: Mapping[str, tuple[float, float, float] | None],
+        spine: Spine,
     ) -> None:
-        self.body, self.at, self.turned, self.ends = body, positions, rotations, ends
+        self.body, self.at, self.turned, self.ends, self.spine = body, positions, rotations, ends, spine
         self.hips_left = self.line(body.legs["right"][0], body.legs["left"][0])
         self.chest_left = self.line(body.arms["right"][1], body.arms["left"][1])
 
@@ -218,14 +264,21 @@ class _Seen:
         chain = (body.hips, *body.trunk)
         ends = (*body.neck, body.head)
         both = _unit(self.hips_left + self.chest_left)
+        steps = [
+            float(np.median(np.linalg.norm(self.at[:, b] - self.at[:, a], axis=-1)))
+            for a, b in pairwise(chain)
+        ]
+        way = np.concatenate([[0.0], np.cumsum(steps)])
         for i, joint in enumerate(chain):
             left = self.hips_left if i == 0 else self.chest_left if joint == body.chest else both
             following = (*chain[i + 1 :], *ends)
             bone = self._first_long(joint, following)
-            frames[joint] = _frame(bone, UP, self.local(joint, left), LEFT)
+            frames[joint] = _frame(
+                bone, self.spine.at(way[i] / max(way[-1], 1e-9)), self.local(joint, left), LEFT
+            )
         for i, joint in enumerate(body.neck):
             bone = self._first_long(joint, ends[i + 1 :])
-            axis = NECK if joint == body.neck[-1] else UP
+            axis = self.spine.neck if joint == body.neck[-1] else self.spine.at(1.0)
             frames[joint] = _frame(bone, axis, self.local(joint, self.chest_left), LEFT)
         frames[body.head] = self._head(frames, (*chain, *body.neck))
 
