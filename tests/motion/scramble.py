@@ -427,8 +427,32 @@ def _arm_of(
     return out
 
 
-def main() -> None:
-    """Scramble as many clips as asked for, and say what came of each that is not right."""
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a scrambled file: `off`, (N,) cm of each of `names`, or why it was refused."""
+
+    how: Scramble
+    names: dict[str, str]
+    off: Array | None
+    refused: str = ""
+
+    @property
+    def right(self) -> bool:
+        """Within 1 cm on average."""
+        return self.off is not None and float(self.off.mean()) <= 1.0
+
+    def __str__(self) -> str:
+        if self.off is None:
+            return f"refused: {self.refused[:200]} {self.how}"
+        worst = sorted(zip(self.off, self.names, strict=True), reverse=True)[:4]
+        return f"{self.off.mean():.2f} cm ({', '.join(f'{n} {x:.1f}' for x, n in worst)}) {self.how}"
+
+
+def outcome(file: Path, seed: int, folder: Path, frames: int | None = None) -> Outcome:
+    """Scramble a file of the 31 joints, make a clip of it and of the file itself, and compare the two.
+
+    frames: how many of the clip's first frames are taken.
+    """
     from hobble.config.sections import Motion
     from hobble.core.bvh import write_bvh
     from hobble.core.errors import HobbleError
@@ -437,47 +461,45 @@ def main() -> None:
     from hobble.motion.rig import load_skeleton
     from hobble.motion.source import load_source
 
+    maps = Path(__file__).parents[2] / "config" / "skeletons"
+    options, how, target = Motion().model_dump(), Scramble.drawn(seed), maps / "holden31.yaml"
+    clip = load_source(read_bvh(file), load_skeleton(target), maps, options).clip
+    part = slice(0, frames)
+    clip = stretched(replace(clip, rotations=clip.rotations[part], root=clip.root[part]), how)
+    plain, other = folder / "plain.bvh", folder / "other.bvh"
+    write_bvh(plain, clip, decimals=6)
+    told, names = written(clip, how)
+    write_bvh(other, told, how.order, decimals=8)
+    try:
+        first, _ = make_clip(plain, target, maps, "plain", "holden31", options)
+        second, _ = make_clip(other, target, maps, "other", "holden31", options)
+    except HobbleError as error:
+        return Outcome(how, names, None, str(error))
+    return Outcome(how, names, compare(first, second, names))
+
+
+def main() -> None:
+    """Scramble as many clips as asked for, and say what came of each that is not right."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("folder", type=Path, help="clips of the 31 joints")
     parser.add_argument("--count", type=int, default=240)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--verbose", action="store_true")
+    parser.add_argument("--frames", type=int)
     given = parser.parse_args()
     files = sorted(given.folder.glob("*.bvh"))
-    maps = Path(__file__).parents[2] / "config" / "skeletons"
-    options = Motion().model_dump()
-    right = refused = 0
-    apart = []
+    all_of_them = []
     for seed in range(given.first, given.first + given.count):
-        how = Scramble.drawn(seed)
         file = files[seed * 7 % len(files)]
         with tempfile.TemporaryDirectory() as folder:
-            clip = load_source(read_bvh(file), load_skeleton(maps / "holden31.yaml"), maps, options).clip
-            clip = stretched(clip, how)
-            plain, other = Path(folder) / "plain.bvh", Path(folder) / "other.bvh"
-            write_bvh(plain, clip, decimals=6)
-            told, names = written(clip, how)
-            write_bvh(other, told, how.order, decimals=8)
-            try:
-                first, _ = make_clip(plain, maps / "holden31.yaml", maps, "plain", "holden31", options)
-                second, report = make_clip(other, maps / "holden31.yaml", maps, "other", "holden31", options)
-            except HobbleError as error:
-                refused += 1
-                print(f"{seed} {file.stem} REFUSED {how}: {str(error)[:300]}", flush=True)
-                continue
-        off = compare(first, second, names)
-        apart.append(off.mean())
-        if off.mean() <= 1.0:
-            right += 1
-        if off.mean() > 1.0 or given.verbose:
-            worst = sorted(zip(off, [n for n in names], strict=True), reverse=True)[:5]
-            print(
-                f"{seed} {file.stem} {off.mean():.2f} cm {report['stance'][:40]} {how}: "
-                + ", ".join(f"{n} {x:.1f}" for x, n in worst),
-                flush=True,
-            )
+            one = outcome(file, seed, Path(folder), given.frames)
+        all_of_them.append(one)
+        if not one.right:
+            print(f"{seed} {file.stem} {one}", flush=True)
+    off = np.array([one.off.mean() for one in all_of_them if one.off is not None])
     print(
-        f"{given.count} scrambled: {right} within 1 cm, {refused} refused, {given.count - right - refused} wrong; median {np.median(apart):.2f} cm"
+        f"{given.count} scrambled: {(off <= 1).sum()} within 1 cm, {(off > 1).sum()} further off "
+        f"({(off > 2).sum()} more than 2 cm), {given.count - len(off)} refused; median {np.median(off):.2f}, "
+        f"most {off.max():.2f} cm"
     )
 
 

@@ -15,6 +15,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import turned
 from hobble.motion.body import body_by_roles
+from hobble.motion.check import check, compare
 from hobble.motion.loop import loop_clip
 from hobble.motion.read import MOST_POSES, Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
@@ -53,6 +54,8 @@ def make_clip(
     _check_length(file, source.clip, target.skeleton, options)
     resampled = resample(source.clip, options["fps"])
     fitted = fit_skeleton(resampled, source, target.skeleton, options["proportions"])
+    if fitted.figures is not None:
+        check(file.path, fitted.figures, source.match.rig)
     made, said, loops = fitted.clip, source.repairs + fitted.repairs, options["loops"]
     if loops > 1:
         made = loop_clip(made, loops, options["heading"])
@@ -61,7 +64,12 @@ def make_clip(
         made = turned(made, np.radians(options["facing"]) - first_facing(made))
     made = replace(made, name=clip)
     _check_finite(file, made)
-    extra = {"loops": loops, "cycle_frames": len(made) // loops, "scale": fitted.scale}
+    extra: dict[str, Any] = {
+        "loops": loops,
+        "cycle_frames": len(made) // loops,
+        "scale": fitted.scale,
+        "retarget": fitted.figures,
+    }
     return made, _report(file, source, made) | extra | {"repairs": said, "notes": source.notes}
 
 
@@ -117,11 +125,16 @@ def resample(clip: Clip, fps: float) -> Clip:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A clip on the joints of the target, how far its path was scaled for that, and what it cost."""
+    """A clip on the joints of the target, how far its path was scaled for that, and what it cost.
+
+    figures: how far it is from its source (`hobble.motion.check.compare`); None for one that was not
+    retargeted.
+    """
 
     clip: Clip
     scale: float
     repairs: list[str]
+    figures: dict[str, Any] | None = None
 
 
 def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str) -> Fitted:
@@ -147,7 +160,8 @@ def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str)
     if proportions == "clip":
         rig = "another" if match.rig == FOUND else match.rig
         repairs.append(f"Its rig is {rig}, so that it was put on the bone lengths of {target.name}.")
-    return Fitted(retarget_clip(clip, how), round(how.scale, 6), repairs)
+    made = retarget_clip(clip, how)
+    return Fitted(made, round(how.scale, 6), repairs, compare(clip, made, how.scale))
 
 
 def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:

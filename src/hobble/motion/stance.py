@@ -33,8 +33,9 @@ BALL = np.array([0.0, -0.045, 0.14])  # from the ankle, to the length of the leg
 TRUSTED = (
     30.0  # degrees between what zero pose and motion say of a joint, from which on the motion is believed
 )
-ROLLED = np.radians(10.0)
-NO_STANCE = 45.0  # degrees: a foot that motion says to be turned so far was never seen standing
+SHRUG = 12.0  # degrees from the chest, on average, up to which clavicles are at rest as in the zero pose
+LIMP = 60.0  # and hands from their forearms
+UPRIGHT = 0.6  # height of the hips above a foot that stands, to the length of the leg
 AGREE = np.radians(25.0)  # joints of a trunk that are turned no further from each other have one rest pose
 SHORT = 2.0  # cm: a bone shorter than this has no direction
 
@@ -135,40 +136,61 @@ def upright(clip: Clip, body: Body, spine: Spine, others: Collection[int] = ()) 
     frames, problem = seen.from_motion(), stands(body, rest)
     if problem is None:
         zero = seen.from_rest(rest)
-        off = {joint: float(np.degrees(quat.angle(zero[joint], frames[joint]))) for joint in zero}
-        if max(off[j] for j in (body.hips, *body.trunk)) > TRUSTED:
+        if max(_apart(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED:
             problem = "the trunk is twisted"
         else:
-            _add_rest(frames, zero, off, body)
+            _add_rest(frames, zero, seen)
     said = "its zero pose" if problem is None else f"its motion, since in its zero pose {problem}"
     kept = _kept(clip, seen, others, frames)
     clip, body = _with_balls(clip, body, frames)
     return Upright(*_told_anew(clip, body, [*body.joints, *kept], frames), said)
 
 
-def _add_rest(frames: dict[int, Array], zero: dict[int, Array], off: dict[int, float], body: Body) -> None:
-    """Put into `frames` what the zero pose knows better; off: degrees between the two."""
-    if off[body.head] < TRUSTED:
+def _add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: _Seen) -> None:
+    """Put into `frames` what the zero pose knows better."""
+    body = seen.body
+    if _apart(zero[body.head], frames[body.head]) < TRUSTED:
         frames[body.head] = zero[body.head]
     for side in SIDES:
         clavicle, _, _, wrist = body.arms[side]
-        if clavicle is not None and off[clavicle] < TRUSTED:
+        if clavicle is not None and _apart(frames[body.chest], frames[clavicle]) < SHRUG:
             frames[clavicle] = frames[body.chest]
-        frames[wrist] = zero[wrist]
+        if _apart(zero[wrist], frames[wrist]) < LIMP:
+            frames[wrist] = zero[wrist]
         heel, toe = body.legs[side][2:]
-        apart = 2.0 * quat.log(quat.mul(quat.inv(zero[heel]), frames[heel]))
-        # Feet of a rig whose legs are splayed at rest are rolled there; how they stand shows by how much.
-        rolled = off[heel] < NO_STANCE and abs(apart[2]) > ROLLED
-        roll = quat.from_axis_angle(AHEAD, apart[2] if rolled else 0.0)
-        for joint in (heel, toe):
-            if joint is not None:
-                frames[joint] = quat.mul(zero[joint], roll)
+        frames[heel] = _foot(frames[heel], zero[heel], seen, side)
+        if toe is not None:
+            frames[toe] = _foot(frames[toe], zero[toe], seen, side)
+
+
+def _foot(standing: Array, zero: Array, seen: _Seen, side: str) -> Array:
+    """How a foot is turned: rolled as it stands, pointing as in the zero pose, where the two agree at all.
+
+    Feet of a rig whose legs are splayed in the zero pose are rolled there; a patient's foot may never be
+    flat.
+    """
+    if not seen.stands(side):
+        return zero
+    heel, toe = seen.body.legs[side][2:]
+    if toe is None:
+        return zero if _apart(standing, zero) < TRUSTED else standing
+    bone = seen.bone(heel, toe)
+    if _apart(standing, zero) > TRUSTED + 60:
+        return standing
+    wanted, found = (quat.rotate(quat.inv(frame), bone) for frame in (zero, standing))
+    return quat.mul(standing, quat.between(wanted, found)) if _off(wanted, found) < TRUSTED else standing
+
+
+def _apart(a: Array, b: Array) -> float:
+    """Degrees between two rotations."""
+    return float(np.degrees(quat.angle(a, b)))
 
 
 def _kept(clip: Clip, seen: _Seen, others: Collection[int], frames: dict[int, Array]) -> list[int]:
     """Those of the other joints that can be kept, with their frames put into `frames`.
 
-    Each is turned, on average, as the part of the body that it hangs from; the base of a finger points along it.
+    Each is turned, on average, as the part of the body that it hangs from; the base of a finger points along
+    it.
     """
     body, parents = seen.body, clip.skeleton.parents
     out = []
@@ -336,6 +358,16 @@ class _Seen:
         if np.linalg.norm(own) < FLEXED:
             return otherwise
         return quat.rotate(self.turned[:, start], np.broadcast_to(_unit(own), axis.shape))
+
+    def stands(self, side: str) -> bool:
+        """Whether the body stands up while that foot is lowest and slowest."""
+        hip, knee, heel, toe = self.body.legs[side]
+        flat = self._flat(heel, heel if toe is None else toe)
+        leg = sum(
+            float(np.median(np.linalg.norm(self.at[:, b] - self.at[:, a], axis=-1)))
+            for a, b in ((hip, knee), (knee, heel))
+        )
+        return bool(np.median(self.at[flat, hip, 1] - self.at[flat, heel, 1]) > UPRIGHT * leg)
 
     def _flat(self, heel: int, toe: int) -> NDArray[np.integer]:
         """The frames in which the whole foot stands: it is lowest and slowest then."""
