@@ -11,10 +11,7 @@ help:            ## list these targets
 env: .venv/.ready  ## the environment in .venv
 
 .venv/.ready: pyproject.toml constraints.txt
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Hobble needs Python 3.11 or later; set PYTHON=")'
-	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt "torch==2.13.0"
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev]"
+	$(PYTHON) src/hobble/workflow/environment.py .venv
 	touch $@
 
 report: env      ## train the default configuration and make its report

@@ -3,13 +3,16 @@ import os
 import sys
 from pathlib import Path
 
+from hobble.channels import NAMES, modules_of
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import modules
+from hobble.workflow import lifetime
 from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check
+from hobble.workflow.told import told_by
 
 try:
     # Relative, so that a checkout can be moved without making anything again.
@@ -20,6 +23,9 @@ try:
     )
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
+
+lifetime.announce()
+lifetime.clear_stale_lock()
 
 # What the rules ask; each part is a module of hobble.workflow.
 catalogue = project.catalogue
@@ -32,12 +38,23 @@ measurements = project.measurements
 demands = Demands(project)
 
 
+# A clip that a data set lists or its folder holds: no mirror, no hurt version.
+OWN = r"[^/]+(?<!_mirror)(?<!_hurt[1-9])"
+
+
+onstart:
+    if workflow.is_main_process:
+        lifetime.own_lock()
+        lifetime.end_jobs_with_run()
+
+
 wildcard_constraints:
     configuration="|".join(catalogue.names()),
     dataset=r"[^/]+",
     clip=r"[^/]+(?<!_mirror)",
     rows=r"[^/]+",
-    selection="healthy|all",
+    channel="|".join(NAMES),
+    told=r"plain|[a-z_+]+(?<!clips)",
     measure="|".join(MEASURES),
 
 
@@ -59,7 +76,13 @@ rule all:
 include: "workflow/rules/synthetic.smk"
 include: "workflow/rules/motion.smk"
 include: "workflow/rules/labels.smk"
-include: "workflow/rules/injury.smk"
+include: "workflow/rules/channels.smk"
+include: "workflow/rules/hurt.smk"
+
+
+ruleorder: hurt_clip > channel_clip
+
+
 include: "workflow/rules/terrain.smk"
 include: "workflow/rules/database.smk"
 include: "workflow/rules/training.smk"

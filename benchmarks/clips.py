@@ -27,8 +27,7 @@ def workflow_seconds(targets: list[str], mocap: Path, cores: int) -> tuple[float
     """Wall and processor seconds that the workflow takes to make `targets`, from nothing."""
     with tempfile.TemporaryDirectory() as scratch:
         command = [sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "-d", scratch]
-        command += ["--workflow-profile", str(ROOT / "workflow/profiles/default"), f"-c{cores}", *targets]
-        command += ["--config", f"mocap={mocap}"]
+        command += [f"-c{cores}", *targets, "--config", f"mocap={mocap}"]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         start = time.perf_counter()
         done = subprocess.run(

@@ -24,10 +24,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hobble.database.clip_rows import ClipRows, save_clip_rows
-from hobble.database.layout import RowLayout
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.layout import RowLayout
 
 CLIP_ROWS = 3000
 BATCH = 512
@@ -39,7 +39,7 @@ SECONDS = 6.0  # of reading, per measurement
 
 def made_up(folder: Path, size: int, joints: int) -> dict[str, Path]:
     """Files of random rows, about `size` bytes in all."""
-    layout = RowLayout(joints, links=30)
+    layout = RowLayout(joints, channels=(("injury", 30),))
     skeleton = {"name": "made up", "joints": {f"j{i}": {} for i in range(joints)}}
     files, total, rng = {}, 0, np.random.default_rng(0)
     while total < size:
@@ -48,15 +48,17 @@ def made_up(folder: Path, size: int, joints: int) -> dict[str, Path]:
             "x": (CLIP_ROWS, layout.x_terrain.start),
             "y": (CLIP_ROWS, layout.y_size),
             "p": (CLIP_ROWS,),
-            "severity": (CLIP_ROWS, 30),
             "heights": (CLIP_ROWS * fits, 36),
             "mean": (CLIP_ROWS * fits,),
         }
         arrays = {name: rng.standard_normal(shape, np.float32) for name, shape in shapes.items()}
+        told = {"injury": rng.standard_normal((CLIP_ROWS, 30), np.float32)}
         count = np.full(CLIP_ROWS, fits)
         frame = np.arange(CLIP_ROWS)
         name = f"clip{len(files):04d}"
-        rows = ClipRows(name, layout, skeleton, frame=frame, cycle=frame // 60, fits=count, **arrays)
+        rows = ClipRows(
+            name, layout, skeleton, frame=frame, cycle=frame // 60, fits=count, channels=told, **arrays
+        )
         files[name] = folder / f"{name}.npz"
         save_clip_rows(files[name], rows)
         total += files[name].stat().st_size
@@ -178,7 +180,7 @@ def task_build(folder: Path, clips: str) -> None:
     files = {file.stem: file for file in sorted(Path(clips).glob("*.npz"))}
     splits = dict.fromkeys(files, "train")
     before, start = status("VmRSS"), time.perf_counter()
-    write_database(folder / "db", files, splits, injury=True, joint_weight=0.1)
+    write_database(folder / "db", files, splits, channels=["injury"], joint_weight=0.1)
     print(time.perf_counter() - start, status("VmHWM") >> 20, before >> 20)
 
 
@@ -256,25 +258,26 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     comes first changes from round to round. So both meet the same machine, and neither profits from what was
     read in the other's time.
     """
-    from hobble.config.sections import Network, Training
+    from hobble.config.sections import Training
+    from hobble.models.pfnn.options import PfnnOptions
     from hobble.training.batches import HostRows
     from hobble.training.start import fresh, step_for, use_threads
     from hobble.training.update import update_for
 
     use_threads(int(os.environ.get("OMP_NUM_THREADS", "2")))
-    options = Training(memory_mb=memory_mb).model_dump(mode="json")
+    options = Training(memory_mb=memory_mb)
     disk, memory = (Database.open(folder / "db", mb) for mb in (memory_mb, 1 << 20))
-    state = fresh(disk, Network().model_dump(mode="json"), options)
+    state = fresh(disk, PfnnOptions(), options)
     device = state.network.flat.device
-    update = update_for(step_for(state.network, options), state.adam, options["batch"])
-    rows = disk.block_rows(options["batch"])
+    update = update_for(step_for(state.network, options), state.adam, options.batch)
+    rows = disk.block_rows(options.batch)
     stretch = WINDOWS * disk.window("train", rows) * disk.manifest.chunks["train"][0].rows
     stretch = min(stretch, disk.section_pairs("train", 0, 10))
 
     def turn(db: Database, section: int) -> tuple[float, float]:
         """Samples a second over one stretch, by the clock and by processor time, that of all threads."""
         start, used, done = time.perf_counter(), time.process_time(), 0
-        for batch in HostRows(db, device).batches(0, section % 10, 10, 1, options["batch"]):
+        for batch in HostRows(db, device).batches(0, section % 10, 10, 1, options.batch):
             loss = update(*batch[:3], 1.0)
             done += len(batch.p)
             if done >= stretch:
@@ -319,7 +322,7 @@ def main() -> None:
     try:
         small = made_up(folder / "one", 1, args.joints)
         splits = dict.fromkeys(small, "train")
-        write_database(folder / "small", small, splits, injury=True, joint_weight=0.1)
+        write_database(folder / "small", small, splits, channels=["injury"], joint_weight=0.1)
         db = build(args, folder)
         if args.only != "training":
             reading(db, folder, args)

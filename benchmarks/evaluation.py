@@ -17,8 +17,9 @@ from runtime import SKELETON, load_skeleton, random_network
 
 from hobble.evaluation.crowd import Stretch, run, severities
 from hobble.measures.rollouts.run import Inputs, roll_out
-from hobble.runtime.network import Network, load_network
-from hobble.runtime.predictor import Predictor
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.models.pfnn.predictor import PfnnPredictor
 
 RUNTIME = {"mode": "cubic"}
 FRAMES = 120
@@ -60,7 +61,7 @@ def roll_outs(network: Network) -> tuple[float, float]:
         still + 1,
     )
     starts = np.arange(1, count - length, 6)
-    predictor = Predictor(network)
+    predictor = PfnnPredictor(network)
     per = 1e6 / length / len(starts)
     together = seconds(lambda: roll_out(predictor, asked, starts, length))
     apart = seconds(

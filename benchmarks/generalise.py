@@ -2,7 +2,7 @@
 
     python benchmarks/generalise.py DATABASE < recipes
 
-DATABASE is results/datasets/<dataset>/database/healthy, beside the `clips` it was made from. Each line of the
+DATABASE is results/datasets/<dataset>/database/plain, beside the `clips` it was made from. Each line of the
 input is one recipe, in keys of the training section: `passes: 2, batch: 256, dropout: 0.1`. For each, the
 mean squared error of the last section of its training (with dropout and roll-outs) and of every held-out row;
 how far joints are from the recorded ones over roll-outs of 1, 10 and 60 frames, cm, as the evaluation stage
@@ -24,11 +24,12 @@ import hobble.training  # noqa: F401 - first, since it says how threads wait
 import torch
 import yaml
 
-from hobble.config.sections import Network, Training
+from hobble.config.sections import Training
 from hobble.database.reader import Database
 from hobble.measures.responsivity.run import responsivity
 from hobble.measures.rollouts.run import measure_roll_outs
-from hobble.runtime.network import load_network
+from hobble.models.load import load_network
+from hobble.models.pfnn.options import PfnnOptions
 from hobble.training.held_out import HeldOut
 from hobble.training.train import train
 from hobble.training.weights import write_weights
@@ -37,8 +38,8 @@ LENGTHS = (1, 10, 60)
 
 
 def measured(database: Database, recipe: dict, threads: int) -> str:
-    network = Network().model_dump(mode="json")
-    training = Training(**recipe).model_dump(mode="json")
+    network = PfnnOptions()
+    training = Training(**recipe)
     clips = {c["clip"]: c["split"] for c in database.manifest.clips if c["split"] == "held_out" and c["rows"]}
     files = {name: database.path.parent / "clips" / f"{name}.npz" for name in clips}
     with tempfile.TemporaryDirectory() as folder:

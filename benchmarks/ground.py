@@ -28,6 +28,7 @@ from hobble.motion.mirror import mirror_clip
 from hobble.synthetic.clip import write_clip
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import heightmaps
+from hobble.terrain.options import Sampling
 from hobble.terrain.patches import Patches, draw_patches
 from hobble.workflow.project import Project
 
@@ -60,11 +61,11 @@ class Found(NamedTuple):
 def patches_of(dataset: str, mocap: Path) -> Patches:
     """The patches of a data set, drawn once a process."""
     project = Project(BASE, {"mocap": str(mocap)})
-    options = project.datasets.options(dataset, "terrain")
-    scales = {name: options[name] for name in ("cell", "height_scale")}
-    maps = heightmaps(options["heightmaps"], project.clips.heightmap_files(dataset), **scales)
-    names = ("cell", "size", "highest", "seed")
-    return draw_patches(maps, count=options["patches"], **{name: options[name] for name in names})
+    options = project.catalogue.dataset(dataset).terrain
+    scales = options.model_dump(include={"cell", "height_scale"})
+    maps = heightmaps(options.heightmaps, project.clips.heightmap_files(dataset), **scales)
+    drawn = options.model_dump(include={"cell", "size", "highest", "seed"})
+    return draw_patches(maps, count=options.patches, **drawn)
 
 
 def source(project: Project, job: Job, folder: Path) -> tuple[Path, list[Path]]:
@@ -107,7 +108,8 @@ def made(project: Project, job: Job, folder: Path) -> Iterator[tuple[Clip, dict]
 def found(job: Job) -> list[Found]:
     """The fits of one clip and its mirror."""
     project = Project(BASE, {"mocap": str(job.mocap)})
-    options, database = (project.datasets.options(job.dataset, name) for name in ("terrain", "database"))
+    options = project.catalogue.dataset(job.dataset).terrain
+    sampling = Sampling(**project.datasets.part(job.dataset, "database", Sampling))
     out = []
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -117,7 +119,7 @@ def found(job: Job) -> list[Found]:
             return []
     for clip, labels in pairs:
         for kind in job.kinds or (project.clips.entry(job.dataset, job.clip).ground,):
-            fits = clip_fits(clip, labels, patches_of(job.dataset, job.mocap), kind, options, database)
+            fits = clip_fits(clip, labels, patches_of(job.dataset, job.mocap), kind, options, sampling)
             if not len(fits.patch):
                 continue
             means = fits.foot_error[..., 0]

@@ -16,10 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hobble.config.sections import Network, Training
+from hobble.config.sections import Training
 from hobble.database.manifest import Manifest
 from hobble.database.merge import write_database
 from hobble.measures.accuracy.run import measure
+from hobble.models.pfnn.options import PfnnOptions
 from hobble.training.run import run
 
 DTYPES = ("float32", "float16", "bfloat16")
@@ -32,8 +33,8 @@ def trained(database: Path, folder: Path, passes: int, seed: int, threads: int) 
     run(
         database,
         configuration="precision",
-        network=Network().model_dump(mode="json"),
-        training=Training(passes=passes, seed=seed).model_dump(mode="json"),
+        network=PfnnOptions(),
+        training=Training(passes=passes, seed=seed),
         checkpoints=folder / "checkpoints",
         threads=threads,
         start=None,
@@ -50,7 +51,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--threads", type=int, default=2)
     asked = parser.parse_args()
-    made = Manifest.load(asked.folder / "database/healthy")
+    made = Manifest.load(asked.folder / "database/plain")
     splits = {clip["clip"]: clip["split"] for clip in made.clips}
     clips = {name: asked.folder / f"database/clips/{name}.npz" for name in splits}
     frames = f"{made.rows('train'):,} frames to learn from, {made.rows('held_out'):,} held out"
@@ -60,7 +61,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         for dtype in DTYPES:
             database = Path(name, dtype)
-            options = {"injury": False, "joint_weight": made.joint_weight, "dtype": dtype}
+            options = {"channels": [], "joint_weight": made.joint_weight, "dtype": dtype}
             manifest = write_database(database, clips, splits, **options)
             for seed in asked.seeds:
                 weights = trained(database, Path(name, f"{dtype}-{seed}"), asked.passes, seed, asked.threads)

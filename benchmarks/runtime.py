@@ -18,10 +18,13 @@ import numpy as np
 import yaml
 
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.database.layout import RowLayout
+from hobble.models.load import load_network
+from hobble.models.network import STORAGES
+from hobble.models.pfnn.forward import weights_at
+from hobble.models.pfnn.network import Pfnn
+from hobble.models.pfnn.predictor import MODES, PfnnPredictor
+from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.network import Network, load_network, weights_at
-from hobble.runtime.predictor import MODES, STORAGES, Predictor
 
 SKELETON = Path(__file__).parents[1] / "config/skeletons/holden31.yaml"
 FRAMES = 1200
@@ -34,7 +37,7 @@ def load_skeleton(path: Path) -> Skeleton:
     return Skeleton.from_dict({"name": path.stem, **{k: v for k, v in data.items() if k != "maps"}})
 
 
-def random_network(skeleton: Skeleton, units: int = 512, hidden: int = 2) -> Network:
+def random_network(skeleton: Skeleton, units: int = 512, hidden: int = 2) -> Pfnn:
     """Random weights around a figure in its rest pose that glides ahead."""
     layout = RowLayout(len(skeleton.joints))
     rng = np.random.default_rng(1)
@@ -44,19 +47,19 @@ def random_network(skeleton: Skeleton, units: int = 512, hidden: int = 2) -> Net
     y[layout.y_joint_position] = forward_kinematics(skeleton, rest, np.array([[0, 93.0, 0]]))[1].ravel()
     y[layout.y_phase_change], y[1] = PHASE_STEP, 1.5
     y[layout.y_direction][layout.future :] = 1
-    return Network(
-        tuple(rng.normal(0, n**-0.5, (4, m, n)).astype(np.float32) for n, m in pairwise(sizes)),
-        tuple(np.zeros((4, m), np.float32) for m in sizes[1:]),
-        np.zeros(layout.x_size, np.float32),
-        np.full(layout.x_size, 20, np.float32),
-        y,
-        np.full(layout.y_size, 0.01, np.float32),
-        layout,
-        skeleton,
+    return Pfnn(
+        weights=tuple(rng.normal(0, n**-0.5, (4, m, n)).astype(np.float32) for n, m in pairwise(sizes)),
+        biases=tuple(np.zeros((4, m), np.float32) for m in sizes[1:]),
+        x_mean=np.zeros(layout.x_size, np.float32),
+        x_std=np.full(layout.x_size, 20, np.float32),
+        y_mean=y,
+        y_std=np.full(layout.y_size, 0.01, np.float32),
+        layout=layout,
+        skeleton=skeleton,
     )
 
 
-def numpy_blend(network: Network, x: np.ndarray, phase: float) -> np.ndarray:
+def numpy_blend(network: Pfnn, x: np.ndarray, phase: float) -> np.ndarray:
     """The plain way: blend every weight at the phase, then multiply."""
     h = (x - network.x_mean) / network.x_std
     last = len(network.weights) - 1
@@ -86,7 +89,7 @@ def show(name: str, times: np.ndarray, baseline: float, note: str = "") -> None:
     print(f"{name:<34}{median:9.1f}{p99:9.1f}{baseline / median:9.1f}  {note}")
 
 
-def predictions(network: Network) -> float:
+def predictions(network: Pfnn) -> float:
     x = np.random.default_rng(2).normal(0, 20, (1, network.layout.x_size)).astype(np.float32)
     blend = timed(lambda p: numpy_blend(network, x[0], p), 120)
     baseline = float(np.median(blend))
@@ -95,10 +98,10 @@ def predictions(network: Network) -> float:
     z, out, phase = np.zeros_like(x), np.zeros((1, network.layout.y_size), np.float32), np.zeros(1)
     for mode in MODES:
         for storage in STORAGES:
-            predictor = Predictor(network, mode, storage)
+            predictor = PfnnPredictor(network, mode, storage)
             predictor.standardise(x, z)
 
-            def call(p: float, predictor: Predictor = predictor) -> None:
+            def call(p: float, predictor: PfnnPredictor = predictor) -> None:
                 phase[0] = p
                 predictor.evaluate(z, phase, out)
 
@@ -109,7 +112,7 @@ def predictions(network: Network) -> float:
     return baseline
 
 
-def frames(network: Network, baseline: float) -> None:
+def frames(network: Pfnn, baseline: float) -> None:
     print(f"\n{'next_pose, a character':<34}{'median':>9}{'p99':>9}{'ratio':>9}")
     for mode in MODES:
         for count in (1, 11, 200):

@@ -2,7 +2,7 @@
 
     python benchmarks/schedules.py DATABASE [--configurations holden,fast] [--plot curves.png] [--threads 2]
 
-DATABASE is a database folder, such as results/datasets/synthetic/database/healthy. Each configuration is
+DATABASE is a database folder, such as results/datasets/synthetic/database/plain. Each configuration is
 trained on it from nothing, the first one to its end, the others likewise. The curves are the held-out errors
 of history.csv over its seconds, which count everything from the first batch on, measuring and checkpoints
 too. CPU seconds of the process are given beside wall time: they change less with what else the machine does.
@@ -60,9 +60,9 @@ class CpuSeconds(logging.Handler):
 
 def trained(name: str, database: Path, threads: int) -> Curve:
     configuration = Catalogue(ROOT / "config").configuration(name)
-    network = configuration.network.model_dump(mode="json")
-    training = configuration.training.model_dump(mode="json")
-    data = Database.open(database, training["memory_mb"])
+    network = configuration.network
+    training = configuration.training
+    data = Database.open(database, training.memory_mb)
     log, clock = logging.getLogger("hobble.training"), CpuSeconds()
     log.setLevel(logging.INFO)
     log.addHandler(clock)

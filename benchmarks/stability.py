@@ -13,8 +13,8 @@ import sys
 
 from hobble.core.errors import HobbleError
 from hobble.evaluation.stability import LIMITS, stability
-from hobble.runtime.network import load_network
-from hobble.runtime.predictor import MODES
+from hobble.models.load import load_network
+from hobble.models.pfnn.predictor import MODES
 
 
 def main() -> int:

@@ -11,8 +11,9 @@ import argparse
 
 import numpy as np
 
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.network import Network, load_network
 from hobble.runtime.waypoints import TRACK
 
 LINES = {  # degrees from the facing to the way, cm a frame

@@ -35,11 +35,12 @@ from hobble.synthetic.clip import write_clip
 from hobble.terrain import search
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import heightmaps
+from hobble.terrain.options import Sampling
 from hobble.terrain.patches import Patches, draw_patches
 
 SKELETONS = Path(__file__).resolve().parents[1] / "config/skeletons"
-OPTIONS = Terrain().model_dump(mode="json")
-DATABASE = Database().model_dump(mode="json")
+OPTIONS = Terrain()
+SAMPLING = Sampling(**Database().model_dump(include=set(Sampling.model_fields)))
 Labelled = tuple[Clip, ClipLabels]
 
 
@@ -81,9 +82,8 @@ def seconds(work: Callable[[], object], times: int = 2) -> float:
 
 
 def draw(count: int) -> Patches:
-    maps = heightmaps(OPTIONS["heightmaps"], [], cell=OPTIONS["cell"], height_scale=OPTIONS["height_scale"])
-    names = ("cell", "size", "highest", "seed")
-    return draw_patches(maps, count=count, **{n: OPTIONS[n] for n in names})
+    maps = heightmaps(OPTIONS.heightmaps, [], cell=OPTIONS.cell, height_scale=OPTIONS.height_scale)
+    return draw_patches(maps, count=count, **OPTIONS.model_dump(include={"cell", "size", "highest", "seed"}))
 
 
 def plain_heights(patches: Patches, p: int, points: np.ndarray) -> np.ndarray:
@@ -126,13 +126,13 @@ def fit(job: tuple[Clip, ClipLabels, Patches, str]) -> tuple[int, float, float]:
     """Cycles of a clip, the worst mean distance of its feet from the ground, and the worst depth below it."""
     clip, labels, patches, ground = job
     arrays = {"contacts": labels.contacts, "cycles": labels.cycles}
-    fits = clip_fits(clip, arrays, patches, ground, OPTIONS, DATABASE)
+    fits = clip_fits(clip, arrays, patches, ground, OPTIONS, SAMPLING)
     return len(fits.patch), float(fits.foot_error[..., 0].max()), float(fits.foot_below.max())
 
 
 def parts(clips: list[Labelled]) -> None:
     """Each part beside plain numpy."""
-    count = OPTIONS["patches"]
+    count = OPTIONS.patches
     draw(50)
     drawing = seconds(lambda: draw(count), 1)
     patches = draw(count)
@@ -183,7 +183,7 @@ def agreement(patches: Patches, footing: search.Footing) -> bool:
 def released(clips: list[Labelled], wanted: int, flat: float, workers: int) -> None:
     """So many cycles, a share of them flat, in so many processes, patches included."""
     start = time.perf_counter()
-    patches = draw(OPTIONS["patches"])
+    patches = draw(OPTIONS.patches)
     jobs, sizes = [], {"flat": 0, "rocky": 0}
     for clip, labels in cycle(clips):
         ground = "flat" if sizes["flat"] < flat * wanted else "rocky"

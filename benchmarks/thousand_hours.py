@@ -26,7 +26,7 @@ CONSTANT_BYTES = {"training", "runtime", "evaluation"}
 
 def groups() -> tuple[set[str], int]:
     """The rules that make one job of many clips, and of how many, as the SLURM profile says."""
-    profile = yaml.safe_load((ROOT / "workflow/profiles/slurm/config.v9+.yaml").read_text())
+    profile = yaml.safe_load((ROOT / "profiles/slurm/config.v9+.yaml").read_text())
     size = int(profile["group-components"][0].split("=")[1])
     return {group.split("=")[0] for group in profile["groups"]}, size
 

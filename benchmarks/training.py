@@ -8,8 +8,8 @@ floor is the time that the products alone take, at their own best, with the same
 - per sample: weights built for every sample, differentiated by autograd, PyTorch's Adam (sixty-four samples
   at a time, since 1,024 need 5 GB);
 - blended: outputs of the control points blended, otherwise the same: what a careful author writes first;
-- PyTorch, float32: `hobble.training.step.Step`, the way that other devices take;
-- fused, float32: `hobble.training.fused.FusedStep`, the default below batch 256;
+- PyTorch, float32: `hobble.models.pfnn.step.Step`, the way that other devices take;
+- fused, float32: `hobble.models.pfnn.fused.FusedStep`, the default below batch 256;
 - fused, bfloat16: the same with factors rounded to bfloat16, the default from there on.
 
 `training_cuda.py` measures a GPU.
@@ -28,12 +28,12 @@ import hobble.training  # noqa: F401 - first, since it says how threads wait
 import torch
 from torch import Tensor
 
-from hobble.training.fused import FusedStep
-from hobble.training.network import coefficients, initialise
+from hobble.models.pfnn.fused import FusedStep
+from hobble.models.pfnn.step import Step
+from hobble.models.pfnn.trainable import coefficients, initialise
+from hobble.models.products import bfloat16_is_fast, product
 from hobble.training.optimiser import Adam
-from hobble.training.products import bfloat16_is_fast, product
 from hobble.training.start import use_threads
-from hobble.training.step import Step
 
 KEEP, L1, RATE, POINTS = 0.7, 0.01, 1e-4, 4
 PART = 64

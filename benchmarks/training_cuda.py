@@ -24,12 +24,13 @@ import torch
 from database import made_up
 from training import L1, POINTS, RATE, Batch, products
 
-from hobble.config.sections import Network, Training
+from hobble.config.sections import Training
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.models.pfnn.options import PfnnOptions
+from hobble.models.pfnn.trainable import initialise
 from hobble.training.batches import Watch
 from hobble.training.device_rows import DeviceRows
-from hobble.training.network import initialise
 from hobble.training.optimiser import Adam
 from hobble.training.start import step_for, use_threads
 from hobble.training.update import Update, update_for
@@ -78,11 +79,11 @@ def main() -> None:
     options = parser.parse_args()
     device = torch.device(options.device)
     use_threads(2)
-    network = Network()
+    network = PfnnOptions()
     with tempfile.TemporaryDirectory() as folder:
         files = made_up(Path(folder), options.size_mb << 20, joints=31)
         write_database(
-            Path(folder) / "database", files, dict.fromkeys(files, "train"), injury=False, joint_weight=0.1
+            Path(folder) / "database", files, dict.fromkeys(files, "train"), channels=[], joint_weight=0.1
         )
         rows = DeviceRows(Database.open(Path(folder) / "database"), device)
     layout = rows.database.layout
@@ -92,7 +93,7 @@ def main() -> None:
     print("  batch  precision   samples/s    plain    floor   minutes for the whole of holden")
     for size in map(int, options.batches.split(",")):
         for precision in PRECISIONS:
-            training = Training(batch=size, precision=precision).model_dump()
+            training = Training(batch=size, precision=precision)
             found = []
             for way in (update_for, lambda step, adam, _: Update(step, adam)):
                 made = initialise(sizes, POINTS, 1).to(device)

@@ -36,9 +36,9 @@ def child(database: Path, configuration: str) -> None:
     from hobble.training.train import train
 
     model = Catalogue(ROOT / "config").configuration(configuration)
-    training = model.training.model_dump(mode="json")
-    data = Database.open(database, training["memory_mb"])
-    training |= {"passes": 1, "sections": max(1, data.pairs("train") // SAMPLES)}
+    data = Database.open(database, model.training.memory_mb)
+    sections = max(1, data.pairs("train") // SAMPLES)
+    training = model.training.model_copy(update={"passes": 1, "sections": sections})
     before = peak_mb()
 
     class Enough(Exception):
@@ -58,12 +58,12 @@ def child(database: Path, configuration: str) -> None:
     with tempfile.TemporaryDirectory() as folder, contextlib.suppress(Enough):
         train(
             data,
-            network=model.network.model_dump(mode="json"),
+            network=model.network,
             training=training,
             checkpoints=Path(folder),
             threads=2,
         )
-    facts = (data.manifest.bytes / 2**20, training["memory_mb"], training["batch"], before, peak_mb())
+    facts = (data.manifest.bytes / 2**20, training.memory_mb, training.batch, before, peak_mb())
     print(json.dumps(facts))
 
 
@@ -87,7 +87,7 @@ def main() -> None:
         try:
             files = made_up(folder, size << 20, joints=31)
             splits = dict.fromkeys(files, "train") | {next(iter(files)): "held_out"}
-            write_database(folder / "database", files, splits, injury=False, joint_weight=0.1)
+            write_database(folder / "database", files, splits, channels=[], joint_weight=0.1)
             command = [sys.executable, __file__, "--child", str(folder / "database")]
             command += ["--configuration", options.configuration]
             done = subprocess.run(command, check=True, capture_output=True, text=True)

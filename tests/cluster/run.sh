@@ -54,12 +54,12 @@ kill_job() {
 
 # The same command as on a real cluster; only the polling is for one that has nothing else to do.
 through_slurm=("$folder/venv/bin/python" -m snakemake -s "$root/Snakefile" -d "$folder/cluster"
-    --workflow-profile "$root/workflow/profiles/slurm" --slurm-init-seconds-before-status-checks 2 "$target")
+    --workflow-profile "$root/profiles/slurm" --slurm-init-seconds-before-status-checks 2 "$target")
 
 export OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=1
 mkdir "$folder/local" "$folder/cluster"
 setsid "$python" -m snakemake -s "$root/Snakefile" -d "$folder/local" -c2 \
-    --workflow-profile "$root/workflow/profiles/default" "$target" >"$folder/local.log" 2>&1 &
+    "$target" >"$folder/local.log" 2>&1 &
 local_run=$!
 running+=("$local_run")
 

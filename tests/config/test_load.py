@@ -51,14 +51,14 @@ def test_overrides_go_on_top_of_every_configuration(folder: Path) -> None:
 def test_a_training_can_be_named(folder: Path) -> None:
     """It stands for the whole section, from a file or the command line, and can be said more of."""
     (folder / "quick.yaml").write_text("extends: base\ntraining: {batch: 256}\n")
-    (folder / "like.yaml").write_text("injury: true\ntraining: quick\n")
+    (folder / "like.yaml").write_text("channels: [injury]\ntraining: quick\n")
     (folder / "more.yaml").write_text("extends: like\ntraining: {seed: 5}\n")
     quick = Catalogue(folder).configuration("quick").training
     assert Catalogue(folder).configuration("like").training == quick
     assert Catalogue(folder).configuration("more").training == quick.model_copy(update={"seed": 5})
     named = Catalogue(folder, {"training": "quick"})
     assert [named.configuration(name).training for name in ("base", "child", "quick")] == [quick] * 3
-    assert named.configuration("like").injury
+    assert named.configuration("like").channels == ("injury",)
 
 
 def test_a_training_that_is_not_there_is_told(folder: Path) -> None:
@@ -137,7 +137,7 @@ def test_a_data_set_that_cannot_be_is_refused(values: dict, message: str) -> Non
     [
         (
             {"injured": "A-B"},
-            r"^d\.yaml: clips\.a\.injured: only clips of a `synthetic` data set have it; use `status`\.$",
+            r"^d\.yaml: clips\.a\.injured: only clips of a `synthetic` data set have it; use `channels`\.$",
         ),
         ({"recipe": "walk"}, r"clips\.a\.recipe: only clips of a `synthetic` data set"),
         ({"share": 4}, r"clips\.a\.share: only clips of a `synthetic` data set"),
@@ -223,6 +223,6 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
     hurried = Catalogue(root / "config", {"training": "fast"}).configuration("holden-xt").training
     assert hurried == catalogue.configuration("fast").training != t
     assert catalogue.configuration("ava-m").network_of == "ava"
-    assert catalogue.configuration("injured").injury
+    assert catalogue.configuration("injured").channels == ("injury",)
     assert catalogue.dataset("synthetic").terrain.fits == 10
-    assert catalogue.dataset("synthetic").synthetic.frames == 20_000
+    assert catalogue.dataset("synthetic").synthetic.frames == 11_412

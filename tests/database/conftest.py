@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from hobble.database.clip_rows import ClipRows
-from hobble.database.layout import RowLayout
+from hobble.rows.clip_rows import ClipRows
+from hobble.rows.layout import RowLayout
 
-LAYOUT = RowLayout(joints=3, links=2)
+LAYOUT = RowLayout(joints=3, channels=(("injury", 2),))
 SKELETON = {
     "name": "stick",
     "joints": {
@@ -41,7 +41,10 @@ def make_rows(clip: str = "a", rows: int = 50, fits: int | None = 1, seed: int =
         x=normal(rows, LAYOUT.x_terrain.start, scale=20),
         y=normal(rows, LAYOUT.y_size, scale=5),
         p=rng.random(rows).astype(np.float32),
-        severity=(rng.random((rows, 2)) < 0.2) * rng.choice([3.0, 7.0, 10.0], (rows, 2)).astype(np.float32),
+        channels={
+            "injury": (rng.random((rows, 2)) < 0.2)
+            * rng.choice([3.0, 7.0, 10.0], (rows, 2)).astype(np.float32)
+        },
         frame=np.arange(60, 60 + rows, dtype=np.int32),
         cycle=np.zeros(rows, np.int32),
         fits=count.astype(np.int32),

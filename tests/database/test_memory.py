@@ -40,7 +40,7 @@ def large(rows_of, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("large") / "db"
     clips = {f"c{i:02d}": rows_of(f"c{i:02d}", 2500, 10, seed=i) for i in range(16)}
     splits = dict.fromkeys(clips, "train")
-    write_database(path, clips, splits, injury=True, joint_weight=0.1, chunk_bytes=300_000)
+    write_database(path, clips, splits, channels=["injury"], joint_weight=0.1, chunk_bytes=300_000)
     assert sum(f.stat().st_size for f in path.rglob("*") if f.is_file()) > 10 * (STATED << 20)
     return path
 

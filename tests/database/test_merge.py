@@ -17,12 +17,12 @@ import pytest
 from hobble.core.errors import HobbleError, InputError
 from hobble.database import merge
 from hobble.database.buckets import INDEX, Buckets
-from hobble.database.clip_rows import load_clip_rows, save_clip_rows
-from hobble.database.layout import RowLayout
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
+from hobble.rows.layout import RowLayout
 
-OPTIONS = {"injury": True, "joint_weight": 0.1, "chunk_bytes": 40_000}
+OPTIONS = {"channels": ["injury"], "joint_weight": 0.1, "chunk_bytes": 40_000}
 
 
 def contents(path: Path) -> dict[str, bytes]:
@@ -46,8 +46,9 @@ def test_rows_survive_their_file_and_files_merge_as_rows_do(rows_of, tmp_path):
         assert back.layout == clip.layout
         assert (back.clip, back.visits, back.skeleton) == (name, 10, clip.skeleton)
         assert list(back.skeleton["joints"]) == ["Hips", "Spine", "Head"]  # in the order of the columns
-        for field in ("x", "y", "p", "severity", "frame", "cycle", "fits", "heights", "mean"):
+        for field in ("x", "y", "p", "frame", "cycle", "fits", "heights", "mean"):
             np.testing.assert_array_equal(getattr(back, field), getattr(clip, field))
+        np.testing.assert_array_equal(back.channels["injury"], clip.channels["injury"])
     write_database(tmp_path / "one", rows, splits, **OPTIONS)
     files = {name: tmp_path / f"{name}.npz" for name in reversed("abc")}  # in any order
     write_database(tmp_path / "two", files, splits, **OPTIONS)
@@ -98,7 +99,7 @@ def test_rows_are_shuffled_globally(rows_of, tmp_path):
 
 def test_size_against_the_original_layout(rows_of, tmp_path):
     """31 joints: at most 27% of the original's bytes in float32, half of that in float16 or bfloat16."""
-    layout = RowLayout(31, links=30)
+    layout = RowLayout(31, channels=(("injury", 30),))
     rng = np.random.default_rng(0)
     joints = {f"j{i}": {} for i in range(31)}
 
@@ -110,14 +111,14 @@ def test_size_against_the_original_layout(rows_of, tmp_path):
             skeleton={"name": "s", "joints": joints},
             x=rng.normal(size=(n, layout.x_terrain.start)).astype(np.float32),
             y=rng.normal(size=(n, layout.y_size)).astype(np.float32),
-            severity=np.zeros((n, 30), np.float32),
+            channels={"injury": np.zeros((n, 30), np.float32)},
         )
 
     for fits in (1, 10):
         clips = {"a": clip("a", fits)}
         sizes = {}
         for dtype in ("float32", "float16", "bfloat16"):
-            options = {**OPTIONS, "injury": False, "dtype": dtype}
+            options = {**OPTIONS, "channels": [], "dtype": dtype}
             manifest = write_database(tmp_path / f"{dtype}{fits}", clips, {"a": "train"}, **options)
             assert manifest.original_bytes == 300 * 10 * (342 + 311 + 1) * 4
             files = (tmp_path / f"{dtype}{fits}").rglob("*")
@@ -203,7 +204,7 @@ def test_what_cannot_be_merged_is_refused(rows_of, tmp_path):
     empty = rows_of("b", 0)
     with pytest.raises(HobbleError, match="nothing to train on"):
         write_database(tmp_path / "db", {"b": empty}, {"b": "train"}, **OPTIONS)
-    other = replace(a, layout=RowLayout(3, window=30, links=2))
+    other = replace(a, layout=RowLayout(3, window=30, channels=(("injury", 2),)))
     with pytest.raises(InputError, match=r"^z: its rows are not laid out as those of a"):
         write_database(tmp_path / "db", {"a": a, "z": other}, {"a": "train", "z": "train"}, **OPTIONS)
     assert not any((tmp_path / "db").iterdir())

@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.database.clip_rows import expanded
 from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database, ahead
+from hobble.rows.clip_rows import expanded
 
 MEMORY = 4096  # MB: everything at once
 DISK = 0  # MB: one chunk at a time
@@ -36,7 +36,7 @@ def sources(rows_of):
 def path(sources, tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("database") / "all"
     splits = {name: "held_out" if name == "kept" else "train" for name in sources}
-    write_database(path, sources, splits, injury=True, joint_weight=0.1, seed=3, chunk_bytes=40_000)
+    write_database(path, sources, splits, channels=["injury"], joint_weight=0.1, seed=3, chunk_bytes=40_000)
     return path
 
 
@@ -73,7 +73,7 @@ def test_a_pass_is_every_pair_standardised_and_a_flat_one_ten_times(path, source
             found: dict[int, list[int]] = {}
             for i in np.flatnonzero(mine):
                 found.setdefault(int(got.frame[i]), []).append(i)
-            for pairs in expanded(rows, links=True):
+            for pairs in expanded(rows, rows.layout):
                 x, y = (pairs.x - s.x_mean) / s.x_std, (pairs.y - s.y_mean) / s.y_std
                 for k, row in enumerate(pairs.row):
                     at = found[int(rows.frame[row])]
@@ -118,7 +118,7 @@ def test_rows_are_mixed_like_independent_draws(rows_of, tmp_path):
     """A feature that is constant per clip: variance of batch means, and correlation from row to row."""
     clips = {f"c{i:02d}": rows_of(f"c{i:02d}", 400, 1, seed=i) for i in range(40)}
     splits = dict.fromkeys(clips, "train")
-    write_database(tmp_path / "db", clips, splits, injury=False, joint_weight=0.1, chunk_bytes=200_000)
+    write_database(tmp_path / "db", clips, splits, channels=[], joint_weight=0.1, chunk_bytes=200_000)
     db = Database.open(tmp_path / "db", 1)
     assert 1 <= db.window("train", 32) <= len(db.manifest.chunks["train"]) // 20
     feature = np.concatenate([b.clip for s in range(3) for b in db.blocks("train", 0, s, 10, 1, 32)])
@@ -131,7 +131,7 @@ def test_rows_are_mixed_like_independent_draws(rows_of, tmp_path):
 
 def test_severities_are_columns_only_where_they_are_inputs(path, sources, tmp_path):
     splits = dict.fromkeys(sources, "train")
-    write_database(tmp_path / "db", sources, splits, injury=False, joint_weight=0.1)
+    write_database(tmp_path / "db", sources, splits, channels=[], joint_weight=0.1)
     healthy, injured = Database.open(tmp_path / "db"), Database.open(path)
     assert healthy.layout.x_size == injured.layout.x_size - 2
     block = next(iter(healthy.blocks("train", 0, 0, 10, 1)))
@@ -149,7 +149,7 @@ def test_half_precision_takes_half_the_bytes_and_hardly_moves_a_value(
         tmp_path / "db",
         sources,
         splits,
-        injury=True,
+        channels=["injury"],
         joint_weight=0.1,
         seed=3,
         dtype=dtype,
@@ -177,7 +177,7 @@ def test_a_damaged_chunk_is_named(sources, tmp_path, harm):
         tmp_path / "db",
         sources,
         dict.fromkeys(sources, "train"),
-        injury=True,
+        channels=["injury"],
         joint_weight=0.1,
         chunk_bytes=40_000,
     )
@@ -196,7 +196,7 @@ def test_a_damaged_chunk_is_named(sources, tmp_path, harm):
 
 def test_any_byte_of_a_chunk_that_changes_is_noticed(sources, tmp_path):
     manifest = write_database(
-        tmp_path / "db", {"a": sources["rocky"]}, {"a": "train"}, injury=True, joint_weight=0.1
+        tmp_path / "db", {"a": sources["rocky"]}, {"a": "train"}, channels=["injury"], joint_weight=0.1
     )
     (chunk,) = manifest.chunks["train"]
     file = tmp_path / "db" / manifest.folder / chunk.file
@@ -213,7 +213,7 @@ def test_any_byte_of_a_chunk_that_changes_is_noticed(sources, tmp_path):
 
 
 def test_a_manifest_that_counts_otherwise_than_its_chunks_is_noticed(sources, tmp_path):
-    write_database(tmp_path, {"a": sources["rocky"]}, {"a": "train"}, injury=True, joint_weight=0.1)
+    write_database(tmp_path, {"a": sources["rocky"]}, {"a": "train"}, channels=["injury"], joint_weight=0.1)
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     chunk = manifest["chunks"]["train"][0]
     for field, change in (("rows", -1), ("rows", 1), ("rows", 900), ("fits", -3), ("fits", 7)):

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.database.layout import RowLayout
 from hobble.database.merge import write_database
 from hobble.database.sizes import RELEASED_FLAT, RELEASED_FRAMES, sizes
+from hobble.rows.layout import RowLayout
 
 PUBLISHED = {31: 7.12e9, 191: 10.4e9}  # bytes; the larger figure's with a quarter of the frames
 
@@ -29,12 +29,12 @@ def test_the_released_data_would_take_what_its_share_of_flat_rows_says(rows_of, 
             skeleton=skeleton,
             x=x,
             y=np.ones((rows, layout.y_size), np.float32),
-            severity=np.zeros((rows, 0), np.float32),
+            channels={},
         )
 
     clips = {"flat": clip("flat", flat, 1), "rocky": clip("rocky", frames - flat, 10)}
     splits = dict.fromkeys(clips, "train")
-    manifest = write_database(tmp_path, clips, splits, injury=False, joint_weight=0.1, dtype=dtype)
+    manifest = write_database(tmp_path, clips, splits, channels=[], joint_weight=0.1, dtype=dtype)
     found = sizes(manifest)
     assert (found["frames"], found["pairs"], found["joints"]) == (frames, 10 * frames, joints)
     files = sum(f.stat().st_size for f in tmp_path.rglob("*.safetensors"))

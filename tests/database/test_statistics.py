@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.database.clip_rows import ClipRows, expanded
-from hobble.database.layout import RowLayout
+from hobble.channels import channel
 from hobble.database.statistics import (
     SILENT,
     UNSEEN,
@@ -18,15 +17,16 @@ from hobble.database.statistics import (
     clip_moments,
     finish,
     grouped,
-    severity_std,
     x_groups,
 )
+from hobble.rows.clip_rows import ClipRows, expanded
+from hobble.rows.layout import RowLayout
 
 
 def written_out(rows: ClipRows) -> tuple[np.ndarray, np.ndarray]:
     """Every pair as often as the original has it: a flat row's one fit ten times."""
     x, y = [], []
-    for pairs in expanded(rows, links=True, batch=7):
+    for pairs in expanded(rows, rows.layout, batch=7):
         times = rows.visits // rows.fits[pairs.row]
         x.append(np.repeat(pairs.x, times, axis=0))
         y.append(np.repeat(pairs.y, times, axis=0))
@@ -37,7 +37,7 @@ def written_out(rows: ClipRows) -> tuple[np.ndarray, np.ndarray]:
 @settings(max_examples=15, deadline=None)
 def test_moments_are_those_of_every_pair_written_out(rows_of, size, seed, fits):
     rows = rows_of(rows=size, fits=fits, seed=seed)
-    for moments, values in zip(clip_moments(rows), written_out(rows), strict=True):
+    for moments, values in zip(clip_moments(rows, rows.layout), written_out(rows), strict=True):
         assert moments.weight == size
         np.testing.assert_allclose(moments.mean, values.mean(0), rtol=1e-6, atol=1e-5)
         np.testing.assert_allclose(moments.std, values.std(0), rtol=1e-6, atol=1e-5)
@@ -60,15 +60,15 @@ def test_parts_merge_into_the_whole_in_any_cut(cuts, seed):
 
 def test_batches_of_a_long_clip_do_not_show(rows_of, monkeypatch):
     rows = rows_of(rows=60, fits=None)
-    whole = clip_moments(rows)
+    whole = clip_moments(rows, rows.layout)
     monkeypatch.setattr("hobble.database.statistics.BATCH", 7)
-    for a, b in zip(clip_moments(rows), whole, strict=True):
+    for a, b in zip(clip_moments(rows, rows.layout), whole, strict=True):
         np.testing.assert_allclose(a.squares, b.squares, rtol=1e-9)
 
 
 def test_deviations_are_shared_in_the_originals_groups_and_weighed(rows_of, layout):
     rows = rows_of(rows=300, fits=10)
-    x, y = clip_moments(rows)
+    x, y = clip_moments(rows, rows.layout)
     s = finish(layout, x, y, 0.1, [1])
     n = layout.samples
     for start in (0, n, 2 * n, 3 * n):  # tx, tz, dx, dz each on their own
@@ -86,17 +86,17 @@ def test_deviations_are_shared_in_the_originals_groups_and_weighed(rows_of, layo
     assert all(v.dtype == np.float32 for v in (s.x_mean, s.x_std, s.y_mean, s.y_std))
 
 
-def test_groups_cover_every_column_of_x_once_but_the_severities():
-    layout = RowLayout(31, links=30)
+def test_groups_cover_every_column_of_x_once_but_the_channels():
+    layout = RowLayout(31, channels=(("injury", 30),))
     columns = np.concatenate([np.arange(layout.x_size)[g] for g in x_groups(layout)])
     np.testing.assert_array_equal(np.sort(columns), np.arange(342))
 
 
 def test_nothing_is_ever_divided_by_zero(rows_of, layout):
     still = rows_of(rows=20, fits=1)
-    for name in ("x", "y", "severity", "heights", "mean"):
-        getattr(still, name)[...] = 0.0
-    s = finish(layout, *clip_moments(still), 0.1, [1])
+    for values in (still.x, still.y, still.heights, still.mean, still.channels["injury"]):
+        values[...] = 0.0
+    s = finish(layout, *clip_moments(still, layout), 0.1, [1])
     for std in (s.x_std, s.y_std):
         assert (std > 0).all()
         assert np.isfinite(std).all()
@@ -110,13 +110,13 @@ def test_a_gait_never_seen_takes_its_groups_deviation(layout):
 
 
 def test_severities_share_one_deviation_and_unknown_ones_are_silent():
-    out = severity_std(np.array([3.0, 0.0, 4.0]))
+    out = channel("injury").deviation(np.array([3.0, 0.0, 4.0]))
     np.testing.assert_allclose(out, [5.0, SILENT, 5.0])
-    np.testing.assert_allclose(severity_std(np.array([0.01, 0.0])), [1.0, SILENT])
+    np.testing.assert_allclose(channel("injury").deviation(np.array([0.01, 0.0])), [1.0, SILENT])
 
 
 def test_without_links_the_severities_leave_no_trace(rows_of, layout):
-    moments = clip_moments(rows_of(rows=30))
     healthy = RowLayout(layout.joints)
+    moments = clip_moments(rows_of(rows=30), healthy)
     s = finish(healthy, *moments, 0.1, [])
     assert s.x_mean.shape == s.x_std.shape == (healthy.x_size,)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.database.clip_rows import ClipRows, save_clip_rows
-from hobble.database.layout import GAITS, RowLayout
 from hobble.evaluation.captured import captured, captured_clips, root_path, unbroken
 from hobble.evaluation.motion_measures import acceleration, in_root_frame
+from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.layout import GAITS, RowLayout
 
-LAYOUT = RowLayout(3, links=2)
+LAYOUT = RowLayout(3, channels=(("injury", 2),))
 FRAMES = 50
 
 
@@ -51,7 +51,7 @@ def rows(world) -> ClipRows:
     heights, mean = np.zeros((2 * FRAMES, 36)), np.tile([-3.0, 99.0], FRAMES)
     fits = np.full(FRAMES, 2)
     phase = np.linspace(0, 0.9, FRAMES)
-    return ClipRows("a", LAYOUT, {}, x, y, phase, severity, frame, 0 * frame, fits, heights, mean)
+    return ClipRows("a", LAYOUT, {}, x, y, phase, {"injury": severity}, frame, 0 * frame, fits, heights, mean)
 
 
 def test_motion_comes_back(rows, world) -> None:
@@ -66,7 +66,7 @@ def test_motion_comes_back(rows, world) -> None:
     assert found.acceleration[0] == 0
     assert (found.gait == np.eye(len(GAITS))[2]).all()
     np.testing.assert_allclose(found.velocity, rows.y[:, LAYOUT.y_root_velocity])
-    np.testing.assert_array_equal(found.severity, rows.severity)
+    np.testing.assert_array_equal(found.told["injury"], rows.channels["injury"])
 
 
 def test_a_gap_parts_stretches(rows, tmp_path) -> None:

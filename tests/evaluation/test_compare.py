@@ -90,7 +90,7 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
         paths[key].write_text(json.dumps(value))
     paths["configuration"], paths["history"] = folder / "configuration.yaml", folder / "history.csv"
     network = {"hidden_layers": len(sizes) - 2, "units": 512, "control_points": 4}
-    model = {"dataset": f"of-{name}", "injury": False, "network": network, "training": {"passes": 20}}
+    model = {"dataset": f"of-{name}", "channels": [], "network": network, "training": {"passes": 20}}
     paths["configuration"].write_text(yaml.safe_dump({"configuration": model}))
     blocks = "pass,train_mse,held_out_turn" if name == "ava" else "pass,train_mse,held_out_mse"
     paths["history"].write_text(f"{blocks}\n1,0.5,0.25\n2,0.4,\n")
@@ -149,6 +149,39 @@ def test_each_pair_on_what_both_were_measured_on(compared) -> None:
     assert len(times) == 3 * len(MODES)
     apart = 1e-6 * (860_471 - 597_815)
     assert times["holden", "holden-xl", "cubic"] == pytest.approx(2 * 2 * apart / 0.2)
+
+
+def test_eq_3_2_divides_by_the_deviations_of_frames_and_of_means(compared) -> None:
+    found = {(d["a"], d["b"], d["over"]): d for d in compared["difference"]}
+    row = found["holden", "holden-xl", "train"]  # clips of .04 and .02, and of .03 and .02
+    assert (row["sd_a"], row["sd_b"]) == (0.02, 0.02)
+    assert (row["sd_of_means_a"], row["sd_of_means_b"]) == (pytest.approx(0.01), pytest.approx(0.005))
+    assert row["difference"] == pytest.approx(2 * 0.005 / 0.04)
+    assert row["difference_of_means"] == pytest.approx(2 * 0.005 / 0.015)
+    assert found["holden", "ava", "train"]["difference_of_means"] is None, "one clip does not spread"
+    assert found["holden", "holden-xl", "a"]["difference_of_means"] is None
+    ours = {(r["measure"], r["configuration"]): (r["published"], r["ours"]) for r in compared["beside"]}
+    what = "standard deviation of the means of train clips"
+    assert ours[what, "holden"] == (0.00954, pytest.approx(0.01))
+    laps = [r for r in compared["milliseconds"]["beside"] if r["measure"].startswith("standard")]
+    assert [(r["configuration"], r["published"], r["ours"]) for r in laps] == [("holden", 0.0173, None)]
+
+
+def test_a_published_figure_stands_beside_its_own_configuration_only(compared, published) -> None:
+    of = {
+        (row["configuration"], value)
+        for kind in ("accuracy", "responsivity", "modes", "stages", "computations")
+        for row in published[kind]
+        for value in row.values()
+        if isinstance(value, float | int)
+    }
+    rows = [*compared["beside"], *compared["milliseconds"]["beside"]]
+    rows = [row for row in rows if not row["measure"].startswith("hurt part")]
+    assert [row for row in rows if (row["configuration"], row["published"]) not in of] == []
+    beside = {row["configuration"] for row in rows if row["ours"] is not None}
+    assert beside == set(SIZES)
+    predictions = [row for row in rows if row["measure"].startswith("a prediction")]
+    assert {(row["configuration"], row["ours"]) for row in predictions} == {("ferre", None)}
 
 
 def test_tables_hold_the_same_whatever_columns_each_has(compared, tmp_path) -> None:

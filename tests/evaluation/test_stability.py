@@ -10,7 +10,7 @@ import pytest
 
 from hobble.evaluation import stability as module
 from hobble.evaluation.stability import KINDS, LIMITS, stability, stretches
-from hobble.runtime.network import load_network
+from hobble.models.load import load_network
 
 
 def test_every_kind_is_asked_for() -> None:

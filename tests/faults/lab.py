@@ -60,41 +60,43 @@ class End:
     seconds: float
 
 
+def clone(folder: Path) -> None:
+    """The workflow without results in a new folder; the package is linked, so that compiled code is found."""
+    folder.mkdir(parents=True)
+    shutil.copy2(ROOT / "Snakefile", folder)
+    for part in ("config", "profiles", "workflow"):
+        shutil.copytree(ROOT / part, folder / part)
+    (folder / "src").symlink_to(ROOT / "src")
+
+
 class Lab:
-    """folder/checkout: a copy of the workflow. folder/run: the undisturbed run's folder."""
+    """folder/run: a clone of the checkout, where the undisturbed run takes place."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.checkout = folder / "checkout"
         self.run = folder / "run"
         self.kept = folder / "kept"
         self.targets: tuple[str, ...] = ()
         self.jobs: list[Job] = []
         self.seconds: dict[str, float] = {}
-        for part in (self.run, self.kept, folder / "site"):
+        for part in (self.kept, folder / "site"):
             part.mkdir(parents=True)
-        self.checkout.mkdir()
-        shutil.copy2(ROOT / "Snakefile", self.checkout)
-        for part in ("config", "workflow"):
-            shutil.copytree(ROOT / part, self.checkout / part)
-        (self.checkout / "src").symlink_to(ROOT / "src")
+        clone(self.run)
         (folder / "site/sitecustomize.py").write_text(KEEP)
 
-    def command(self, folder: Path, *arguments: str) -> list[str]:
-        """Snakemake in a run's folder, which lies beside `checkout`."""
-        snakefile, profile = self.checkout / "Snakefile", self.checkout / "workflow/profiles/default"
-        base = [sys.executable, "-m", "snakemake", "-s", str(snakefile), "-d", str(folder)]
-        return [*base, "--workflow-profile", str(profile), *arguments]
+    def command(self, *arguments: str) -> list[str]:
+        """Snakemake as the README calls it, in a clone of the checkout."""
+        return [str(Path(sys.executable).with_name("snakemake")), *arguments]
 
     def environment(self, keep: bool = False) -> dict[str, str]:
-        path = [str(self.checkout / "src"), *([str(self.folder / "site")] if keep else [])]
+        path = [str(ROOT / "src"), *([str(self.folder / "site")] if keep else [])]
         own = {"PYTHONPATH": os.pathsep.join(path), "PYTHONDONTWRITEBYTECODE": "1"}
         return {**os.environ, **own, "KEPT_SCRIPTS": str(self.kept)}
 
     def snakemake(self, folder: Path, *arguments: str, keep: bool = False) -> End:
         began = time.monotonic()
         done = subprocess.run(
-            self.command(folder, *arguments), env=self.environment(keep), capture_output=True, text=True
+            self.command(*arguments), cwd=folder, env=self.environment(keep), capture_output=True, text=True
         )
         return End(done.returncode, done.stdout + done.stderr, time.monotonic() - began)
 
@@ -129,7 +131,7 @@ class Lab:
         """A folder of its own with the job's inputs, its checksums included; gone afterwards."""
         folder = Path(tempfile.mkdtemp(prefix="bench-", dir=self.folder))
         try:
-            (folder / "checkout").symlink_to(self.checkout)
+            clone(folder / "run")
             bench = Bench(self, job, folder / "run")
             bench.fill()
             yield bench

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -17,6 +18,7 @@ from .lab import End, Job, Lab
 from .same import same
 from .throws import FAULT, REFUSED, REMADE, TRACEBACK, UNHARMED, Throw
 
+FAILED = re.compile(r"^\d+ of \d+ jobs done in .*, \d+ failed:$", re.M)
 LOCKED = "cannot be locked"  # Snakemake's own words
 
 
@@ -49,7 +51,8 @@ def _following(lab: Lab, jobs: list[Job]) -> set[str]:
 def _start(lab: Lab, folder: Path, said: Path) -> subprocess.Popen[bytes]:
     with open(said, "wb") as out:
         return subprocess.Popen(
-            lab.command(folder, "-c2", *lab.targets),
+            lab.command("-c2", *lab.targets),
+            cwd=folder,
             env=lab.environment(),
             stdout=out,
             stderr=subprocess.STDOUT,
@@ -95,21 +98,15 @@ def kill_run(lab: Lab, rng: Random) -> Throw:
             return _rerun(lab, folder, what, at, UNHARMED)
         if victim == "a job" and (wrong := _unsaid(process.returncode, said.read_text(errors="replace"))):
             return Throw(what, at, FAULT, wrong)
-        if victim != "a job":
-            again = lab.snakemake(folder, "-c2", *lab.targets)
-            if again.status == 0 and "Nothing to be done" not in again.said and LOCKED not in again.said:
-                pass  # it was killed before it had taken the lock
-            elif again.status and LOCKED not in again.said:
-                return Throw(what, at, FAULT, f"neither done nor locked: {again.said[-1500:]}")
-            lab.snakemake(folder, "--unlock", *lab.targets)
         return _rerun(lab, folder, what, at, REMADE)
 
 
 def _unsaid(status: int, said: str) -> str:
     """What is wrong with how Snakemake ends when one of its jobs is killed."""
+    failed = FAILED.search(said)
     if status == 0:
-        return "" if "Error in rule" not in said else "status 0 in spite of an error"
-    if "Error in rule" not in said or TRACEBACK in said:
+        return "status 0 in spite of an error" if failed else ""
+    if not failed or TRACEBACK in said:
         return f"no message but {said[-1500:]}"
     return ""
 

@@ -31,7 +31,7 @@ def same(a: Path, b: Path) -> bool:
         return _untimed(json.loads(a.read_text()), TIMED[a.name]) == _untimed(
             json.loads(b.read_text()), TIMED[a.name]
         )
-    if a.name in ("history.csv", "responsivity.csv"):
+    if a.name in ("history.csv", "laps.csv"):
         return _rows(a) == _rows(b)
     if "checkpoint" in a.name:
         return _checkpoint(a, b)
@@ -51,7 +51,7 @@ def _untimed(value: Any, names: set[str]) -> Any:
 
 def _rows(path: Path) -> list[dict[str, str]]:
     rows = csv.DictReader(io.StringIO(path.read_text()))
-    timed = ("milliseconds",) if path.name == "responsivity.csv" else ("seconds",)
+    timed = ("milliseconds",) if path.name == "laps.csv" else ("seconds",)
     return [{k: v for k, v in row.items() if not k.startswith(timed)} for row in rows]
 
 

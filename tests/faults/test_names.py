@@ -31,7 +31,7 @@ NAMES = (
 def lab(tmp_path: Path) -> Lab:
     """A checkout with a data set of a user's own, whose clips lie in run/mocap/mine."""
     made = Lab(tmp_path / "lab")
-    (made.checkout / "config/datasets/mine.yaml").write_text(DATASET)
+    (made.run / "config/datasets/mine.yaml").write_text(DATASET)
     (made.run / "mocap/mine").mkdir(parents=True)
     return made
 
@@ -39,7 +39,7 @@ def lab(tmp_path: Path) -> Lab:
 def run(lab: Lab, *arguments: str) -> tuple[int, str]:
     end = lab.snakemake(lab.run, *arguments, "--config", "mocap=mocap")
     assert TRACEBACK not in end.said
-    assert not list(lab.run.rglob("pwned")) + list(lab.checkout.glob("pwned"))
+    assert not list(lab.run.rglob("pwned"))
     return end.status, end.said
 
 
@@ -54,7 +54,7 @@ def test_no_name_reaches_a_shell(lab: Lab, tiny_bvh: str) -> None:
 
 def test_a_name_that_cannot_be_one_ends_before_the_first_job(lab: Lab, tiny_bvh: str) -> None:
     (lab.run / "mocap/mine/a\ntouch pwned\n.bvh").write_text(tiny_bvh)
-    status, said = run(lab, "-n", "results/datasets/mine/database/all")
+    status, said = run(lab, "-np", "results/datasets/mine/database/injury")
     assert status == 1
     assert "mocap/mine: a clip is called" in said
     assert "Building DAG" not in said
@@ -62,8 +62,8 @@ def test_a_name_that_cannot_be_one_ends_before_the_first_job(lab: Lab, tiny_bvh:
 
 def test_a_configuration_makes_no_objects(lab: Lab) -> None:
     text = "extends: test\nreport:\n  title: !!python/object/apply:os.system ['touch pwned']\n"
-    (lab.checkout / "config/mine.yaml").write_text(text)
-    status, said = run(lab, "-n", "results/mine/report.html")
+    (lab.run / "config/mine.yaml").write_text(text)
+    status, said = run(lab, "-np", "results/mine/report.html")
     assert status == 1
     assert "mine.yaml, line 3: not valid YAML" in said
 
@@ -111,7 +111,7 @@ def as_nobody(read: Callable[[], object]) -> str:
 def test_what_decides_on_the_jobs_but_may_not_be_read_is_named(reachable: Path, closed: str) -> None:
     for path, text in {
         "config/datasets/mine.yaml": DATASET,
-        "config/test.yaml": "dataset: mine\ninjury: true\n",
+        "config/test.yaml": "dataset: mine\nchannels: [injury]\n",
         "config/skeletons/holden31.yaml": SKELETON.read_text(),
         "mocap/mine/a.bvh": "HIERARCHY",
         "mocap/mine/a_injuries.txt": "frames:9\n",

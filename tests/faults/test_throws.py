@@ -49,7 +49,7 @@ def test_faults_at_jobs(lab: Lab, throw, times: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "rule", ["motion_clip", "labels_clip", "injury_clip", "terrain_fits", "database_clip"]
+    "rule", ["motion_clip", "labels_clip", "channel_clip", "terrain_fits", "database_clip"]
 )
 def test_harm_to_what_a_job_reads(lab: Lab, rule: str) -> None:
     thrown = [throws.harm(lab, Random(f"{SEED}-{number}"), rule) for number in range(8)]

@@ -20,18 +20,18 @@ import numpy as np
 import pytest
 import yaml
 
+from hobble.channels.injury.status import read_status
+from hobble.channels.injury.table import write_statuses
 from hobble.config.load import Catalogue
 from hobble.core.clip import load_clip
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import load_npz, read_json
 from hobble.core.untrusted import read_bytes, read_yaml
-from hobble.channels.injury.status import read_status
-from hobble.channels.injury.table import write_statuses
 from hobble.labels.files import SourceTime, read_gait_keys
+from hobble.models.load import load_network
 from hobble.motion import read as bvh
 from hobble.motion.make import make_clip
 from hobble.motion.rig import load_skeleton
-from hobble.runtime.network import load_network
 from hobble.terrain.heightmaps import read_heights
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check
@@ -136,8 +136,8 @@ def test_files_without_end_are_not_read(tmp_path: Path) -> None:
 
 
 def test_a_status_file_that_counts_two_billion_frames_takes_no_room(tmp_path: Path) -> None:
-    from hobble.core.clip import Clip
     from hobble.channels.injury.severity import clip_severity
+    from hobble.core.clip import Clip
 
     skeleton = load_skeleton(SKELETON).skeleton
     clip = Clip("a", skeleton, 60.0, np.tile([1.0, 0, 0, 0], (9, 31, 1)), np.zeros((9, 3)))
@@ -191,6 +191,64 @@ def test_a_zip_bomb_is_not_unpacked(tmp_path: Path) -> None:
     assert path.stat().st_size < 2 * MB
     for read in (load_npz, read_heights):
         refused(lambda r=read: r(path), "a.npz: damaged", "would unpack to more than 1024 MB", mb=200)
+
+
+def test_entries_that_share_bytes_are_not_read_as_often_as_they_are_listed(tmp_path: Path) -> None:
+    """8 MB of one array, listed 400 times over: 3.2 GB."""
+    path = zipped(tmp_path / "a.npz", {"heights.npy": npy((MB,), bytes(8 * MB))})
+    data = path.read_bytes()
+    start, end = data.rindex(b"PK\x01\x02"), data.rindex(b"PK\x05\x06")
+    entry, record = data[start:end], bytearray(data[end:])
+    record[8:12] = struct.pack("<HH", 400, 400)
+    record[12:16] = struct.pack("<I", 400 * len(entry))
+    path.write_bytes(data[:start] + 400 * entry + record)
+    for read in (load_npz, load_network, read_heights):
+        refused(lambda r=read: r(path), "a.npz: damaged", "its entries lie over each other", mb=64)
+
+
+@pytest.mark.parametrize("kind", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_arrays_are_packed_as_numpy_packs_them(tmp_path: Path, kind: int) -> None:
+    path = zipped(tmp_path / "a.npz", {"heights.npy": npy((4, 4), bytes(128))}, kind)
+    refused(lambda: load_npz(path), "a.npz: damaged", "packed in a way that NumPy does not use")
+
+
+POSTSCRIPT = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\n(pwned) (w) file\n%%EOF\n"
+
+
+@pytest.mark.parametrize("suffix", [".png", ".tif", ".tiff", ".npy", ".npz", ".txt"])
+@pytest.mark.parametrize("content", ["EPS", "BMP", "GIF", "PDF", "zip", "pickle"])
+def test_a_heightmap_is_read_as_its_name_says_whatever_it_holds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, content: str
+) -> None:
+    from PIL import Image
+
+    made = io.BytesIO()
+    if content in ("BMP", "GIF", "PDF"):
+        Image.new("L", (4, 4)).save(made, content)
+    elif content == "zip":
+        zipped(tmp_path / "z", {"other.txt": b"1 2\n3 4\n"})
+        made.write((tmp_path / "z").read_bytes())
+    else:
+        made.write(POSTSCRIPT if content == "EPS" else pickle.dumps({"heights": 1}))
+    path = write(tmp_path / f"map{suffix}", made.getvalue())
+    started = []
+    monkeypatch.setattr("subprocess.Popen.__init__", lambda *a, **k: started.append(a))
+    with pytest.raises(InputError, match=f"map{suffix}"):
+        read_heights(path)
+    assert started == []
+
+
+def test_an_image_of_too_many_pixels_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
+    """A PNG of a few bytes whose header says 60,000 by 60,000."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    for side in (9_000, 60_000):
+        header = struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
+        data = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(bytes(1000))) + chunk(b"IEND", b"")
+        path = write(tmp_path / "map.png", b"\x89PNG\r\n\x1a\n" + data)
+        refused(lambda p=path: read_heights(p), "map.png: ", mb=64)
 
 
 def test_an_image_that_says_it_is_huge_is_not_decoded(tmp_path: Path) -> None:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
-from hobble.config.sections import Motion
-from hobble.core.errors import InputError
 from hobble.channels.injury.severity import odd_ranges, severity_matrix
 from hobble.channels.injury.status import read_status
+from hobble.config.sections import Motion
+from hobble.core.errors import InputError
 from hobble.motion.make import make_clip
 from hobble.motion.rig import load_skeleton
 

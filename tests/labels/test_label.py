@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.database.layout import CONTACTS, GAITS
 from hobble.labels import model
 from hobble.labels.label import label_clip, mirror_labels, write_report
 from hobble.labels.model import LabelReport, load_labels, save_labels
+from hobble.rows.layout import CONTACTS, GAITS
 
 MOTION = {"source_frames": 1200, "source_fps": 120.0, "source_start": 0}
 FOOTSTEPS = "141 201\n261 321\n381 441 *\n501 561\n621 681\n741"

@@ -12,9 +12,6 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.database.clip_rows import ClipRows, expanded, save_clip_rows
-from hobble.database.layout import RowLayout
-from hobble.evaluation.predict import phase_shares, predict
 from hobble.evaluation.tables import write_csv
 from hobble.measures.accuracy.run import (
     QUANTILES,
@@ -26,15 +23,20 @@ from hobble.measures.accuracy.run import (
     joint_indices,
     measure,
 )
-from hobble.runtime.network import Network, load_network, weights_at
+from hobble.models.checks import NEEDED_ROLES
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.models.pfnn.forward import phase_shares, weights_at
+from hobble.rows.clip_rows import ClipRows, expanded, save_clip_rows
+from hobble.rows.layout import RowLayout
 
-LAYOUT = RowLayout(3, links=1)
+LAYOUT = RowLayout(3, channels=(("injury", 1),))
 SKELETON = {
     "name": "stick",
     "joints": {
         n: {"parent": p, "offset": [0, 1, 0]} for n, p in (("Hips", None), ("Arm", "Hips"), ("Foot", "Hips"))
     },
-    "roles": {"hips": "Hips"},
+    "roles": dict.fromkeys(NEEDED_ROLES, "Foot") | {"hips": "Hips"},
     "links": [["Hips", "Arm"]],
 }
 
@@ -48,7 +50,7 @@ def make_rows(clip: str, rows: int, fits: int, seed: int) -> ClipRows:
         rng.normal(size=(rows, LAYOUT.x_terrain.start)).astype(np.float32),
         rng.normal(2, 5, (rows, LAYOUT.y_size)).astype(np.float32),
         rng.random(rows).astype(np.float32),
-        rng.random((rows, 1)).astype(np.float32) * 10,
+        {"injury": rng.random((rows, 1)).astype(np.float32) * 10},
         np.arange(rows),
         np.zeros(rows, int),
         np.full(rows, fits),
@@ -69,7 +71,8 @@ def make_network(
     for name, size in (("X", layout.x_size), ("Y", layout.y_size)):
         arrays[f"{name}mean"] = rng.normal(size=size).astype(np.float32)
         arrays[f"{name}std"] = (rng.random(size) + 0.5).astype(np.float32)
-    meta = {"layout": layout.to_dict(), "skeleton": SKELETON, "links": ["Hips-Arm"][: layout.links]}
+    told = {"injury": ["Hips-Arm"]} if layout.channels else {}
+    meta = {"layout": layout.to_dict(), "skeleton": SKELETON, "channels": told}
     return {**arrays, "meta": np.array(json.dumps(meta))}
 
 
@@ -94,12 +97,12 @@ def test_the_released_network_on_the_original_rows(shared):
     network = load_network(shared / "reference" / "pfnn_release_network.npz")
     with np.load(shared / "reference" / "original_rows_LocomotionFlat09_000.npz") as file:
         x, y, p, released = (file[name] for name in ("X", "Y", "P", "Y_release"))
-    predicted = predict(network, x, p, constant=True)
+    predicted = network.predict(x, p, constant=True)
     np.testing.assert_allclose(predicted, released, atol=1e-3)
     errors = joint_errors(RowLayout(31), y, predicted, range(31))
     assert round(float(errors[..., 0].mean()), 4) == 0.0438
     assert 2.3 < errors[..., 1].mean() < 2.7
-    smooth = joint_errors(RowLayout(31), y, predict(network, x, p), range(31))
+    smooth = joint_errors(RowLayout(31), y, network.predict(x, p), range(31))
     assert round(float(smooth[..., 0].mean()), 4) == 0.0436  # a phase of its own instead of the bin's
 
 
@@ -111,7 +114,7 @@ def test_a_batch_is_what_each_row_gives_with_its_weights_blended_first(tmp_path,
     x = rng.normal(size=(20, LAYOUT.x_size)).astype(np.float32)
     phase = np.r_[0.0, 1.0, 0.25, 0.5, rng.random(16)]
     expected = np.stack([slow(network, row, p) for row, p in zip(x, phase, strict=True)])
-    np.testing.assert_allclose(predict(network, x, phase), expected, atol=1e-4)
+    np.testing.assert_allclose(network.predict(x, phase), expected, atol=1e-4)
 
 
 def test_phase_shares_hit_the_control_points_and_sum_to_one():
@@ -141,8 +144,8 @@ def test_a_clips_figures_are_those_of_all_its_pairs(weights, fits):
     network = load_network(weights)
     rows = make_rows("a", 37, fits, 5)
     relative, distance = [], []
-    for pairs in expanded(rows, links=True):
-        errors = joint_errors(LAYOUT, pairs.y, predict(network, pairs.x, pairs.p), range(3))
+    for pairs in expanded(rows, rows.layout):
+        errors = joint_errors(LAYOUT, pairs.y, network.predict(pairs.x, pairs.p), range(3))
         relative.append(errors[..., 0])
         distance.append(errors[..., 1])
     got = clip_errors(network, rows, [0, 1, 2]).to_dict()
@@ -158,7 +161,7 @@ def test_batches_do_not_show(weights, monkeypatch):
     network, rows = load_network(weights), make_rows("a", 50, 10, 5)
     whole = clip_errors(network, rows, [0, 1, 2]).to_dict()
     monkeypatch.setattr(
-        "hobble.measures.accuracy.run.expanded", lambda rows, links: expanded(rows, links, batch=7)
+        "hobble.measures.accuracy.run.expanded", lambda rows, layout: expanded(rows, layout, batch=7)
     )
     assert clip_errors(network, rows, [0, 1, 2]).to_dict() == pytest.approx(whole)
 
@@ -211,7 +214,7 @@ def test_only_equivalent_joints(weights, tmp_path):
 
 
 def test_a_network_without_severities_reads_the_same_rows(tmp_path):
-    np.savez(tmp_path / "w.npz", **make_network(layout=replace(LAYOUT, links=0)))
+    np.savez(tmp_path / "w.npz", **make_network(layout=replace(LAYOUT, channels=())))
     save_clip_rows(tmp_path / "a.npz", make_rows("a", 20, 1, 0))
     result = measure(tmp_path / "w.npz", {"a": tmp_path / "a.npz"}, {"a": "held_out"}, "holden")
     assert result["held_out"]["frames"] == 20
@@ -222,7 +225,9 @@ def test_rows_of_another_layout_are_refused(weights, tmp_path):
     other = make_rows("a", 0, 1, 0)
     save_clip_rows(
         tmp_path / "a.npz",
-        replace(other, layout=RowLayout(4, links=1), x=np.zeros((0, 144)), y=np.zeros((0, 68))),
+        replace(
+            other, layout=RowLayout(4, channels=(("injury", 1),)), x=np.zeros((0, 144)), y=np.zeros((0, 68))
+        ),
     )
     with pytest.raises(InputError, match=r"a\.npz: its rows .* are not those the network has learnt"):
         measure(weights, {"a": tmp_path / "a.npz"}, {"a": "train"}, "holden")

@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import InputError
-from hobble.database.clip_rows import ClipRows, save_clip_rows
-from hobble.database.layout import RowLayout
 from hobble.evaluation.motion_measures import in_root_frame
 from hobble.measures.rollouts.run import (
     Inputs,
@@ -22,9 +20,11 @@ from hobble.measures.rollouts.run import (
     roll_out,
     roll_out_rows,
 )
+from hobble.models.network import Network
+from hobble.models.pfnn.predictor import PfnnPredictor
+from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.network import Network
-from hobble.runtime.predictor import Predictor
 
 
 def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -75,7 +75,7 @@ def test_a_roll_out_is_what_the_runtime_does(hurtable: Network, ground: Any) -> 
     hurtable = replace(hurtable, x_std=scale, y_std=np.full_like(hurtable.y_std, 0.2))
     asked, local = recorded(hurtable, 80, ground)
     starts = np.array([1, 2, 17, 40, 79])
-    made, phase = roll_out(Predictor(hurtable), asked, starts, 60)
+    made, phase = roll_out(PfnnPredictor(hurtable), asked, starts, 60)
     assert [len(place) for place in made] == [5] + [4] * 39 + [3] * 20
     for age, place in enumerate(made):
         np.testing.assert_allclose(place, local[starts[: len(place)] + age], atol=1e-3)
@@ -83,11 +83,11 @@ def test_a_roll_out_is_what_the_runtime_does(hurtable: Network, ground: Any) -> 
     # The pose is its own: a start from another pose stays another for a while.
     other = Inputs(asked.x.copy(), *list(vars(asked).values())[1:])
     other.x[1, hurtable.layout.x_joint_position] += 5
-    moved, _ = roll_out(Predictor(hurtable), other, starts[:1], 2)
+    moved, _ = roll_out(PfnnPredictor(hurtable), other, starts[:1], 2)
     assert np.abs(moved[0] - local[1]).max() > 1
 
 
-LAYOUT = RowLayout(31, links=30)
+LAYOUT = RowLayout(31, channels=(("injury", 30),))
 
 
 def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) -> ClipRows:
@@ -104,7 +104,7 @@ def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) ->
         rng.normal(size=(rows, LAYOUT.x_terrain.start)).astype(np.float32),
         rng.normal(0, 1, (rows, LAYOUT.y_size)).astype(np.float32),
         rng.random(rows).astype(np.float32),
-        rng.random((rows, 30)).astype(np.float32) * 10,
+        {"injury": rng.random((rows, 30)).astype(np.float32) * 10},
         frame,
         np.zeros(rows, int),
         np.ones(rows, int),
@@ -115,7 +115,7 @@ def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) ->
 
 def test_every_frame_is_reached_ten_times(hurtable: Network) -> None:
     rows = clip_rows(hurtable, 240, 1, gap=90)
-    found = clip_roll_outs(Predictor(hurtable), rows, range(31), (1, 10, 20, 200))
+    found = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1, 10, 20, 200))
     # Of 90 and 150 frames in a row the first of each starts none.
     assert found[1].frames == found[1].starts == 89 + 149
     assert found[10].starts == 89 + 149
@@ -130,11 +130,11 @@ def test_every_frame_is_reached_ten_times(hurtable: Network) -> None:
 
 def test_one_frame_is_half_the_prediction_and_half_the_pose_carried_on(hurtable: Network) -> None:
     rows = clip_rows(hurtable, 40, 2)
-    asked = inputs(rows, np.arange(40), links=True)
+    asked = inputs(rows, np.arange(40), rows.layout)
     layout = hurtable.layout
-    np.testing.assert_array_equal(asked.x[:, layout.x_injury], rows.severity)
-    y = Predictor(hurtable).predict(asked.x, asked.phase)
-    made, _ = roll_out(Predictor(hurtable), asked, np.arange(1, 40), 1)
+    np.testing.assert_array_equal(asked.x[:, layout.x_channel("injury")], rows.channels["injury"])
+    y = PfnnPredictor(hurtable).predict(asked.x, asked.phase)
+    made, _ = roll_out(PfnnPredictor(hurtable), asked, np.arange(1, 40), 1)
     before = asked.x[1:, layout.x_joint_position].reshape(39, 31, 3).astype(float)
     a = asked.turn[:-1, None]
     x, z = before[..., 0] - asked.velocity[:-1, :1], before[..., 2] - asked.velocity[:-1, 1:]
@@ -145,7 +145,7 @@ def test_one_frame_is_half_the_prediction_and_half_the_pose_carried_on(hurtable:
     guess = y[1:, layout.y_joint_position].reshape(39, 31, 3)
     np.testing.assert_allclose(made[0], (carried + speed + guess) / 2, atol=1e-4)
     truth = asked.y[1:, layout.y_joint_position].reshape(39, 31, 3)
-    found = clip_roll_outs(Predictor(hurtable), rows, range(31), (1,))[1].to_dict()
+    found = clip_roll_outs(PfnnPredictor(hurtable), rows, range(31), (1,))[1].to_dict()
     assert found["position_error_cm"] == pytest.approx(
         np.linalg.norm(truth - made[0], axis=-1).mean(), rel=1e-5
     )
@@ -184,7 +184,7 @@ def test_splits_add_up_and_come_out_the_same(hurtable: Network, tmp_path: Path, 
 def test_rows_of_another_layout_are_refused(hurtable: Network, network: Network, tmp_path: Path) -> None:
     save(tmp_path / "weights.npz", hurtable)
     rows = clip_rows(hurtable, 0, 0)
-    layout = RowLayout(4, links=30)
+    layout = RowLayout(4, channels=(("injury", 30),))
     other = ClipRows(
         **{
             **vars(rows),
@@ -213,7 +213,7 @@ def save(path: Path, network: Network) -> None:
     meta = {
         "layout": network.layout.to_dict(),
         "skeleton": network.skeleton.to_dict(),
-        "links": list(network.links),
+        "channels": {"injury": list(network.links)},
         "gaits": list(network.gaits),
     }
     np.savez(path, **arrays, meta=np.array(json.dumps(meta)))

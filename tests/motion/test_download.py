@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import signal
 import socket
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -140,6 +144,62 @@ def test_a_silent_server_is_not_waited_for_for_ever(tmp_path):
         url = f"http://127.0.0.1:{silent.getsockname()[1]}/walk.bvh"
         with pytest.raises(InputError, match=r"no answer for 0\.05 seconds"):
             download_clip(url, tmp_path / "walk.bvh", SHA256, "data/mine", attempts=1, timeout=0.05)
+
+
+ANSWER = b"HTTP/1.1 200 OK\r\n"
+
+
+class Babbler(threading.Thread):
+    """A server that says `begin`, then `more` a hundred times a second until the other side is gone."""
+
+    def __init__(self, begin: bytes, more: bytes) -> None:
+        super().__init__(daemon=True)
+        self.begin, self.more = begin, more
+        self.socket = socket.create_server(("127.0.0.1", 0))
+        self.url = f"http://127.0.0.1:{self.socket.getsockname()[1]}/walk.bvh"
+        self.start()
+
+    def run(self) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                asked, _ = self.socket.accept()
+                with asked, contextlib.suppress(OSError):
+                    asked.recv(10_000)
+                    asked.sendall(self.begin)
+                    while True:
+                        asked.sendall(self.more)
+                        time.sleep(0.01)
+
+
+@pytest.mark.parametrize(
+    ("begin", "more"),
+    [(b"", b"H"), (ANSWER, b"X"), (ANSWER + b"Content-Length: 9999\r\n\r\n", b"1")],
+    ids=["before it answers", "in its headers", "in the file"],
+)
+def test_a_server_that_dribbles_is_given_up_in_the_end(tmp_path, begin: bytes, more: bytes):
+    before = time.monotonic()
+    with pytest.raises(InputError, match=r"cannot be downloaded: not done within 0\.3 seconds"):
+        download_clip(Babbler(begin, more).url, tmp_path / "walk.bvh", SHA256, "data/mine", deadline=0.3)
+    assert time.monotonic() - before < 3
+    assert signal.getitimer(signal.ITIMER_REAL) == (0, 0)
+
+
+@pytest.mark.parametrize("announces", [True, False])
+def test_of_a_file_that_is_too_large_nothing_is_kept(server, fetch, announces: bool):
+    server.announces = announces
+    with pytest.raises(InputError, match=r"larger than 0\.05 MB, which is the most that a clip may be"):
+        fetch(most=50_000)
+    assert list(fetch.part.parent.iterdir()) == []
+    assert len(server.asked) == 1
+
+
+def test_what_a_server_says_cannot_steer_the_terminal(tmp_path):
+    answer = b"HTTP/1.1 404 \x1b[2J\x1b]0;owned\x07 gone" + b"x" * 1000 + b"\r\n\r\n"
+    with pytest.raises(InputError) as refused:
+        download_clip(Babbler(answer, b"").url, tmp_path / "walk.bvh", SHA256, "data/mine")
+    assert str(refused.value).isprintable()
+    assert "404 ?[2J?]0;owned? gonexxx" in str(refused.value)
+    assert len(str(refused.value)) < 500
 
 
 def test_a_folder_that_cannot_be_written_is_named(server, tmp_path):

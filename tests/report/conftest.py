@@ -14,13 +14,14 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.report.bundle import WEB, bundle, install
 from hobble.report.compare import comparisons
 from hobble.report.gather import Material, gather
 from hobble.report.page import render
 from hobble.report.playable import playable
 from hobble.report.scenes import scenes
-from hobble.runtime.network import Network, load_network
 
 
 def beside(name: str) -> ModuleType:

@@ -13,8 +13,9 @@ import yaml
 from hobble.core import quat
 from hobble.core.files import save_npz, write_json, write_text
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.database.clip_rows import ClipRows, save_clip_rows
-from hobble.database.layout import RowLayout
+from hobble.rows.clip_rows import ClipRows, save_clip_rows
+from hobble.rows.layout import RowLayout
+from hobble.runtime.options import Runtime
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 STAGES = (
@@ -30,13 +31,7 @@ STAGES = (
 )
 CLIPS = ("walk_straight", "walk_turns", "jog", "crouch", "stand", "strafe", "hurt_left_knee", "hurt_back")
 LINKS = ("LeftUpLeg-LeftLeg", "RightLeg-RightFoot", "Hips-LowerBack")
-RUNTIME = {
-    "mode": "cubic",
-    "severity_rate": 10.0,
-    "severity_scale": 1.0,
-    "foot_locking": True,
-    "steering": 1.0,
-}
+RUNTIME = Runtime(steering=1.0)
 HELD_OUT = ("walk_turns", "hurt_back")
 
 
@@ -69,10 +64,10 @@ def walker(skeleton: Skeleton, frames: int, speed: float, limp: float = 0.0) -> 
     step = speed * np.stack([np.sin(heading), np.zeros(frames), np.cos(heading)], axis=1)
     root = np.cumsum(step, axis=0) + np.array([0, 91.0, 0])
     root[:, 1] += 2 * np.cos(2 * angle)
-    _, positions = forward_kinematics(skeleton, rotations, root)
+    world, positions = forward_kinematics(skeleton, rotations, root)
     left = np.sin(angle + 0.4) < 0
     contacts = np.stack([left, left, ~left, ~left], axis=1).astype(float)
-    return {"positions": positions, "contacts": contacts, "phase": phase}
+    return {"positions": positions, "rotations": world, "contacts": contacts, "phase": phase}
 
 
 def scenarios(path: Path, skeleton: Skeleton, hurt: bool = True) -> None:
@@ -101,7 +96,7 @@ def scenarios(path: Path, skeleton: Skeleton, hurt: bool = True) -> None:
 def weights(path: Path, skeleton: Skeleton, units: int = 16, links: bool = True) -> None:
     """network/weights.npz of a small untrained network that stays near a standing pose and walks a little."""
     rng = np.random.default_rng(0)
-    layout = RowLayout(len(skeleton.joints), links=len(skeleton.links) if links else 0)
+    layout = RowLayout(len(skeleton.joints), channels=(("injury", len(skeleton.links)),) if links else ())
     sizes = (layout.x_size, units, units, layout.y_size)
     arrays: dict[str, Any] = {}
     for i, (a, b) in enumerate(pairwise(sizes)):
@@ -121,7 +116,9 @@ def weights(path: Path, skeleton: Skeleton, units: int = 16, links: bool = True)
     spread[layout.y_joint_position], spread[layout.y_joint_velocity] = 3.0, 0.3
     spread[layout.y_contacts], spread[layout.y_phase_change] = 0.4, 0.003
     x_spread = np.full(layout.x_size, 50.0)
-    x_spread[layout.x_gait], x_spread[layout.x_direction], x_spread[layout.x_injury] = 1.0, 1.0, 5.0
+    x_spread[layout.x_gait], x_spread[layout.x_direction] = 1.0, 1.0
+    for name, _ in layout.channels:
+        x_spread[layout.x_channel(name)] = 5.0
     x_mean = np.zeros(layout.x_size)
     x_mean[layout.x_joint_position] = mean[layout.y_joint_position]
     meta = {
@@ -219,7 +216,7 @@ def strip(seconds: float) -> dict[str, Any]:
 def clip_reports(folder: Path, clips: tuple[str, ...]) -> dict[str, list[str]]:
     """motion/, labels/ and injury/<clip>.json of every clip and its mirror; returns their paths."""
     rng = np.random.default_rng(5)
-    paths: dict[str, list[str]] = {"motion": [], "labels": [], "injuries": []}
+    paths: dict[str, list[str]] = {"motion": [], "labels": [], "told": []}
     for clip in clips:
         for i, name in enumerate((clip, f"{clip}_mirror")):
             safe = f"{len(paths['motion']):03d}"
@@ -255,8 +252,8 @@ def clip_reports(folder: Path, clips: tuple[str, ...]) -> dict[str, list[str]]:
                 "hurt_left_knee": {f"{side}UpLeg-{side}Leg": {"seconds": frames / 60, "highest": 7.0}},
                 "hurt_back": {"Hips-LowerBack": {"seconds": frames / 90, "highest": 5.0}},
             }.get(clip, {})
-            injury = {"clip": name, "hurt": hurt, "warnings": []}
-            for key, value in (("motion", motion), ("labels", labels), ("injuries", injury)):
+            injury = {"clip": name, "channel": "injury", "told": hurt, "warnings": []}
+            for key, value in (("motion", motion), ("labels", labels), ("told", injury)):
                 path = folder / key / f"{safe}.json"
                 write_json(path, value)
                 paths[key].append(str(path))
@@ -295,7 +292,7 @@ def costs() -> dict[str, Any]:
 
 def rows(path: Path, skeleton: Skeleton, frames: int = 200, links: bool = True) -> str:
     """database/clips/<clip>.npz of a straight walk on flat ground; two cycles share a frame."""
-    layout = RowLayout(len(skeleton.joints), links=len(skeleton.links))
+    layout = RowLayout(len(skeleton.joints), channels=(("injury", len(skeleton.links)),))
     made = walker(skeleton, frames, 2.2)
     made["positions"][..., 2] += 7.0
     local = made["positions"] - made["positions"][:, :1] * [1, 0, 1]
@@ -303,6 +300,7 @@ def rows(path: Path, skeleton: Skeleton, frames: int = 200, links: bool = True) 
     frame = frame[frame < frames]
     y = np.zeros((len(frame), layout.y_size))
     y[:, layout.y_joint_position] = local[frame].reshape(len(frame), -1)
+    y[:, layout.y_joint_rotation] = quat.log(made["rotations"])[frame].reshape(len(frame), -1)
     root = made["positions"][:, 0][:, [0, 2]]
     y[:, layout.y_root_velocity] = np.diff(root, axis=0)[frame]
     count = len(frame)
@@ -315,7 +313,7 @@ def rows(path: Path, skeleton: Skeleton, frames: int = 200, links: bool = True) 
             x=np.zeros((count, layout.x_terrain.start)),
             y=y,
             p=made["phase"][frame],
-            severity=np.zeros((count, layout.links)),
+            channels={"injury": np.zeros((count, len(skeleton.links)))},
             frame=frame,
             cycle=np.zeros(count, int),
             fits=np.ones(count, int),
@@ -480,7 +478,7 @@ def write_all(
     }
     resolved = {
         "name": "example",
-        "configuration": {"training": {"passes": 20}, "runtime": RUNTIME},
+        "configuration": {"training": {"passes": 20}, "runtime": RUNTIME.model_dump()},
         "dataset": {"name": "made_up"},
     }
     write_text(folder / "configuration.yaml", yaml.safe_dump(resolved))

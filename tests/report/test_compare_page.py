@@ -16,12 +16,12 @@ from hobble.evaluation.compare import compare
 from hobble.evaluation.measured import Measured
 from hobble.measures.accuracy import comparison_page as of_accuracy
 from hobble.measures.responsivity import comparison_page as of_responsivity
+from hobble.models.load import load_network
 from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
 from hobble.report.compare_page import render_compared
 from hobble.report.gather import PUBLISHED, Material
 from hobble.report.playable import playable
-from hobble.runtime.network import load_network
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def compared(material: Material) -> dict[str, Any]:
     resolved = {
         "configuration": {
             "dataset": "made_up",
-            "injury": True,
+            "channels": ["injury"],
             "network": {"hidden_layers": 2, "units": 16, "control_points": 4},
             "training": {"passes": 3},
         }
@@ -120,12 +120,12 @@ def test_every_pair_is_in_the_table_and_the_map(compared: dict[str, Any]) -> Non
     table, chart = tables.difference_table(compared), of_accuracy.difference_map(compared)
     assert table is not None
     assert chart is not None
+    held_out = chart.options["held-out clips, sd of single frames"]
+    of_means = chart.options["held-out clips, sd of the means of clips"][0]["z"][0][1]
     overall = next(row for row in table.rows if row[2] == "error, held out")
-    assert (
-        chart.options["held-out clips"][0]["z"][0][1]
-        == overall[-1]
-        == chart.options["held-out clips"][0]["z"][1][0]
-    )
+    assert held_out[0]["z"][0][1] == overall[-2] == held_out[0]["z"][1][0]
+    assert of_means == overall[-1]
+    assert of_means != overall[-2]
 
 
 def test_published_figures_have_ours_beside_them(compared: dict[str, Any]) -> None:
@@ -136,7 +136,14 @@ def test_published_figures_have_ours_beside_them(compared: dict[str, Any]) -> No
     assert rows["database, on disk", "holden"] == ["7.12 GB", "30 MB"]
     assert rows["database, time", "holden"] == ["1 h 30 min", "21 s"]
     of_clips = {row[0] for row in tables.beside_table(compared).rows if "80 clips" in row[4]}
-    assert of_clips == {"relative error, train clips", "relative error, held_out clips"}
+    assert of_clips == {
+        f"{what} {split} clips"
+        for what in ("relative error,", "standard deviation of the means of")
+        for split in ("train", "held_out")
+    }
+    cited = {(row[0], row[1]): row[4] for row in tables.beside_table(compared).rows}
+    assert cited["a frame, mean", "ava"] == "Segerstedt (2021), Table 5.1 (but 1.479 ms in Appendix A.4)"
+    assert cited["relative error, train clips", "ava"].endswith(", Table 5.2 (but 0.0311 in Appendix A.5)")
 
 
 def test_frame_times_are_medians_and_measures_have_names(

@@ -12,12 +12,12 @@ import pytest
 
 from hobble.core.files import load_npz, save_npz
 from hobble.core.skeleton import Skeleton
+from hobble.models.load import load_network
 from hobble.report.compare import comparisons
 from hobble.report.gather import gather
 from hobble.report.page import render
 from hobble.report.playable import playable
 from hobble.report.scenes import scenes
-from hobble.runtime.network import load_network
 
 HOSTILE = (
     "<script>pwned=1</script></script></style><img src=x onerror=pwned=2>\"'`&amp;{{7*7}}${pwned=3}"

@@ -13,7 +13,6 @@ from hobble.channels.injury.response import page as injury_page
 from hobble.channels.injury.response import page_cases
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.database.clip_rows import load_clip_rows, save_clip_rows
 from hobble.measures.accuracy import page as accuracy_page
 from hobble.measures.responsivity import page as responsivity_page
 from hobble.report import cost_section, coverage, data_section, terrain_section, training_section
@@ -22,6 +21,7 @@ from hobble.report.gather import Material, describe_network, read_history
 from hobble.report.ground_pictures import ground_pictures
 from hobble.report.parts import Pair
 from hobble.report.summary import Figure
+from hobble.rows.clip_rows import load_clip_rows, save_clip_rows
 
 
 def test_sections_end_where_their_pass_does(material: Material) -> None:
@@ -79,12 +79,12 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     examples: ModuleType, holden31: Skeleton, tmp_path: Path
 ) -> None:
     rows = load_clip_rows(examples.rows(tmp_path / "walk.npz", holden31))
-    y, severity = np.array(rows.y), np.zeros_like(rows.severity)
+    y, severity = np.array(rows.y), np.zeros_like(rows.channels["injury"])
     y[:, rows.layout.y_root_velocity] = [0.0, 2.05]  # 1.23 m/s
     y[:, rows.layout.y_turn] = np.radians(-30.0) / 60  # the world turns right, the figure left
     knee = holden31.link_names.index("LeftUpLeg-LeftLeg")
     severity[: len(rows) // 2, knee] = 7.2
-    save_clip_rows(tmp_path / "walk.npz", replace(rows, y=y, severity=severity))
+    save_clip_rows(tmp_path / "walk.npz", replace(rows, y=y, channels={"injury": severity}))
     found = coverage.counted([tmp_path / "walk.npz"], {rows.clip: "held_out"})
     seconds, hurt = len(np.unique(rows.frame)) / 60, len(np.unique(rows.frame[: len(rows) // 2])) / 60
     turns = dict(zip(coverage._middles(coverage.TURNS), found["turns"]["held_out"], strict=True))
@@ -110,9 +110,21 @@ def test_strips_carry_what_hurts(material: Material) -> None:
 
 
 def test_stages_beside_the_published(material: Material) -> None:
-    rows = {row[0]: row for row in cost_section.stage_table(material).rows}
-    assert rows["training"][-2:] == [154800, 122.0e6]
-    assert rows["labels"][-2:] == [None, None]
+    """A published time or size stands beside the configuration that it is of, and no other."""
+    nothing, patches = [None, None], [1680, 606.0e6]
+    known = {
+        "holden": {"terrain": patches, "database": [5400, 7.12e9], "training": [43 * 3600, 122.0e6]},
+        "holden-xl": {"training": [47 * 3600, 176.0e6]},
+        "holden-xt": {"training": [91 * 3600, None]},
+        "ava": {"database": [55 * 60, 10.4e9], "training": [31 * 3600, 374.0e6]},
+        "ferre": {"training": [50 * 3600, None]},
+        "example": {},
+    }
+    for name, theirs in known.items():
+        table = cost_section.stage_table(replace(material, name=name))
+        assert {row[0]: row[-2:] for row in table.rows} == {
+            stage["stage"]: theirs.get(stage["stage"], nothing) for stage in material.pipeline["stages"]
+        }
 
 
 def test_steps_of_a_frame_in_their_order(material: Material) -> None:

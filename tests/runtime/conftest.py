@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton, forward_kinematics
-from hobble.database.layout import RowLayout
-from hobble.runtime.network import Network
+from hobble.models.pfnn.network import Pfnn
+from hobble.rows.layout import RowLayout
 
-MakeNetwork = Callable[..., Network]
+MakeNetwork = Callable[..., Pfnn]
 
 
 def mean_output(skeleton: Skeleton, layout: RowLayout, speed: float, turn: float) -> np.ndarray:
@@ -44,49 +44,49 @@ def make_network(holden31: Skeleton) -> MakeNetwork:
         turn: float = 0.0,
         control_points: int = 4,
         skeleton: Skeleton = holden31,
-    ) -> Network:
-        layout = RowLayout(len(skeleton.joints), links=links)
+    ) -> Pfnn:
+        layout = RowLayout(len(skeleton.joints), channels=(("injury", links),) if links else ())
         rng = np.random.default_rng(5)
         sizes = (layout.x_size, 23, 17, layout.y_size)
         shapes = list(zip(sizes[1:], sizes, strict=False))
         gain = [scale if i == len(shapes) - 1 else 1.0 for i in range(len(shapes))]
-        return Network(
-            tuple(
+        return Pfnn(
+            weights=tuple(
                 (g * rng.normal(0, n**-0.5, (control_points, m, n))).astype(np.float32)
                 for g, (m, n) in zip(gain, shapes, strict=True)
             ),
-            tuple(
+            biases=tuple(
                 (g * rng.normal(0, 0.1, (control_points, m))).astype(np.float32)
                 for g, (m, n) in zip(gain, shapes, strict=True)
             ),
-            np.zeros(layout.x_size, np.float32),
-            np.full(layout.x_size, 20, np.float32),
-            mean_output(skeleton, layout, speed, turn),
-            np.full(layout.y_size, 0.05, np.float32),
-            layout,
-            skeleton,
-            links=skeleton.link_names[:links],
+            x_mean=np.zeros(layout.x_size, np.float32),
+            x_std=np.full(layout.x_size, 20, np.float32),
+            y_mean=mean_output(skeleton, layout, speed, turn),
+            y_std=np.full(layout.y_size, 0.05, np.float32),
+            layout=layout,
+            skeleton=skeleton,
+            channels={"injury": skeleton.link_names[:links]} if links else {},
         )
 
     return make
 
 
 @pytest.fixture
-def network(make_network: MakeNetwork) -> Network:
+def network(make_network: MakeNetwork) -> Pfnn:
     """A network of random weights around a gliding figure, without severities."""
     return make_network()
 
 
 @pytest.fixture
-def steady(make_network: MakeNetwork) -> Network:
+def steady(make_network: MakeNetwork) -> Pfnn:
     """A network that predicts a figure gliding straight ahead at 1.5 cm a frame, whatever it is told."""
     return make_network(scale=0.0)
 
 
 @pytest.fixture
-def hurtable(make_network: MakeNetwork) -> Network:
+def hurtable(make_network: MakeNetwork) -> Pfnn:
     """A network of random weights with 30 severities, of which all were seen in training."""
     made = make_network(links=30)
     mean = made.x_mean.copy()
-    mean[made.layout.x_injury] = 0.5
+    mean[made.layout.x_channel("injury")] = 0.5
     return replace(made, x_mean=mean)

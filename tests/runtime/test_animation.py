@@ -15,10 +15,10 @@ from hobble.core import quat
 from hobble.core.errors import InputError
 from hobble.core.skeleton import forward_kinematics
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
+from hobble.models.load import load_network
 from hobble.runtime import Pose, ProceduralAnimation
 from hobble.runtime.axes import MATRICES, Axes
 from hobble.runtime.ground import CELL, Heightmap
-from hobble.runtime.network import load_network
 from hobble.runtime.waypoints import Waypoint
 
 KNEE = "LeftUpLeg-LeftLeg"
@@ -43,7 +43,7 @@ def test_the_row_is_that_of_the_definition(hurtable) -> None:
         seen.update(state=copy.deepcopy(character.state)),
         evaluate(*a),
     )
-    character.next_pose((0.5, 2.0), (1, 0), "jog", {KNEE: 6.0}, hills)
+    character.next_pose((0.5, 2.0), (1, 0), "jog", injury={KNEE: 6.0}, terrain=hills)
     state, layout, x = seen["state"], hurtable.layout, character._controller.x[0]
     now = layout.window
     position, direction = state.position[0], state.direction[0]
@@ -70,8 +70,8 @@ def test_the_row_is_that_of_the_definition(hurtable) -> None:
     np.testing.assert_allclose(x[layout.x_joint_position], joints.ravel(), atol=1e-4)
     velocities = to_root(state.joint_velocity[0], now - 1)
     np.testing.assert_allclose(x[layout.x_joint_velocity], velocities.ravel(), atol=1e-5)
-    assert x[layout.x_injury][2] == 6.0
-    assert x[layout.x_injury].sum() == 6.0
+    assert x[layout.x_channel("injury")][2] == 6.0
+    assert x[layout.x_channel("injury")].sum() == 6.0
 
 
 def test_the_pose_is_that_of_the_prediction(network) -> None:
@@ -122,7 +122,7 @@ def test_what_the_caller_does_to_a_pose_stays_with_the_caller(network) -> None:
     for _ in range(40):
         pose, untouched = left.next_pose((1, 2)), right.next_pose((1, 2))
         np.testing.assert_array_equal(pose.positions, untouched.positions)
-        for array in (pose.positions, pose.rotations, pose.contacts, pose.root, pose.severity):
+        for array in (pose.positions, pose.rotations, pose.contacts, pose.root, *pose.told.values()):
             array[...] = 1e6
 
 
@@ -136,16 +136,18 @@ def test_many_characters_are_so_many_single_ones(hurtable, count: int) -> None:
     crowd = ProceduralAnimation(hurtable, characters=count, position=start)
     alone = [ProceduralAnimation(hurtable, position=start[k]) for k in range(count)]
     for _ in range(45):
-        many = crowd.next_pose(velocity, facing, gaits, {KNEE: severity}, hills)
+        many = crowd.next_pose(velocity, facing, gaits, injury={KNEE: severity}, terrain=hills)
         for k, one in enumerate(alone):
-            single = one.next_pose(velocity[k], facing[k], gaits[k], {KNEE: severity[k]}, hills)
+            single = one.next_pose(
+                velocity[k], facing[k], gaits[k], injury={KNEE: severity[k]}, terrain=hills
+            )
     assert many.positions.shape == (count, 31, 3)
     for k in range(count):
-        one = alone[k].next_pose(velocity[k], facing[k], gaits[k], {KNEE: severity[k]}, hills)
-    many = crowd.next_pose(velocity, facing, gaits, {KNEE: severity}, hills)
+        one = alone[k].next_pose(velocity[k], facing[k], gaits[k], injury={KNEE: severity[k]}, terrain=hills)
+    many = crowd.next_pose(velocity, facing, gaits, injury={KNEE: severity}, terrain=hills)
     np.testing.assert_allclose(many.positions[-1], one.positions, atol=0.02)
     np.testing.assert_allclose(many.phase[-1], one.phase, atol=1e-4)
-    assert single.severity.max() == pytest.approx(min(severity[-1], 7.5))
+    assert single.told["injury"].max() == pytest.approx(min(severity[-1], 7.5))
 
 
 def test_the_same_calls_give_the_same_motion(network) -> None:
@@ -198,16 +200,16 @@ def test_gait_blends_slowly_into_the_future(network) -> None:
 
 
 def test_severities_come_on_at_their_rate_and_are_scaled(hurtable) -> None:
-    character = ProceduralAnimation(hurtable, severity_rate=5.0, severity_scale=2.0)
+    character = ProceduralAnimation(hurtable, rates={"injury": 5.0}, scales={"injury": 2.0})
     index = hurtable.links.index(KNEE)
-    on = [p.severity[index] for p in walk(character, 120, injury={KNEE: 10})]
+    on = [p.told["injury"][index] for p in walk(character, 120, injury={KNEE: 10})]
     np.testing.assert_allclose(on[:60], 5.0 / 60 * np.arange(1, 61))
     assert on[-1] == pytest.approx(5.0)
     kept = walk(character, 5)[-1]
-    assert kept.severity[index] == pytest.approx(5.0)
-    assert kept.severity.sum() == pytest.approx(5.0)
+    assert kept.told["injury"][index] == pytest.approx(5.0)
+    assert kept.told["injury"].sum() == pytest.approx(5.0)
     healed = walk(character, 120, injury={})[-1]
-    assert healed.severity.sum() == 0
+    assert healed.told["injury"].sum() == 0
 
 
 @pytest.mark.parametrize("injury", [{"LeftUpLeg-LeftLeg": 11}, {KNEE: -0.1}, {KNEE: np.nan}])
@@ -235,12 +237,13 @@ def test_wishes_that_make_no_sense(network) -> None:
         character.next_pose((0, 1), gait=["walk"])
     for name, value in (
         ("characters", 0),
-        ("severity_rate", 0),
-        ("severity_scale", -1),
         ("steering", np.nan),
     ):
         with pytest.raises(ValueError, match=f"{name} is {value!r}, but has to be"):
             ProceduralAnimation(network, **{name: value})
+    for name in ("rate", "scale"):
+        with pytest.raises(ValueError, match=f"the {name} of injury is 0, but has to be more than 0"):
+            ProceduralAnimation(network, **{f"{name}s": {"injury": 0}})
     with pytest.raises(KeyError, match=r"no gait 'jogging'; did you mean jog\?"):
         ProceduralAnimation(network, waypoints=[Waypoint((0, 0), "walk", 2), Waypoint((9, 0), "jogging", 2)])
 
@@ -263,11 +266,15 @@ def test_a_facing_of_no_length_looks_where_it_goes(network) -> None:
 
 
 def test_unknown_links_are_named(hurtable, network) -> None:
-    with pytest.raises(KeyError, match=r"^no link 'Tail': there are Hips-LHipJoint, "):
+    with pytest.raises(KeyError, match=r"^injury has no 'Tail': there are Hips-LHipJoint, "):
         ProceduralAnimation(hurtable).next_pose((0, 1), injury={"Tail": 1})
-    with pytest.raises(KeyError, match=r"^no link 'LeftUpLeg-LeftFoot'; did you mean .*LeftUpLeg-LeftLeg"):
+    with pytest.raises(
+        KeyError, match=r"^injury has no 'LeftUpLeg-LeftFoot'; did you mean .*LeftUpLeg-LeftLeg"
+    ):
         ProceduralAnimation(hurtable).next_pose((0, 1), injury={"LeftUpLeg-LeftFoot": 1})
-    with pytest.raises(ValueError, match="no severity inputs; train a configuration with `injury: true`"):
+    with pytest.raises(
+        ValueError, match="not told injury; train a configuration with `channels: \\[injury\\]`"
+    ):
         ProceduralAnimation(network).next_pose((0, 1), injury={KNEE: 1})
 
 
@@ -275,13 +282,11 @@ def test_severities_of_another_shape(hurtable, network) -> None:
     crowd = ProceduralAnimation(hurtable, characters=3)
     for injury in (np.ones((3, 30)), np.ones(30), {KNEE: [1, 2, 3]}, {KNEE: 4}, {}):
         crowd.next_pose((0, 1), injury=injury)
-    with pytest.raises(
-        ValueError, match=r"severities are \(30,\) or \(3, 30\) numbers, not of shape \(29,\)"
-    ):
+    with pytest.raises(ValueError, match=r"injury is \(30,\) or \(3, 30\) numbers, not of shape \(29,\)"):
         crowd.next_pose((0, 1), injury=np.ones(29))
-    with pytest.raises(ValueError, match=rf"{KNEE}: a severity, or 3, not of shape \(2,\)"):
+    with pytest.raises(ValueError, match=rf"{KNEE}: one severity, or 3, not of shape \(2,\)"):
         crowd.next_pose((0, 1), injury={KNEE: [1, 2]})
-    with pytest.raises(ValueError, match="30 severities given, but this network has no severity inputs"):
+    with pytest.raises(ValueError, match="30 numbers given for injury, but this network is not told injury"):
         ProceduralAnimation(network).next_pose((0, 1), injury=np.ones(30))
 
 
@@ -365,7 +370,7 @@ def test_the_callers_axes(network, handed: str, up: str, unit: str) -> None:
         a = native.next_pose(velocity, (1, 0, 0), terrain=hills)
         wish = axes.points_out(velocity)
         b = theirs.next_pose(
-            wish if k % 2 else wish[level], axes.directions_out(np.array([1.0, 0, 0])), None, None, terrain
+            wish if k % 2 else wish[level], axes.directions_out(np.array([1.0, 0, 0])), terrain=terrain
         )
     np.testing.assert_allclose(axes.points_in(b.positions), a.positions, atol=1e-3)
     np.testing.assert_allclose(axes.points_in(b.root), a.root, atol=1e-3)

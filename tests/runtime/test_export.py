@@ -11,10 +11,11 @@ from scipy.spatial.transform import Rotation
 
 from hobble.core import quat
 from hobble.core.skeleton import forward_kinematics
+from hobble.models.load import load_network
 from hobble.runtime import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton, motion_clip
 from hobble.runtime.feet import leg_joints
-from hobble.runtime.network import load_network
+from hobble.runtime.options import Runtime
 from hobble.runtime.scenarios import generate, hurt_links, scenarios
 
 
@@ -97,7 +98,7 @@ def test_a_bvh_file_says_the_same_when_read_again(tmp_path: Path, holden31) -> N
 
 
 def test_scenarios_are_written(tmp_path: Path, hurtable) -> None:
-    generate(hurtable, tmp_path / "scenarios.npz", tmp_path / "bvh", mode="cubic")
+    generate(hurtable, tmp_path / "scenarios.npz", tmp_path / "bvh", Runtime())
     data = np.load(tmp_path / "scenarios.npz")
     names = [str(name) for name in data["names"]]
     assert names[:3] == ["walk", "jog", "crouch"]
@@ -127,7 +128,7 @@ def test_which_link_each_scenario_hurts(hurtable, network) -> None:
     }
     assert hurt_links(network) == {}
     mean = np.zeros_like(hurtable.x_mean)
-    mean[hurtable.layout.x_injury.start + hurtable.links.index("LowerBack-Spine")] = 0.1
+    mean[hurtable.layout.x_channel("injury").start + hurtable.links.index("LowerBack-Spine")] = 0.1
     trained = hurt_links(replace(hurtable, x_mean=mean))
     assert trained["lower_back"] == "LowerBack-Spine"
     assert trained["left_knee"] == "LeftUpLeg-LeftLeg"

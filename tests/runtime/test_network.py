@@ -12,9 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
-from hobble.runtime.network import Network, catmull_rom, load_network, weights_at
-from hobble.runtime.predictor import MODES, STORAGES, Predictor
-from hobble.runtime.release import read_release, write_release
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.models.pfnn.forward import catmull_rom, weights_at
+from hobble.models.pfnn.predictor import MODES, STORAGES, PfnnPredictor
+from hobble.models.pfnn.release import read_release, write_release
 
 ROWS = 7
 
@@ -73,7 +75,9 @@ def test_spline_is_the_definition(phase: float, points: int) -> None:
 def test_cubic_mode_is_exact(make_network, points: int) -> None:
     network = make_network(control_points=points, scale=20.0)
     x, phase = rows(network)
-    np.testing.assert_allclose(Predictor(network).predict(x, phase), reference(network, x, phase), atol=2e-4)
+    np.testing.assert_allclose(
+        PfnnPredictor(network).predict(x, phase), reference(network, x, phase), atol=2e-4
+    )
 
 
 @pytest.mark.parametrize("storage", STORAGES)
@@ -81,7 +85,7 @@ def test_cubic_mode_is_exact(make_network, points: int) -> None:
 @pytest.mark.parametrize("count", [3, 4, 5, 23])
 def test_a_crowd_is_so_many_single_characters(make_network, mode: str, storage: str, count: int) -> None:
     network = make_network(scale=20.0)
-    predictor = Predictor(network, mode, storage)
+    predictor = PfnnPredictor(network, mode, storage)
     x, phase = rows(network, count)
     one_by_one = [predictor.predict(x[i : i + 1], phase[i : i + 1])[0] for i in range(count)]
     np.testing.assert_allclose(predictor.predict(x, phase), one_by_one, atol=1e-4)
@@ -90,19 +94,19 @@ def test_a_crowd_is_so_many_single_characters(make_network, mode: str, storage: 
 def test_modes_approach_the_spline(make_network) -> None:
     network = make_network(scale=20.0)
     x, phase = rows(network, 40)
-    exact = Predictor(network).predict(x, phase)
-    error = {mode: np.abs(Predictor(network, mode).predict(x, phase) - exact).mean() for mode in MODES}
+    exact = PfnnPredictor(network).predict(x, phase)
+    error = {mode: np.abs(PfnnPredictor(network, mode).predict(x, phase) - exact).mean() for mode in MODES}
     assert 0 < error["linear"] < error["constant"] < 0.05 * np.abs(exact - network.y_mean).max()
     on_table = np.arange(10) / 10
     some = x[:10]
-    at_points = Predictor(network, "linear").predict(some, on_table)
-    np.testing.assert_allclose(at_points, Predictor(network).predict(some, on_table), atol=1e-4)
+    at_points = PfnnPredictor(network, "linear").predict(some, on_table)
+    np.testing.assert_allclose(at_points, PfnnPredictor(network).predict(some, on_table), atol=1e-4)
 
 
 @given(st.floats(-2, 3))
 @settings(max_examples=50, deadline=None)
 def test_no_phase_leaves_the_table(phase: float) -> None:
-    from hobble.runtime.predictor import _phase
+    from hobble.models.pfnn.predictor import _phase
 
     for kind, points in ((1, 50), (2, 10), (4, 4)):
         index, share = np.zeros(kind, np.int64), np.zeros(kind, np.float32)
@@ -116,7 +120,7 @@ def test_no_phase_leaves_the_table(phase: float) -> None:
 def test_phase_one_is_the_last_entry_of_the_constant_table(make_network) -> None:
     network = make_network(scale=20.0)
     x, _ = rows(network, 1)
-    predictor = Predictor(network, "constant")
+    predictor = PfnnPredictor(network, "constant")
     y = [predictor.predict(x, np.array([p]))[0] for p in (0.0, 0.985, 1.0)]
     np.testing.assert_array_equal(y[1], y[2])
     assert not np.allclose(y[0], y[2], atol=1e-4)
@@ -125,14 +129,16 @@ def test_phase_one_is_the_last_entry_of_the_constant_table(make_network) -> None
 def test_int16_storage_is_close(make_network) -> None:
     network = make_network(scale=20.0)
     x, phase = rows(network)
-    difference = Predictor(network, storage="int16").predict(x, phase) - Predictor(network).predict(x, phase)
+    difference = PfnnPredictor(network, storage="int16").predict(x, phase) - PfnnPredictor(network).predict(
+        x, phase
+    )
     assert 0 < np.abs(difference).max() < 1e-3 * np.abs(network.y_std * 20).max()
 
 
 def test_a_column_that_never_varied_is_ignored(network: Network) -> None:
     std = network.x_std.copy()
     std[5] = 0
-    blind = Predictor(replace(network, x_std=std))
+    blind = PfnnPredictor(replace(network, x_std=std))
     x, phase = rows(network)
     before = blind.predict(x, phase)
     x[:, 5] += 1e6
@@ -141,16 +147,16 @@ def test_a_column_that_never_varied_is_ignored(network: Network) -> None:
 
 def test_unknown_mode_and_storage(network: Network) -> None:
     with pytest.raises(ValueError, match="constant, linear, cubic"):
-        Predictor(network, "quadratic")
+        PfnnPredictor(network, "quadratic")
     with pytest.raises(ValueError, match="float32, int16"):
-        Predictor(network, "cubic", "float8")
+        PfnnPredictor(network, "cubic", "float8")
 
 
 def test_weights_file_round_trip(tmp_path: Path, hurtable: Network, holden31) -> None:
     meta = {
         "layout": hurtable.layout.to_dict(),
         "skeleton": holden31.to_dict(),
-        "links": list(hurtable.links),
+        "channels": {"injury": list(hurtable.links)},
         "gaits": list(hurtable.gaits),
     }
     np.savez(tmp_path / "weights.npz", **arrays(hurtable), meta=np.array(json.dumps(meta)))
@@ -175,7 +181,7 @@ def test_a_file_without_meta_tells_its_layout(tmp_path: Path, hurtable: Network,
 def test_hurt_links_are_those_of_training(make_network) -> None:
     network = make_network(links=30)
     assert network.hurt_links == network.links
-    network.x_mean[network.layout.x_injury.start + 3] = 0.2
+    network.x_mean[network.layout.x_channel("injury").start + 3] = 0.2
     assert network.hurt_links == network.links[3:4]
 
 
@@ -186,7 +192,7 @@ def test_hurt_links_are_those_of_training(make_network) -> None:
         (lambda a: a.pop("Ystd"), "no Ystd"),
         (lambda a: a.update(W1=a["W1"][:, :, :-1]), "W1"),
         (lambda a: a.update(W0=np.full_like(a["W0"], np.nan)), "not finite"),
-        (lambda a: a.update(Ymean=a["Ymean"][:-1]), "statistics"),
+        (lambda a: a.update(Ymean=a["Ymean"][:-1]), "Ymean has 310 columns and Ystd 311"),
         (lambda a: a.update({k: v[:3] for k, v in a.items() if k[0] in "Wb"}), "3 control points"),
     ],
 )
@@ -214,7 +220,7 @@ def test_release_folder_round_trip(tmp_path: Path, network: Network, holden31) -
         np.testing.assert_allclose(a, b, atol=1e-6)
     x, phase = rows(network)
     np.testing.assert_allclose(
-        Predictor(back).predict(x, phase), Predictor(network).predict(x, phase), atol=1e-4
+        PfnnPredictor(back).predict(x, phase), PfnnPredictor(network).predict(x, phase), atol=1e-4
     )
 
 
@@ -240,8 +246,8 @@ def test_released_network_predicts_its_rows(shared: Path) -> None:
     network = load_network(shared / "reference" / "pfnn_release_network.npz")
     assert network.sizes == (342, 512, 512, 311)
     assert network.parameters == 597_815
-    y = Predictor(network, "constant").predict(data["X"], data["P"].astype(float))
+    y = PfnnPredictor(network, "constant").predict(data["X"], data["P"].astype(float))
     assert np.abs(y - data["Y_release"]).max() < 1e-3
-    stored = Predictor(network, "constant", "int16").predict(data["X"], data["P"].astype(float))
+    stored = PfnnPredictor(network, "constant", "int16").predict(data["X"], data["P"].astype(float))
     joints = network.layout.y_joint_position
     assert np.abs(stored - y)[:, joints].max() < 0.01  # 0.1 mm

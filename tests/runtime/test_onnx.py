@@ -13,12 +13,13 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.database.layout import RowLayout
+from hobble.models.load import load_network
+from hobble.models.pfnn.forward import weights_at
+from hobble.models.pfnn.onnx_export import OPSET, TOLERANCE, check_onnx, export_onnx, write_checked
+from hobble.models.pfnn.predictor import MODES, PfnnPredictor
+from hobble.models.pfnn.release import write_release
+from hobble.rows.layout import RowLayout
 from hobble.runtime.__main__ import main
-from hobble.runtime.network import load_network, weights_at
-from hobble.runtime.onnx_export import OPSET, TOLERANCE, check_onnx, export_onnx, write_checked
-from hobble.runtime.predictor import MODES, Predictor
-from hobble.runtime.release import write_release
 
 
 def run(path: Path, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
@@ -37,7 +38,7 @@ def test_onnxruntime_gives_the_runtimes_numbers(make_network, tmp_path: Path, mo
         # Also before 0 and after 1, and between every two points.
         phase = rng.uniform(-1, 2, rows).astype(np.float32)
         y = run(tmp_path / "network.onnx", x, phase)
-        np.testing.assert_allclose(y, Predictor(network, mode).predict(x, phase.astype(float)), atol=1e-4)
+        np.testing.assert_allclose(y, PfnnPredictor(network, mode).predict(x, phase.astype(float)), atol=1e-4)
 
 
 def test_cubic_is_the_definition(make_network, tmp_path: Path) -> None:
@@ -116,5 +117,5 @@ def test_the_released_network_in_onnx(shared: Path, tmp_path: Path) -> None:
     for mode in ("cubic", "constant"):
         export_onnx(tmp_path / "network.onnx", network, mode)
         y = run(tmp_path / "network.onnx", x, phase)
-        assert np.abs(y - Predictor(network, mode).predict(x, phase.astype(float))).max() < 1e-4
+        assert np.abs(y - PfnnPredictor(network, mode).predict(x, phase.astype(float))).max() < 1e-4
     assert np.abs(y - data["Y_release"][::20]).max() < 1e-3

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.database.layout import RowLayout
+from hobble.rows.layout import RowLayout
 from hobble.runtime import trajectory
 
 LAYOUT = RowLayout(31)

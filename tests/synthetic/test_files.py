@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.core.errors import HobbleError
 from hobble.channels.injury.status import read_status
+from hobble.core.errors import HobbleError
 from hobble.synthetic.clip import ENOUGH, SHORTEST, write_clip
 from hobble.synthetic.files import footsteps_text, gait_text, status_text
 from hobble.synthetic.links import LINKS

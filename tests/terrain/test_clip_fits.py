@@ -16,6 +16,7 @@ from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, sa
 from hobble.terrain.feet import HEEL, Feet, feet_of, heel_above_toe, held_up
 from hobble.terrain.ground import fit_cycle
 from hobble.terrain.heightmaps import heightmaps
+from hobble.terrain.options import Heightmap
 from hobble.terrain.patches import Patches, draw_patches
 
 GROUNDS = {
@@ -269,9 +270,9 @@ def test_a_single_low_frame_lowers_the_soles_a_fault_of_capture_does_not(made: S
 def honest_over(heightmap: dict, files: list[Path], made: SimpleNamespace) -> None:
     """A walk over waves stands on patches of one heightmap."""
     options = made.options(patches=100)
-    maps = heightmaps([{"seed": 0, **heightmap}], files, cell=options["cell"], height_scale=3.0)
-    names = ("cell", "size", "highest", "seed")
-    patches = draw_patches(maps, count=100, **{name: options[name] for name in names})
+    maps = heightmaps([Heightmap(**heightmap)], files, cell=options.cell, height_scale=3.0)
+    drawn = options.model_dump(include={"cell", "size", "highest", "seed"})
+    patches = draw_patches(maps, count=100, **drawn)
     walk = made.walk(GROUNDS["waves"])
     fits = clip_fits(walk.clip, walk.labels, patches, "rocky", options, made.database())
     assert np.ptp(patches.at(range(100), np.zeros((1, 2), np.float32))) > 1  # it has hills
@@ -285,7 +286,7 @@ def test_real_landscape_is_ground_to_walk_on(made: SimpleNamespace) -> None:
 
 @pytest.mark.shared
 def test_so_is_the_originals_heightmap(shared: Path, made: SimpleNamespace) -> None:
-    honest_over({"kind": "file"}, [shared / "mocap/pfnn/hmap_001_smooth.txt"], made)
+    honest_over({"kind": "file", "path": "x"}, [shared / "mocap/pfnn/hmap_001_smooth.txt"], made)
 
 
 @pytest.mark.shared
@@ -296,7 +297,7 @@ def test_real_clips_are_honest_too(shared: Path, root: Path, made: SimpleNamespa
     from hobble.motion.make import make_clip
 
     patches = made.patches(2_000)
-    terrain = Terrain().model_dump(mode="json")
+    terrain = Terrain()
     skeletons = root / "config/skeletons"
     for file, kind in (
         ("cmu/03_04", "rocky"),

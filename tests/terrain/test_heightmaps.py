@@ -12,6 +12,7 @@ from PIL.TiffImagePlugin import ImageFileDirectory_v2
 from hobble.core.errors import InputError
 from hobble.terrain.generate import KINDS, generate
 from hobble.terrain.heightmaps import elevation, heightmaps, read_heights
+from hobble.terrain.options import Heightmap
 
 CELL = 3.937007874
 RAMP = np.add.outer(np.arange(5.0), 10 * np.arange(4.0))
@@ -96,9 +97,9 @@ def test_files_are_scaled_and_may_say_their_own_cell_and_scale(tmp_path: Path) -
     write(tmp_path / "a.txt", RAMP)
     write(tmp_path / "b.txt", RAMP)
     entries = [
-        {"kind": "file", "seed": 0, "cell": None, "height_scale": None},
-        {"kind": "hills", "seed": 0, "cell": None, "height_scale": 0.5},
-        {"kind": "file", "seed": 0, "cell": 10.0, "height_scale": 2.0},
+        Heightmap(kind="file", path="a.txt"),
+        Heightmap(kind="hills", height_scale=0.5),
+        Heightmap(kind="file", path="b.txt", cell=10.0, height_scale=2.0),
     ]
     maps = heightmaps(entries, [tmp_path / "a.txt", tmp_path / "b.txt"], cell=CELL, height_scale=3.0)
     assert np.array_equal(maps[0].heights, 3 * RAMP)
@@ -140,6 +141,6 @@ def test_a_missing_file_and_an_npz_that_could_mean_two_arrays_are_refused(tmp_pa
 @pytest.mark.shared
 def test_the_original_heightmap(shared: Path) -> None:
     path = shared / "mocap/pfnn/hmap_001_smooth.txt"
-    (made,) = heightmaps([{"kind": "file", "seed": 0}], [path], cell=CELL, height_scale=3.0)
+    (made,) = heightmaps([Heightmap(kind="file", path="x")], [path], cell=CELL, height_scale=3.0)
     assert made.heights.shape == (504, 302)
     assert np.allclose(made.heights, 3 * np.loadtxt(path))

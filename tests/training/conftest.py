@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton
-from hobble.database.clip_rows import ClipRows
-from hobble.database.layout import RowLayout
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
+from hobble.models.pfnn.options import PfnnOptions
+from hobble.rows.clip_rows import ClipRows
+from hobble.rows.layout import RowLayout
+from hobble.training.options import Training
 
 SPLITS = {"walk": "train", "hop": "train", "turn": "held_out"}
 
@@ -25,7 +29,7 @@ def figure() -> Skeleton:
 def clip_rows(name: str, rows: int, fits: int, seed: int) -> ClipRows:
     """Rows whose Y is a smooth function of two columns of X and of the phase, with some noise."""
     skeleton = figure()
-    layout = RowLayout(joints=4, links=1)
+    layout = RowLayout(joints=4, channels=(("injury", 1),))
     rng = np.random.default_rng(seed)
     columns = layout.x_terrain.start
     x = rng.normal(0, 2, (rows, columns)).astype(np.float32)
@@ -41,7 +45,7 @@ def clip_rows(name: str, rows: int, fits: int, seed: int) -> ClipRows:
         x,
         (y + rng.normal(0, 0.05, y.shape)).astype(np.float32),
         p,
-        rng.uniform(0, 10, (rows, 1)).astype(np.float32),
+        {"injury": rng.uniform(0, 10, (rows, 1)).astype(np.float32)},
         np.arange(60, 60 + rows),
         np.arange(rows) // 40,
         np.full(rows, fits),
@@ -60,7 +64,7 @@ def small_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "hop": clip_rows("hop", 80, 10, 2),
         "turn": clip_rows("turn", 70, 1, 3),
     }
-    write_database(path, clips, SPLITS, injury=True, joint_weight=0.1)
+    write_database(path, clips, SPLITS, channels=["injury"], joint_weight=0.1)
     return path
 
 
@@ -70,27 +74,17 @@ def data(small_database: Path) -> Database:
 
 
 @pytest.fixture
-def network() -> dict[str, int]:
-    return {"hidden_layers": 2, "units": 24, "control_points": 4}
+def network() -> PfnnOptions:
+    return PfnnOptions(hidden_layers=2, units=24, control_points=4)
+
+
+class Recipe(Training):
+    """A training section that a test changes with `|`, as one does with mappings."""
+
+    def __or__(self, changes: Mapping[str, Any]) -> Recipe:
+        return Recipe.model_validate(self.model_dump() | dict(changes))
 
 
 @pytest.fixture
-def training() -> dict[str, object]:
-    return {
-        "passes": 2,
-        "sections": 3,
-        "batch": 32,
-        "learning_rate": 1e-3,
-        "beta1": 0.9,
-        "beta2": 0.999,
-        "dropout": 0.3,
-        "l1": 0.01,
-        "schedule": "constant",
-        "warm_up": 0.0,
-        "rollout": 1,
-        "seed": 1,
-        "memory_mb": 64,
-        "continues": None,
-        "device": "cpu",
-        "precision": "auto",
-    }
+def training() -> Recipe:
+    return Recipe(passes=2, sections=3, learning_rate=1e-3, memory_mb=64, device="cpu")

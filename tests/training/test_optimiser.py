@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
+from hobble.models.pfnn.trainable import initialise
 from hobble.training import optimiser
-from hobble.training.network import initialise
 from hobble.training.optimiser import Adam
 
 

@@ -16,8 +16,8 @@ import torch
 
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
-from hobble.database.layout import CONTACTS, GAITS, RowLayout
 from hobble.database.reader import Database
+from hobble.rows.layout import CONTACTS, GAITS, RowLayout
 from hobble.training import checkpoint
 from hobble.training import run as run_module
 from hobble.training.checkpoint import State, pack
@@ -32,8 +32,12 @@ PROCESS = """
 import json, sys
 from pathlib import Path
 from hobble.database.reader import Database
+from hobble.models import options
+from hobble.training.options import Training
 from hobble.training.train import train
-train(Database.open(sys.argv[1], 64), checkpoints=Path(sys.argv[2]), threads=2, **json.loads(sys.argv[3]))
+sections = json.loads(sys.argv[3])
+typed = {"network": options(sections["network"]), "training": Training(**sections["training"])}
+train(Database.open(sys.argv[1], 64), checkpoints=Path(sys.argv[2]), threads=2, **typed)
 """
 
 
@@ -41,8 +45,9 @@ def test_killed_at_any_moment_it_ends_at_the_same_bits(
     small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
     settings = {"network": network, "training": training | {"passes": 15}}
+    plain = {name: section.model_dump(mode="json") for name, section in settings.items()}
     killed = tmp_path / "killed"
-    command = [sys.executable, "-c", PROCESS, str(small_database), str(killed), json.dumps(settings)]
+    command = [sys.executable, "-c", PROCESS, str(small_database), str(killed), json.dumps(plain)]
     for wait in (0.02, 0.0):
         before = _sections(killed)
         process = subprocess.Popen(command)
@@ -252,16 +257,19 @@ def test_weights_are_all_that_a_runtime_needs(
 ) -> None:
     files = {name: tmp_path / name for name in ("weights", "history", "checkpoint")}
     settings = {"network": network, "training": training, "threads": 2, "start": None, "code": None}
-    run(small_database, configuration="small", checkpoints=tmp_path / "c", **settings, **files)
+    settings |= {"configuration": "small", "terrain_side": 31.0}
+    run(small_database, checkpoints=tmp_path / "c", **settings, **files)
     first = files["weights"].read_bytes()
-    run(small_database, configuration="small", checkpoints=tmp_path / "d", **settings, **files)
+    run(small_database, checkpoints=tmp_path / "d", **settings, **files)
     assert files["weights"].read_bytes() == first
     weights = load_npz(files["weights"])
     meta = json.loads(str(weights["meta"]))
     assert RowLayout.from_dict(meta["layout"]) == data.layout
     assert list(meta["skeleton"]["joints"]) == list(data.skeleton["joints"])
     assert (meta["gaits"], meta["contacts"]) == (list(GAITS), list(CONTACTS))
-    assert (meta["links"], meta["configuration"]) == (["Hips-LeftLeg"], "small")
+    assert (meta["channels"], meta["configuration"]) == ({"injury": ["Hips-LeftLeg"]}, "small")
+    assert (meta["kind"], meta["terrain_side"]) == ("pfnn", 31.0)
+    assert meta["network"].startswith("y = W2 elu(W1 elu(W0 x + b0) + b1) + b2 on")
     assert weights["W0"].shape == (4, 24, data.layout.x_size)
     assert weights["b2"].shape == (4, data.layout.y_size)
     block = next(data.blocks("held_out", 0, 0, data.manifest.visits, 0))
@@ -287,7 +295,7 @@ def test_a_checkpoint_of_another_network_is_refused(
     ):
         train(
             data,
-            network=network | {"units": 30},
+            network=network.model_copy(update={"units": 30}),
             training=training,
             checkpoints=tmp_path / "b",
             start=tmp_path / "other.npz",
@@ -315,7 +323,7 @@ def test_the_name_of_a_training_says_what_determines_it(
     name = recipe_hash(network, training, data, "code")
     assert name == recipe_hash(network, training | {"passes": 99, "continues": "x"}, data, "code")
     others = [
-        recipe_hash(network | {"units": 25}, training, data, "code"),
+        recipe_hash(network.model_copy(update={"units": 25}), training, data, "code"),
         recipe_hash(network, training | {"learning_rate": 0.1}, data, "code"),
         recipe_hash(network, training, data, "other code"),
         recipe_hash(network, training | {"sections": 4}, data, "code"),

@@ -12,11 +12,11 @@ import torch
 
 from hobble.database.reader import Database
 from hobble.measures.rollouts.run import Inputs, roll_out
+from hobble.models.pfnn.fused import FusedStep
+from hobble.models.pfnn.step import Step
+from hobble.models.pfnn.trainable import initialise
 from hobble.training.batches import HostRows
-from hobble.training.fused import FusedStep
-from hobble.training.network import initialise
 from hobble.training.rollout import RollOut
-from hobble.training.step import Step
 from hobble.training.train import train
 from hobble.training.update import Update
 
@@ -113,8 +113,8 @@ def test_sections_do_not_depend_on_each_other_and_a_short_batch_is_one(data: Dat
 
 def test_the_training_goes_by_them(
     data: Database,
-    network: dict[str, Any],
-    training: dict[str, Any],
+    network: Any,
+    training: Any,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -136,7 +136,7 @@ def test_the_training_goes_by_them(
     number = 0
     for section in range(2):
         carried.begin()
-        for batch in HostRows(data, CPU).batches(0, section, 2, settings["seed"], 300):
+        for batch in HostRows(data, CPU).batches(0, section, 2, settings.seed, 300):
             x = batch.x.clone()
             carried.add(x)
             assert torch.equal(x, given[number])

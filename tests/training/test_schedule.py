@@ -22,7 +22,7 @@ FAST = {"schedule": "cosine", "warm_up": 0.5, "rollout": 4, "batch": 300}
 
 
 def test_a_cosine_falls_from_one_to_nothing() -> None:
-    recipe = {"schedule": "cosine", "warm_up": 0.0, "passes": 10}
+    recipe = Training(schedule="cosine", passes=10)
     shares = [share(recipe, passes) for passes in np.linspace(0, 10, 101)]
     assert shares[0] == 1
     assert shares[50] == pytest.approx(0.5)
@@ -32,7 +32,7 @@ def test_a_cosine_falls_from_one_to_nothing() -> None:
 
 
 def test_a_constant_rate_rises_and_stays() -> None:
-    recipe = {"schedule": "constant", "warm_up": 2.0, "passes": 10}
+    recipe = Training(warm_up=2.0, passes=10)
     assert [share(recipe, passes) for passes in (0, 0.5, 1, 2, 5, 10)] == [0, 0.25, 0.5, 1, 1, 1]
 
 

@@ -16,13 +16,13 @@ from hobble.core import files
 from hobble.core.errors import HobbleError, InputError
 from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database
+from hobble.models.pfnn.trainable import initialise
 from hobble.training import checkpoint, start, train
 from hobble.training.batches import HostRows
 from hobble.training.checkpoint import State
 from hobble.training.device_rows import DeviceRows, fits_on, rows_for
 from hobble.training.held_out import HeldOut
 from hobble.training.history import columns, write_history
-from hobble.training.network import initialise
 
 from .conftest import SPLITS, clip_rows
 
@@ -72,7 +72,14 @@ def test_rows_on_a_device_are_those_of_the_reader(tmp_path: Path, dtype: str) ->
     """Of several chunks, in every type that a database has."""
     clips = {"walk": clip_rows("walk", 150, 1, 1), "hop": clip_rows("hop", 80, 10, 2)}
     write_database(
-        tmp_path, clips, SPLITS, injury=True, joint_weight=0.1, dtype=dtype, chunk_bytes=30_000, seed=1
+        tmp_path,
+        clips,
+        SPLITS,
+        channels=["injury"],
+        joint_weight=0.1,
+        dtype=dtype,
+        chunk_bytes=30_000,
+        seed=1,
     )
     data = Database.open(tmp_path, 64)
     assert len(data.manifest.chunks["train"]) > 2
@@ -230,7 +237,7 @@ def test_bfloat16_is_chosen_where_a_device_has_it(
 
     monkeypatch.setattr(torch.cuda, "is_bf16_supported", supported)
     network = initialise((4, 3, 2), 4, 1).to("meta")
-    monkeypatch.setattr(start, "Step", lambda network, dropout, half: half)
+    monkeypatch.setattr(type(network), "step", lambda self, dropout, half: half)
     assert start.step_for(network, training | {"batch": 256}) is half
 
 

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 import torch
 
-from hobble.training.fused import FusedStep
-from hobble.training.network import initialise
+from hobble.models.pfnn.fused import FusedStep
+from hobble.models.pfnn.step import Step
+from hobble.models.pfnn.trainable import initialise
 from hobble.training.optimiser import Adam
-from hobble.training.step import Step
 from hobble.training.update import CapturedUpdate, Update, update_for
 
 ROWS = 12

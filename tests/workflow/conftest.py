@@ -15,16 +15,30 @@ import pytest
 
 @dataclass
 class Workflow:
-    """A copy of the checkout and a folder to run it in."""
+    """A clone of the checkout, in which commands are given as the README gives them."""
 
     checkout: Path
-    folder: Path
+
+    @property
+    def folder(self) -> Path:
+        """Where results lie: in the checkout itself, as without any option."""
+        return self.checkout
 
     def command(self, *arguments: str) -> list[str]:
-        snakefile = self.checkout / "Snakefile"
-        profile = self.checkout / "workflow/profiles/default"
-        base = [sys.executable, "-m", "snakemake", "-s", str(snakefile), "-d", str(self.folder)]
-        return [*base, "--workflow-profile", str(profile), *arguments]
+        """The README's own: `snakemake -c2 results/...`, and no option that it does not show."""
+        return [str(Path(sys.executable).with_name("snakemake")), *arguments]
+
+    def start(self, *arguments: str, said: Path | None = None) -> subprocess.Popen[bytes]:
+        """The same in a session of its own, not waited for; what it says goes to the file `said`."""
+        with open(said or os.devnull, "wb") as out:
+            return subprocess.Popen(
+                self.command(*arguments),
+                cwd=self.checkout,
+                env=self.environment(),
+                stdout=out,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
 
     def environment(self) -> dict[str, str]:
         path = os.pathsep.join([str(self.checkout / "src"), os.environ.get("PYTHONPATH", "")])
@@ -33,7 +47,12 @@ class Workflow:
     def run(self, *arguments: str, ok: bool = True) -> str:
         """Run snakemake; returns stdout and stderr. Fails the test where it ends otherwise than `ok` says."""
         done = subprocess.run(
-            self.command(*arguments), env=self.environment(), capture_output=True, text=True, timeout=600
+            self.command(*arguments),
+            cwd=self.checkout,
+            env=self.environment(),
+            capture_output=True,
+            text=True,
+            timeout=600,
         )
         text = done.stdout + done.stderr
         assert (done.returncode == 0) is ok, text
@@ -66,11 +85,10 @@ def copy_of(root: Path, folder: Path) -> Workflow:
     checkout = folder / "checkout"
     checkout.mkdir(parents=True)
     shutil.copy2(root / "Snakefile", checkout)
-    for part in ("config", "workflow"):
+    for part in ("config", "profiles", "workflow"):
         shutil.copytree(root / part, checkout / part)
     (checkout / "src").symlink_to(root / "src")
-    (folder / "run").mkdir()
-    return Workflow(checkout, folder / "run")
+    return Workflow(checkout)
 
 
 @pytest.fixture
@@ -92,7 +110,7 @@ def copied(finished: Workflow, tmp_path: Path) -> Workflow:
     """A copy of the finished run that a test may change (times are kept, so nothing is out of date)."""
     target = tmp_path / "copy"
     shutil.copytree(finished.checkout.parent, target, symlinks=True)
-    return Workflow(target / "checkout", target / "run")
+    return Workflow(target / "checkout")
 
 
 @pytest.fixture(scope="session")

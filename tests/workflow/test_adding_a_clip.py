@@ -9,7 +9,7 @@ import pytest
 
 pytestmark = pytest.mark.workflow
 
-TARGET = "results/datasets/mine/database/all"
+TARGET = "results/datasets/mine/database/injury"
 DATASET = "skeleton: holden31\nfolder: mine\nmirror: false\nterrain: {patches: 100}\n"
 
 
@@ -29,7 +29,7 @@ def test_a_clip_more_makes_its_own_rows_and_the_merge(clips: list[Path], workflo
     first = workflow.folder / f"results/datasets/mine/database/clips/{clips[0].stem}.npz"
     before, rows = first.stat().st_mtime_ns, first.read_bytes()
     put(clips[1], folder)
-    own = ("motion_clip", "labels_clip", "injury_clip", "terrain_fits", "database_clip", "database_merge")
+    own = ("motion_clip", "labels_clip", "channel_clip", "terrain_fits", "database_clip", "database_merge")
     assert workflow.planned(*asked) == dict.fromkeys(own, 1)
     workflow.run("-c2", *asked)
     assert (first.stat().st_mtime_ns, first.read_bytes()) == (before, rows)

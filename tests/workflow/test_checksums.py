@@ -56,7 +56,7 @@ def test_a_damaged_record_is_noticed_and_a_missing_one_let_pass(made: Path) -> N
 
 
 def test_a_folder_is_vouched_for_by_the_files_right_in_it(tmp_path: Path) -> None:
-    folder = tmp_path / "results/datasets/tiny/database/all"
+    folder = tmp_path / "results/datasets/tiny/database/injury"
     write_json(folder / "manifest.json", {"rows": 3})
     checksums.record([str(folder)])
     (folder / ".snakemake_timestamp").touch()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -91,7 +90,7 @@ def test_editing_labels_reruns_from_labels_on(copied) -> None:
     module.write_text(module.read_text() + "\n_EDITED = 1\n")
     planned = copied.planned(TARGET)
     assert {"labels_clip", "terrain_fits", "database_clip", "database_merge", "training"} <= set(planned)
-    assert not {"synthetic_clip", "motion_clip", "injury_clip", "terrain_patches"} & set(planned)
+    assert not {"synthetic_clip", "motion_clip", "channel_clip", "terrain_patches"} & set(planned)
 
 
 def test_editing_a_comment_of_the_page_remakes_only_the_report(copied) -> None:
@@ -119,13 +118,7 @@ def test_a_default_said_aloud_reruns_nothing(copied) -> None:
 
 @pytest.mark.parametrize("moment", ["database", "training"])
 def test_killed_half_way_the_same_command_ends_with_the_same_bytes(finished, workflow, moment: str) -> None:
-    process = subprocess.Popen(
-        workflow.command("-c2", TARGET),
-        env=workflow.environment(),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+    process = workflow.start("-c2", TARGET)
     sign = {
         "database": lambda: list(workflow.folder.glob("results/datasets/tiny/database/clips/*.npz")),
         "training": lambda: list(workflow.folder.glob("results/test/checkpoints/*/*.npz")),
@@ -138,7 +131,6 @@ def test_killed_half_way_the_same_command_ends_with_the_same_bytes(finished, wor
     process.wait()
     weights = "results/test/network/weights.npz"
     assert not (workflow.folder / weights).exists()
-    workflow.run("--unlock")
     workflow.run("-c2", weights)
     a, b = (np.load(w.folder / weights) for w in (finished, workflow))
     assert all(np.array_equal(a[name], b[name]) for name in a.files)
@@ -158,6 +150,6 @@ def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> Non
 
 
 def test_no_job_took_more_than_its_rule_asks_of_a_cluster(finished) -> None:
-    jobs = list(measured(planned(finished.run("-n", "-F", TARGET)), finished.folder))
+    jobs = list(measured(planned(finished.run("-np", "-F", TARGET)), finished.folder))
     assert {"motion_clip", "terrain_fits", "training", "report"} <= {job.rule for job in jobs if job.took_mb}
     assert [(job.log, job.memory, job.time) for job in jobs if max(job.memory, job.time) >= 1] == []

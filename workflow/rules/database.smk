@@ -1,9 +1,15 @@
+from hobble.database.options import Merging, Rows
+
+
 rule database_clip:
     """The rows of X, Y and P of one clip."""
     input:
         clip="results/datasets/{dataset}/motion/{rows}.npz",
         labels="results/datasets/{dataset}/labels/{rows}.npz",
-        injury="results/datasets/{dataset}/injury/{rows}.npz",
+        channels=lambda w: [
+            f"results/datasets/{w.dataset}/channels/{channel}/{w.rows}.npz"
+            for channel in datasets.told.channels(w.dataset)
+        ],
         terrain="results/datasets/{dataset}/terrain/clips/{rows}.npz",
     output:
         rows="results/datasets/{dataset}/database/clips/{rows}.npz",
@@ -17,8 +23,11 @@ rule database_clip:
         runtime=lambda w, attempt: demands.minutes(w.dataset, w.rows, 0.15, attempt),
     params:
         clip=lambda w: w.rows,
-        options=lambda w: datasets.options(w.dataset, "database"),
-        code=package.code("database_clip"),
+        channels=lambda w: datasets.told.channels(w.dataset),
+        options=lambda w: datasets.part(w.dataset, "database", Rows),
+        code=lambda w: package.code(
+            "database_clip", *modules_of(datasets.told.channels(w.dataset))
+        ),
     script:
         "../scripts/database_clip.py"
 
@@ -28,14 +37,14 @@ rule database_merge:
     input:
         clips=lambda w: expand(
             f"results/datasets/{w.dataset}/database/clips/{{clip}}.npz",
-            clip=datasets.selected(w.dataset, w.selection),
+            clip=datasets.selected(w.dataset, told_by(w.told)),
         ),
     output:
-        database=directory("results/datasets/{dataset}/database/{selection}"),
+        database=directory("results/datasets/{dataset}/database/{told}"),
     log:
-        "results/datasets/{dataset}/logs/database/database_merge/{selection}.log",
+        "results/datasets/{dataset}/logs/database/database_merge/{told}.log",
     benchmark:
-        "results/datasets/{dataset}/benchmarks/database/database_merge/{selection}.tsv"
+        "results/datasets/{dataset}/benchmarks/database/database_merge/{told}.tsv"
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.memory_of_longest(w.dataset, 10, 24, attempt),
@@ -43,9 +52,9 @@ rule database_merge:
             w.dataset, 0.1, attempt, least=5
         ),
     params:
-        splits=lambda w: datasets.selected(w.dataset, w.selection),
-        injury=lambda w: w.selection == "all",
-        options=lambda w: datasets.options(w.dataset, "database"),
-        code=package.code("database_merge"),
+        splits=lambda w: datasets.selected(w.dataset, told_by(w.told)),
+        channels=lambda w: told_by(w.told),
+        options=lambda w: datasets.part(w.dataset, "database", Merging),
+        code=lambda w: package.code("database_merge", *modules_of(told_by(w.told))),
     script:
         "../scripts/database_merge.py"

@@ -23,7 +23,9 @@ rule measure:
         splits=lambda w: measurements.splits(w.configuration, w.measure),
         runtime=lambda w: measurements.runtime(w.configuration, w.measure),
         options=lambda w: measurements.options(w.configuration, w.measure),
-        code=lambda w: measurements.code(w.measure),
+        code=lambda w: measurements.code(
+            w.measure, configurations.kind(w.configuration)
+        ),
     script:
         "../scripts/measure.py"
 

@@ -11,6 +11,8 @@ rule labels_clip:
         "results/datasets/{dataset}/logs/labels/labels_clip/{clip}.log",
     benchmark:
         "results/datasets/{dataset}/benchmarks/labels/labels_clip/{clip}.tsv"
+    wildcard_constraints:
+        clip=OWN,
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 5, attempt),

@@ -30,6 +30,8 @@ rule motion_clip:
         "results/datasets/{dataset}/logs/motion/motion_clip/{clip}.log",
     benchmark:
         "results/datasets/{dataset}/benchmarks/motion/motion_clip/{clip}.tsv"
+    wildcard_constraints:
+        clip=OWN,
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 13, attempt),

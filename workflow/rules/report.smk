@@ -88,9 +88,15 @@ rule report:
         labels=lambda w: configurations.of_dataset(
             w.configuration, "labels/{clip}.json"
         ),
-        injuries=lambda w: configurations.of_dataset(
-            w.configuration, "injury/{clip}.json"
-        ),
+        told=lambda w: [
+            file
+            for channel in datasets.told.channels(
+                configurations.dataset(w.configuration)
+            )
+            for file in configurations.of_dataset(
+                w.configuration, f"channels/{channel}/{{clip}}.json"
+            )
+        ],
         rows=lambda w: configurations.of_dataset(
             w.configuration, "database/clips/{clip}.npz"
         ),
@@ -117,7 +123,9 @@ rule report:
         dataset=lambda w: configurations.dataset(w.configuration),
         splits=lambda w: configurations.splits(w.configuration),
         title=lambda w: catalogue.configuration(w.configuration).report.title,
-        code=package.code("report", *modules("page")),
+        code=lambda w: package.code(
+            "report", configurations.kind(w.configuration), *modules("page")
+        ),
     script:
         "../scripts/report.py"
 
@@ -161,6 +169,6 @@ rule stimuli:
         runtime=15,
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=package.code("stimuli"),
+        code=lambda w: package.code("stimuli", configurations.kind(w.configuration)),
     script:
         "../scripts/stimuli.py"

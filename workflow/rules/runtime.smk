@@ -15,7 +15,7 @@ rule generate:
         runtime=10,
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=package.code("generate"),
+        code=lambda w: package.code("generate", configurations.kind(w.configuration)),
     script:
         "../scripts/generate.py"
 
@@ -38,7 +38,7 @@ rule export_onnx:
         runtime=10,
     params:
         mode=lambda w: w.mode,
-        code=package.code("export_onnx"),
+        code=lambda w: package.code("export_onnx", configurations.kind(w.configuration)),
     script:
         "../scripts/export_onnx.py"
 
@@ -58,6 +58,8 @@ rule export_release:
         mem_mb=1000,
         runtime=10,
     params:
-        code=package.code("export_release"),
+        code=lambda w: package.code(
+            "export_release", configurations.kind(w.configuration)
+        ),
     script:
         "../scripts/export_release.py"

@@ -11,6 +11,8 @@ rule synthetic_clip:
         "results/datasets/{dataset}/logs/synthetic/synthetic_clip/{clip}.log",
     benchmark:
         "results/datasets/{dataset}/benchmarks/synthetic/synthetic_clip/{clip}.tsv"
+    wildcard_constraints:
+        clip=OWN,
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 13, attempt),

@@ -1,3 +1,6 @@
+from hobble.terrain.options import Drawing, Fitting, Sampling
+
+
 rule terrain_patches:
     """Patches of ground drawn from the heightmaps."""
     input:
@@ -13,7 +16,7 @@ rule terrain_patches:
         mem_mb=2000,
         runtime=10,
     params:
-        options=lambda w: datasets.options(w.dataset, "terrain"),
+        options=lambda w: datasets.part(w.dataset, "terrain", Drawing),
         code=package.code("terrain_patches"),
     script:
         "../scripts/terrain_patches.py"
@@ -40,8 +43,8 @@ rule terrain_fits:
     params:
         clip=lambda w: w.rows,
         ground=lambda w: clips.entry(w.dataset, w.rows).ground,
-        options=lambda w: datasets.options(w.dataset, "terrain"),
-        database=lambda w: datasets.options(w.dataset, "database"),
+        options=lambda w: datasets.part(w.dataset, "terrain", Fitting),
+        sampling=lambda w: datasets.part(w.dataset, "database", Sampling),
         code=package.code("terrain_fits"),
     script:
         "../scripts/terrain_fits.py"

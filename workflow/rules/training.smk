@@ -20,7 +20,10 @@ rule training:
         configuration=lambda w: w.configuration,
         network=lambda w: configurations.section(w.configuration, "network"),
         training=lambda w: configurations.section(w.configuration, "training"),
+        terrain_side=lambda w: datasets.options(
+            configurations.dataset(w.configuration), "database", "terrain_side"
+        )["terrain_side"],
         checkpoints="results/{configuration}/checkpoints",
-        code=package.code("training"),
+        code=lambda w: package.code("training", configurations.kind(w.configuration)),
     script:
         "../scripts/training.py"

@@ -1,9 +1,10 @@
-"""Creates the rows of one clip from its motion, labels, severities and terrain fits."""
+"""Creates the rows of one clip from its motion, labels, what it is told, and terrain fits."""
 
+from hobble.channels.files import load_values
 from hobble.core.clip import load_clip
 from hobble.core.files import load_npz
-from hobble.database.clip_rows import save_clip_rows
-from hobble.database.rows import clip_rows
+from hobble.rows.build import clip_rows
+from hobble.rows.clip_rows import save_clip_rows
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
@@ -12,7 +13,10 @@ with job(snakemake) as log:
         snakemake.params.clip,
         load_clip(snakemake.input.clip),
         load_npz(snakemake.input.labels),
-        load_npz(snakemake.input.injury)["severity"],
+        {
+            name: load_values(file)[0]
+            for name, file in zip(snakemake.params.channels, snakemake.input.get("channels", []), strict=True)
+        },
         load_npz(snakemake.input.terrain),
         window=options["window"],
         step=options["step"],

@@ -11,7 +11,7 @@ with job(snakemake) as log:
         snakemake.output.database,
         {Path(file).stem: file for file in snakemake.input.clips},
         snakemake.params.splits,
-        injury=snakemake.params.injury,
+        channels=snakemake.params.channels,
         joint_weight=options["joint_weight"],
         dtype=options["dtype"],
         seed=options["seed"],

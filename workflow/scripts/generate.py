@@ -1,6 +1,7 @@
 """Creates the generated motion of each scripted scenario (npz and BVH) from a trained network."""
 
-from hobble.runtime.network import load_network
+from hobble.models.load import load_network
+from hobble.runtime.options import Runtime
 from hobble.runtime.scenarios import generate
 from hobble.workflow.job import job
 
@@ -9,6 +10,6 @@ with job(snakemake) as log:
         load_network(snakemake.input.weights),
         snakemake.output.scenarios,
         snakemake.output.bvh,
-        **snakemake.params.runtime,
+        Runtime.model_validate(snakemake.params.runtime),
     )
     log.info("wrote %s and %s", snakemake.output.scenarios, snakemake.output.bvh)

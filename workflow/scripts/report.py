@@ -3,12 +3,13 @@
 from pathlib import Path
 
 from hobble.core.files import write_text
+from hobble.models.load import load_network
 from hobble.report.compare import comparisons
 from hobble.report.gather import gather
 from hobble.report.page import render
 from hobble.report.playable import playable
 from hobble.report.scenes import scenes
-from hobble.runtime.network import load_network
+from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake):
@@ -25,14 +26,14 @@ with job(snakemake):
         weights=given.weights,
         motion=given.motion,
         labels=given.labels,
-        injuries=given.injuries,
+        told=given.told,
         terrain=given.terrain,
         rows=given.rows,
     )
     network = material.network
     play = scenes(given.scenarios, network["skeleton"], network["links"])
     trained = load_network(given.weights)
-    character = playable(trained, material.resolved["configuration"]["runtime"])
+    character = playable(trained, Runtime.model_validate(material.resolved["configuration"]["runtime"]))
     compared = comparisons(trained, given.rows, asked.splits)
     bundle = Path(given.bundle).read_text(encoding="utf-8")
     write_text(snakemake.output.html, render(material, play, character, compared, bundle))

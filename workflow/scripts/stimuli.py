@@ -1,12 +1,15 @@
 """Creates results/<configuration>/stimuli/: loops of the hurt character as animated images and BVH files."""
 
+from hobble.models.load import load_network
 from hobble.report.stimuli import doubts, write_stimuli
-from hobble.runtime.network import load_network
+from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
     made = write_stimuli(
-        load_network(snakemake.input.weights), snakemake.output.folder, **snakemake.params.runtime
+        load_network(snakemake.input.weights),
+        snakemake.output.folder,
+        Runtime.model_validate(snakemake.params.runtime),
     )
     for doubt in doubts(made):
         log.warning("%s", doubt)

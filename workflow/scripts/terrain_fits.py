@@ -3,6 +3,7 @@
 from hobble.core.clip import load_clip
 from hobble.core.files import load_npz
 from hobble.terrain.clip_fits import clip_fits, save_fits
+from hobble.terrain.options import Fitting, Sampling
 from hobble.terrain.patches import load_patches
 from hobble.workflow.job import job
 
@@ -12,8 +13,8 @@ with job(snakemake) as log:
         load_npz(snakemake.input.labels),
         load_patches(snakemake.input.patches),
         snakemake.params.ground,
-        snakemake.params.options,
-        snakemake.params.database,
+        Fitting.model_validate(snakemake.params.options),
+        Sampling.model_validate(snakemake.params.sampling),
     )
     save_fits(snakemake.output.fits, fits)
     log.info("%d rows in %d cycles, %d fits", len(fits.frame), len(fits.patch), len(fits.heights))

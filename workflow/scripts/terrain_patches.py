@@ -1,24 +1,25 @@
 """Creates patches of ground from the heightmaps of a data set."""
 
 from hobble.terrain.heightmaps import heightmaps
+from hobble.terrain.options import Drawing
 from hobble.terrain.patches import draw_patches, save_patches
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
-    options = snakemake.params.options
+    options = Drawing.model_validate(snakemake.params.options)
     maps = heightmaps(
-        options["heightmaps"],
+        options.heightmaps,
         snakemake.input.get("files", []),
-        cell=options["cell"],
-        height_scale=options["height_scale"],
+        cell=options.cell,
+        height_scale=options.height_scale,
     )
     patches = draw_patches(
         maps,
-        count=options["patches"],
-        cell=options["cell"],
-        size=options["size"],
-        highest=options["highest"],
-        seed=options["seed"],
+        count=options.patches,
+        cell=options.cell,
+        size=options.size,
+        highest=options.highest,
+        seed=options.seed,
     )
     save_patches(snakemake.output.patches, patches)
     log.info("%d patches of %d heightmaps", len(patches), len(maps))

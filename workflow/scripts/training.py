@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from hobble.models import options
+from hobble.training.options import Training
 from hobble.training.run import run
 from hobble.workflow.job import job
 
@@ -9,8 +11,8 @@ with job(snakemake):
     run(
         Path(snakemake.input.database),
         configuration=snakemake.params.configuration,
-        network=snakemake.params.network,
-        training=snakemake.params.training,
+        network=options(snakemake.params.network),
+        training=Training.model_validate(snakemake.params.training),
         checkpoints=Path(snakemake.params.checkpoints),
         threads=snakemake.threads,
         start=Path(snakemake.input.checkpoint[0]) if snakemake.input.checkpoint else None,
@@ -18,4 +20,5 @@ with job(snakemake):
         weights=Path(snakemake.output.weights),
         history=Path(snakemake.output.history),
         checkpoint=Path(snakemake.output.checkpoint),
+        terrain_side=snakemake.params.terrain_side,
     )

@@ -11,9 +11,10 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from hobble.config.models import Configuration, Dataset, SkeletonFile
+from hobble.config.models import Configuration, Dataset, SkeletonFile, configuration_of
 from hobble.core import untrusted
 from hobble.core.errors import HobbleError, InputError
+from hobble.models import DEFAULT, MODELS
 
 Model = TypeVar("Model", bound=BaseModel)
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")  # so that no name leads out of its folder
@@ -23,12 +24,22 @@ NAMES = "Names are made of letters, digits, dots, dashes and underscores."
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """`over` on top of `base`, mappings merged deeply, anything else replaced."""
+    """`over` on top of `base`, mappings merged deeply, anything else replaced.
+
+    A network of another kind has other keys, so it takes none of those below it.
+    """
     out = copy.deepcopy(dict(base))
     for key, value in over.items():
         both = isinstance(value, Mapping) and isinstance(out.get(key), Mapping)
+        if both and key == "network" and _kind(value, out[key]) != _kind(out[key]):
+            both = False
         out[key] = merge(out[key], value) if both else copy.deepcopy(value)
     return out
+
+
+def _kind(network: Mapping[str, Any], below: Mapping[str, Any] | None = None) -> Any:
+    """The kind of a section `network`, which may leave it to the one below it."""
+    return network.get("kind", _kind(below) if below is not None else DEFAULT)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -131,6 +142,17 @@ class Catalogue:
         """The configuration `name`, resolved."""
         return self._get("configuration", name, self.folder, Configuration, self.overrides)
 
+    @staticmethod
+    def _typed(model: type[Model], values: Mapping[str, Any], where: str) -> type[Model]:
+        """A configuration's type, which depends on the kind of its network."""
+        network = values.get("network")
+        if model is not Configuration or not isinstance(network, Mapping):
+            return model
+        kind = _kind(network)
+        if kind not in MODELS:
+            raise HobbleError(f"{where}: network.kind: there is no {kind!r:.40}; {', '.join(MODELS)} can be.")
+        return configuration_of(kind)  # type: ignore[return-value]
+
     def dataset(self, name: str) -> Dataset:
         """The data set `name`, resolved."""
         return self._get("dataset", name, self.folder / "datasets", Dataset, {})
@@ -145,5 +167,5 @@ class Catalogue:
             where = " < ".join(str(path) for path in files)
             if over:
                 values, where = with_training(folder, merge(values, over)), f"{where} < --config"
-            self._cache[kind, name] = validate(model, values, where)
+            self._cache[kind, name] = validate(self._typed(model, values, where), values, where)
         return self._cache[kind, name]

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import re
+import functools
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, create_model, field_validator, model_validator
 
+from hobble.channels import NAMES as NAMES_OF_CHANNELS
+from hobble.channels import channel, every
 from hobble.config import sections as s
 from hobble.core.clip_files import NAMES, can_be_called
+from hobble.models import DEFAULT, model
+from hobble.models.options import Options
 
 
 def _clip_name(name: str) -> str:
@@ -17,15 +21,25 @@ def _clip_name(name: str) -> str:
     return name
 
 
-def hurts(text: str) -> bool:
-    """Whether a status (`A-B[4];`), or the text of a status file, has a severity other than 0."""
-    return any(NOTHING.fullmatch(severity) is None for severity in re.findall(r"\[([^\]]*)", text))
+def _renamed(values: Any, model: type[s.Section], how: str) -> Any:
+    """Refuse a key that there was before channels; how: what to write instead of it, for channel {}."""
+    for key in values if isinstance(values, dict) else ():
+        if key not in model.model_fields and isinstance(key, str) and key in FORMER:
+            raise ValueError(f"`{key}` is now `{how.format(FORMER[key])}`")
+    return values
+
+
+def _channel(name: str) -> str:
+    if name not in NAMES_OF_CHANNELS:
+        raise ValueError(f"must be a channel ({', '.join(NAMES_OF_CHANNELS)})")
+    return name
 
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 ClipName = Annotated[str, AfterValidator(_clip_name)]
 Link = Annotated[str, Field(min_length=3)]
-NOTHING = re.compile(r"\s*0+(\.0*)?\s*")
+ChannelName = Annotated[str, AfterValidator(_channel)]
+FORMER = {key: one.name for one in every() for key in one.former}
 SYNTHETIC = ("injured", "recipe", "share")  # keys of a clip that only the walker reads
 
 
@@ -34,7 +48,9 @@ class ClipEntry(s.Section):
 
     gait: s.Gait | None = Field(None, description="the gait it mostly shows, for automatic labels")
     ground: s.Ground = "flat"
-    status: str | None = Field(None, description='what hurts all the while: "RightLeg-RightFoot[4];..."')
+    channels: dict[ChannelName, Any] = Field(
+        {}, description='what the body is told all the while: {injury: "RightLeg-RightFoot[4];..."}'
+    )
     injured: Link | None = Field(None, description="synthetic: the link hurt, at severities 3, 5, 7 and 10")
     recipe: str | None = Field(None, description="synthetic: which plan the walker follows")
     share: s.PositiveFloat = Field(1.0, description="synthetic: length relative to the other clips")
@@ -42,10 +58,10 @@ class ClipEntry(s.Section):
     loops: s.Positive | None = Field(None, description="overrules motion.loops")
     heading: s.Finite | None = Field(None, description="overrules motion.heading")
 
-    @property
-    def is_injured(self) -> bool:
-        """Whether the configuration says that something hurts."""
-        return bool(self.injured) or hurts(self.status or "")
+    @model_validator(mode="before")
+    @classmethod
+    def _not_renamed(cls, values: Any) -> Any:
+        return _renamed(values, cls, "channels: {{{}: ...}}")
 
 
 class Dataset(s.Section):
@@ -61,11 +77,26 @@ class Dataset(s.Section):
     )
     held_out: tuple[ClipName, ...] = Field((), description="clips kept from training, with their mirrors")
     mirror: bool = False
+    channels: dict[ChannelName, dict[str, Any]] = Field(
+        {}, description="where channels that need to be told find their values: a section for each"
+    )
     synthetic: s.Synthetic | None = None
     motion: s.Motion = s.Motion()
     labels: s.Labels = s.Labels()
+    hurt: s.Hurt | None = Field(None, description="hurt versions of the healthy clips, as further clips")
     terrain: s.Terrain = s.Terrain()
     database: s.Database = s.Database()
+
+    @field_validator("channels")
+    @classmethod
+    def _sections(cls, given: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        out = {}
+        for name, values in given.items():
+            options = channel(name).Options
+            if options is None:
+                raise ValueError(f"channel {name} has no section: it is read from what lies beside the clips")
+            out[name] = options.model_validate(values).model_dump(mode="json")
+        return out
 
     @model_validator(mode="after")
     def _one_source(self) -> Dataset:
@@ -86,7 +117,7 @@ class Dataset(s.Section):
         for clip, entry in self.clips.items():
             for key in SYNTHETIC:
                 if entry and getattr(entry, key) != ClipEntry.model_fields[key].default:
-                    hint = "; use `status`" if key == "injured" else ""
+                    hint = "; use `channels`" if key == "injured" else ""
                     raise ValueError(
                         f"clips.{clip}.{key}: only clips of a `synthetic` data set have it{hint}"
                     )
@@ -97,13 +128,33 @@ class Configuration(s.Section):
 
     extends: Name | None = None
     dataset: Name = "synthetic"
-    injury: bool = Field(False, description="severities as inputs and all clips; else the healthy clips only")
+    channels: tuple[ChannelName, ...] = Field(
+        (), description="what the network is told; clips that another channel tells something are left out"
+    )
     network_of: Name | None = Field(None, description="read another configuration's network, train none")
-    network: s.Network = s.Network()
+    network: Options = model(DEFAULT).options()()  # of its kind; see `configuration_of`
     training: s.Training = s.Training()
     runtime: s.Runtime = s.Runtime()
     evaluation: s.Evaluation = s.Evaluation()
     report: s.Report = s.Report()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _not_renamed(cls, values: Any) -> Any:
+        return _renamed(values, cls, "channels: [{}]")
+
+    @field_validator("channels")
+    @classmethod
+    def _in_order(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        """In the order of the list of channels, each once: the same channels are the same database."""
+        return tuple(name for name in NAMES_OF_CHANNELS if name in names)
+
+
+@functools.cache
+def configuration_of(kind: str) -> type[Configuration]:
+    """`Configuration` with the keys that a network of this kind has, one of MODELS."""
+    of_network = model(kind).options()
+    return create_model("Configuration", __base__=Configuration, network=(of_network, of_network()))
 
 
 class JointEntry(s.Section):

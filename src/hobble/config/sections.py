@@ -17,13 +17,14 @@ from hobble.core.section import (
 )
 from hobble.database.options import Database
 from hobble.evaluation.options import Evaluation
+from hobble.hurt.options import Hurt
 from hobble.labels.options import Labels
 from hobble.motion.options import Download, Motion
 from hobble.report.options import Report
 from hobble.runtime.options import Runtime
 from hobble.synthetic.options import Synthetic
 from hobble.terrain.options import Heightmap, Terrain
-from hobble.training.options import Network, Training
+from hobble.training.options import Training
 
 __all__ = [
     "COMPARED",
@@ -34,10 +35,10 @@ __all__ = [
     "Gait",
     "Ground",
     "Heightmap",
+    "Hurt",
     "Inside",
     "Labels",
     "Motion",
-    "Network",
     "PhaseMode",
     "Positive",
     "PositiveFloat",

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 from pathlib import Path
 
 from hobble.core.errors import InputError
+from hobble.core.untrusted import check_regular
 
 SUFFIX = ".bvh"
 SPEAKABLE = re.compile(r"(?![.\s])[^{}<>\\/]+(?<!\s)")  # Snakemake fills in {x} and <x>
@@ -47,11 +49,13 @@ def find_clips(folder: Path) -> dict[str, list[Path]]:
 
 
 def the_file(clip: str, files: list[Path]) -> Path:
-    """The only one of a clip's files; raises InputError where there are two."""
+    """The only one of a clip's files; raises InputError where there are two, or it is a device or a pipe."""
     if len(files) > 1:
         raise InputError(
             files[1],
             f"a second file of clip {clip}, beside {files[0]}",
             fix="Rename one of them: a clip is called what its file is called, whatever its folder.",
         )
+    with contextlib.suppress(OSError):  # a link that leads nowhere is told when the clip is read
+        check_regular(files[0])
     return files[0]

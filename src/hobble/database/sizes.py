@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from hobble.database.compose import fit_columns, x_columns
 from hobble.database.manifest import Manifest
 from hobble.database.precision import STORED
+from hobble.rows.compose import fit_columns, x_columns
 
 RELEASED_FRAMES = 465_990  # at 60 Hz, mirrors included, in the released clips of Holden, Komura, Saito (2017)
 RELEASED_FLAT = 0.479  # share of them on flat ground, which have one fit and not ten

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels import channel
+from hobble.channels.channel import LEAST, SILENT
 from hobble.core.quat import Array
-from hobble.database.clip_rows import ClipRows
-from hobble.database.layout import RowLayout
+from hobble.rows.clip_rows import ClipRows
+from hobble.rows.compose import TERRAIN, body_layout
+from hobble.rows.layout import RowLayout
 
-SILENT = 1e10  # the deviation of an input that is to have no effect: it standardises to nothing
 UNSEEN = 1e-10  # weight of a joint left out of the input, as in the original
-LEAST = 1e-6  # below this a column does not vary at all
 BATCH = 2048  # rows held in float64 at a time
 
 
@@ -35,6 +36,10 @@ class Moments:
         mean = self.mean + delta * (other.weight / weight)
         squares = self.squares + other.squares + delta**2 * (self.weight * other.weight / weight)
         return Moments(weight, mean, squares)
+
+    def columns(self, block: slice) -> Moments:
+        """Of some of the columns."""
+        return Moments(self.weight, self.mean[block], self.squares[block])
 
     @property
     def std(self) -> Array:
@@ -69,12 +74,12 @@ class Statistics:
     y_std: Array = field(repr=False)
 
 
-def clip_moments(rows: ClipRows) -> tuple[Moments, Moments]:
-    """Moments of X (with terrain and every link) and of Y over the clip's (frame, fit) pairs.
+def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
+    """Moments of X and of Y over the clip's (frame, fit) pairs, laid out as `layout`.
 
     Each row weighs 1, shared equally by its fits, so that a flat cycle's one fit counts as much as ten.
     """
-    layout = rows.layout
+    body = body_layout(layout)
     x, y = Moments.nothing(layout.x_size), Moments.nothing(layout.y_size)
     first = rows.first_fit
     for start in range(0, len(rows), BATCH):
@@ -87,8 +92,10 @@ def clip_moments(rows: ClipRows) -> tuple[Moments, Moments]:
         row_mean: Array = np.bincount(of_row, share * mean, len(fits)).astype(np.float64)
         spread = float(np.sum(share * (mean - row_mean[of_row]) ** 2))
         heights = Moments.of(rows.heights[span], share)
-        x_frame = _lowered(rows.x[part], layout.x_joint_position, row_mean, spread)
-        x = x + _joined(x_frame, heights, Moments.of(rows.severity[part]))
+        x_frame = _lowered(rows.x[part], body.x_joint_position, row_mean, spread)
+        parts = {name: x_frame.columns(block) for name, block in body.blocks("x").items() if name != TERRAIN}
+        parts |= {name: Moments.of(rows.channels[name][part]) for name, _ in layout.channels}
+        x = x + _joined(*[({TERRAIN: heights} | parts)[name] for name in layout.blocks("x")])
         y = y + _lowered(rows.y[part], layout.y_joint_position, row_mean, spread)
     return x, y
 
@@ -114,7 +121,7 @@ def _joined(*parts: Moments) -> Moments:
 
 
 def x_groups(layout: RowLayout) -> list[slice]:
-    """Columns of X that share the mean of their deviations, as in the original; not the severities."""
+    """Columns of X that share the mean of their deviations, as in the original; not the channels."""
     half = layout.samples
     split = [
         slice(start, start + half)
@@ -138,31 +145,23 @@ def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
     return out
 
 
-def severity_std(std: Array) -> Array:
-    """One deviation for all severities: that of the whole vector, so that hurt stands out but does not drown.
-
-    Taking each column's own would turn a link that is hurt in 1 frame of 1,000 into an input of 30
-    deviations. It is never less than 1. A link that is never hurt has no effect: the network cannot know
-    what it does.
-    """
-    return np.where(std > LEAST, max(1.0, float(np.sqrt(np.sum(std**2)))), SILENT)
-
-
 def finish(
     layout: RowLayout, x: Moments, y: Moments, joint_weight: float, unseen: Sequence[int]
 ) -> Statistics:
     """Group the deviations and weigh the joints: block mean / (w joint_weight), w 1e-10 for unseen ones.
 
-    layout: of the rows to be made; without links, the severities' moments are left out.
+    Each channel says itself what its columns are divided by.
     """
-    x_std = grouped(x.std, x_groups(layout), SILENT)[: layout.x_size]
+    x_std = grouped(x.std, x_groups(layout), SILENT)
     w = np.ones(layout.joints)
     w[list(unseen)] = UNSEEN
     for block in (layout.x_joint_position, layout.x_joint_velocity):
         x_std[block] = np.minimum(x_std[block] / np.repeat(w * joint_weight, 3), 1e30)
-    x_std[layout.x_injury] = severity_std(x.std[layout.x_injury])
+    for name, _ in layout.channels:
+        block = layout.x_channel(name)
+        x_std[block] = channel(name).deviation(x.std[block])
     y_std = grouped(y.std, y_groups(layout), 1.0)
-    f32 = [np.asarray(v, np.float32) for v in (x.mean[: layout.x_size], x_std, y.mean, y_std)]
+    f32 = [np.asarray(v, np.float32) for v in (x.mean, x_std, y.mean, y_std)]
     return Statistics(*f32)
 
 

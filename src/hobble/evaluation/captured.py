@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.database.clip_rows import ClipRows, load_clip_rows
-from hobble.database.layout import GAITS
+from hobble.rows.clip_rows import ClipRows, load_clip_rows
+from hobble.rows.compose import lower
+from hobble.rows.layout import GAITS
 
 
 @dataclass(frozen=True)
@@ -18,16 +19,16 @@ class Captured:
     """F consecutive frames of a clip.
 
     local: (F, J, 3) positions in the root frame, cm above the ground; contacts: (F, 4); phase: (F,);
-    severity: (F, L); gait: (F, 6); velocity: (F, 2) of the root, seen from itself, cm a frame; root: (F, 3)
-    where it is, level, from the origin on; acceleration: (F,) the largest of any joint, cm per frame squared,
-    0 in the first frame; rows: (F,) which row of the clip each frame is.
+    told: channel -> (F, its columns); gait: (F, 6); velocity: (F, 2) of the root, seen from itself, cm a
+    frame; root: (F, 3) where it is, level, from the origin on; acceleration: (F,) the largest of any joint,
+    cm per frame squared, 0 in the first frame; rows: (F,) which row of the clip each frame is.
     """
 
     clip: str
     local: Array = field(repr=False)
     contacts: Array = field(repr=False)
     phase: Array = field(repr=False)
-    severity: Array = field(repr=False)
+    told: Mapping[str, Array] = field(repr=False)
     gait: Array = field(repr=False)
     velocity: Array = field(repr=False)
     root: Array = field(repr=False)
@@ -55,8 +56,8 @@ def captured(rows: ClipRows) -> Iterator[Captured]:
     layout = rows.layout
     for chosen in unbroken(rows.frame):
         y = rows.y[chosen].astype(float)
+        lower(y, layout.y_joint_position, rows.mean[rows.first_fit[chosen]][:, None])
         local = y[:, layout.y_joint_position].reshape(len(chosen), -1, 3)
-        local[..., 1] -= rows.mean[rows.first_fit[chosen]][:, None]
         turn, velocity = y[:, layout.y_turn][:, 0], y[:, layout.y_root_velocity]
         gait = rows.x[chosen][:, layout.x_gait].reshape(len(chosen), len(GAITS), layout.samples)
         yield Captured(
@@ -64,7 +65,7 @@ def captured(rows: ClipRows) -> Iterator[Captured]:
             local,
             y[:, layout.y_contacts],
             rows.p[chosen].astype(float),
-            rows.severity[chosen].astype(float),
+            {name: values[chosen].astype(float) for name, values in rows.channels.items()},
             gait[:, :, layout.samples // 2].astype(float),
             velocity,
             root_path(velocity, turn),

@@ -66,9 +66,9 @@ def describe(measured: Measured, found: Iterable[SideBySide]) -> dict[str, Any]:
         "configuration": measured.name,
         "dataset": measured.dataset,
         "network_of": model.get("network_of"),
-        "injury": bool(model.get("injury")),
-        "hidden_layers": model["network"]["hidden_layers"],
-        "units": model["network"]["units"],
+        "channels": list(model.get("channels") or ()),
+        "hidden_layers": model["network"].get("hidden_layers"),
+        "units": model["network"].get("units"),
         "passes": model["training"]["passes"],
         **about,
     }
@@ -78,28 +78,23 @@ def stage_sizes(all_measured: Sequence[Measured], published: Json) -> list[dict[
     """Published bytes of the database and of the patches, with ours."""
     found = {m.name: m for m in all_measured}
     out = []
-    for row in published["sizes"]:
-        if "database" in row:
-            m = found.get(row["configuration"])
-            ours = (m.pipeline.get("database") or {}).get("bytes") if m else None
-            out.append(beside("database", row, row["database"], ours, "bytes"))
     for row in published["stages"]:
-        for m in all_measured if row["stage"] == "terrain" else ():
-            named = {**row, "configuration": m.name}
-            out.append(beside("patches", named, row["bytes"], m.of_stage(row["stage"], "bytes"), "bytes"))
+        m = found.get(row["configuration"])
+        if row["stage"] == "database":
+            ours = (m.pipeline.get("database") or {}).get("bytes") if m else None
+            out.append(beside("database", row, row["bytes"], ours, "bytes"))
+        elif row["stage"] == "terrain":
+            ours = m.of_stage("terrain", "bytes") if m else None
+            out.append(beside("patches", row, row["bytes"], ours, "bytes"))
     return out
 
 
 def stage_times(all_measured: Sequence[Measured], published: Json) -> list[dict[str, Any]]:
     """Published seconds of whole stages, with ours."""
-    return [
-        beside(
-            f"{row['stage']}, time",
-            {**row, "configuration": m.name},
-            row["seconds"],
-            m.of_stage(row["stage"], "seconds"),
-            "s",
-        )
-        for row in published["stages"]
-        for m in all_measured
-    ]
+    found = {m.name: m for m in all_measured}
+    out = []
+    for row in published["stages"]:
+        m = found.get(row["configuration"])
+        ours = m.of_stage(row["stage"], "seconds") if m else None
+        out.append(beside(f"{row['stage']}, time", row, row["seconds"], ours, "s"))
+    return out

@@ -9,10 +9,11 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import in_root_frame
+from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.network import Network
 from hobble.runtime.options import Runtime
 
+INJURY = "injury"  # the channel
 FPS = 60
 SPEEDS = {"walk": 2.5, "jog": 7.0}  # cm a frame asked for
 SETTLING = 0.25  # share of a stretch that is not measured: severity and gait are still on their way
@@ -74,9 +75,10 @@ def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
     for stretch in script:
         velocity = np.zeros((count, 2))
         velocity[:, 1] = [SPEEDS[name] for name in stretch.gait] if stretch.speed is None else stretch.speed
+        told = {INJURY: stretch.severity} if network.links else {}
         shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
         for _ in range(stretch.frames):
-            pose = animation.next_pose(velocity, gait=shares, injury=stretch.severity)
+            pose = animation.next_pose(velocity, gait=shares, **told)
             # One figure alone has no axis of its own.
             positions = pose.positions.reshape(count, -1, 3)
             root[f], phase[f], contacts[f] = pose.root, pose.phase, pose.contacts

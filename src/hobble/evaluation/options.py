@@ -21,9 +21,10 @@ def together(sections: list[type[Section]]) -> type[Section]:
             defines = [c for c in section.__mro__ if key in getattr(c, "model_fields", {})][-1]
             if owner.setdefault(key, defines) is not defines:
                 raise TypeError(f"{key} is a key of {owner[key].__module__} and of {defines.__module__}")
+    # pydantic takes the fields of the last base first.
     different = list(dict.fromkeys(sections))
     bases = [s for s in different if not any(o is not s and issubclass(o, s) for o in different)]
-    return create_model("Evaluation", __base__=tuple(bases) or Section, __doc__="The measurements.")
+    return create_model("Evaluation", __base__=tuple(bases[::-1]) or Section, __doc__="The measurements.")
 
 
 if TYPE_CHECKING:

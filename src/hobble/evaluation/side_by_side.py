@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from hobble.evaluation.series import difference
 from hobble.measures.given import Json, Row
 
@@ -27,18 +29,33 @@ class SideBySide:
 
 
 def pair(a: Json, b: Json) -> dict[str, Any]:
-    """Mean and standard deviation of two series, and eq. 3.2 of Segerstedt 2021 of them."""
-    return {
+    """Mean and standard deviation of two series, and eq. 3.2 of Segerstedt 2021 of them.
+
+    `difference` divides by the deviations of single frames. `difference_of_means`, as published, by those of
+    the means of clips or laps, where a and b have them as `means`; None where they do not.
+    """
+    out = {
         "mean_a": a["mean"],
         "sd_a": a["sd"],
         "mean_b": b["mean"],
         "sd_b": b["sd"],
         "difference": difference(a["mean"], a["sd"], b["mean"], b["sd"]),
     }
+    means = [np.asarray(one.get("means", ()), float) for one in (a, b)]
+    sds = [float(some.std()) if len(some) > 1 else None for some in means]
+    out |= {"sd_of_means_a": sds[0], "sd_of_means_b": sds[1], "difference_of_means": None}
+    if sds[0] is not None and sds[1] is not None:
+        one, other = (float(some.mean()) for some in means)
+        out["difference_of_means"] = difference(one, sds[0], other, sds[1])
+    return out
 
 
 def beside(measure: str, row: Json, theirs: float, ours: float | None, unit: str = "") -> dict[str, Any]:
-    """A published figure (of `row`: configuration and source), and ours where it was measured."""
+    """A published figure, and ours where it was measured.
+
+    row: its `configuration` and `source`; the `table` that it was printed in, and the other figure that the
+    same publication gives `elsewhere`, where there are any.
+    """
     return {
         "measure": measure,
         "configuration": row["configuration"],
@@ -46,4 +63,6 @@ def beside(measure: str, row: Json, theirs: float, ours: float | None, unit: str
         "published": theirs,
         "ours": ours,
         "source": row["source"],
+        "table": row.get("table"),
+        "elsewhere": row.get("elsewhere"),
     }

@@ -10,8 +10,8 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
+from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.network import Network
 
 FPS = 60
 # speed in cm a frame, whether it looks elsewhere than it goes, gait

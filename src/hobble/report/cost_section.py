@@ -51,12 +51,9 @@ def log_range(values: list[float]) -> list[float]:
 
 
 def stage_table(material: Material) -> Table:
-    """A row per stage, the published figures beside ours."""
-    theirs = {row["stage"]: dict(row) for row in material.published["stages"]}
-    own = material.beside("sizes") or {}
-    for stage, key in (("database", "database"), ("training", "weights")):
-        if key in own:  # of this configuration, where it was published
-            theirs[stage]["bytes"] = own[key]
+    """A row per stage, beside it what was published of this very configuration."""
+    rows_of = [row for row in material.published["stages"] if row["configuration"] == material.name]
+    theirs = {row["stage"]: row for row in rows_of}
     columns = [
         Column("stage"),
         Column.count("jobs"),

@@ -10,9 +10,10 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.database.clip_rows import load_clip_rows
 from hobble.report.charts import Chart, Trace, axis
+from hobble.rows.clip_rows import load_clip_rows
 
+INJURY = "injury"  # the channel
 FPS = 60.0
 SPEEDS = np.arange(0, 6.01, 0.2)  # metres a second
 TURNS = np.arange(-220, 221, 20.0)  # degrees a second, to the left positive
@@ -37,9 +38,8 @@ def counted(paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str,
         speed, turn = (np.clip(v, e[0], e[-1] - 1e-6) for v, e in ((speed, SPEEDS), (turn, TURNS)))
         turns[splits.get(rows.clip, "train")] += np.histogram(turn, TURNS)[0] / FPS
         both += np.histogram2d(turn, speed, (TURNS, SPEEDS))[0] / FPS
-        for link, values in zip(
-            Skeleton.from_dict(rows.skeleton).link_names, rows.severity[once].T, strict=True
-        ):
+        skeleton = Skeleton.from_dict(rows.skeleton)
+        for link, values in zip(skeleton.link_names, rows.channels[INJURY][once].T, strict=True):
             if values.any():
                 found = np.histogram(values, LEVELS)[0] / FPS
                 hurt[link] = hurt.get(link, 0) + found

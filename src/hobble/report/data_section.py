@@ -123,10 +123,12 @@ def remarks_table(material: Material) -> Table | None:
     for stage, reports, key in (
         ("motion", material.motion, "repairs"),
         ("labels", material.labels, "warnings"),
-        ("injury", material.injuries, "warnings"),
+        (None, material.told, "warnings"),
     ):
         for report in reports:
-            rows += [[report["clip"], stage, sentence] for sentence in report.get(key) or ()]
+            rows += [
+                [report["clip"], stage or report["channel"], sentence] for sentence in report.get(key) or ()
+            ]
     if not rows:
         return None
     columns = [Column("clip"), Column("stage"), Column("what", kind="long")]
@@ -134,8 +136,10 @@ def remarks_table(material: Material) -> Table | None:
 
 
 def strips(material: Material) -> list[dict[str, Any]]:
-    """The label strip of each clip that has one, with what hurts along it; mirrors would say it twice."""
-    injuries = {report["clip"]: report for report in material.injuries}
+    """The label strip of each clip that has one, with what it was told; mirrors would say it twice."""
+    told: dict[str, dict[str, Any]] = {}
+    for report in material.told:
+        told.setdefault(report["clip"], {}).update(report["told"])
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
     known = {report["clip"] for report in material.labels}
     out = []
@@ -145,10 +149,9 @@ def strips(material: Material) -> list[dict[str, Any]]:
         if mirrors or not strip or not strip.get("seconds"):
             continue
         length = lengths.get(clip) or strip["seconds"][-1]
-        hurt = (injuries.get(clip) or {}).get("hurt") or {}
         status = [
-            {"name": link, "spans": value.get("spells") or [[0, length, value["highest"]]]}
-            for link, value in hurt.items()
+            {"name": label, "spans": value.get("spells") or [[0, length, value["highest"]]]}
+            for label, value in told.get(clip, {}).items()
         ]
         out.append({**strip, "clip": clip, "length": length, "status": status})
     return out

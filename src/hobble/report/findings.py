@@ -26,9 +26,8 @@ def lead(material: Material) -> str:
     passes = _recipe(material).get("passes")
     network = material.network
     text = (
-        f"A phase-functioned network of {len(network['sizes']) - 2} hidden layers and "
-        f"{network['control_points']} control points, with {network['sizes'][0]} inputs and "
-        f"{network['sizes'][-1]} outputs, trained"
+        f"A {network['described']}, with {network['sizes'][0]} inputs and {network['sizes'][-1]} outputs, "
+        "trained"
     )
     text += f" for {passes} passes" if passes else ""
     text += f" on {len(clips) - kept} clips of {material.dataset}"
@@ -125,7 +124,7 @@ def _coverage(material: Material) -> Iterator[Hint]:
 
 def _repairs(material: Material) -> Iterator[Hint]:
     repaired = [report["clip"] for report in material.motion if report.get("repairs")]
-    warned = {r["clip"] for r in (*material.labels, *material.injuries) if r.get("warnings")}
+    warned = {r["clip"] for r in (*material.labels, *material.told) if r.get("warnings")}
     if repaired or warned:
         yield Hint(
             "note",

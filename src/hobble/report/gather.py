@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz, read_json
+from hobble.core.files import read_json
 from hobble.core.untrusted import read_text, read_yaml
 from hobble.measures.given import Json
+from hobble.models.load import load_network
 
 PUBLISHED = Path(__file__).parents[1] / "evaluation" / "published.yaml"
 COUNTED = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
@@ -26,8 +26,9 @@ class Material:
     """What one configuration left behind.
 
     measured: measurement -> its JSON.
-    history: column -> values, one per section of training; None where a cell is empty. motion, labels,
-    injuries: the reports of the clips, in one order. terrain, rows: paths of their fits and of their rows.
+    history: column -> values, one per section of training; None where a cell is empty. motion, labels: the
+    reports of the clips, in one order; told: those of their channels. terrain, rows: paths of their fits and
+    of their rows.
     splits: clip -> "train" or "held_out".
     """
 
@@ -42,7 +43,7 @@ class Material:
     network: Mapping[str, Any] = field(repr=False)
     motion: list[dict[str, Any]] = field(repr=False)
     labels: list[dict[str, Any]] = field(repr=False)
-    injuries: list[dict[str, Any]] = field(repr=False)
+    told: list[dict[str, Any]] = field(repr=False)
     terrain: list[str] = field(repr=False)
     rows: list[str] = field(repr=False)
     published: Mapping[str, Any] = field(repr=False)
@@ -79,7 +80,7 @@ def gather(
     weights: str,
     motion: Iterable[str],
     labels: Iterable[str],
-    injuries: Iterable[str],
+    told: Iterable[str],
     terrain: Iterable[str] = (),
     rows: Iterable[str] = (),
 ) -> Material:
@@ -96,7 +97,7 @@ def gather(
         network=describe_network(weights),
         motion=[read_json(path) for path in motion],
         labels=[read_json(path) for path in labels],
-        injuries=[read_json(path) for path in injuries],
+        told=[read_json(path) for path in told],
         terrain=list(terrain),
         rows=list(rows),
         published=read_yaml(PUBLISHED),
@@ -123,19 +124,13 @@ def _cell(path: str | Path, key: str, text: str | None) -> float | None:
 
 
 def describe_network(path: str | Path) -> dict[str, Any]:
-    """Layer sizes, control points and parameters of a weights file; its skeleton and links."""
-    arrays = load_npz(path)
-    shapes = {key: array.shape for key, array in arrays.items() if key[:1] in "Wb" and key[1:].isdigit()}
-    if "W0" not in shapes:
-        raise InputError(path, "not a network's weights", fix="Train again.")
-    meta = json.loads(str(arrays["meta"])) if "meta" in arrays else {}
-    layers = sorted(int(key[1:]) for key in shapes if key[0] == "W")
-    sizes = [shapes[f"W{layers[0]}"][2]] + [shapes[f"W{i}"][1] for i in layers]
+    """What the page says of a network: what it is, its sizes and parameters, its skeleton and links."""
+    network = load_network(path)
     return {
-        "sizes": sizes,
-        "control_points": shapes["W0"][0],
-        "parameters": int(sum(np.prod(shape[1:]) for shape in shapes.values())),
+        "described": network.described,
+        "sizes": list(network.sizes),
+        "parameters": network.parameters,
         "bytes": Path(path).stat().st_size,
-        "skeleton": meta.get("skeleton") or {},
-        "links": meta.get("links") or [],
+        "skeleton": network.meta.get("skeleton") or {},
+        "links": list(network.links),
     }

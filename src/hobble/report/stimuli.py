@@ -11,18 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_json
 from hobble.core.quat import Array
-from hobble.report.body import body
+from hobble.core.skeleton import Skeleton
+from hobble.figure.mesh import body
+from hobble.figure.pack import regions
+from hobble.models.network import Network
 from hobble.report.playable import PRESETS, body_parts
 from hobble.report.raster import GRID, Camera, Studio
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.export import export_bvh, fitted_skeleton
-from hobble.runtime.network import Network
+from hobble.runtime.export import export_bvh, fitted_skeleton, jointed
+from hobble.runtime.options import Runtime
 
 SEVERITY = 8.0
-# The study of Ferre et al. showed thirteen walks, and asked which part is hurt; in them nothing is coloured.
+# The study of Quentin Ferre (2019) showed thirteen walks, and asked which part is hurt; nothing is coloured.
 STUDY: dict[str, tuple[str, ...]] = {
     "healthy": (),
     "left-thigh": ("left thigh",),
@@ -59,7 +63,7 @@ class Loop:
 
 
 def write_stimuli(
-    network: Network, folder: str | Path, size: int = 400, **runtime: Any
+    network: Network, folder: str | Path, runtime: Runtime, size: int = 400
 ) -> list[dict[str, Any]]:
     """Write <name>.webp and <name>.bvh of each stimulus and preset into a folder, and stimuli.json.
 
@@ -72,17 +76,17 @@ def write_stimuli(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     skeleton = network.skeleton
-    dressed = body(skeleton.joints, skeleton.parents, skeleton.roles, network.links)
-    studio, rows = Studio(dressed), []
-    healthy, trained = walk(network, {}, **runtime), hurt_in_training(network)
+    figure, rows = body(skeleton), []
+    studio = Studio(figure, regions(skeleton, network.links))
+    healthy, trained = walk(network, {}, runtime), hurt_in_training(network)
     for name, hurt, shown in wanted(network):
-        loop = walk(network, hurt, **runtime) if hurt else healthy
+        loop = walk(network, hurt, runtime) if hurt else healthy
         own = skeleton
         if "skeleton" not in network.meta:
             own = fitted_skeleton(skeleton, loop.positions, loop.rotations)
         export_bvh(folder / f"{name}.bvh", name, own, loop.positions, loop.rotations)
         severity = np.array([hurt.get(link, 0.0) for link in network.links]) if shown else None
-        save_loop(folder / f"{name}.webp", frames(studio, dressed, loop, severity, size))
+        save_loop(folder / f"{name}.webp", frames(studio, skeleton, loop, severity, size))
         seconds = len(loop.positions) / 60
         rows.append(
             {
@@ -103,7 +107,7 @@ def write_stimuli(
 
 def hurt_in_training(network: Network) -> set[str]:
     """Links whose severity was above 0 somewhere in training, as the mean of the input tells."""
-    means = network.x_mean[network.layout.x_injury]
+    means = network.x_mean[network.layout.x_channel("injury")]
     return {link for link, mean in zip(network.links, means, strict=True) if mean > 0}
 
 
@@ -146,12 +150,12 @@ def wanted(network: Network) -> list[tuple[str, dict[str, float], bool]]:
     return out
 
 
-def walk(network: Network, injury: Mapping[str, float], **runtime: Any) -> Loop:
+def walk(network: Network, injury: Mapping[str, float], runtime: Runtime) -> Loop:
     """The character walking straight on, cut where a later moment is most like an earlier one."""
-    animation = ProceduralAnimation(network, **runtime)
+    animation = ProceduralAnimation(network, **dict(runtime))
     ahead = np.array([0.0, SPEED])
     poses = [
-        animation.next_pose(ahead, None, "walk", dict(injury) or None)
+        animation.next_pose(ahead, None, "walk", injury=dict(injury) or None)
         for _ in range(SETTLED + 60 + LONGEST + BLEND)
     ]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
@@ -186,23 +190,25 @@ def cut(positions: Array) -> tuple[int, int, float]:
 
 
 def frames(
-    studio: Studio, dressed: Mapping[str, Any], loop: Loop, severity: Array | None, size: int
+    studio: Studio, skeleton: Skeleton, loop: Loop, severity: Array | None, size: int
 ) -> list[NDArray[np.uint8]]:
     """The pictures of a loop. The camera goes along evenly, and the grid under it by whole meshes a round."""
-    count, keep = len(loop.positions), dressed["keep"]
+    count, keep = len(loop.positions), body(skeleton).bones
+    world, places = jointed(skeleton, loop.positions, loop.rotations)
     start, yaw = loop.positions[0, 0], np.arctan2(loop.way[0], loop.way[2])
     middle = loop.positions[:, 0].mean(axis=0) - loop.way * (count - 1) / count / 2 - start
     length = float(np.linalg.norm(loop.way))
     even = max(1, round(length / GRID)) * GRID / max(length, 1e-9)
     turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
+    turns = quat.mul(quat.yaw(-yaw), world[:, keep])
     out = []
     for f in range(0, count - count % STRIDE, STRIDE):
         gone = loop.way * f / count
-        points = (loop.positions[f, keep] - start - gone - middle * [1, 0, 1]) @ turn.T
-        points[:, 1] = loop.positions[f, keep, 1]
+        points = (places[f, keep] - start - gone - middle * [1, 0, 1]) @ turn.T
+        points[:, 1] = places[f, keep, 1]
         travelled = np.array([0.0, 0.0, length * f / count * even])
         camera = Camera(np.array([0.0, 82.0, 0.0]) + travelled, size=size)
-        out.append(studio.draw(points + travelled, camera, severity))
+        out.append(studio.draw(points + travelled, turns[f], camera, severity))
     return out
 
 

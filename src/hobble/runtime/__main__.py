@@ -10,12 +10,13 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from typing import get_args
 
 from hobble.core.errors import HobbleError
-from hobble.runtime.network import Network, load_network
-from hobble.runtime.onnx_export import write_checked
-from hobble.runtime.predictor import MODES
-from hobble.runtime.release import write_release
+from hobble.core.section import PhaseMode
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.runtime.options import Runtime
 from hobble.runtime.scenarios import write_motions
 
 
@@ -31,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("network", help="weights.npz, a folder that holds it, or a folder of .bin files")
     parser.add_argument("target", help="the file or folder to write")
-    parser.add_argument("--mode", choices=tuple(MODES), default="cubic", help="how phase is looked up")
+    parser.add_argument("--mode", choices=get_args(PhaseMode), default="cubic", help="how phase is looked up")
     parser.add_argument("--skeleton", help="for a network that carries none: a file of config/skeletons")
     options = parser.parse_args(arguments)
     try:
@@ -44,16 +45,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _write(to: str, network: Network, target: str, mode: str) -> str:
-    if to == "bin":
-        write_release(target, network)
-        return f"{target}: weights at 50 phases"
     if to == "bvh":
         if network.skeleton is None:
             raise HobbleError("the network carries no skeleton: name one with --skeleton")
-        names = [track.scenario.name for track in write_motions(network, target, mode=mode)]
+        names = [track.scenario.name for track in write_motions(network, target, Runtime(mode=mode))]
         return f"{target}: {', '.join(names)}"
-    difference = write_checked(target, network, mode)
-    return f"{target}: within {difference:.1g} of the runtime"
+    return network.export(to, target, mode)
 
 
 if __name__ == "__main__":

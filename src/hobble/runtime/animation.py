@@ -2,43 +2,29 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hobble.channels import channel
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.runtime.axes import Axes
 from hobble.runtime.character import Character, standing
 from hobble.runtime.controller import Controller
 from hobble.runtime.ground import as_ground
-from hobble.runtime.network import Network, load_network
-from hobble.runtime.predictor import Predictor
+from hobble.runtime.told import Told, UnknownName
 from hobble.runtime.trajectory import STILL
 from hobble.runtime.waypoints import Follower, Waypoint
 
 JOG_FROM = 5.0  # cm a frame: between walking at 2.5 and jogging at 7.5
-TERRAIN_SIDE = 25.0  # centimetres from the path to the side heights, where a network does not tell
-BLIND = "this network has no severity inputs; train a configuration with `injury: true`"
 TURN_IN_PLACE = np.radians(20)  # a standing figure steps around to face what is further aside than this
-
-
-class UnknownName(KeyError):
-    """A link or a gait that the network does not have; the text names those that are nearest."""
-
-    def __init__(self, what: str, name: object, known: Iterable[str]) -> None:
-        names = list(known)
-        near = difflib.get_close_matches(str(name), names, 3, 0.5)
-        hint = f"; did you mean {' or '.join(near)}?" if near else f": there are {', '.join(names)}"
-        super().__init__(f"no {what} {name!r}{hint}")
-
-    def __str__(self) -> str:
-        return str(self.args[0])
 
 
 @dataclass(frozen=True)
@@ -47,7 +33,7 @@ class Pose:
 
     positions: (C, J, 3); rotations: (C, J, 4) world, w first; contacts: (C, 4) left heel, left toe, right
     heel, right toe, 0..1; phase: (C,) in cycles; root: (C, 3) where the trajectory is; yaw: (C,) radians of
-    its facing, 0 for +Z, growing to the left; severity: (C, L) as the network was told.
+    its facing, 0 for +Z, growing to the left; told: channel -> (C, its columns), as the network was told.
     """
 
     positions: Array = field(repr=False)
@@ -56,7 +42,7 @@ class Pose:
     phase: Any
     root: Array
     yaw: Any
-    severity: Array = field(repr=False)
+    told: Mapping[str, Array] = field(repr=False)
 
 
 class ProceduralAnimation:
@@ -76,8 +62,8 @@ class ProceduralAnimation:
         storage: str = "float32",
         characters: int = 1,
         waypoints: Sequence[Waypoint] | None = None,
-        severity_rate: float = 10.0,
-        severity_scale: float = 1.0,
+        rates: Mapping[str, float] | None = None,
+        scales: Mapping[str, float] | None = None,
         foot_locking: bool = True,
         steering: float = 2.0,
         axes: Axes | None = None,
@@ -88,25 +74,24 @@ class ProceduralAnimation:
             raise ValueError("the network carries no skeleton: load it with skeleton=")
         for name, value, least in (
             ("characters", characters, 1),
-            ("severity_rate", severity_rate, 1e-9),
-            ("severity_scale", severity_scale, 1e-9),
             ("steering", steering, 0),
+            *((f"the rate of {name}", value, 1e-9) for name, value in (rates or {}).items()),
+            *((f"the scale of {name}", value, 1e-9) for name, value in (scales or {}).items()),
         ):
             if not least <= value < np.inf:
                 bound = f"{least} or more" if least in (0, 1) else "more than 0"
                 raise ValueError(f"{name} is {value!r}, but has to be {bound}")
         self.network, self.skeleton = network, network.skeleton
         self.characters, self.axes = characters, axes or Axes()
-        self.severity_scale = severity_scale
+        self._told = Told(network, scales or {})
         self._of_controller: dict[str, Any] = {
-            "severity_rate": severity_rate,
+            "rates": {name: channel(name).rate for name in network.channels} | dict(rates or {}),
             "foot_locking": foot_locking,
             "steering": steering,
-            "side": float(network.meta.get("terrain_side", TERRAIN_SIDE)),
+            "side": network.terrain_side,
         }
-        self._predictor = Predictor(network, mode, storage)
+        self._predictor = network.predictor(mode, storage)
         self._waypoints = list(waypoints) if waypoints is not None else None
-        self._links = {name: i for i, name in enumerate(network.links)}
         self._gaits = {name: i for i, name in enumerate(network.gaits)}
         for waypoint in self._waypoints or ():
             self._known_gait(waypoint.gait)
@@ -121,12 +106,12 @@ class ProceduralAnimation:
 
         skeleton: where the file carries none; it, or a file of config/skeletons. mode: "constant", "linear"
         or "cubic". storage: "float32" or "int16". characters: how many. waypoints: a track to follow when
-        `next_pose` is given no velocity. severity_rate: largest change of a severity in a second;
-        severity_scale: severities are divided by this. foot_locking: hold feet in contact where they landed.
-        steering: how hard a velocity that is not reached is asked for, 0 as the original. axes: the caller's
-        convention. position, facing: as of `reset`.
-        Raises InputError where the file is not a network that fits, ValueError for an option out of range,
-        UnknownName for a gait that the network does not have.
+        `next_pose` is given no velocity. rates: channel -> largest change of its values in a second, instead
+        of the channel's own; scales: channel -> what its values are divided by. foot_locking: hold feet in
+        contact where they landed. steering: how hard a velocity that is not reached is asked for, 0 as the
+        original. axes: the caller's convention. position, facing: as of `reset`. Raises InputError where the
+        file is not a network that fits, ValueError for an option out of range, UnknownName for a gait that
+        the network does not have.
         """
         network = load_network(path, skeleton)
         if network.skeleton is None:
@@ -167,29 +152,33 @@ class ProceduralAnimation:
         target_velocity: Any = None,
         facing: Any = None,
         gait: str | Sequence[str] | Array | None = None,
-        injury: Mapping[str, Any] | Array | None = None,
+        *,
         terrain: Any = None,
+        **told: Mapping[str, Any] | Array | None,
     ) -> Pose:
         """One 60 Hz frame on.
 
         target_velocity: (2,) on the ground or (3,), or (C, 2 or 3), how far to go in this frame (at 60 Hz, in
         your unit); None follows the waypoints or stands. facing: direction to look in, likewise, of any
         length; None or zero looks where it goes. gait: a name ("walk"), one for each, shares (6,) or (C, 6),
-        or None to choose by speed; below 0.1 cm a frame the figure stands, whatever the gait. injury: link
-        -> severity 0..10 (or (C,) severities), or (L,) or (C, L); links not named heal; None leaves all as
-        they were. terrain: None for flat at zero, a function of two ground coordinates (arrays) to heights, a
-        `ground.Heightmap` or a 2D array around the origin, all in your axes and unit; give the same object
-        every frame.
-        Raises UnknownName (a KeyError) for a link or gait that the network does not have, ValueError for
-        severities out of range and for what is not finite or of another shape.
+        or None to choose by speed; below 0.1 cm a frame the figure stands, whatever the gait. told: by the
+        name of a channel (injury={"LeftUpLeg-LeftLeg": 7}) label -> value (or (C,) values), or (L,) or (C,
+        L); labels not named go back to 0; None, or no such keyword, leaves the channel as it was. terrain:
+        None for flat at zero, a function of two ground coordinates (arrays) to heights, a `ground.Heightmap`
+        or a 2D array around the origin, all in your axes and unit; give the same object every frame. Raises
+        UnknownName (a KeyError) for a label or gait that the network does not have, TypeError for a keyword
+        that is no channel, ValueError for a channel that the network is not told, for values out of range and
+        for what is not finite or of another shape.
         """
         velocity, ahead, gait = self._wish(target_velocity, facing, gait)
         strafe, direction = self._facing(velocity, ahead)
         shares = self._gait(velocity, direction, gait)
         if terrain is not self._terrain[0]:
             self._terrain = (terrain, as_ground(terrain, self.axes))
-        if injury is not None:
-            self.state.severity_target[:] = self._severities(injury)
+        for name, given in told.items():
+            if given is not None:
+                columns, values = self._told.values(name, given, self.characters)
+                self.state.told_target[:, columns] = values
         self._controller.frame(velocity, direction, strafe, shares, self._terrain[1])
         return self._pose()
 
@@ -276,39 +265,13 @@ class ProceduralAnimation:
 
     def _known_gait(self, name: Any) -> None:
         if name not in self._gaits:
-            raise UnknownName("gait", name, self._gaits)
+            raise UnknownName("no gait", name, self._gaits)
 
     def _turning(self, c: int, direction: Array) -> float:
         """1 where a standing figure has to step around to face `direction`, else 0."""
         x, z = self.state.direction[c, self.network.layout.window]
         angle = np.arctan2(direction[0] * z - direction[1] * x, direction[0] * x + direction[1] * z)
         return float(abs(angle) > TURN_IN_PLACE)
-
-    def _severities(self, injury: Any) -> Array:
-        shape = (self.characters, len(self._links))
-        values = np.zeros(shape)
-        if isinstance(injury, Mapping):
-            for name, value in injury.items():
-                if not self._links:
-                    raise ValueError(f"{name} cannot be hurt: {BLIND}")
-                if name not in self._links:
-                    raise UnknownName("link", name, self._links)
-                if np.shape(value) not in ((), (1,), shape[:1]):
-                    raise ValueError(f"{name}: a severity, or {shape[0]}, not of shape {np.shape(value)}")
-                values[:, self._links[name]] = value
-        else:
-            given = np.asarray(injury, float)
-            if not self._links and given.size:
-                raise ValueError(f"{given.size} severities given, but {BLIND}")
-            if given.shape not in (shape, shape[1:]):
-                raise ValueError(f"severities are {shape[1:]} or {shape} numbers, not of shape {given.shape}")
-            values[:] = given
-        wrong = ~((values >= 0) & (values <= 10))
-        if wrong.any():
-            c, k = np.argwhere(wrong)[0]
-            name, value = self.network.links[k], values[c, k]
-            raise ValueError(f"the severity of {name} is {value:g}, but it is a number from 0 to 10")
-        return values / self.severity_scale
 
     def _pose(self) -> Pose:
         c, state = self._controller, self.state
@@ -317,9 +280,9 @@ class ProceduralAnimation:
             positions[:], root[:] = self.axes.points_out(positions), self.axes.points_out(root)
             rotations = self.axes.rotations_out(rotations)
         contacts = np.clip(c.y[:, c.layout.y_contacts], 0, 1)
-        severity = state.severity.copy()
+        told = {name: state.told[:, columns].copy() for name, columns in self._told.columns.items()}
         if self.characters > 1:
-            return Pose(positions, rotations, contacts, state.phase.copy(), root, c.yaw.copy(), severity)
+            return Pose(positions, rotations, contacts, state.phase.copy(), root, c.yaw.copy(), told)
         return Pose(
             positions[0],
             rotations[0],
@@ -327,7 +290,7 @@ class ProceduralAnimation:
             float(state.phase[0]),
             root[0],
             float(c.yaw[0]),
-            severity[0],
+            {name: values[0] for name, values in told.items()},
         )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.runtime.network import Network
+from hobble.models.network import Network
 
 
 @dataclass
@@ -17,7 +17,8 @@ class Character:
 
     position, direction: (C, T, 2) trajectory; gait: (C, T, 6). ground: (C, samples, 3) heights at left, path,
     right; root_height: (C,) mean of those on the path. joint_position, joint_velocity: (C, J, 3);
-    joint_rotation: (C, J, 4) world: the network's own copy. phase: (C,). severity, severity_target: (C, L).
+    joint_rotation: (C, J, 4) world: the network's own copy. phase: (C,). told, told_target: (C, K) every
+    channel's columns side by side.
     target_velocity, target_direction: (C, 2); strafe: (C,); owed: (C, 2) of `trajectory.follow_wish`.
     foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2): of `feet`.
     """
@@ -31,8 +32,8 @@ class Character:
     joint_velocity: Array
     joint_rotation: Array
     phase: Array
-    severity: Array
-    severity_target: Array
+    told: Array
+    told_target: Array
     target_velocity: Array
     target_direction: Array
     strafe: Array
@@ -46,6 +47,7 @@ def standing(network: Network, characters: int, position: Array, yaw: Array) -> 
     """C characters in the network's mean pose at ground positions (C, 2), facing `yaw` (C,) in radians."""
     layout = network.layout
     count, joints, length = characters, layout.joints, 2 * layout.window
+    columns = sum(columns for _, columns in layout.channels)
     mean = network.y_mean.astype(float)
     sin, cos = np.sin(yaw)[:, None], np.cos(yaw)[:, None]
     x, y, z = mean[layout.y_joint_position].reshape(joints, 3).T
@@ -71,8 +73,8 @@ def standing(network: Network, characters: int, position: Array, yaw: Array) -> 
         joint_velocity=np.zeros((count, joints, 3)),
         joint_rotation=quat.mul(quat.yaw(yaw)[:, None], quat.exp(turns)),
         phase=np.zeros(count),
-        severity=np.zeros((count, layout.links)),
-        severity_target=np.zeros((count, layout.links)),
+        told=np.zeros((count, columns)),
+        told_target=np.zeros((count, columns)),
         target_velocity=np.zeros((count, 2)),
         target_direction=facing.copy(),
         strafe=np.zeros(count),

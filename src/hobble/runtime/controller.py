@@ -2,7 +2,8 @@
 
 - prepare: the caller's wish becomes targets, the future trajectory bends toward them, the ground is looked
 up;
-- input: trajectory, gait, ground, last pose and severities are put into a row X, in the root frame;
+- input: trajectory, gait, ground, last pose and what the channels tell are put into a row X, in the root
+frame;
 - insert: the row is standardised into the network's input;
 - predict: the network at the present phase gives Y;
 - output: Y becomes the pose in the world, and the copy for the caller gets its feet placed;
@@ -11,18 +12,22 @@ up;
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
+from hobble.character import rule
 from hobble.core.quat import Array
+from hobble.models.network import Predictor
+from hobble.rows.layout import BODY
 from hobble.runtime import feet, trajectory
 from hobble.runtime.character import Character
-from hobble.runtime.predictor import Predictor
 
+met = register_jitable(rule.met)
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
 # Radians a frame (1500 degrees a second). No joint of a person who walks or runs turns as fast, but a
@@ -36,8 +41,9 @@ Ground = Callable[[Array, Array], Array]
 class Controller:
     """Runs characters of one network; `seconds` (6,) holds what each of STEPS took in the last frame.
 
-    severity_rate: largest change of a severity in a second; foot_locking: hold feet in contact where they
-    landed; steering: as of `trajectory.follow_wish`; side: centimetres from the path to the side heights.
+    rates: channel -> largest change of one of its values in a second; foot_locking: hold feet in contact
+    where they landed; steering: as of `trajectory.follow_wish`; side: centimetres from the path to the side
+    heights.
     """
 
     def __init__(
@@ -45,7 +51,7 @@ class Controller:
         predictor: Predictor,
         character: Character,
         *,
-        severity_rate: float,
+        rates: Mapping[str, float],
         foot_locking: bool,
         steering: float,
         side: float,
@@ -54,7 +60,6 @@ class Controller:
         layout = network.layout
         count = len(character.phase)
         self.predictor, self.character, self.layout = predictor, character, layout
-        self.severity_step = severity_rate / FPS
         self.side, self.foot_locking, self.steering = side, foot_locking, steering
         self.seconds = np.zeros(len(STEPS))
         self.x = np.zeros((count, layout.x_size), np.float32)
@@ -65,7 +70,12 @@ class Controller:
         self.pose_position = character.joint_position.copy()
         self.pose_rotation = character.joint_rotation.copy()
         self._points = np.zeros((count, layout.samples, 3, 2))
-        self._x_columns = np.array([s.start for s in layout.blocks("x").values()], np.int64)
+        blocks = layout.blocks("x")
+        self._x_columns = np.array([blocks[name].start for name in BODY], np.int64)
+        of_channel = [np.arange(layout.x_size)[layout.x_channel(name)] for name, _ in layout.channels]
+        self._told_columns = np.concatenate([np.zeros(0, np.int64), *of_channel])
+        steps = [np.full(columns, rates[name] / FPS) for name, columns in layout.channels]
+        self._told_step = np.concatenate([np.zeros(0), *steps])
         self._y_columns = trajectory.advance_columns(layout)
         self._y_joints = np.array([layout.y_joint_position.start, layout.y_contacts.start], np.int64)
         assert network.skeleton is not None
@@ -105,7 +115,7 @@ class Controller:
         c = self.character
         trajectory.prepare(
             velocity, direction, strafe, gait, self.steering, c.target_velocity, c.target_direction, c.strafe,
-            c.gait, c.position, c.direction, c.owed, c.severity, c.severity_target, self.severity_step,
+            c.gait, c.position, c.direction, c.owed, c.told, c.told_target, self._told_step,
             self.layout.step, self.side, self._points,
         )  # fmt: skip
         if ground is None:
@@ -119,7 +129,7 @@ class Controller:
         c = self.character
         _fill_input(
             c.position, c.direction, c.gait, c.ground, c.root_height, c.joint_position, c.joint_velocity,
-            c.severity, self._x_columns, self.layout.step, self.x,
+            c.told, self._x_columns, self._told_columns, self.layout.step, self.x,
         )  # fmt: skip
 
     def _output(self, ground: Ground | None) -> None:
@@ -160,9 +170,9 @@ def _heights(ground: Ground, x: Array, z: Array) -> Array:
 @njit(cache=True)
 def _fill_input(
     position: Any, direction: Any, gait: Any, ground: Any, height: Any, joints: Any, velocities: Any,
-    severity: Any, at: Any, step: int, x: Any,
+    told: Any, at: Any, told_at: Any, step: int, x: Any,
 ) -> None:  # fmt: skip
-    """Fill rows X; at: first columns of the blocks of X in order."""
+    """Fill rows X; at: first columns of the blocks of BODY; told_at: (K,) the columns of what is told."""
     middle, samples = position.shape[1] // 2, ground.shape[1]
     for c in range(x.shape[0]):
         px, pz = position[c, middle]
@@ -191,8 +201,8 @@ def _fill_input(
             dx, dz = velocities[c, j, 0], velocities[c, j, 2]
             k = at[4] + 3 * j
             x[c, k], x[c, k + 1], x[c, k + 2] = dx * cos - dz * sin, velocities[c, j, 1], dx * sin + dz * cos
-        for k in range(severity.shape[1]):
-            x[c, at[6] + k] = severity[c, k]
+        for k in range(told.shape[1]):
+            x[c, told_at[k]] = told[c, k]
 
 
 @njit(cache=True)
@@ -217,9 +227,9 @@ def _take_output(
             velocities[c, j, 2] = y[c, v + 2] * cos - y[c, v] * sin
             new_x = y[c, p] * cos + y[c, p + 2] * sin + root[c, 0]
             new_z = y[c, p + 2] * cos - y[c, p] * sin + root[c, 2]
-            joints[c, j, 0] = 0.5 * (joints[c, j, 0] + velocities[c, j, 0] + new_x)
-            joints[c, j, 1] = 0.5 * (joints[c, j, 1] + velocities[c, j, 1] + y[c, p + 1] + root[c, 1])
-            joints[c, j, 2] = 0.5 * (joints[c, j, 2] + velocities[c, j, 2] + new_z)
+            joints[c, j, 0] = met(joints[c, j, 0] + velocities[c, j, 0], new_x)
+            joints[c, j, 1] = met(joints[c, j, 1] + velocities[c, j, 1], y[c, p + 1] + root[c, 1])
+            joints[c, j, 2] = met(joints[c, j, 2] + velocities[c, j, 2], new_z)
             rx, ry, rz = y[c, r], y[c, r + 1], y[c, r + 2]
             half = np.sqrt(rx * rx + ry * ry + rz * rz)
             scale = np.sin(half) / half if half > 1e-8 else 1.0

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from hobble.core.skeleton import Skeleton
-from hobble.runtime.network import Network
+from hobble.models.network import Network
 
 # Contact more likely than not. The original waits for .8, and a foot slides 4.8 cm a step before and after.
 LOCK_AT = 0.5

@@ -12,12 +12,14 @@ import numpy as np
 
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
+from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton
-from hobble.runtime.network import Network
+from hobble.runtime.options import Runtime
 
 Wish = tuple[Array, Array | None, str]  # velocity, facing, gait
 
+HURTS = "injury"  # the channel that they sweep
 # The hurt of the injury scenarios: name -> links, by the roles of their ends.
 HURT = {
     "left_knee": ("left_hip", "left_knee"),
@@ -97,17 +99,17 @@ def hurt_links(network: Network) -> dict[str, str]:
     return out
 
 
-def run_scenario(network: Network, scenario: Scenario, **options: Any) -> Track:
-    """Generate one scenario on flat ground; options as of ProceduralAnimation."""
-    animation = ProceduralAnimation(network, **options)
+def run_scenario(network: Network, scenario: Scenario, options: Runtime) -> Track:
+    """Generate one scenario on flat ground."""
+    animation = ProceduralAnimation(network, **dict(options))
     poses, targets, gaits, severity = [], [], [], np.zeros(scenario.frames, np.float32)
     for f in range(scenario.frames):
         velocity, facing, gait = scenario.wish(f)
-        injury = None
+        told = {}
         if scenario.hurt:
             severity[f] = 10.0 * f / max(1, scenario.frames - 1)
-            injury = {scenario.hurt: float(severity[f])}
-        poses.append(animation.next_pose(velocity, facing, gait, injury))
+            told = {HURTS: {scenario.hurt: float(severity[f])}}
+        poses.append(animation.next_pose(velocity, facing, gait, **told))
         targets.append(velocity)
         gaits.append(gait)
     return Track(
@@ -123,11 +125,11 @@ def run_scenario(network: Network, scenario: Scenario, **options: Any) -> Track:
     )
 
 
-def write_motions(network: Network, bvh: str | Path, **options: Any) -> Iterator[Track]:
+def write_motions(network: Network, bvh: str | Path, options: Runtime) -> Iterator[Track]:
     """Run every scenario, write each as a BVH file into the folder `bvh` and yield what came of it."""
     assert network.skeleton is not None
     for scenario in scenarios(network):
-        track = run_scenario(network, scenario, **options)
+        track = run_scenario(network, scenario, options)
         own = "skeleton" in network.meta
         body = (
             network.skeleton if own else fitted_skeleton(network.skeleton, track.positions, track.rotations)
@@ -136,20 +138,21 @@ def write_motions(network: Network, bvh: str | Path, **options: Any) -> Iterator
         yield track
 
 
-def generate(network: Network, npz: str | Path, bvh: str | Path, **options: Any) -> None:
+def generate(network: Network, npz: str | Path, bvh: str | Path, options: Runtime) -> None:
     """Run every scenario and write `npz` and, into the folder `bvh`, a BVH file each.
 
     npz: names (N,), joints (J,), parents (J,), fps; for scenario <name>: <name>/positions (F, J, 3) float32
-    cm, <name>/contacts (F, 4), <name>/phase (F,), <name>/gait (F,) str, <name>/target (F, 2), <name>/root (F,
-    3), <name>/severity (F,) float32, <name>/hurt: the hurt link or "".
+    cm, <name>/rotations (F, J, 4) world, w first, <name>/contacts (F, 4), <name>/phase (F,), <name>/gait (F,)
+    str, <name>/target (F, 2), <name>/root (F, 3), <name>/severity (F,) float32, <name>/hurt: the hurt link or
+    "".
     """
     assert network.skeleton is not None
     arrays: dict[str, Any] = {}
     names = []
-    for track in write_motions(network, bvh, **options):
+    for track in write_motions(network, bvh, options):
         name = track.scenario.name
         names.append(name)
-        for key in ("positions", "contacts", "phase", "target", "root", "severity"):
+        for key in ("positions", "rotations", "contacts", "phase", "target", "root", "severity"):
             arrays[f"{name}/{key}"] = getattr(track, key).astype(np.float32)
         arrays[f"{name}/gait"] = track.gait
         arrays[f"{name}/hurt"] = np.array(track.scenario.hurt or "")

@@ -11,8 +11,12 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
-from hobble.database.layout import RowLayout
+from hobble.character import rule
+from hobble.rows.layout import RowLayout
+
+phase_change, moving_share = register_jitable(rule.phase_change), register_jitable(rule.moving)
 
 STEERING_LIMIT = 2.0  # with 1, a network that saw few starts stands for seconds before it sets off
 TARGET_MIX = 0.9
@@ -145,9 +149,10 @@ def sample_points(position: Any, direction: Any, step: int, side: float, points:
 def prepare(
     wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
     velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
-    owed: Any, severity: Any, severity_target: Any, severity_step: float, step: int, side: float, points: Any,
+    owed: Any, told: Any, told_target: Any, told_step: Any, step: int, side: float, points: Any,
 ) -> None:  # fmt: skip
-    """All of the above in one call, and severities (C, L) move toward their targets, at most by a step.
+    """All of the above in one call, and what is told (C, K) moves toward its target, at most by told_step
+    (K,).
 
     In this file because compiled code kept on disk is renewed when its own file changes, not its callees'.
     """
@@ -157,10 +162,10 @@ def prepare(
     )  # fmt: skip
     blend_future(velocity, target, strafe, position, direction, gait)
     sample_points(position, direction, step, side, points)
-    for c in range(severity.shape[0]):
-        for k in range(severity.shape[1]):
-            change = severity_target[c, k] - severity[c, k]
-            severity[c, k] += min(max(change, -severity_step), severity_step)
+    for c in range(told.shape[0]):
+        for k in range(told.shape[1]):
+            change = told_target[c, k] - told[c, k]
+            told[c, k] += min(max(change, -told_step[k]), told_step[k])
 
 
 @njit(cache=True)
@@ -185,7 +190,7 @@ def advance(
                 direction[c, i, k] = direction[c, i + 1, k]
             for k in range(gait.shape[2]):
                 gait[c, i, k] = gait[c, i + 1, k]
-        moving = max(0.0, 1.0 - gait[c, middle, 0]) ** 0.25
+        moving = moving_share(gait[c, middle, 0])
         yaw = np.arctan2(direction[c, middle, 0], direction[c, middle, 1])
         sin, cos = np.sin(yaw), np.cos(yaw)
         vx, vz = y[c, at[0]], y[c, at[0] + 1]
@@ -216,7 +221,7 @@ def advance(
             norm = max(np.sqrt(x * x + z * z), 1e-6)
             direction[c, i, 0] = (x * cos + z * sin) / norm
             direction[c, i, 1] = (z * cos - x * sin) / norm
-        change = (0.9 * moving + 0.1) * y[c, at[2]]
+        change = phase_change(moving, y[c, at[2]])
         phase[c] = phase[c] + change - np.floor(phase[c] + change)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from hobble.core.errors import HobbleError
 
 LEFT, RIGHT = 0, 1
+WRITES = ("_footsteps.txt", "_gait.txt", "_injuries.txt")  # beside each clip
 LINKS = {
     "LeftUpLeg-LeftLeg": ("thigh", LEFT),
     "RightUpLeg-RightLeg": ("thigh", RIGHT),

@@ -17,6 +17,7 @@ from hobble.core.quat import Array
 from hobble.motion.root import RootFrames, continued, root_frames
 from hobble.terrain.feet import Feet, Mask, feet_of, held_up
 from hobble.terrain.ground import Ground, fit_cycle, flat_ground
+from hobble.terrain.options import Fitting, Sampling
 from hobble.terrain.patches import Patches
 from hobble.terrain.picture import Picture, picture_cycles, picture_of
 
@@ -52,26 +53,26 @@ def clip_fits(
     labels: Mapping[str, Array],
     patches: Patches,
     ground: str,
-    options: Mapping[str, Any],
-    database: Mapping[str, Any],
+    options: Fitting,
+    sampling: Sampling,
 ) -> ClipFits:
     """Fit the ground under every cycle of a clip.
 
-    labels: `contacts` (F, 4) and `cycles` (C, 2). ground: "flat", "rocky", "jumpy" or "beam". options,
-    database: those sections of the data set. Raises InputError where the labels do not belong to the clip.
+    labels: `contacts` (F, 4) and `cycles` (C, 2). ground: "flat", "rocky", "jumpy" or "beam".
+    Raises InputError where the labels do not belong to the clip.
     """
     cycles, contacts = np.asarray(labels["cycles"], int), np.asarray(labels["contacts"], bool)
-    window, step = database["window"], database["step"]
+    window = sampling.window
     _check(clip, cycles, contacts)
-    if len(patches) < options["fits"]:
+    if len(patches) < options.fits:
         raise InputError(
             "terrain.patches",
-            f"{len(patches)} patches are fewer than the {options['fits']} fits of a cycle",
+            f"{len(patches)} patches are fewer than the {options.fits} fits of a cycle",
         )
-    root = continued(root_frames(clip, database["facing_sigma"]), window)
-    samples = sample_points(root, database["terrain_side"])
+    root = continued(root_frames(clip, sampling.facing_sigma), window)
+    samples = sample_points(root, sampling.terrain_side)
     feet = _feet(clip, contacts, cycles, window, ground == "flat", options)
-    offsets = np.arange(-window, window, step)
+    offsets = np.arange(-window, window, sampling.step)
     heights: list[Array] = [np.zeros((0, 3 * len(offsets)))]
     fitted, pictures = [], []
     shown = picture_cycles(len(cycles))
@@ -88,12 +89,12 @@ def clip_fits(
         cycle=cycle,
         fits=np.array([len(fit.chosen) for fit, _, _ in fitted], np.int32)[cycle],
         heights=np.concatenate(heights).astype(np.float32),
-        **_accounts(fitted, options["fits"]),
+        **_accounts(fitted, options.fits),
         heel_height=feet.heel_height,
         toe_height=feet.toe_height,
         pictures=tuple(pictures),
     )
-    _warn(clip.name, fits, options["deepest"])
+    _warn(clip.name, fits, options.deepest)
     return fits
 
 
@@ -107,9 +108,7 @@ def _warn(name: str, fits: ClipFits, deepest: float | None) -> None:
         log.warning(text, name, mean, below)
 
 
-def _feet(
-    clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: Mapping[str, Any]
-) -> Feet:
+def _feet(clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: Fitting) -> Feet:
     """Soles, and contacts that are on the ground.
 
     On flat ground a heel that is held up, still, over its standing toe may not be. Where no foot stands all
@@ -118,11 +117,19 @@ def _feet(
     counted = np.zeros(len(clip), bool)
     for start, end in cycles:
         counted[_around(start, end, window, len(clip))] = True
-    names = ("heel_height", "toe_height", "sole", "deepest")
-    feet = feet_of(clip, contacts, np.flatnonzero(counted), flat, **{n: options[n] for n in names})
+    feet = feet_of(
+        clip,
+        contacts,
+        np.flatnonzero(counted),
+        flat,
+        heel_height=options.heel_height,
+        toe_height=options.toe_height,
+        sole=options.sole,
+        deepest=options.deepest,
+    )
     contacts = feet.contacts.copy()
-    if flat and options["held_up"] is not None:
-        contacts &= ~held_up(feet, options["held_up"])
+    if flat and options.held_up is not None:
+        contacts &= ~held_up(feet, options.held_up)
     for start, end in cycles:
         around = _around(start, end, window, len(clip))
         if not contacts[around].any():
@@ -139,17 +146,29 @@ def _around(start: int, end: int, window: int, frames: int) -> slice:
 
 
 def _ground(
-    feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: Mapping[str, Any]
+    feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: Fitting
 ) -> Ground:
     """The fits of the cycle that, with its window, takes the frames `around`."""
     soles, contacts = feet.soles[around], feet.contacts[around]
-    corrected = {n: options[n] for n in ("smoothing", "deepest")}
+    smoothing, deepest = options.smoothing, options.deepest
     if kind == "flat":
-        return flat_ground(soles, contacts, options["flat_level"], **corrected, bent=options["bend_flat"])
+        return flat_ground(
+            soles, contacts, options.flat_level, smoothing=smoothing, deepest=deepest, bent=options.bend_flat
+        )
     path = samples[1, around]
     sides = samples[0, around] - path
     sides = sides / np.linalg.norm(sides, axis=-1, keepdims=True)
-    return fit_cycle(patches, soles, contacts, path, sides, kind, fits=options["fits"], **corrected)
+    return fit_cycle(
+        patches,
+        soles,
+        contacts,
+        path,
+        sides,
+        kind,
+        fits=options.fits,
+        smoothing=smoothing,
+        deepest=deepest,
+    )
 
 
 def _accounts(fitted: Sequence[tuple[Ground, Array, Mask]], fits: int) -> dict[str, Any]:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from hobble.core.errors import InputError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.untrusted import read_text
+from hobble.terrain import options
 from hobble.terrain.generate import generate
 
 MOST_CELLS = 1 << 26  # of a map: 8192 squared, half a gigabyte; 322 m a side at 3.9 cm a cell
@@ -29,6 +29,7 @@ ESRI_HEADER = {
     "cellsize",
     "nodata_value",
 }
+IMAGES = {".png": ("PNG",), ".tif": ("TIFF",), ".tiff": ("TIFF",)}  # a suffix, and what the file must be
 GDAL_NODATA = 42113  # the tag of a TIFF in which GDAL says, as text, what stands for no data
 
 
@@ -42,28 +43,28 @@ class Heightmap:
 
 
 def heightmaps(
-    entries: Sequence[Mapping[str, Any]], files: Sequence[str | Path], *, cell: float, height_scale: float
+    entries: Sequence[options.Heightmap], files: Sequence[str | Path], *, cell: float, height_scale: float
 ) -> list[Heightmap]:
     """The heightmaps that a data set lists.
 
-    entries: `kind`, `seed`, and `cell` and `height_scale` where they differ from the general ones. files:
-    those of the entries of kind `file`, in their order. cell: cm a cell. height_scale: what the heights of
-    files are multiplied by to make them cm. Raises InputError for a file that cannot be used.
+    entries: with `cell` and `height_scale` where they differ from the general ones. files: those of the
+    entries of kind `file`, in their order. cell: cm a cell. height_scale: what the heights of files are
+    multiplied by to make them cm. Raises InputError for a file that cannot be used.
     """
     given = iter(files)
     out = []
     for entry in entries:
-        width = entry.get("cell") or cell
-        scale = entry.get("height_scale")
-        if entry["kind"] == "file":
+        width = entry.cell or cell
+        scale = entry.height_scale
+        if entry.kind == "file":
             path = next(given)
             heights = read_heights(path) * (scale or height_scale)
             out.append(Heightmap(str(path), heights, width))
-        elif entry["kind"] == "elevation":
+        elif entry.kind == "elevation":
             out.append(Heightmap("elevation", elevation(width) * (scale or 1.0), width))
         else:
-            name = f"{entry['kind']} (seed {entry['seed']})"
-            heights = generate(entry["kind"], entry["seed"], width) * (scale or 1.0)
+            name = f"{entry.kind} (seed {entry.seed})"
+            heights = generate(entry.kind, entry.seed, width) * (scale or 1.0)
             out.append(Heightmap(name, heights, width))
     return out
 
@@ -98,7 +99,7 @@ def read_heights(path: str | Path) -> Array:
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no such heightmap", fix="See terrain.heightmaps of the data set.")
-    readers = {".npz": _npz, ".npy": _npy, ".png": _image, ".tif": _image, ".tiff": _image}
+    readers = {".npz": _npz, ".npy": _npy, **dict.fromkeys(IMAGES, _image)}
     heights = np.asarray(readers.get(path.suffix.lower(), _text)(path))
     if heights.ndim != 2 or min(heights.shape) < 2:
         raise InputError(path, f"a heightmap has rows and columns, this has shape {heights.shape}")
@@ -138,7 +139,7 @@ def _text(path: Path) -> Array:
 def _npy(path: Path) -> Array:
     try:
         # Mapped, so that a header that promises more than the file holds takes no memory.
-        heights = np.load(path, mmap_mode="r", allow_pickle=False)
+        heights = np.lib.format.open_memmap(path, mode="r")  # never a pickle or an archive
         if heights.size > MOST_CELLS:
             raise InputError(path, f"{heights.size} heights, more than {MOST_CELLS}")
         return np.array(heights)
@@ -162,7 +163,8 @@ def _image(path: Path) -> Array:
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(path) as image:
+        # Of the other formats some run programs: Ghostscript for what begins as PostScript does.
+        with Image.open(path, formats=IMAGES[path.suffix.lower()]) as image:
             if image.width * image.height > MOST_CELLS:
                 raise InputError(path, f"{image.width} x {image.height} cells, more than {MOST_CELLS}")
             grey = image if image.mode in ("L", "I", "F", "I;16", "I;16B", "1") else image.convert("L")

@@ -27,8 +27,8 @@ class Heightmap(Section):
         return self
 
 
-class Terrain(Section):
-    """Patches of ground and their fits under the clips."""
+class Drawing(Section):
+    """How patches are drawn from heightmaps: what the rule `terrain_patches` reads."""
 
     heightmaps: tuple[Heightmap, ...] = Field(
         default_factory=lambda: tuple(
@@ -37,11 +37,23 @@ class Terrain(Section):
         )
     )
     patches: Positive = 20_000
-    fits: Positive = Field(10, description="fits kept for each cycle; a flat cycle has one, counted so often")
     cell: PositiveFloat = Field(3.937007874, description="centimetres a cell")
     size: Annotated[int, Field(gt=0, le=2048)] = Field(128, description="cells a side of a patch")
     height_scale: PositiveFloat = 3.0
     highest: PositiveFloat = Field(50.0, description="a patch that goes further from its mean is dropped")
+    seed: int = 1
+
+    @model_validator(mode="after")
+    def _some_ground(self) -> Drawing:
+        if not self.heightmaps:
+            raise ValueError("`heightmaps` names none, so that there is no ground to draw patches from")
+        return self
+
+
+class Fitting(Section):
+    """How patches are fitted under the cycles of a clip: what the rule `terrain_fits` reads."""
+
+    fits: Positive = Field(10, description="fits kept for each cycle; a flat cycle has one, counted so often")
     smoothing: Annotated[float, Field(ge=0)] = Field(0.1, description="regularisation of the residual's RBF")
     heel_height: Literal["auto"] | Finite = Field(
         "auto", description="of the heel joint above its sole, cm; the original has 5, `auto` asks the clip"
@@ -64,12 +76,22 @@ class Terrain(Section):
         description="a heel that keeps still so far above its standing toe is not on flat ground, cm; null "
         "as in the original: not looked at",
     )
-    seed: int = 1
+
+
+class Terrain(Drawing, Fitting):
+    """Patches of ground and their fits under the clips."""
 
     @model_validator(mode="after")
     def _enough_patches(self) -> Terrain:
-        if not self.heightmaps:
-            raise ValueError("`heightmaps` names none, so that there is no ground to draw patches from")
         if self.patches < self.fits:
             raise ValueError(f"`patches` ({self.patches}) are fewer than the `fits` of a cycle ({self.fits})")
         return self
+
+
+class Sampling(Section):
+    """Where rows want heights: those keys of the section `database` that decide it."""
+
+    window: Positive
+    step: Positive
+    facing_sigma: PositiveFloat
+    terrain_side: PositiveFloat

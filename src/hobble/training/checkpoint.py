@@ -12,7 +12,7 @@ import torch
 
 from hobble.core.errors import InputError
 from hobble.core.files import save_npz
-from hobble.training.network import Network, parameters
+from hobble.models.trainable import Trainable
 from hobble.training.optimiser import Adam
 
 
@@ -26,7 +26,7 @@ class State:
     choices (order of the rows, dropout) are seeded by pass and section, so the position is their state.
     """
 
-    network: Network
+    network: Trainable
     adam: Adam
     sections: int = 0
     samples: int = 0
@@ -56,8 +56,7 @@ def pack(state: State) -> dict[str, np.ndarray]:
         "samples": np.array(state.samples),
         "seconds": np.array(state.seconds),
         "history": np.array(state.history, float),
-        "sizes": np.array(state.network.sizes),
-        "control_points": np.array(state.network.control_points),
+        "network": np.array(state.network.described),
         "recipe": np.array(state.recipe),
     }
 
@@ -65,12 +64,11 @@ def pack(state: State) -> dict[str, np.ndarray]:
 def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
     """Set `state` to what a checkpoint holds; raises InputError where it is of a network of another shape."""
     try:
-        shape = (tuple(data["sizes"].tolist()), int(data["control_points"]))
-        if shape != (state.network.sizes, state.network.control_points):
-            here = _described(state.network.sizes, state.network.control_points)
+        described = str(data["network"])
+        if described != state.network.described:
             raise InputError(
                 path,
-                f"holds a network of {_described(*shape)}, not of {here}",
+                f"holds a network of {described:.200}, not of {state.network.described}",
                 fix="A training can only go on with the network it started with.",
             )
         state.network.flat.copy_(torch.from_numpy(data["weights"]))
@@ -83,11 +81,6 @@ def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
         state.history = data["history"].tolist()
     except KeyError as error:
         raise InputError(path, f"is no checkpoint of a training: it has no {error}") from None
-
-
-def _described(sizes: tuple[int, ...], control_points: int) -> str:
-    units, numbers = "-".join(map(str, sizes)), parameters(sizes, control_points)
-    return f"{units} units and {control_points} control points ({numbers:,} parameters)"
 
 
 def _copied(flat: torch.Tensor) -> np.ndarray:

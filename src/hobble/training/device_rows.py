@@ -10,10 +10,10 @@ from torch import Tensor
 
 from hobble.database import order
 from hobble.database.chunks import read_chunk
-from hobble.database.compose import fit_columns, joint_heights, x_columns
 from hobble.database.manifest import Manifest
 from hobble.database.precision import STORED
 from hobble.database.reader import Database
+from hobble.rows.compose import compose, fit_columns, x_columns
 from hobble.training.batches import TRAIN, Batch, HostRows
 
 AT_ONCE = 4096  # rows composed in one go: few launches, 10 MB
@@ -92,18 +92,12 @@ class DeviceRows:
             yield rows, self.first[rows] + np.concatenate(picked)[rows]
 
     def _composed(self, rows: Tensor, fits: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """x (n, X), y (n, Y) and p (n,): `hobble.database.compose.compose` on any device."""
+        """x (n, X), y (n, Y) and p (n,), composed where they lie."""
         layout = self.database.layout
-        of_frame, ground = self.x[rows].float(), self.fits[fits].float()
-        at = layout.x_terrain.start
-        x = torch.cat([of_frame[:, :at], ground[:, :-1], of_frame[:, at:]], dim=1)
-        y, lift = self.y[rows].float(), ground[:, -1:]
-        for values, std, joints in (
-            (x, self.x_std, layout.x_joint_position),
-            (y, self.y_std, layout.y_joint_position),
-        ):
-            heights = joint_heights(joints)
-            values[:, heights] -= lift / std[heights]
+        ground, y = self.fits[fits].float(), self.y[rows].float()
+        x = torch.empty(len(rows), layout.x_size, device=self.device)
+        frames, lift = self.x[rows].float(), ground[:, -1:]
+        compose(layout, frames, ground[:, :-1], lift, x, y, self.x_std, self.y_std)
         return x, y, self.phase[rows]
 
 

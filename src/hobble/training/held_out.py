@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from hobble.database.reader import Database
-from hobble.training.network import Network
+from hobble.models.trainable import Trainable
 
 SPLIT = "held_out"
 AT_ONCE = 2048  # rows in one product: large enough to be fast, small enough to stay in 50 MB
@@ -34,16 +34,16 @@ class HeldOut:
             if rows <= 0:
                 break
 
-    def errors(self, network: Network) -> list[float]:
+    def errors(self, network: Trainable) -> list[float]:
         """Mean squared error of the standardised output on the sample, then that of each block of Y."""
         return self._errors(network, self.sample)
 
-    def whole(self, network: Network) -> list[float]:
+    def whole(self, network: Trainable) -> list[float]:
         """The same over every held-out row."""
         return self._errors(network, self._stream())
 
-    def _errors(self, network: Network, batches: Iterable[tuple[Tensor, ...]]) -> list[float]:
-        total = np.zeros(network.sizes[-1])
+    def _errors(self, network: Trainable, batches: Iterable[tuple[Tensor, ...]]) -> list[float]:
+        total = np.zeros(network.outputs)
         rows = 0
         for x, y, p in batches:
             squares = torch.square(network(x, p).sub_(y))

@@ -9,13 +9,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from hobble.training.fused import bits, team, widened
-from hobble.training.network import Network
+from hobble.models.kernels import bits, team, widened
+from hobble.models.trainable import Trainable
 
 EPSILON = 1e-8
 
 
-def l1_slopes(network: Network, l1: float) -> list[float]:
+def l1_slopes(network: Trainable, l1: float) -> list[float]:
     """What the L1 term adds to the gradient of a weight, times its sign, for each layer.
 
     The term is l1 * sum over the layers of mean|W| / (2 * layers): the original divides by the number of its
@@ -31,7 +31,9 @@ class Adam:
     first, second: the running moments, laid out like `network.flat`. steps: how many were made.
     """
 
-    def __init__(self, network: Network, learning_rate: float, beta1: float, beta2: float, l1: float) -> None:
+    def __init__(
+        self, network: Trainable, learning_rate: float, beta1: float, beta2: float, l1: float
+    ) -> None:
         self.network = network
         self.learning_rate, self.beta1, self.beta2 = learning_rate, beta1, beta2
         self.slopes = l1_slopes(network, l1)

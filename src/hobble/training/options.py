@@ -1,4 +1,4 @@
-"""The keys of a configuration's `network` and `training` sections."""
+"""The keys of a configuration's `training` section."""
 
 from __future__ import annotations
 
@@ -7,14 +7,6 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from hobble.core.section import Positive, PositiveFloat, Section, Share
-
-
-class Network(Section):
-    """The phase-functioned network. Two hidden layers is what the published weight sizes show."""
-
-    hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
-    units: Annotated[int, Field(gt=0, le=8192)] = 512
-    control_points: Annotated[int, Field(ge=4, le=16)] = 4
 
 
 class Training(Section):

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from hobble.core.files import save_npz
 from hobble.database.reader import Database
+from hobble.models.network import TERRAIN_SIDE
+from hobble.models.options import Options
 from hobble.training.checkpoint import pack
 from hobble.training.held_out import HeldOut
 from hobble.training.history import write_history
+from hobble.training.options import Training
 from hobble.training.train import train
 from hobble.training.weights import write_weights
 
@@ -22,8 +23,8 @@ def run(
     database: Path,
     *,
     configuration: str,
-    network: Mapping[str, Any],
-    training: Mapping[str, Any],
+    network: Options,
+    training: Training,
     checkpoints: Path,
     threads: int,
     start: Path | None,
@@ -31,13 +32,14 @@ def run(
     weights: Path,
     history: Path,
     checkpoint: Path,
+    terrain_side: float = TERRAIN_SIDE,
 ) -> None:
     """Train on the database folder and write the three files; see `hobble.training.train.train`.
 
     The weights written are those at the end, as in the original; the checkpoint holds the best held-out ones
-    too.
+    too. terrain_side: centimetres from the path to the side heights in the database's rows.
     """
-    data = Database.open(database, training["memory_mb"])
+    data = Database.open(database, training.memory_mb)
     state = train(
         data,
         network=network,
@@ -52,9 +54,10 @@ def run(
     each = zip(["held out, every row", *blocks], whole, strict=True)
     log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in each))
     facts = {
-        "passes": state.sections // training["sections"],
+        "passes": state.sections // training.sections,
         "samples": state.samples,
         "steps": state.adam.steps,
+        "terrain_side": terrain_side,
     }
     if data.rows("held_out"):
         facts["held_out_mse"] = whole[0]

@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+
+from hobble.training.options import Training
 
 
-def share(training: Mapping[str, Any], passes: float) -> float:
-    """The share of `training["learning_rate"]` that counts after `passes` passes, parts of one included.
+def share(training: Training, passes: float) -> float:
+    """The share of `training.learning_rate` that counts after `passes` passes, parts of one included.
 
     It rises straight from 0 over `warm_up` passes. `constant` then stays at 1; `cosine` falls to 0 in half a
     wave over all the passes (Loshchilov and Hutter 2017, without restarts).
 
-    >>> recipe = {"schedule": "cosine", "warm_up": 0.5, "passes": 8}
+    >>> recipe = Training(schedule="cosine", warm_up=0.5, passes=8)
     >>> [round(share(recipe, passes), 3) for passes in (0, 0.25, 2, 4, 8)]
     [0.0, 0.499, 0.854, 0.5, 0.0]
     """
-    rise = min(1.0, passes / training["warm_up"]) if training["warm_up"] else 1.0
-    if training["schedule"] == "constant":
+    rise = min(1.0, passes / training.warm_up) if training.warm_up else 1.0
+    if training.schedule == "constant":
         return rise
-    return rise * (1 + math.cos(math.pi * min(1.0, passes / training["passes"]))) / 2
+    return rise * (1 + math.cos(math.pi * min(1.0, passes / training.passes))) / 2
 
 
-def depends_on_passes(training: Mapping[str, Any]) -> bool:
+def depends_on_passes(training: Training) -> bool:
     """Whether a training of more passes is another one from its start, and not a longer one."""
-    return training["schedule"] != "constant"
+    return training.schedule != "constant"

@@ -5,9 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numba
 import torch
@@ -16,13 +14,14 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import Arrays, load_npz
 from hobble.database.manifest import FILE
 from hobble.database.reader import Database
+from hobble.models import model
+from hobble.models.options import Options
+from hobble.models.products import bfloat16_is_fast
+from hobble.models.trainable import Step, Trainable
 from hobble.training.checkpoint import State, unpack
-from hobble.training.fused import FusedStep
-from hobble.training.network import Network, initialise
 from hobble.training.optimiser import Adam
-from hobble.training.products import bfloat16_is_fast
+from hobble.training.options import Training
 from hobble.training.schedule import depends_on_passes
-from hobble.training.step import Step
 
 log = logging.getLogger("hobble.training")
 
@@ -42,19 +41,17 @@ def use_threads(threads: int) -> None:
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
 
 
-def recipe_hash(
-    network: Mapping[str, Any], training: Mapping[str, Any], database: Database, code: str | None
-) -> str:
+def recipe_hash(network: Options, training: Training, database: Database, code: str | None) -> str:
     """Names all that determines a training section by section.
 
     How many passes there are is no part of it, unless the learning rate goes by that.
     code: a fingerprint of the training's source, where there is one.
     """
-    kept = {key: value for key, value in training.items() if key not in NOT_IN_THE_NAME}
+    kept = training.model_dump(mode="json", exclude=set(NOT_IN_THE_NAME))
     if not depends_on_passes(training):
         del kept["passes"]
     data = hashlib.sha256((database.path / FILE).read_bytes()).hexdigest()
-    text = json.dumps([dict(network), kept, data, code], sort_keys=True)
+    text = json.dumps([network.model_dump(mode="json"), kept, data, code], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -73,8 +70,8 @@ def run_name(recipe: str, start: Arrays | None) -> str:
 
 def begin(
     database: Database,
-    network: Mapping[str, Any],
-    training: Mapping[str, Any],
+    network: Options,
+    training: Training,
     recipe: str,
     checkpoints: Path,
     start: Path | None,
@@ -89,14 +86,14 @@ def begin(
     state = fresh(database, network, training)
     state.recipe = run_name(recipe, begun)
     own = checkpoints / state.recipe / "checkpoint.npz"
-    goal = training["passes"] * training["sections"]
+    goal = training.passes * training.sections
     if own.exists():
         data = load_npz(own)
         if int(data.get("sections", 0)) <= goal:
             unpack(data, state, own)
             log.info("going on from %s, after section %d of %d", own, state.sections, goal)
             return state, own
-        log.warning("%s is past %d passes; starting anew", own, training["passes"])
+        log.warning("%s is past %d passes; starting anew", own, training.passes)
     if start is not None and begun is not None:
         unpack(begun, state, start)
         _check_start(state, training, start)
@@ -106,30 +103,29 @@ def begin(
     return state, own
 
 
-def _check_start(state: State, training: Mapping[str, Any], path: Path) -> None:
+def _check_start(state: State, training: Training, path: Path) -> None:
     """Where a training stands is counted in sections, so those of the start have to be its own."""
-    sections = int(max(row[1] for row in state.history)) if state.history else training["sections"]
-    if sections != training["sections"]:
+    sections = int(max(row[1] for row in state.history)) if state.history else training.sections
+    if sections != training.sections:
         raise InputError(
             path,
-            f"was trained in {sections} sections a pass, and is to go on in {training['sections']}",
+            f"was trained in {sections} sections a pass, and is to go on in {training.sections}",
             fix=f"Give training.sections {sections}, or leave out training.continues.",
         )
     passes = state.sections // sections
-    if passes > training["passes"]:
+    if passes > training.passes:
         raise InputError(
             path,
-            f"stands after {passes} passes, and is to go on to {training['passes']}",
+            f"stands after {passes} passes, and is to go on to {training.passes}",
             fix=f"Give training.passes more than {passes}, or leave out training.continues.",
         )
 
 
-def fresh(database: Database, network: Mapping[str, Any], training: Mapping[str, Any]) -> State:
+def fresh(database: Database, network: Options, training: Training) -> State:
     """A new network, sized for the database's rows, and an optimiser that has not moved."""
-    layout = database.layout
-    sizes = (layout.x_size, *[network["units"]] * network["hidden_layers"], layout.y_size)
-    new = initialise(sizes, network["control_points"], training["seed"]).to(device(training["device"]))
-    return State(new, Adam(new, **{key: training[key] for key in OF_ADAM}))
+    new = model(network.kind).trainable(network, database.layout, training.seed)
+    new = new.to(device(training.device))
+    return State(new, Adam(new, **training.model_dump(include=set(OF_ADAM))))
 
 
 def device(wanted: str) -> torch.device:
@@ -140,16 +136,16 @@ def device(wanted: str) -> torch.device:
     return torch.device("cuda" if there and wanted != "cpu" else "cpu")
 
 
-def step_for(network: Network, training: Mapping[str, Any]) -> Step:
+def step_for(network: Trainable, training: Training) -> Step:
     """The way to find gradients that suits the device, the precision wanted and the size of a batch.
 
     Sums are float32 whatever the factors. TF32, which rounds factors to 11 bits, is a setting of the process.
     """
     on_cpu = network.flat.device.type == "cpu"
-    precision = training["precision"]
+    precision = training.precision
     half = precision == "bfloat16"
-    if precision == "auto" and training["batch"] >= HALF_FROM:
+    if precision == "auto" and training.batch >= HALF_FROM:
         half = bfloat16_is_fast() if on_cpu else torch.cuda.is_bf16_supported(including_emulation=False)
     torch.backends.cuda.matmul.allow_tf32 = precision in ("auto", "tf32")
     torch.backends.cuda.matmul.allow_bf16_reduced_precision_reduction = False
-    return (FusedStep if on_cpu else Step)(network, training["dropout"], half)
+    return network.step(training.dropout, half)

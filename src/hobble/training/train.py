@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
+from hobble.models.options import Options
 from hobble.training.batches import TRAIN, Watch
 from hobble.training.checkpoint import Saver, State, pack
 from hobble.training.device_rows import rows_for
 from hobble.training.held_out import HeldOut
 from hobble.training.history import duration
+from hobble.training.options import Training
 from hobble.training.rollout import RollOut
 from hobble.training.schedule import share
 from hobble.training.start import begin, recipe_hash, step_for, use_threads
@@ -29,16 +29,16 @@ log = logging.getLogger("hobble.training")
 def train(
     database: Database,
     *,
-    network: Mapping[str, Any],
-    training: Mapping[str, Any],
+    network: Options,
+    training: Training,
     checkpoints: Path,
     threads: int = 1,
     start: Path | None = None,
     code: str | None = None,
 ) -> State:
-    """Train to `training["passes"]` passes over the database's training clips; returns where that ends.
+    """Train to `training.passes` passes over the database's training clips; returns where that ends.
 
-    network, training: the sections of a configuration. checkpoints: a folder in which the run keeps its
+    network, training: those sections of a configuration. checkpoints: a folder in which the run keeps its
     state, by the hash of all that determines it; a run that finds its own there goes on from it. start: a
     checkpoint to begin from where there is none yet; a run from another start is another run. The result
     depends on the arguments and the number of threads, never on interruptions. Raises HobbleError where an
@@ -46,7 +46,7 @@ def train(
     than sections.
     """
     use_threads(threads)
-    pairs, sections = database.pairs(TRAIN), training["sections"]
+    pairs, sections = database.pairs(TRAIN), training.sections
     if pairs < sections:
         raise HobbleError(f"{pairs} samples to train on are fewer than training.sections, {sections}")
     recipe = recipe_hash(network, training, database, code)
@@ -56,14 +56,14 @@ def train(
     return state
 
 
-def _run(state: State, database: Database, training: Mapping[str, Any], saver: Saver) -> None:
-    passes, sections, seed = training["passes"], training["sections"], training["seed"]
+def _run(state: State, database: Database, training: Training, saver: Saver) -> None:
+    passes, sections, seed = training.passes, training.sections, training.seed
     device = state.network.flat.device
     step = step_for(state.network, training)
-    update = update_for(step, state.adam, training["batch"])
+    update = update_for(step, state.adam, training.batch)
     rows = rows_for(database, device)
     held_out = HeldOut(database, device, database.pairs(TRAIN) // sections)
-    roll_out = RollOut(database, training["rollout"], training["batch"], device)
+    roll_out = RollOut(database, training.rollout, training.batch, device)
     pairs = database.pairs(TRAIN)
     progress = Progress(state, passes * pairs)
     for turn in range(state.sections, passes * sections):
@@ -72,7 +72,7 @@ def _run(state: State, database: Database, training: Mapping[str, Any], saver: S
         watch = Watch(where, database.clips)
         step.seed(section_seed(seed, turn))
         roll_out.begin()
-        for batch in rows.batches(pass_index, section, sections, seed, training["batch"]):
+        for batch in rows.batches(pass_index, section, sections, seed, training.batch):
             roll_out.add(batch.x)
             rate = share(training, (state.samples + watch.seen) / pairs)
             watch.add(update(*batch[:3], rate), batch)

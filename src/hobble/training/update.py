@@ -5,8 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from hobble.models.trainable import Step
 from hobble.training.optimiser import Adam
-from hobble.training.step import Step
 
 CAPTURED_UP_TO = 1024  # rows of a batch: from there on the products outlast the launches
 WARM_UP = 3  # runs before a capture, in which libraries choose their algorithms and take their memory
@@ -35,8 +35,8 @@ class CapturedUpdate(Update):
 
     def __init__(self, step: Step, adam: Adam, rows: int) -> None:
         super().__init__(step, adam)
-        flat, (wide, *_, out) = adam.network.flat, adam.network.sizes
-        self.x, self.y = (torch.zeros(rows, size, device=flat.device) for size in (wide, out))
+        flat, columns = adam.network.flat, (adam.network.inputs, adam.network.outputs)
+        self.x, self.y = (torch.zeros(rows, size, device=flat.device) for size in columns)
         self.p = torch.zeros(rows, device=flat.device)
         self.numbers = torch.zeros(len(adam.numbers(0.0)), dtype=torch.float32, device=flat.device)
         self.graph = torch.cuda.CUDAGraph()

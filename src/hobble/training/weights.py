@@ -9,49 +9,44 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels import channel
 from hobble.core.files import save_npz
-from hobble.database.layout import CONTACTS, GAITS
+from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
-from hobble.training.network import Network
+from hobble.models.trainable import Trainable
+from hobble.rows.layout import CONTACTS, GAITS
 
-UNITS = (
-    "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z forward, +X left, "
-    "severities 0 to 10"
-)
+UNITS = "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z forward, +X left"
 
 
 def write_weights(
-    path: Path, network: Network, database: Database, configuration: str, facts: Mapping[str, Any]
+    path: Path, network: Trainable, database: Database, configuration: str, facts: Mapping[str, Any]
 ) -> None:
-    """Write `W0` (K, out, in), `b0` (K, out), ..., `Xmean`, `Xstd`, `Ymean`, `Ystd` and `meta`, a JSON text.
+    """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd` and `meta`, a JSON text.
 
-    facts: numbers about the training that go into `meta` as they are. Equal networks give equal bytes.
+    facts: numbers about the training and its rows that go into `meta` as they are. Equal networks give equal
+    bytes.
     """
-    arrays: dict[str, np.ndarray] = {}
-    for number, layer in enumerate(network.layers):
-        values = layer.cpu().numpy()
-        arrays[f"W{number}"] = np.ascontiguousarray(values[:, :, :-1].swapaxes(0, 1))
-        arrays[f"b{number}"] = np.ascontiguousarray(values[:, :, -1].T)
     s = database.statistics
-    arrays |= {"Xmean": s.x_mean, "Xstd": s.x_std, "Ymean": s.y_mean, "Ystd": s.y_std}
+    arrays = {**network.arrays(), "Xmean": s.x_mean, "Xstd": s.x_std, "Ymean": s.y_mean, "Ystd": s.y_std}
     save_npz(path, **arrays, meta=np.array(meta(network, database, configuration, facts)))
 
 
-def meta(network: Network, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
+def meta(network: Trainable, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
     """What the columns mean and where the network comes from, as JSON; the joints keep their order."""
-    links = ["-".join(link) for link in database.skeleton["links"]] if database.layout.links else []
+    rig = Skeleton.from_dict(database.skeleton)
+    channels = [channel(name) for name, _ in database.layout.channels]
     return json.dumps(
         {
+            "kind": network.kind,
             "configuration": configuration,
             "layout": database.layout.to_dict(),
             "skeleton": database.skeleton,
             "gaits": list(GAITS),
             "contacts": list(CONTACTS),
-            "links": links,
-            "control_points": network.control_points,
-            "units": UNITS,
-            "network": "y = W2 elu(W1 elu(W0 x + b0) + b1) + b2 on standardised x and y; W and b are cyclic "
-            "Catmull-Rom splines of the phase through their control points at k / control_points",
+            "channels": {one.name: one.columns(rig) for one in channels},
+            "units": "; ".join([UNITS, *(f"{one.value} 0 to {one.highest:g}" for one in channels)]),
+            **network.about,
             **facts,
         }
     )  # not sorted: the order of the skeleton's joints is that of the columns

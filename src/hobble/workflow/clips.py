@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from urllib.parse import quote
@@ -12,11 +13,21 @@ from hobble.config.load import Catalogue
 from hobble.config.models import ClipEntry
 from hobble.core.clip_files import NAMES, can_be_called, find_clips, the_file
 from hobble.core.errors import HobbleError, InputError
+from hobble.core.untrusted import check_regular
+from hobble.synthetic.links import WRITES
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
+from hobble.workflow.told import Told
 
 DATASETS = "results/datasets"
 MIRROR = "_mirror"
+HURT = re.compile(r"_hurt([1-9])$")  # at the end of a hurt version's name
+HURTS = "injury"  # the channel that hurt versions are told
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
+
+
+def original(clip: str) -> str:
+    """The clip that a mirror, a hurt version, or the mirror of one is made from; else itself."""
+    return HURT.sub("", clip.removesuffix(MIRROR))
 
 
 class Clips:
@@ -24,22 +35,60 @@ class Clips:
 
     def __init__(self, base: Path, mocap: Path, catalogue: Catalogue) -> None:
         self.base, self.mocap, self.catalogue = base, mocap, catalogue
+        self.told = Told(catalogue, self)
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def of(self, dataset: str) -> dict[str, ClipEntry]:
-        """The clips of a data set by name, without mirrors. Raises HobbleError where there are none."""
+        """The clips of a data set by name, hurt versions among them, without mirrors.
+
+        Raises HobbleError where there are none.
+        """
+        own = self.own(dataset)
+        return {**own, **{version: own[original(version)] for version in self.versions(dataset)}}
+
+    @functools.cache  # noqa: B019
+    def own(self, dataset: str) -> dict[str, ClipEntry]:
+        """The clips that the data set lists or its folder holds."""
         listed = self.catalogue.dataset(dataset).clips or dict.fromkeys(self._scanned(dataset))
         if odd := [name for name in listed if name.endswith(MIRROR)]:
             raise HobbleError(
                 f"data set {dataset}: {', '.join(odd)}: only a mirror is called so, which `mirror: true` "
                 "makes from its original. Take it out, or rename its file."
             )
+        if odd := [name for name in listed if HURT.search(name)]:
+            raise HobbleError(
+                f"data set {dataset}: {', '.join(odd)}: only a hurt version is called so, which `hurt` makes "
+                "from its original. Take it out, or rename its file."
+            )
         return {name: entry or ClipEntry() for name, entry in listed.items()}
 
+    versions_of = HURTS
+
+    @staticmethod
+    def original(clip: str) -> str:
+        """The clip that a mirror or a hurt version is made from; see `original`."""
+        return original(clip)
+
+    @staticmethod
+    def is_version(clip: str) -> bool:
+        """Whether it is a hurt version of a clip, or the mirror of one."""
+        return HURT.search(clip.removesuffix(MIRROR)) is not None
+
+    @functools.cache  # noqa: B019
+    def versions(self, dataset: str) -> dict[str, int]:
+        """The hurt versions of the healthy clips by name, and which turn each has among them, from 0."""
+        options = self.catalogue.dataset(dataset).hurt
+        healthy = (
+            [clip for clip in self.own(dataset) if self.told.neutral(dataset, clip, HURTS)] if options else []
+        )
+        many = options.versions if options else 0
+        names = [f"{clip}_hurt{version + 1}" for version in range(many) for clip in healthy]
+        return {name: turn for turn, name in enumerate(names)}
+
     def entry(self, dataset: str, clip: str) -> ClipEntry:
-        """What the data set says of a clip or of the original of a mirror."""
-        clips = self.of(dataset)
-        name = clip.removesuffix(MIRROR)
+        """What the data set says of a clip, or of the original of a mirror or of a hurt version."""
+        clips = self.own(dataset)
+        name = original(clip)
         if name not in clips:
             raise HobbleError(f"data set {dataset} has no clip {name!r}; it has: {', '.join(clips)}")
         return clips[name]
@@ -100,18 +149,14 @@ class Clips:
             return self.beside(dataset, clip, ("_footsteps.txt", "_gait.txt"))
         return self.beside(dataset, clip, LABEL_FILES) if self._reads_labels(dataset) else []
 
-    def status_files(self, dataset: str, clip: str) -> list[str]:
-        """The status file beside the clip, if there is one and the data set gives no status of its own."""
-        if self.catalogue.dataset(dataset).synthetic is None and self.entry(dataset, clip).status:
-            return []
-        return self.beside(dataset, clip, ("_injuries.txt",))
-
     def beside(self, dataset: str, clip: str, suffixes: Iterable[str]) -> list[str]:
         """The files called as the clip is, with one of `suffixes` after its name.
 
         Those of the embedded walker are named whether they exist or not, since it makes them all.
         """
         made = self.catalogue.dataset(dataset).synthetic is not None
+        if made:
+            suffixes = [suffix for suffix in suffixes if suffix in WRITES]
         stem = self.folder(dataset) / clip
         if not made and clip in (files := self._files(dataset)):
             stem = files[clip][0].with_suffix("")
@@ -120,7 +165,10 @@ class Clips:
     def heightmap_files(self, dataset: str) -> list[str]:
         """Heightmaps that are files, in the order of the configuration."""
         maps = self.catalogue.dataset(dataset).terrain.heightmaps
-        return [str(self.mocap / m.path) for m in maps if m.path]
+        files = [self.mocap / m.path for m in maps if m.path]
+        for file in filter(Path.exists, files):
+            check_regular(file)
+        return [str(file) for file in files]
 
     def skeleton_file(self, dataset: str) -> str:
         """Path of the data set's skeleton."""

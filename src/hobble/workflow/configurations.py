@@ -9,6 +9,7 @@ from typing import Any
 from hobble.config.load import Catalogue
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.datasets import Datasets
+from hobble.workflow.told import folder
 
 
 class Configurations:
@@ -41,13 +42,13 @@ class Configurations:
         """The name of the data set that it learns from."""
         return self.catalogue.configuration(configuration).dataset
 
-    def selection(self, configuration: str) -> str:
-        """Which clips it trains on: `healthy`, or `all` with severities as inputs."""
-        return "all" if self.catalogue.configuration(configuration).injury else "healthy"
+    def channels(self, configuration: str) -> tuple[str, ...]:
+        """The channels that its network is told."""
+        return self.catalogue.configuration(configuration).channels
 
     def splits(self, configuration: str) -> dict[str, str]:
         """Clip -> split."""
-        return self.datasets.selected(self.dataset(configuration), self.selection(configuration))
+        return self.datasets.selected(self.dataset(configuration), self.channels(configuration))
 
     def of_dataset(self, configuration: str, pattern: str) -> list[str]:
         """`pattern` (with {clip} in it, or not) under the configuration's data set, for each of its clips."""
@@ -60,13 +61,17 @@ class Configurations:
         """The configuration whose network it reads: itself, or another."""
         return self.catalogue.configuration(configuration).network_of or configuration
 
+    def kind(self, configuration: str) -> str:
+        """The package of the kind of network that it trains or reads: hobble.models.pfnn."""
+        return f"hobble.models.{self.catalogue.configuration(self.owner(configuration)).network.kind}"
+
     def network(self, configuration: str, file: str) -> str:
         """A file of the configuration's network, or of the network it reads."""
         return f"results/{self.owner(configuration)}/network/{file}"
 
     def database(self, configuration: str) -> str:
         """The database that the configuration learns from."""
-        return f"{DATASETS}/{self.dataset(configuration)}/database/{self.selection(configuration)}"
+        return f"{DATASETS}/{self.dataset(configuration)}/database/{folder(self.channels(configuration))}"
 
     def start(self, configuration: str) -> list[str]:
         """The checkpoint that training goes on from, if it continues another configuration's."""

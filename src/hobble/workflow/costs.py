@@ -7,7 +7,7 @@ from pathlib import Path
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.configurations import Configurations
 
-OF_DATASET = ("synthetic", "motion", "labels", "injury", "terrain", "database")
+OF_DATASET = ("synthetic", "motion", "labels", "channels", "terrain", "database")
 
 Places = dict[str, list[str]]
 

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from hobble.config.load import Catalogue
-from hobble.config.models import hurts
 from hobble.core.errors import HobbleError
-from hobble.core.untrusted import MOST_TEXT, read_bytes
-from hobble.workflow.clips import MIRROR, Clips
+from hobble.core.section import Section
+from hobble.workflow.clips import MIRROR, Clips, original
 
 
 class Datasets:
     """The data sets of a project, with the clips that lie in its folders."""
 
     def __init__(self, catalogue: Catalogue, clips: Clips) -> None:
-        self.catalogue, self.clips = catalogue, clips
+        self.catalogue, self.clips, self.told = catalogue, clips, clips.told
 
     def options(self, dataset: str, section: str, *keys: str) -> dict[str, Any]:
         """Plain values of one section of a data set: of those `keys`, or of all where none is named."""
         values = getattr(self.catalogue.dataset(dataset), section).model_dump(mode="json")
         return {key: values[key] for key in keys} if keys else values
+
+    def part(self, dataset: str, section: str, model: type[Section]) -> dict[str, Any]:
+        """Plain values of the keys of a section that `model` has: what one rule reads of it."""
+        return self.options(dataset, section, *model.model_fields)
 
     def motion_options(self, dataset: str, clip: str) -> dict[str, Any]:
         """The motion section, with what the clip's entry overrules, and the ground that the clip is on."""
@@ -32,31 +36,33 @@ class Datasets:
         """Synthetic clips: the frames at 60 Hz that fall to this one."""
         synthetic = self.catalogue.dataset(dataset).synthetic
         assert synthetic is not None
-        total = sum(entry.share for entry in self.clips.of(dataset).values())
+        total = sum(entry.share for entry in self.clips.own(dataset).values())
         return round(synthetic.frames * self.clips.entry(dataset, clip).share / total)
 
-    def is_injured(self, dataset: str, clip: str) -> bool:
-        """Whether anything hurts in the clip, by the configuration or by its status file."""
-        if self.clips.entry(dataset, clip).is_injured:
-            return True
-        if self.catalogue.dataset(dataset).synthetic is not None:
-            return False
-        files = self.clips.status_files(dataset, clip)
-        return any(hurts(read_bytes(file, MOST_TEXT).decode("latin-1")) for file in files)
+    def selected(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
+        """Clip -> "train" or "held_out", of the clips that no other channel tells anything.
 
-    def selected(self, dataset: str, selection: str) -> dict[str, str]:
-        """Clip -> "train" or "held_out", of the `healthy` or of `all` clips; mirrors go with originals."""
+        channels: those that the network is told. Mirrors go with originals. Raises HobbleError where the data
+        set lacks one of `channels`, or no clip is left to train on.
+        """
+        there = self.told.channels(dataset)
+        if lacking := [name for name in channels if name not in there]:
+            raise HobbleError(
+                f"data set {dataset} says nothing of {', '.join(lacking)}: give it a section "
+                f"`channels: {{{lacking[0]}: ...}}`, or take another data set"
+            )
+        others = [name for name in there if name not in channels]
         model, clips = self.catalogue.dataset(dataset), self.clips.of(dataset)
         held_out = set(model.held_out)
-        if missing := held_out - set(clips):
+        if missing := held_out - set(self.clips.own(dataset)):
             raise HobbleError(f"data set {dataset}: held_out names no clip: {', '.join(sorted(missing))}")
         splits = {}
         for clip in clips:
-            if selection == "healthy" and self.is_injured(dataset, clip):
+            if not all(self.told.neutral(dataset, clip, name) for name in others):
                 continue
             for name in (clip, clip + MIRROR) if model.mirror else (clip,):
-                splits[name] = "held_out" if clip in held_out else "train"
+                splits[name] = "held_out" if original(clip) in held_out else "train"
         if "train" not in splits.values():
-            kind = "healthy clip" if selection == "healthy" else "clip"
-            raise HobbleError(f"data set {dataset}: no {kind} is left to train on")
+            only = f" that is told nothing of {' or '.join(others)}" if others else ""
+            raise HobbleError(f"data set {dataset}: no clip{only} is left to train on")
         return splits

@@ -13,8 +13,11 @@ import os
 import re
 from pathlib import Path
 
+from hobble.channels import channel
 from hobble.measures.registry import measure
-from hobble.workflow.clips import MIRROR
+from hobble.models import model
+from hobble.rows.layout import RowLayout
+from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 
 ENGINE_MB = 400  # Snakemake, twice in a cluster's job: as the step that SLURM starts, and beside the script
@@ -95,14 +98,20 @@ class Demands:
 
     def thousands(self, dataset: str, clip: str) -> float:
         """Thousands of frames at the data set's rate, as if of 31 joints."""
-        return self._frames(dataset, clip.removesuffix(MIRROR)) / 1e3 * self._joints(dataset) / JOINTS
+        return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / JOINTS
 
     def weights(self, configuration: str) -> float:
-        """Weights of the network, of all its control points, by the sizes of the rows of a figure."""
-        network = self.project.configurations.section(configuration, "network")
-        joints = self._joints(self.project.configurations.dataset(configuration))
-        inputs, outputs, units = 156 + 7 * joints, 32 + 9 * joints, network["units"]
-        return network["control_points"] * units * (inputs + (network["hidden_layers"] - 1) * units + outputs)
+        """Numbers that are trained, by the columns of the configuration's rows."""
+        chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
+        return model(chosen.network.kind).parameters(chosen.network, layout.x_size, layout.y_size)
+
+    def layout(self, configuration: str) -> RowLayout:
+        """The columns of a configuration's rows."""
+        chosen = self.project.catalogue.configuration(configuration)
+        skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(chosen.dataset).skeleton)
+        of_rows = self.project.datasets.options(chosen.dataset, "database", "window", "step")
+        told = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
+        return RowLayout(joints=len(skeleton.joints), channels=told, **of_rows)
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
     def all_thousands(self, dataset: str) -> float:

@@ -1,85 +1,197 @@
-"""A hash of what a script really runs: its own code and that of every project module it imports."""
+"""A hash of what a rule computes: of its script and of every project module that this one imports.
+
+What cannot change a result does not count: comments, docstrings, annotations of functions, the words of
+errors and log messages, descriptions of options. Nor do the fields of a configuration's section, whose values
+reach the rule as params, nor the modules of `INFRASTRUCTURE`.
+"""
 
 from __future__ import annotations
 
 import ast
 import functools
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
+
+# Modules (or packages) without a part in any result, and why. A change there re-runs nothing.
+INFRASTRUCTURE = {
+    "hobble.config": "its values are params of the rules",
+    "hobble.workflow": "the frame around a job, and what the Snakefile asks",
+    "hobble.core.errors": "how a refusal is worded",
+    "hobble.core.files": "what is written comes back the same, or is refused",
+    "hobble.core.section": "how the configuration is checked, before there is a job",
+    "hobble.core.untrusted": "limits of what is read; within them a file is what it is",
+}
+LOGGERS = {"log", "logger", "logging", "warnings"}
+LEVELS = {"debug", "info", "warning", "error", "exception", "critical", "warn"}
+WORDLESS = {"__future__", "collections.abc", "logging", "typing", "warnings"}
 
 
 def fingerprint(script: Path, source: Path, modules: Iterable[str] = ()) -> str:
     """Hash `script` and its import closure among the packages under `source`.
 
-    modules: full names of modules that the script imports by a name it is told. Comments, blank lines and
-    docstrings do not count, so that editing them re-runs nothing.
+    modules: full names of modules that the script imports by a name it is told.
     """
-    digest = hashlib.sha256(_stripped(script).encode())
-    for module in sorted(closure(script, source, modules)):
-        digest.update(_stripped(module).encode())
+    files = [_module(path, source) for path in (script, *sorted(closure(script, source, modules)))]
+    used = frozenset().union(*(file.names for file in files))
+    digest = hashlib.sha256()
+    for module in files:
+        digest.update(module.digest)
+        for name, text in module.texts:
+            if name in used:  # else it stands in messages only
+                digest.update(f"{name}={text}".encode())
     return digest.hexdigest()[:16]
 
 
 def closure(script: Path, source: Path, modules: Iterable[str] = ()) -> set[Path]:
-    """The project files that `script` imports, directly or through others, and `modules` with theirs."""
-    found: set[Path] = set()
-    waiting = list(_imports(script, source))
-    for module in modules:
-        waiting += _files_of(module, source)
+    """The project files that `script` imports, directly or through others, and `modules` with theirs.
+
+    Without the infrastructure.
+    """
+    found = {path for module in modules for path in _files_of(module, source)}
+    waiting = [script, *found]
     while waiting:
-        path = waiting.pop()
-        if path not in found:
-            found.add(path)
-            waiting += _imports(path, source)
+        new = set(_module(waiting.pop(), source).imports) - found
+        found |= new
+        waiting += new
     return found
 
 
-@functools.cache
-def _tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+@dataclass(frozen=True)
+class _Module:
+    """What counts of a module.
+
+    digest: of its code. texts: its constants that are texts, which count where something but a message uses
+    them. names: what its code uses. imports: project files.
+    """
+
+    digest: bytes
+    texts: tuple[tuple[str, str], ...]
+    names: frozenset[str]
+    imports: frozenset[Path]
 
 
 @functools.cache
-def _stripped(path: Path) -> str:
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list) and body and _is_docstring(body[0]):
-            body[0] = ast.Pass()
-    return ast.dump(tree)
-
-
-def _is_docstring(node: ast.stmt) -> bool:
-    return (
-        isinstance(node, ast.Expr)
-        and isinstance(node.value, ast.Constant)
-        and isinstance(node.value.value, str)
+def _module(path: Path, source: Path) -> _Module:
+    bare = _Bare()
+    tree = bare.visit(ast.parse(path.read_text(encoding="utf-8"), filename=str(path)))
+    texts, code = [], []
+    for node in tree.body:
+        if (constant := _text(node)) is not None:
+            texts.append(constant)
+        else:
+            code.append(ast.dump(node))
+    imports = {file for name in bare.imported for file in _files_of(name, source)}
+    return _Module(
+        hashlib.sha256("\n".join(code).encode()).digest(),
+        tuple(texts),
+        frozenset(bare.names),
+        frozenset(imports),
     )
 
 
+class _Bare(ast.NodeTransformer):
+    """Takes away what cannot change a result; notes of the rest which names it uses and what it imports."""
+
+    def __init__(self) -> None:
+        self.names: set[str] = set()
+        self.imported: set[str] = set()
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        if isinstance(node.ctx, ast.Load):
+            self.names.add(node.id)
+        return node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        self.names.add(node.attr)
+        return self.generic_visit(node)
+
+    def visit_Expr(self, node: ast.Expr) -> ast.AST:
+        value = node.value
+        if isinstance(value, ast.Constant) and isinstance(value.value, str):
+            return ast.Pass()  # a docstring
+        if isinstance(value, ast.Call) and isinstance(value.func, ast.Attribute):
+            place = value.func.value
+            if value.func.attr in LEVELS and isinstance(place, ast.Name) and place.id in LOGGERS:
+                return ast.Pass()
+        return self.generic_visit(node)
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        name = _name(node.func)
+        if name.endswith("Error"):
+            return ast.Call(node.func, [], [])
+        if name == "Field":
+            node.keywords = [keyword for keyword in node.keywords if keyword.arg != "description"]
+        return self.generic_visit(node)
+
+    def visit_Assert(self, node: ast.Assert) -> ast.AST:
+        node.msg = None
+        return self.generic_visit(node)
+
+    def visit_ClassDef(self, node: ast.ClassDef) -> ast.AST:
+        if any(_name(base) == "Section" for base in node.bases):
+            node.body = [part for part in node.body if not isinstance(part, ast.AnnAssign)] or [ast.Pass()]
+        return self.generic_visit(node)
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
+        node.returns = None
+        return self.generic_visit(node)
+
+    def visit_arg(self, node: ast.arg) -> ast.AST:
+        node.annotation = None
+        return node
+
+    def visit_If(self, node: ast.If) -> ast.AST:
+        return ast.Pass() if _name(node.test) == "TYPE_CHECKING" else self.generic_visit(node)
+
+    def visit_Import(self, node: ast.Import) -> ast.AST:
+        names = [alias.name for alias in node.names]
+        self.imported.update(name for name in names if not _is_infrastructure(name))
+        return node
+
+    def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST:
+        module = node.module or ""
+        if module in WORDLESS or _is_infrastructure(module):
+            return ast.Pass()
+        if not node.level:
+            full = [f"{module}.{alias.name}" for alias in node.names]
+            self.imported.update(name for name in (module, *full) if not _is_infrastructure(name))
+            node.names = [alias for alias in node.names if not _is_infrastructure(f"{module}.{alias.name}")]
+        return node if node.names else ast.Pass()
+
+
+def _name(node: ast.AST) -> str:
+    """The last part of a dotted name, "" of anything else."""
+    if isinstance(node, ast.Attribute):
+        return node.attr
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def _text(node: ast.stmt) -> tuple[str, str] | None:
+    """Name and content of a module's constant that is a text."""
+    if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
+        if isinstance(node.value, ast.JoinedStr):
+            return node.targets[0].id, ast.dump(node.value)
+        if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            return node.targets[0].id, node.value.value
+    return None
+
+
+def _is_infrastructure(module: str) -> bool:
+    return any(module == name or module.startswith(f"{name}.") for name in INFRASTRUCTURE)
+
+
 @functools.cache
-def _imports(path: Path, source: Path) -> frozenset[Path]:
-    found: set[Path] = set()
-    for node in ast.walk(_tree(path)):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names = [node.module] + [f"{node.module}.{alias.name}" for alias in node.names]
-        else:
-            continue
-        for name in names:
-            found |= _files_of(name, source)
-    return frozenset(found)
+def _files_of(module: str, source: Path) -> tuple[Path, ...]:
+    return tuple(_found(module, source))
 
 
-def _files_of(module: str, source: Path) -> set[Path]:
+def _found(module: str, source: Path) -> Iterator[Path]:
     """The module's file and the `__init__.py` of each package on the way to it."""
     parts = module.split(".")
-    files = set()
     for n in range(1, len(parts) + 1):
         here = source.joinpath(*parts[:n])
         for candidate in (here / "__init__.py", here.with_suffix(".py")):
             if candidate.is_file():
-                files.add(candidate)
-    return files
+                yield candidate

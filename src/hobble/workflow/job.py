@@ -12,6 +12,7 @@ from typing import Any
 
 from hobble.core.errors import HobbleError
 from hobble.workflow import checksums
+from hobble.workflow.lifetime import ends_with_run
 from hobble.workflow.usage import peak_memory_mb
 
 BUG = "This is a fault of Hobble, not of your data; please report it with the log."
@@ -35,17 +36,20 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
     to_file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     to_terminal = logging.StreamHandler(sys.stderr)
     to_terminal.setLevel(logging.WARNING)
-    to_terminal.setFormatter(logging.Formatter(f"{snakemake.rule}: %(message)s"))
+    # On a terminal the line of progress gives way.
+    wiped = "\r\x1b[K" if sys.stderr.isatty() else ""
+    to_terminal.setFormatter(logging.Formatter(f"{wiped}{snakemake.rule}: %(message)s"))
     logger.handlers = [to_file, to_terminal]
     logging.captureWarnings(True)
     inputs, outputs = getattr(snakemake, "input", ()), getattr(snakemake, "output", ())
     try:
         checksums.forget(outputs)
-        before = checksums.stamps(inputs)
-        checksums.verify(inputs)
-        yield logger
-        checksums.check_unchanged(before)
-        checksums.record(outputs)
+        with ends_with_run():
+            before = checksums.stamps(inputs)
+            checksums.verify(inputs)
+            yield logger
+            checksums.check_unchanged(before)
+            checksums.record(outputs)
         logger.info("took %.0f MB of memory at most", peak_memory_mb())
     except HobbleError as error:
         logger.error("%s", error)

@@ -57,6 +57,6 @@ class Measurements:
         """Full name of its package."""
         return measure(name).package
 
-    def code(self, name: str) -> str:
-        """Fingerprint of what it runs."""
-        return self.package.code("measure", measure(name).module("run"))
+    def code(self, name: str, *modules: str) -> str:
+        """Fingerprint of what it runs, and of other modules that it finds by name: of the network."""
+        return self.package.code("measure", measure(name).module("run"), *modules)

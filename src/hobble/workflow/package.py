@@ -30,7 +30,8 @@ class Package:
 
     def web(self, suffix: str) -> list[str]:
         """The page's scripts (".js"), or what says which packages they need (".json")."""
-        return sorted(str(p) for p in (self.folder / "report" / "web").iterdir() if p.suffix == suffix)
+        files = [*(self.folder / "report" / "web").iterdir(), *self.folder.glob("models/*/*.js")]
+        return sorted(str(path) for path in files if path.suffix == suffix)
 
     def published(self) -> str:
         """The file of published figures that stand beside ours."""

@@ -13,8 +13,9 @@ from hobble.workflow.comparison import COMPARE
 from hobble.workflow.project import Project
 
 if TYPE_CHECKING:
-    from hobble.config.models import ClipEntry, Configuration, SkeletonFile
+    from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 
+HURTS = "injury"  # the channel that stimuli show
 PAGE = "page"  # under results/: what all reports share
 
 
@@ -44,13 +45,14 @@ def _configuration(project: Project, name: str) -> None:
     if model.training.continues:
         _goes_on(name, model, project.catalogue.configuration(model.training.continues))
     _dataset(project, model.dataset)
+    project.datasets.selected(model.dataset, model.channels)
 
 
 def _goes_on(name: str, model: Configuration, start: Configuration) -> None:
     """A training goes on with a network of the same shape, and counts its passes in sections."""
     begun = model.training.continues
     for key, mine, of_start in (
-        ("injury", model.injury, start.injury),
+        ("channels", list(model.channels), list(start.channels)),
         ("network", model.network.model_dump(), start.network.model_dump()),
         ("training.sections", model.training.sections, start.training.sections),
     ):
@@ -68,21 +70,19 @@ def _goes_on(name: str, model: Configuration, start: Configuration) -> None:
 def _dataset(project: Project, name: str) -> None:
     model = project.catalogue.dataset(name)
     skeleton = project.catalogue.skeleton(model.skeleton)
-    for clip, entry in project.clips.of(name).items():
+    for clip, entry in project.clips.own(name).items():
         project.clips.rig_files(name, clip)
-        _entry(f"data set {name}: clips.{clip}", entry, [f"{a}-{b}" for a, b in skeleton.links])
-    project.datasets.selected(name, "all")
+        _entry(f"data set {name}: clips.{clip}", entry)
+    _hurt(name, model, [f"{a}-{b}" for a, b in skeleton.links])
+    project.datasets.told.check(name)
+    project.datasets.selected(name, project.datasets.told.channels(name))
     if model.mirror:
         _mirrored(model.skeleton, skeleton)
 
 
-def _entry(where: str, entry: ClipEntry, links: Sequence[str]) -> None:
-    """What a clip's entry names: links that there are, severities from 0 to 10, what the walker can do."""
-    # Imported where there is something to check: they bring numpy, which takes longer than all else here.
-    if entry.status is not None:
-        from hobble.channels.injury.status import parse_links
-
-        parse_links(entry.status, links, f"{where}.status")
+def _entry(where: str, entry: ClipEntry) -> None:
+    """What a clip's entry asks of the walker: what it can do."""
+    # Imported where there is something to check: it brings numpy, which takes longer than all else here.
     if entry.injured is not None:
         check_link(entry.injured, where)
     if entry.recipe is not None:
@@ -94,6 +94,20 @@ def _entry(where: str, entry: ClipEntry, links: Sequence[str]) -> None:
                 f"no such recipe: {entry.recipe:.80}",
                 fix=f"There are {', '.join(RECIPES)}.",
             )
+
+
+def _hurt(name: str, model: Dataset, links: Sequence[str]) -> None:
+    """What a data set says of hurt versions: links that there are."""
+    if model.hurt is None or not model.hurt.versions:
+        return
+    if not links:
+        raise HobbleError(
+            f"data set {name}: hurt: skeleton {model.skeleton} has no links. List `links` there."
+        )
+    if odd := [link for link in model.hurt.links if link not in links]:
+        raise HobbleError(
+            f"data set {name}: hurt.links: no such link: {', '.join(odd)}. There are {', '.join(links)}."
+        )
 
 
 def _mirrored(name: str, skeleton: SkeletonFile) -> None:
@@ -109,11 +123,11 @@ def _mirrored(name: str, skeleton: SkeletonFile) -> None:
 def _asked(project: Project, name: str, folder: str, file: str) -> None:
     """What no network of this configuration could give, though it were trained."""
     owner = project.catalogue.configuration(name).network_of or name
-    if folder == "stimuli" and not project.catalogue.configuration(owner).injury:
+    if folder == "stimuli" and HURTS not in project.catalogue.configuration(owner).channels:
         raise HobbleError(
-            f"results/{name}/stimuli: configuration {owner} has `injury: false`, so nothing can hurt its "
-            "character. Ask for results/injured/stimuli, or for those of a configuration of your own with "
-            "`extends: injured`."
+            f"results/{name}/stimuli: the network of configuration {owner} is not told {HURTS}, so nothing "
+            "can hurt its character. Ask for results/injured/stimuli, or for those of a configuration of "
+            "your own with `extends: injured`."
         )
     stem, _, suffix = file.rpartition(".")
     if folder == "export" and suffix == "onnx" and stem not in get_args(PhaseMode):

@@ -14,8 +14,8 @@ from hobble.channels.injury.recognition.run import HEALTHY, Window, recognition,
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.evaluation.captured import Captured
-from hobble.evaluation.discriminant import learn
 from hobble.evaluation.gait_features import features
+from hobble.gait.discriminant import learn
 from hobble.runtime.options import Runtime
 
 RUNTIME = Runtime(steering=1.0)
@@ -53,7 +53,8 @@ def clip(network, name: str, link: str | None, severity: float, seed: int, frame
     root = np.zeros((frames, 3))
     root[:, 2] = 2.0 * np.arange(frames)
     still = np.zeros(frames)
-    return Captured(name, local, contacts, still, severities, gait, velocity, root, still, np.arange(frames))
+    told, rows = {"injury": severities}, np.arange(frames)
+    return Captured(name, local, contacts, still, told, gait, velocity, root, still, rows)
 
 
 @pytest.fixture
@@ -150,13 +151,13 @@ def test_windows_are_of_one_hurt_walking_ahead(hurtable) -> None:
     assert walking_windows(aside, hurtable) == []
     assert walking_windows(replace(good, velocity=0.1 * good.velocity), hurtable) == []
     assert walking_windows(replace(good, gait=0 * good.gait), hurtable) == []
-    severity = good.severity.copy()
+    severity = good.told["injury"].copy()
     severity[150:] = 0  # half way through the second part, in which no window is all of a kind
-    healed = walking_windows(replace(good, severity=severity), hurtable)
+    healed = walking_windows(replace(good, told={"injury": severity}), hurtable)
     assert [w.hurt for w in healed] == [KNEE] * 3 + [HEALTHY] * 6
-    severity = good.severity.copy()
+    severity = good.told["injury"].copy()
     severity[:, hurtable.links.index(ARM)] = 2
-    both = walking_windows(replace(good, severity=severity), hurtable)
+    both = walking_windows(replace(good, told={"injury": severity}), hurtable)
     assert {(w.hurt, w.severity) for w in both} == {(f"{KNEE} and {ARM}", 5.0)}
     assert module.WINDOW == 60
 

@@ -34,7 +34,9 @@ def slowing(hurtable, links: tuple[str, ...] = (KNEE,)):
     weights = [np.zeros_like(w) for w in hurtable.weights]
     biases = [np.zeros_like(b) for b in hurtable.biases]
     for link in links:
-        weights[0][:, 0, layout.x_injury.start + hurtable.links.index(link)] = 2.0  # the inputs are over 20
+        weights[0][:, 0, layout.x_channel("injury").start + hurtable.links.index(link)] = (
+            2.0  # the inputs are over 20
+        )
     biases[0][:, 0] = 1.0
     weights[1][:, 0, 0] = 1.0
     head = layout.y_joint_position.start + 3 * hurtable.skeleton.role("head") + 1
@@ -103,7 +105,7 @@ def test_a_link_that_is_not_felt_changes_nothing(hurtable) -> None:
 
 def test_every_link_is_swept_and_those_never_hurt_are_marked(hurtable) -> None:
     seen = np.zeros_like(hurtable.x_mean)
-    start = hurtable.layout.x_injury.start
+    start = hurtable.layout.x_channel("injury").start
     seen[start + 7] = seen[start + 2] = 0.1
     result = response(replace(hurtable, x_mean=seen), links=None, seconds=0.2)
     hurt = ["LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg"]
@@ -217,7 +219,7 @@ def test_largest_accelerations_are_of_the_gait_and_the_hurt_link(hurtable) -> No
     clip = Captured(
         "a",
         *(np.zeros((6, 1, 3)), np.zeros((6, 4)), np.zeros(6)),
-        severity,
+        {"injury": severity},
         gait,
         np.zeros((6, 2)),
         np.zeros((6, 3)),

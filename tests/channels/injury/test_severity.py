@@ -10,20 +10,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hobble.channels.files import load_values, save_values, write_report
+from hobble.channels.injury.severity import (
+    clip_severity,
+    mirror_severity,
+    odd_ranges,
+    severity_matrix,
+    source_rows,
+)
+from hobble.channels.injury.status import Spell, Status, read_status
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.channels.injury.severity import (
-    clip_severity,
-    load_injury,
-    mirror_severity,
-    odd_ranges,
-    save_injury,
-    severity_matrix,
-    source_rows,
-    write_report,
-)
-from hobble.channels.injury.status import Spell, Status, read_status
 from hobble.motion.resample import sample_times
 
 THIGH, ARM = "LeftUpLeg-LeftLeg", "LeftArm-LeftForeArm"
@@ -173,15 +171,16 @@ def test_files_keep_columns_and_report_says_what_hurts(clip, tmp_path):
     severity[:60] = 0
     severity[90:120] = severity[90:120] / 2
     hurt = {"seconds": 4.0, "highest": 4.0, "spells": [[1.0, 1.5, 4.0], [1.5, 2.0, 2.0], [2.0, 5.0, 4.0]]}
-    save_injury(tmp_path / "a.npz", severity, clip.skeleton.link_names)
-    save_injury(tmp_path / "b.npz", severity, clip.skeleton.link_names)
+    save_values(tmp_path / "a.npz", severity, clip.skeleton.link_names)
+    save_values(tmp_path / "b.npz", severity, clip.skeleton.link_names)
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
-    read, links = load_injury(tmp_path / "a.npz")
+    read, links = load_values(tmp_path / "a.npz")
     assert (read == severity).all()
     assert links == clip.skeleton.link_names
-    write_report(tmp_path / "a.json", clip, severity, links, ["odd"])
+    write_report(tmp_path / "a.json", "injury", clip, severity, links, ["odd"])
     report = json.loads((tmp_path / "a.json").read_text())
-    assert report == {"clip": "walk", "hurt": {THIGH: hurt}, "warnings": ["odd"]}
+    told = {"clip": "walk", "channel": "injury", "title": "Injury", "told": {THIGH: hurt}}
+    assert report == {**told, "highest": 10.0, "warnings": ["odd"]}
 
 
 @pytest.mark.shared

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.core.errors import InputError
 from hobble.channels.injury.status import Spell, Status, format_status, read_status, write_status
+from hobble.core.errors import InputError
 
 LINKS = ("Hips-LHipJoint", "LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg", "LeftShoulder-LeftArm")
 

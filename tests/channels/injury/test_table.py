@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from hobble.core.errors import InputError
 from hobble.channels.injury.__main__ import main
 from hobble.channels.injury.status import read_status
 from hobble.channels.injury.table import bvh_frames, read_table, statuses, write_statuses
+from hobble.core.errors import InputError
 
 LINKS = ("LeftUpLeg-LeftLeg", "LowerBack-Spine")
 HEADER = "clip,link,severity,from,to\n"

@@ -1,4 +1,4 @@
-"""Write status files from a table: python -m hobble.channels.injury TABLE.csv FOLDER --skeleton SKELETON.yaml."""
+"""Status files from a table: python -m hobble.channels.injury TABLE.csv FOLDER --skeleton SKELETON.yaml."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from hobble.channels.injury.table import write_statuses
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import read_yaml
-from hobble.channels.injury.table import write_statuses
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hobble.channels.injury.status import Spell, Status, parse_links, read_status
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz, save_npz, write_json
 from hobble.core.quat import Array
-from hobble.channels.injury.status import Spell, Status, parse_links, read_status
 
 FPS = 60.0  # of every clip
 
@@ -99,43 +97,6 @@ def source_rows(frames: int, rows: int, motion: Mapping[str, Any]) -> Array:
     return np.clip(np.floor(at + 1e-6).astype(int), 0, rows - 1)
 
 
-def save_injury(path: str | Path, severity: Array, links: Sequence[str]) -> None:
-    """Write severities (F, L) and the links they belong to as one npz file."""
-    save_npz(path, severity=severity, links=np.array(list(links), dtype=np.str_))
-
-
-def load_injury(path: str | Path) -> tuple[Array, tuple[str, ...]]:
-    """Severities (F, L) and the names of the links."""
-    data = load_npz(path)
-    return data["severity"], tuple(str(link) for link in data["links"])
-
-
 def mirror_severity(severity: Array, mirror_links: Array) -> Array:
     """Severities (F, L) of the mirrored clip: what hurt on the left hurts on the right."""
     return np.ascontiguousarray(severity[:, mirror_links])
-
-
-def write_report(
-    path: str | Path, clip: Clip, severity: Array, links: Sequence[str], warnings: Sequence[str]
-) -> None:
-    """Write the JSON beside the severities: for each link hurt, for how long, how much at most, and when."""
-    hurt = {
-        link: {
-            "seconds": float(np.sum(column > 0) / clip.fps),
-            "highest": float(column.max()),
-            "spells": _spells(column, clip.fps),
-        }
-        for link, column in zip(links, severity.T, strict=True)
-        if column.any()
-    }
-    write_json(path, {"clip": clip.name, "hurt": hurt, "warnings": list(warnings)})
-
-
-def _spells(column: Array, fps: float) -> list[list[float]]:
-    """[from, to, severity] in seconds of each stretch of one severity above 0."""
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(column)) + 1, [len(column)]])
-    return [
-        [round(float(a / fps), 3), round(float(b / fps), 3), float(column[a])]
-        for a, b in itertools.pairwise(edges)
-        if column[a] > 0
-    ]

@@ -17,10 +17,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from hobble.channels.injury.status import Spell, Status, check_link, check_severity, write_status
 from hobble.core.clip_files import find_clips, the_file
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_text
-from hobble.channels.injury.status import Spell, Status, check_link, check_severity, write_status
 
 COUNT = re.compile(r"\d{1,12}")
 COLUMNS = ("clip", "link", "severity", "from", "to")

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
 
+import numpy as np
+
 from hobble.evaluation.measured import Measured
 from hobble.evaluation.side_by_side import SideBySide, beside, pair
 from hobble.measures.accuracy.run import SPLITS, clip_rows
@@ -38,12 +40,22 @@ def accuracy_differences(all_measured: Sequence[Measured]) -> list[dict[str, Any
     """Eq. 3.2 of each pair: over each split, and for each clip that both were measured on."""
     out = []
     for a, b in combinations(all_measured, 2):
-        ours = {**{s: a.found(NAME)[s] for s in ("train", "held_out")}, **_clips(a)}
-        theirs = {**{s: b.found(NAME)[s] for s in ("train", "held_out")}, **_clips(b)}
+        ours, theirs = ({**_of_splits(m), **_clips(m)} for m in (a, b))
         for over in ours:
             if over in theirs and ours[over]["frames"] and theirs[over]["frames"]:
                 out.append({"a": a.name, "b": b.name, "over": over, **pair(ours[over], theirs[over])})
     return out
+
+
+def _of_splits(measured: Measured) -> dict[str, Any]:
+    """Split -> its errors over all frames, and the `means` of its clips."""
+    found = measured.found(NAME)
+    return {split: {**found[split], "means": clip_means(found, split)} for split in SPLITS}
+
+
+def clip_means(found: Json, split: str) -> list[float]:
+    """The mean error of each clip of a split."""
+    return [c["mean"] for c in found["clips"] if c["split"] == split and c["mean"] is not None]
 
 
 def _splits(all_measured: Sequence[Measured], published: Json) -> list[dict[str, Any]]:
@@ -54,6 +66,13 @@ def _splits(all_measured: Sequence[Measured], published: Json) -> list[dict[str,
         for split in SPLITS:
             ours = m.found(NAME)[split]["mean_of_clips"] if m else None
             out.append(beside(f"relative error, {split} clips", row, row["mean"], ours))
+            if "sd" in row:
+                in_text = {**row, "table": None}
+                means = clip_means(m.found(NAME), split) if m else []
+                sd = float(np.std(means)) if len(means) > 1 else None
+                out.append(
+                    beside(f"standard deviation of the means of {split} clips", in_text, row["sd"], sd)
+                )
     return out
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 from typing import Any
 
 from hobble.measures.accuracy.page import quantiles
@@ -12,6 +13,9 @@ from hobble.report.measured import Overview
 from hobble.report.parts import Part, Section
 from hobble.report.side_by_side import SPLITS, Compared, colours, dots, names
 from hobble.report.tables import Column
+
+# Which standard deviation eq. 3.2 divides by.
+KINDS = {"difference_of_means": "sd of the means of clips", "difference": "sd of single frames"}
 
 
 def section(compared: Compared) -> Section:
@@ -126,14 +130,14 @@ def clip_dots(compared: Compared) -> Chart | None:
 
 
 def difference_map(compared: Compared) -> Chart | None:
-    """Eq. 3.2 of every pair."""
+    """Eq. 3.2 of every pair, with both kinds of deviation."""
     order, options = names(compared), {}
-    for over, label in SPLITS.items():
-        found = {(r["a"], r["b"]): r["difference"] for r in compared["difference"] if r["over"] == over}
-        if not found:
+    for (over, split), (key, kind) in product(SPLITS.items(), KINDS.items()):
+        found = {(r["a"], r["b"]): r[key] for r in compared["difference"] if r["over"] == over}
+        if all(value is None for value in found.values()):
             continue
         cells = [[found.get((a, b), found.get((b, a))) for b in order] for a in order]
-        options[label] = [
+        options[f"{split}, {kind}"] = [
             {
                 "type": "heatmap",
                 "x": order,
@@ -157,8 +161,10 @@ def difference_map(compared: Compared) -> Chart | None:
     return Chart(
         "compare-difference",
         "How far apart two configurations are",
-        "Eq. 3.2 of Segerstedt: twice the distance of the means over the sum of the standard deviations. "
-        "Under 0.2 the two can hardly be told apart; 1 means that the means lie a standard deviation apart.",
+        "Eq. 3.2 of Segerstedt: twice the distance of the means over the sum of the standard deviations. He "
+        "divides by the deviations of the means of the clips; those of single frames are several times as "
+        "large. 1 means that the means lie a standard deviation apart. Our own rule of thumb: under 0.2 the "
+        "two can hardly be told apart.",
         layout=layout,
         height=max(240, 90 + 42 * len(order)),
         choose="Error over",

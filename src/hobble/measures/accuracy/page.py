@@ -12,6 +12,7 @@ from hobble.report.charts import Chart, axis, mark
 from hobble.report.formats import number
 from hobble.report.gather import Material
 from hobble.report.parts import Fragment, Part, Section, Words
+from hobble.report.published import cited
 from hobble.report.summary import Figure, Hint, placed
 from hobble.report.tables import Column, Table
 
@@ -165,7 +166,7 @@ def beside_published(found: Json, material: Material) -> Table:
             rows.append([what, part["mean"], part.get("sd"), part.get("position_error_cm"), "this report"])
     sources = material.published["sources"]
     for entry in material.published["accuracy"]:
-        rows.append([entry["label"], entry["mean"], None, None, sources[entry["source"]]])
+        rows.append([entry["label"], entry["mean"], None, None, cited(entry, sources)])
     columns = [
         Column("network"),
         Column.number("mean"),

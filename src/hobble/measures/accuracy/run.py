@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +17,13 @@ import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
-from hobble.database.clip_rows import ClipRows, expanded, load_clip_rows
-from hobble.database.layout import RowLayout
 from hobble.database.statistics import Moments
-from hobble.evaluation.predict import predict
 from hobble.measures.given import Given, Outcome
 from hobble.measures.joints import Joints
-from hobble.runtime.network import Network, load_network
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
+from hobble.rows.layout import RowLayout
 
 LEAST = 1e-3  # cm; below this a joint stands at the root itself and a relative error says nothing
 SPLITS = ("train", "held_out")
@@ -85,8 +85,8 @@ def clip_errors(network: Network, rows: ClipRows, joints: Sequence[int]) -> Erro
     """The errors over every frame and fit of a clip, a batch at a time."""
     layout = network.layout
     total, histogram = Moments.nothing(2), np.zeros(len(EDGES) - 1)
-    for pairs in expanded(rows, links=layout.links > 0):
-        errors = joint_errors(layout, pairs.y, predict(network, pairs.x, pairs.p), joints)
+    for pairs in expanded(rows, layout):
+        errors = joint_errors(layout, pairs.y, network.predict(pairs.x, pairs.p), joints)
         weights = np.repeat(pairs.weight / len(joints), len(joints))
         errors = errors.reshape(-1, 2)
         total = total + Moments.of(errors, weights)
@@ -155,12 +155,8 @@ def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[
 def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
     """Raise InputError, naming `where`, unless the network has learnt rows of this layout."""
     layout = network.layout
-    same = (layout.joints, layout.window, layout.step) == (
-        rows.layout.joints,
-        rows.layout.window,
-        rows.layout.step,
-    )
-    if not same or layout.links not in (0, rows.layout.links):
+    bare = rows.layout.told(()) == replace(layout, channels=(), order=())
+    if not bare or not set(layout.channels) <= set(rows.layout.channels):
         raise InputError(where, f"its rows ({rows.layout}) are not those the network has learnt ({layout})")
 
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
+import numpy as np
+
 from hobble.evaluation.compare_tables import flat
 from hobble.evaluation.measured import Measured
 from hobble.evaluation.series import line
@@ -52,7 +54,7 @@ def by_mode(measured: Measured) -> list[dict[str, Any]]:
 def _sizes(measured: Measured) -> dict[str, Any]:
     """Computations as Table 6.1 counts them, and bytes of the weights of so many phases."""
     counts = measured.found(NAME)["parameters"]
-    phases = {**PHASES, "cubic": measured.resolved["configuration"]["network"]["control_points"]}
+    phases = {**PHASES, "cubic": measured.resolved["configuration"]["network"].get("control_points", 1)}
     return {
         "computations": {key: counts[key] for key in COUNTS},
         "weights_bytes": {mode: count * counts["true"] * FLOAT for mode, count in phases.items()},
@@ -67,7 +69,11 @@ def time_differences(all_measured: Sequence[Measured]) -> list[dict[str, Any]]:
         for entry in by_mode(a):
             if entry["mode"] in theirs:
                 times = [
-                    {"mean": e["milliseconds"]["total"], "sd": e["milliseconds"]["spread"]["sd"]}
+                    {
+                        "mean": e["milliseconds"]["total"],
+                        "sd": e["milliseconds"]["spread"]["sd"],
+                        "means": lap_means(e),
+                    }
                     for e in (entry, theirs[entry["mode"]])
                 ]
                 out.append({"a": a.name, "b": b.name, "over": entry["mode"], **pair(*times)})
@@ -123,15 +129,22 @@ def _fit(
     }
 
 
+def lap_means(entry: Json) -> list[float]:
+    """Milliseconds a frame of each lap, all steps together."""
+    return [lap["milliseconds"]["total"] for lap in entry["laps"]]
+
+
 def _published_sizes(about: Mapping[str, Json], published: Json) -> list[dict[str, Any]]:
     out = []
     for row in published["computations"]:
         counts = about.get(row["configuration"], {}).get("computations", {})
-        out.append(beside("computations of Table 6.1", row, row["table_6_1"], counts.get(COUNTS[2])))
+        printed = {**row, "table": "6.1"}
+        out.append(beside("computations of Table 6.1", printed, row["table_6_1"], counts.get(COUNTS[2])))
         out.append(beside("parameters of a phase", row, row["parameters"], counts.get("true")))
-    for row in published["sizes"]:
-        ours = about.get(row["configuration"], {}).get("weights_bytes", {}).get("constant")
-        out.append(beside("weights of 50 phases", row, row["weights"], ours, "bytes"))
+    for row in published["stages"]:
+        if row["stage"] == "training" and "bytes" in row:
+            ours = about.get(row["configuration"], {}).get("weights_bytes", {}).get("constant")
+            out.append(beside("weights of 50 phases", row, row["bytes"], ours, "bytes"))
     return out
 
 
@@ -142,13 +155,16 @@ def _published_times(all_measured: Sequence[Measured], published: Json) -> list[
         m = found.get(row["configuration"])
         ours = m.found(NAME)["milliseconds"]["total"] if m else None
         out.append(beside("a frame", row, row["milliseconds"], ours, "ms"))
+        if "sd" in row:
+            in_text = {**row, "table": None}
+            means = lap_means(m.found(NAME)) if m else []
+            sd = float(np.std(means)) if len(means) > 1 else None
+            out.append(beside("standard deviation of the means of laps", in_text, row["sd"], sd, "ms"))
     for row in published["modes"]:
-        for m in all_measured:
-            times = {entry["mode"]: entry["milliseconds"]["predict"] for entry in by_mode(m)}
-            if row["mode"] in times:
-                named = {**row, "configuration": m.name}
-                what = f"a prediction, {row['mode']}"
-                out.append(beside(what, named, row["milliseconds"], times[row["mode"]], "ms"))
+        m = found.get(row["configuration"])
+        times = {e["mode"]: e["milliseconds"]["predict"] for e in by_mode(m)} if m else {}
+        what = f"a prediction, {row['mode']}"
+        out.append(beside(what, row, row["milliseconds"], times.get(row["mode"]), "ms"))
     return out
 
 

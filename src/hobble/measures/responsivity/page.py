@@ -10,6 +10,7 @@ from hobble.report.charts import Chart, Trace, axis, mark
 from hobble.report.formats import number
 from hobble.report.gather import Material
 from hobble.report.parts import Numbers, Part, Section, Words
+from hobble.report.published import cited
 from hobble.report.summary import Figure, Hint, placed
 from hobble.report.tables import Column, Table
 
@@ -212,14 +213,14 @@ def speed_published(found: Json, material: Material) -> Table | None:
         ]
     ]
     for entry in material.published["responsivity"]:
-        rows.append([entry["label"], None, entry["milliseconds"], sources[entry["source"]]])
+        rows.append([entry["label"], None, entry["milliseconds"], cited(entry, sources)])
     for entry in material.published["modes"]:
         rows.append(
             [
                 f"prediction alone, {entry['mode']} phase",
                 None,
                 entry["milliseconds"],
-                sources[entry["source"]],
+                cited(entry, sources),
             ]
         )
     columns = [

@@ -13,11 +13,11 @@ from hobble.core.quat import Array
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
 from hobble.measures.given import Given, Outcome
 from hobble.measures.responsivity import Options
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.controller import STEPS
-from hobble.runtime.network import Network, load_network
 from hobble.runtime.options import Runtime
-from hobble.runtime.predictor import MODES
 from hobble.runtime.waypoints import TRACK, Waypoint
 
 FPS = 60
@@ -31,21 +31,21 @@ def responsivity(
     runtime: Runtime,
     laps: int,
     lap_seconds: float,
-    modes: Sequence[str] = tuple(MODES),
+    modes: Sequence[str] | None = None,
     track: Sequence[Waypoint] = TRACK,
 ) -> dict[str, Any]:
     """Run `laps` laps of the track of Segerstedt 2021 in each of `modes` and in the runtime's own.
 
-    A lap that takes longer than `lap_seconds` of simulated time is
-    ended there, its remaining waypoints not reached, and the next one starts from the beginning of the track.
-    `modes` holds the laps of each mode and what they come to; those of the runtime's own mode stand at the
-    top too. Measured times stand under "milliseconds" only, each with the steps' means, their `total`, and
-    `spread`: sd, median and 99th percentile of the total, and the mean of a whole call.
+    modes: by default all that the network has. A lap that takes longer than `lap_seconds` of simulated time
+    is ended there, its remaining waypoints not reached, and the next one starts from the beginning of the
+    track. `modes` holds the laps of each mode and what they come to; those of the runtime's own mode stand at
+    the top too. Measured times stand under "milliseconds" only, each with the steps' means, their `total`,
+    and `spread`: sd, median and 99th percentile of the total, and the mean of a whole call.
     """
-    own = runtime.mode
+    own = network.mode(runtime.mode)
     found = {
         mode: _laps(network, runtime.model_copy(update={"mode": mode}), track, laps, lap_seconds)
-        for mode in dict.fromkeys((*modes, own))
+        for mode in dict.fromkeys((*map(network.mode, network.modes if modes is None else modes), own))
     }
     return {
         "configuration": configuration,

@@ -16,9 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from hobble.character.rule import met, moving, phase_change
 from hobble.core.quat import Array
-from hobble.database.clip_rows import ClipRows, load_clip_rows
-from hobble.database.layout import GAITS
 from hobble.database.statistics import Moments
 from hobble.evaluation.captured import turned, unbroken
 from hobble.measures.accuracy.run import (
@@ -30,13 +29,14 @@ from hobble.measures.accuracy.run import (
 )
 from hobble.measures.given import Given, Outcome
 from hobble.measures.rollouts import Options
-from hobble.runtime.network import load_network
-from hobble.runtime.predictor import Predictor
+from hobble.models.load import load_network
+from hobble.models.network import Predictor
+from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
+from hobble.rows.layout import GAITS, RowLayout
 
 LENGTHS = (1, 10, 60, 300)  # frames
 OVERLAP = 10  # roll-outs of one length that every frame lies in
 BATCH = 1024  # roll-outs side by side
-HALF = 0.5  # where a joint is carried by its velocity, and where it is predicted, meet
 
 log = logging.getLogger("hobble")
 
@@ -94,15 +94,10 @@ class Inputs:
     moving: Array
 
 
-def inputs(rows: ClipRows, chosen: np.ndarray, links: bool) -> Inputs:
-    """Of the rows `chosen` (F,), on the first fit of each; severities only with `links`."""
-    layout = rows.layout
+def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
+    """Of the rows `chosen` (F,), on the first fit of each, laid out as the network's `layout`."""
     fit = rows.first_fit[chosen]
-    severity = rows.severity[chosen] if links else rows.severity[chosen, :0]
-    x = np.concatenate([rows.x[chosen], rows.heights[fit], severity], axis=1, dtype=np.float32)
-    y = rows.y[chosen].astype(np.float32)
-    for values, joints in ((x, layout.x_joint_position), (y, layout.y_joint_position)):
-        values[:, joints.start + 1 : joints.stop : 3] -= rows.mean[fit, None]
+    x, y, *_ = pairs(rows, layout, chosen, fit)
     gait = x[:, layout.x_gait].reshape(len(x), len(GAITS), layout.samples)
     stand = gait[:, GAITS.index("stand"), layout.samples // 2]
     return Inputs(
@@ -112,7 +107,7 @@ def inputs(rows: ClipRows, chosen: np.ndarray, links: bool) -> Inputs:
         rows.p[chosen].astype(float),
         y[:, layout.y_turn][:, 0].astype(float),
         y[:, layout.y_root_velocity].astype(float),
-        np.maximum(0.0, 1.0 - stand) ** 0.25,
+        moving(stand),
     )
 
 
@@ -148,9 +143,9 @@ def roll_out(
         before = row[:, layout.x_joint_position].reshape(alive, -1, 3).astype(float)
         speed[:alive] = y[:, layout.y_joint_velocity].reshape(alive, -1, 3)
         guess = y[:, layout.y_joint_position].reshape(alive, -1, 3)
-        place[:alive] = HALF * (_carried(before, asked, at) + speed[:alive] + guess)
+        place[:alive] = met(_carried(before, asked, at) + speed[:alive], guess)
         made.append(place[:alive].copy())
-        moved = (0.9 * asked.moving[at] + 0.1) * y[:, layout.y_phase_change][:, 0]
+        moved = phase_change(asked.moving[at], y[:, layout.y_phase_change][:, 0])
         phase[:alive] = np.mod(phase[:alive] + moved, 1.0)
     return made, phase
 
@@ -174,7 +169,7 @@ def clip_roll_outs(
     layout = predictor.network.layout
     out = {length: Strayed() for length in lengths}
     for chosen in unbroken(rows.frame):
-        asked = inputs(rows, chosen, layout.links > 0)
+        asked = inputs(rows, chosen, layout)
         for length in lengths:
             all_starts = np.arange(1, len(chosen), max(1, length // OVERLAP))
             for first in range(0, len(all_starts), BATCH):
@@ -221,7 +216,7 @@ def measure_roll_outs(
     how phase is looked up. Raises InputError where rows and network differ.
     """
     network = load_network(weights)
-    predictor = Predictor(network, mode)
+    predictor = network.predictor(mode)
     joints = joint_indices(network, equivalents)
     total = {length: dict.fromkeys(SPLITS, Strayed()) for length in lengths}
     entries: dict[int, list[dict[str, Any]]] = {length: [] for length in lengths}

@@ -36,6 +36,11 @@ def _beside_people(measured: Measured, people: Json) -> list[dict[str, Any]]:
     hurt = [row for row in generated["by_severity"] if row["severity"] > 0]
     shares |= {f"severity {row['severity']:g}": row["right"] for row in hurt}
     return [
-        beside(f"hurt part named right, {which}", named, people["share"], ours)
+        beside(
+            f"hurt part named right, {which} (published: by people)",
+            named,
+            people["share"],
+            ours,
+        )
         for which, ours in shares.items()
     ]

@@ -53,9 +53,8 @@ def recognition_chart(found: Json) -> Chart | None:
         return None
     classes = len(found.get("classes") or ())
     people = found.get("people")
-    beside = (
-        f" People named the part right {100 * people:.0f} % of the time (Ferre et al.)." if people else ""
-    )
+    told = f" People named the part right {100 * people:.0f} % of the time" if people else ""
+    beside = f"{told} (Ferre 2019, of the figure of another network)." if told else ""
     return Chart(
         "recognition",
         "Can one tell what hurts?",

@@ -2,7 +2,7 @@
 
 It learns windows of the training clips, each labelled with the link that hurts. How well it names windows of
 captured motion that it has not seen is the ceiling; how well it names those of generated walks stands beside
-the share that people got right when shown figures (Ferre et al. 2019).
+the share that people got right when shown figures (Ferre 2019).
 """
 
 from __future__ import annotations
@@ -20,12 +20,14 @@ from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured, captured_clips
 from hobble.evaluation.crowd import FPS, Stretch, severities
 from hobble.evaluation.crowd import run as run_walks
-from hobble.evaluation.discriminant import Discriminant, learn
 from hobble.evaluation.gait_features import features
+from hobble.gait.discriminant import Discriminant, learn
 from hobble.measures.given import Given, Outcome
-from hobble.runtime.network import Network, load_network
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
+INJURY = "injury"  # the channel
 HEALTHY = "healthy"
 WINDOW = 60  # frames, about a cycle; captured motion that was left out is named less well by 75 or 90
 STEP = 15
@@ -95,7 +97,7 @@ def walking_windows(clip: Captured, network: Network) -> list[Window]:
     """The windows of a captured stretch in which it walks ahead and the same link hurts throughout."""
     assert network.skeleton is not None
     walk = clip.gait[:, network.gaits.index("walk")]
-    hurts = clip.severity > 0
+    hurts = clip.told[INJURY] > 0
     out = []
     for part, start in product(range(PARTS), range(0, len(clip), STEP)):
         first = part * len(clip) // PARTS + start
@@ -108,7 +110,7 @@ def walking_windows(clip: Captured, network: Network) -> list[Window]:
         if walk[span].mean() > 0.5 and ahead and same:
             names = [network.links[i] for i in np.flatnonzero(hurts[first])]
             values = _values(network.skeleton, clip.local, clip.contacts, clip.root, span)
-            severity = float(clip.severity[span].max())
+            severity = float(clip.told[INJURY][span].max())
             out.append(Window(clip.clip, " and ".join(names) or HEALTHY, severity, values, part))
     return out
 

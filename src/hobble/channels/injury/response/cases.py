@@ -14,7 +14,7 @@ from hobble.evaluation.crowd import FPS, Stretch, Walks, run, severities
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import apart, mean_cycle
 from hobble.evaluation.spearman import spearman
-from hobble.runtime.network import Network
+from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 FIRST = 7.0  # severity of the injury that stays while a second one comes
@@ -143,7 +143,7 @@ def divided_severities(
     ]
     out = []
     for scale in SCALES:
-        walks = run(network, script, runtime.model_copy(update={"severity_scale": scale}))
+        walks = run(network, script, runtime.model_copy(update={"scales": {"injury": scale}}))
         for i, link in enumerate(links):
             healthy = _cycle(walks, 1, i)
             own, speed = _from(walks, 1, i, healthy), _speed(network, walks, 1, i)

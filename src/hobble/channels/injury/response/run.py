@@ -13,9 +13,11 @@ from hobble.channels.injury.response.sweep import SEVERITIES, Sweep
 from hobble.evaluation.captured import Captured, captured_clips
 from hobble.evaluation.crowd import SPEEDS
 from hobble.measures.given import Given, Outcome
-from hobble.runtime.network import Network, load_network
+from hobble.models.load import load_network
+from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
+INJURY = "injury"  # the channel
 GAITS = tuple(SPEEDS)
 REASON = "this network has no severity inputs"
 SUMMARY = (
@@ -105,7 +107,7 @@ def largest_accelerations(
         for gait in GAITS:
             going = clip.gait[:, network.gaits.index(gait)] > 0.5
             hurt: list[tuple[str | None, Any]] = [(None, going)]
-            hurt += [(link, going & (clip.severity[:, i] > 0)) for i, link in enumerate(network.links)]
+            hurt += [(link, going & (clip.told[INJURY][:, i] > 0)) for i, link in enumerate(network.links)]
             for link, chosen in hurt:
                 if np.any(chosen):
                     found = round(float(clip.acceleration[chosen].max()), 5)

@@ -16,7 +16,7 @@ from hobble.evaluation.crowd import FPS, Stretch, Walks, run, severities
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import apart, mean_cycle, period, settling
 from hobble.evaluation.spearman import spearman
-from hobble.runtime.network import Network
+from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 SEVERITIES = np.arange(11.0)

@@ -1,0 +1,129 @@
+"""How well a limp is named: people who were left out, half-way limps, healthy walks, captured clips.
+
+python benchmarks/limps.py CMU_FOLDER [CLIP.bvh ...]
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from hobble.core.errors import HobbleError
+from hobble.core.files import load_npz
+from hobble.gait.compare import compare, healthy_profile
+from hobble.gait.derive_healthy import REFERENCE, healthy_windows
+from hobble.gait.graded import HEALTHY, Grader, grade, healthy_covariance, learn_grader
+from hobble.gait.people import GAITS, NORMAL, people
+from hobble.gait.profile import NAMES, Profile, mirrored
+from hobble.gait.read import read_clip
+from hobble.gait.recogniser import SHRINKAGE, examples, learn, recognise
+
+STRENGTHS = (0.15, 0.3, 0.5, 0.7, 1.0)
+EXAM = ("105_16", "105_25", "105_26", "105_15")
+
+
+def left_out() -> Iterator[tuple[int, list[int]]]:
+    everyone = range(people().count)
+    return ((person, [other for other in everyone if other != person]) for person in everyone)
+
+
+def half_way(a: Profile, b: Profile, share: float) -> dict[str, float]:
+    return {name: a[name] + share * (b[name] - a[name]) for name in NAMES}
+
+
+def limps(person: int, strength: float) -> Iterator[tuple[str, str, Profile, Profile]]:
+    """(gait, side, walk, healthy walk) of one person, each leg in turn."""
+    healthy = people().profile(NORMAL, person)
+    for gait in GAITS[1:]:
+        walk = half_way(healthy, people().profile(gait, person), strength)
+        yield gait, "right", walk, healthy
+        yield gait, "left", mirrored(walk), mirrored(healthy)
+
+
+def people_left_out(name: str, judges: dict[int, Callable]) -> None:
+    print(f"\n{name}, people left out; by strength, 1 as shown:")
+    print(f"{'':15}" + "".join(f"{s:>25}" for s in STRENGTHS))
+    print(f"{'':15}" + "impaired right  side".rjust(25) * len(STRENGTHS))
+    confusion: Counter[tuple[str, str]] = Counter()
+    totals = {s: np.zeros(3) for s in STRENGTHS}
+    lines = {gait: f"{gait:15}" for gait in GAITS[1:]}
+    for strength in STRENGTHS:
+        seen: dict[str, list[tuple[bool, bool, bool]]] = {gait: [] for gait in GAITS[1:]}
+        for person, judge in judges.items():
+            for gait, side, walk, healthy in limps(person, strength):
+                said = judge(walk, healthy)
+                right = said.label == gait and said.side == side
+                seen[gait].append((said.impaired, right, said.side in (None, side)))
+                if strength == 1.0:
+                    confusion[gait, said.label] += 1
+        for gait, rows in seen.items():
+            share = np.mean(rows, axis=0)
+            lines[gait] += "{:>13.2f}{:>6.2f}{:>6.2f}".format(*share)
+            totals[strength] += share / len(seen)
+    print("\n".join(lines.values()))
+    print(f"{'mean':15}" + "".join("{:>13.2f}{:>6.2f}{:>6.2f}".format(*totals[s]) for s in STRENGTHS))
+    print(
+        "confusion at 1 (rows: shown):",
+        {gait: {b: n for (a, b), n in confusion.items() if a == gait} for gait in GAITS[1:]},
+    )
+
+
+def healthy_walks(folder: Path) -> None:
+    print("\nhealthy walks of the CMU database, windows: share called impaired")
+    print("performer, windows, by the linear one, the graded one, the graded one without the performer")
+    known = load_npz(HEALTHY)
+    for i, performer in enumerate(REFERENCE):
+        own = [pair for _, *pair in healthy_windows(folder, performer)]
+        rest = np.arange(len(REFERENCE)) != i
+        others = np.average(known["covariances"][rest], axis=0, weights=known["clips"][rest])
+        stranger = learn_grader(people(), range(people().count), others)
+        said = [
+            np.mean([judge(*pair).impaired for pair in own]) for judge in (recognise, grade, stranger.grade)
+        ]
+        print(f"  {performer:4}{len(own):4}" + "".join(f"{share:6.2f}" for share in said))
+
+
+def strangers() -> None:
+    everyone, normal = range(people().count), lambda person: people().profile(NORMAL, person)
+    pairs = [(normal(a), normal(b)) for a in everyone for b in everyone if a != b]
+    for name, judge in (("linear", recognise), ("graded", grade)):
+        wrong = np.mean([judge(*pair).impaired for pair in pairs])
+        print(f"\none person's normal walk beside another's: {name} calls {wrong:.2f} impaired")
+
+
+def rounded(shares: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {share:.2f}" for name, share in shares.items()) or "none"
+
+
+def captured(folder: Path, clips: list[str]) -> None:
+    healthy = healthy_profile([read_clip(folder / f"{name}.bvh") for name in REFERENCE["105"]])
+    print("\ncaptured impaired walks, beside the healthy walks of CMU 105")
+    for path in [*(folder / f"{name}.bvh" for name in EXAM), *map(Path, clips)]:
+        try:
+            seen = compare(read_clip(path), healthy)
+        except HobbleError as error:
+            print(f"  {path.stem}: {error}")
+            continue
+        a, g = seen.answer, seen.grade
+        print(f"  {path.stem}")
+        print(f"    linear {a.label} {a.side or ''}; windows: {rounded(seen.named())}")
+        print(f"    graded {g.label} {g.side or ''} {g.strength:.1f}; windows: {rounded(seen.graded())}")
+
+
+def main(folder: str, *clips: str) -> None:
+    linear = {p: learn(*examples(people(), rest), shrinkage=SHRINKAGE) for p, rest in left_out()}
+    people_left_out("linear", {p: lambda w, h, j=j: recognise(w, h, j) for p, j in linear.items()})
+    healthy = healthy_covariance()
+    graders: dict[int, Grader] = {p: learn_grader(people(), rest, healthy) for p, rest in left_out()}
+    people_left_out("graded", {p: g.grade for p, g in graders.items()})
+    strangers()
+    healthy_walks(Path(folder))
+    captured(Path(folder), list(clips))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,58 @@
+"""The values of one channel in each frame of a clip: made from their source or their mirror, and kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.channels import Source, channel
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.files import load_npz, save_npz, write_json
+from hobble.core.quat import Array
+
+
+def clip_values(name: str, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
+    """Values (F, C) float32 of channel `name` for a clip, and warnings.
+
+    motion: the report of the motion stage. Raises InputError where they cannot be read, are no finite numbers
+    or leave the channel's range.
+    """
+    one = channel(name)
+    values, warnings = one.read(clip, source, motion)
+    labels = one.columns(clip.skeleton)
+    if values.shape != (len(clip), len(labels)):
+        expected = (len(clip), len(labels))
+        raise InputError(clip.name, f"{one.title.lower()}: {values.shape} values where {expected} belong")
+    wrong = ~((values >= 0) & (values <= one.highest))
+    if wrong.any():
+        frame, column = (int(i) for i in np.argwhere(wrong)[0])
+        problem = f"{one.value} {values[frame, column]:g} of {labels[column]} is not in 0..{one.highest:g}"
+        raise InputError(clip.name, problem, frame=frame)
+    return values, warnings
+
+
+def save_values(path: str | Path, values: Array, labels: Sequence[str]) -> None:
+    """Write values (F, C) and the labels of their columns as one npz file."""
+    save_npz(path, values=values, labels=np.array(list(labels), dtype=np.str_))
+
+
+def load_values(path: str | Path) -> tuple[Array, tuple[str, ...]]:
+    """Values (F, C) and the labels of their columns."""
+    data = load_npz(path)
+    if set(data) != {"values", "labels"} or data["values"].shape[1:] != data["labels"].shape:
+        raise InputError(path, "holds no channel's values", fix="Delete it; the next run makes it again.")
+    return data["values"], tuple(str(label) for label in data["labels"])
+
+
+def write_report(
+    path: str | Path, name: str, clip: Clip, values: Array, labels: Sequence[str], warnings: Sequence[str]
+) -> None:
+    """Write the JSON beside the values: what was told, for how long, how much at most, and when."""
+    one = channel(name)
+    told = one.told(values, labels, clip.fps)
+    report = {"clip": clip.name, "channel": name, "title": one.title, "told": told}
+    write_json(path, {**report, "highest": one.highest, "warnings": list(warnings)})

@@ -1,0 +1,32 @@
+"""Raw rows standardised for a database, so that composing them is little more than copying."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.database.statistics import Statistics
+from hobble.rows.compose import lower, without_terrain
+from hobble.rows.layout import RowLayout
+
+
+def split_rows(
+    layout: RowLayout, statistics: Statistics, x: Array, y: Array, fits: Array, count: np.ndarray
+) -> tuple[Array, Array, Array]:
+    """Standardised x, y and fits out of raw ones.
+
+    x: (R, x columns) X without the terrain. y: (R, Y). fits: (S, fit columns) heights and the mean to take
+    off joint heights. count: (R,) fits of each row. In what comes back each row's joint heights have the mean
+    over its fits taken off, and a fit's last column (the lift, cm) is what its own mean is above that: small
+    numbers, which half precision holds well.
+    """
+    s, terrain = statistics, layout.x_terrain
+    of_row = np.repeat(np.arange(len(count)), count)
+    row_mean = np.bincount(of_row, fits[:, -1].astype(np.float64) / count[of_row], len(count))
+    x, y = x.astype(np.float64), y.astype(np.float64)
+    lower(x, without_terrain(layout)["joint_position"], row_mean[:, None])
+    lower(y, layout.y_joint_position, row_mean[:, None])
+    x = (x - np.delete(s.x_mean, terrain)) / np.delete(s.x_std, terrain)
+    heights = (fits[:, :-1].astype(np.float64) - s.x_mean[terrain]) / s.x_std[terrain]
+    lift = fits[:, -1] - row_mean[of_row]
+    return x, (y - s.y_mean) / s.y_std, np.concatenate([heights, lift[:, None]], axis=1)

@@ -1,0 +1,84 @@
+"""A clip beside the healthy walk of the same figure: what it is called, and by how much it differs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from hobble.core.clip import Clip
+from hobble.gait.cycles import Walk, joined, measure
+from hobble.gait.effects import effects
+from hobble.gait.graded import Grade, grade
+from hobble.gait.people import people
+from hobble.gait.profile import Profile, profile
+from hobble.gait.recogniser import RIGHT, SIDES, Answer, recognise, windows
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What was measured and said of a clip.
+
+    walk: its cycles. profile: its numbers. answer, grade: what the whole clip is called by the linear
+    classifier of people's strong limps, and by the recogniser that is made for mild ones too. windows,
+    grades: (first frame, answer or grade) of each window of some seconds. effects: side -> sizes, as if that
+    side were the hurt one.
+    """
+
+    walk: Walk = field(repr=False)
+    profile: Profile = field(repr=False)
+    answer: Answer
+    grade: Grade
+    windows: Sequence[tuple[int, Answer]] = field(repr=False)
+    grades: Sequence[tuple[int, Grade]] = field(repr=False)
+    effects: Mapping[str, Mapping[str, float]] = field(repr=False)
+
+    @property
+    def side(self) -> str:
+        """The side that is taken for the hurt one; right where the walk is called normal."""
+        return self.answer.side or RIGHT
+
+    def named(self) -> dict[str, float]:
+        """Share of the windows that the linear classifier calls each label and side: "antalgic right"."""
+        return _shares([answer for _, answer in self.windows])
+
+    def graded(self) -> dict[str, float]:
+        """The same of the recogniser of mild limps."""
+        return _shares([answer for _, answer in self.grades])
+
+
+def _shares(answers: Sequence[Answer | Grade]) -> dict[str, float]:
+    names = [f"{a.label} {a.side}" if a.side else a.label for a in answers]
+    return {name: names.count(name) / len(names) for name in dict.fromkeys(names)}
+
+
+def measure_clip(clip: Clip) -> Walk:
+    """The cycles of a clip on any skeleton with roles."""
+    return measure(clip.skeleton, clip.positions, clip.fps)
+
+
+def healthy_profile(clips: Sequence[Clip]) -> Profile:
+    """The profile of a figure's healthy clips, all cycles together; without any, that of people.
+
+    Raises HobbleError where no clip holds a cycle.
+    """
+    return profile(joined(measure_clip(clip) for clip in clips)) if clips else people().normal()
+
+
+def compare(clip: Clip, healthy: Profile, seconds: float = 4.0) -> Comparison:
+    """Measure a clip beside a healthy profile; windows last `seconds`. Raises HobbleError without a cycle."""
+    return compare_walk(measure_clip(clip), len(clip), healthy, seconds)
+
+
+def compare_walk(walk: Walk, frames: int, healthy: Profile, seconds: float = 4.0) -> Comparison:
+    """The same of the cycles that `measure` found in a motion of `frames` frames."""
+    own = profile(walk)
+    parts = [(start, profile(part)) for start, part in windows(walk, frames, seconds)]
+    return Comparison(
+        walk,
+        own,
+        recognise(own, healthy),
+        grade(own, healthy),
+        [(start, recognise(part, healthy)) for start, part in parts],
+        [(start, grade(part, healthy)) for start, part in parts],
+        {side: effects(own, healthy, side) for side in SIDES},
+    )

@@ -1,0 +1,160 @@
+"""The cycles of a walk, from one landing of a foot to its next, and each cycle in numbers.
+
+A foot lands where its ankle is furthest ahead of the hips. That is defined for a foot that drags and for one
+that is set down beside the other, where contacts and zero crossings are not.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.gait.signals import CURVES, Signals, mirrored, signals
+
+SAMPLES = 50
+SCALARS = (
+    "stride_seconds",
+    "speed_per_leg",
+    "left_strike_phase",
+    "stance_share_R",
+    "stance_share_L",
+    "step_R",
+    "step_L",
+    "step_width",
+)
+SLOW = 0.35  # of the walking speed: a slower ankle stands
+SHORTEST, LONGEST = 0.4, 3.5  # s, a cycle
+LEAST_TRAVEL = 0.2  # leg lengths in a cycle; less is standing
+LEAST_SWING = 0.12  # leg lengths that an ankle goes back and forth, or it makes no step
+OF_RANGE = 0.4  # of the ankle's range within the longest cycle: lesser turns of it are no step
+STRAIGHT = 25.0  # degrees that the path turns in a cycle at most: people were measured on straight paths
+AHEAD = 0.7  # mean cosine between facing and travel; less is a walk backward or sideways
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A cycle of the right leg: frames `start` to `end`, its landings.
+
+    scalars: by name of SCALARS. curves: (22, 50), rows as CURVES, the first sample at `start` and the
+    50 steps equal.
+    """
+
+    start: int
+    end: int
+    scalars: dict[str, float]
+    curves: Array = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Walk:
+    """The cycles of a stretch of walking: `right` begin as the right foot lands.
+
+    left: those that begin as the left foot lands, each as seen in a mirror, so that in them too the leg that
+    lands first is called R.
+    """
+
+    fps: float
+    right: tuple[Cycle, ...] = field(repr=False)
+    left: tuple[Cycle, ...] = field(repr=False)
+
+    def __len__(self) -> int:
+        """Cycles of the side that has fewer."""
+        return min(len(self.right), len(self.left))
+
+    def within(self, start: float, end: float) -> Walk:
+        """The cycles that lie between two frames whole."""
+        kept = ((c for c in side if start <= c.start and c.end <= end) for side in (self.right, self.left))
+        return Walk(self.fps, *map(tuple, kept))
+
+    def mirrored(self) -> Walk:
+        """The same walk seen in a mirror."""
+        return Walk(self.fps, self.left, self.right)
+
+
+def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> Walk:
+    """Find and measure the cycles in which a figure walks straight ahead.
+
+    positions: (F, J, 3) world, cm, Y up. Standing, turning, walking backward and sideways, and steps
+    without one step of the other foot between them make no cycle; of a clip shorter than a cycle nothing is
+    left.
+    """
+    if len(positions) < SHORTEST * fps:
+        return Walk(fps, (), ())
+    seen = signals(skeleton, positions, fps)
+    return Walk(fps, tuple(_cycles(seen)), tuple(_cycles(mirrored(seen))))
+
+
+def joined(walks: Iterable[Walk]) -> Walk:
+    """The cycles of several clips of one walker as one walk; their frames then mean nothing any more."""
+    walks = tuple(walks)
+    right, left = (
+        tuple(itertools.chain(*side)) for side in zip(*((w.right, w.left) for w in walks), strict=True)
+    )
+    return Walk(walks[0].fps, right, left)
+
+
+def landings(forward: Array, fps: float) -> list[int]:
+    """Frames where an ankle (F,), leg lengths ahead of the hips, is furthest ahead.
+
+    A turn counts where the ankle goes back by OF_RANGE of what it moves within the longest cycle around.
+    """
+    reach = int(LONGEST * fps / 2)
+    least = np.maximum(LEAST_SWING, OF_RANGE * _ranges(forward, reach))
+    found: list[int] = []
+    high = low = 0
+    rising = True
+    for i, value in enumerate(forward):
+        if rising:
+            high = i if value > forward[high] else high
+            if forward[high] - value >= least[high]:
+                found.append(high)
+                rising, low = False, i
+        else:
+            low = i if value < forward[low] else low
+            if value - forward[low] >= least[low]:
+                rising, high = True, i
+    return [i for i in found if i > 0]
+
+
+def _ranges(values: Array, reach: int) -> Array:
+    """(F,) largest minus least value within `reach` frames to either side."""
+    padded = np.pad(values, reach, mode="edge")
+    return np.ptp(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1)
+
+
+def _cycles(seen: Signals) -> Iterable[Cycle]:
+    right, left = (landings(seen.curves[f"ankle_forward_{side}"], seen.fps) for side in "RL")
+    for a, b in itertools.pairwise(right):
+        between = [i for i in left if a < i < b]
+        if len(between) == 1 and SHORTEST * seen.fps <= b - a <= LONGEST * seen.fps:
+            travel = np.linalg.norm(np.diff(seen.hips[a : b + 1], axis=0), axis=1).sum()
+            straight = abs(seen.heading[b] - seen.heading[a]) <= STRAIGHT
+            if travel >= LEAST_TRAVEL and straight and seen.ahead[a:b].mean() >= AHEAD:
+                yield _cycle(seen, a, between[0], b)
+
+
+def _cycle(seen: Signals, a: int, other: int, b: int) -> Cycle:
+    seconds = (b - a) / seen.fps
+    speed = float(np.linalg.norm(seen.hips[b] - seen.hips[a])) / seconds
+    apart = seen.curves["ankle_forward_R"] - seen.curves["ankle_forward_L"]
+    standing = {side: float(np.mean(seen.ankle_speed[side][a:b] < SLOW * speed)) for side in "LR"}
+    width = [seen.across["L"][i] - seen.across["R"][i] for i in (a, other)]
+    values = (
+        seconds,
+        speed,
+        (other - a) / (b - a),
+        standing["R"],
+        standing["L"],
+        float(apart[a]),
+        float(-apart[other]),
+        float(np.mean(width)),
+    )
+    at = a + (b - a) * np.arange(SAMPLES) / SAMPLES
+    frames = np.arange(a, b + 1)
+    curves = np.stack([np.interp(at, frames, seen.curves[name][a : b + 1]) for name in CURVES])
+    return Cycle(a, b, dict(zip(SCALARS, values, strict=True)), curves)

@@ -1,0 +1,103 @@
+"""Write healthy.npz from walks of the CMU database: python -m hobble.gait.derive_healthy CMU_FOLDER
+[OUT.npz].
+
+How much a healthy walk differs from the same walker's other healthy walks: at other speeds, on slight
+curves, from one window to the next. The motion was obtained from mocap.cs.cmu.edu, which NSF EIA-0196217
+funded.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.core.errors import HobbleError
+from hobble.core.files import save_npz
+from hobble.core.quat import Array
+from hobble.gait.compare import healthy_profile, measure_clip
+from hobble.gait.cycles import Walk
+from hobble.gait.features import features
+from hobble.gait.graded import HEALTHY
+from hobble.gait.profile import Profile, mirrored, profile
+from hobble.gait.read import SKELETONS, read_clip
+from hobble.gait.recogniser import windows
+
+# performer -> the walks that make the reference, and others: slow, quick, on curves
+REFERENCE = {
+    "105": ("105_29", "105_31", "105_34", "105_36"),
+    "07": ("07_01", "07_02", "07_03", "07_06"),
+    "08": ("08_01", "08_02", "08_05", "08_06", "08_08"),
+    "16": ("16_15", "16_21", "16_31"),
+}
+OTHERS = {
+    "105": ("105_02", "105_10", "105_17", "105_22", "105_27"),
+    "07": ("07_04", "07_05", "07_09", "07_12"),
+    "08": ("08_03", "08_04", "08_09", "08_11"),
+    "16": ("16_11", "16_13", "16_17", "16_23", "16_25"),
+}
+SECONDS = 4.0
+
+
+def healthy_windows(
+    folder: str | Path, performer: str, skeletons: str | Path = SKELETONS
+) -> Iterator[tuple[str, Profile, Profile]]:
+    """(clip, profile, that of the performer's other healthy walks) of each window of a performer."""
+    names = REFERENCE[performer] + OTHERS[performer]
+    clips = {name: read_clip(Path(folder, f"{name}.bvh"), skeletons) for name in names}
+    for name, clip in clips.items():
+        healthy = healthy_profile([clips[other] for other in REFERENCE[performer] if other != name])
+        for part in _parts(clip):
+            yield name, profile(part), healthy
+
+
+def _parts(clip: Clip) -> list[Walk]:
+    """A clip's windows; the whole of one that is too short for a window, if it has a cycle."""
+    walk = measure_clip(clip)
+    found = [part for _, part in windows(walk, len(clip), SECONDS)]
+    return found or [walk] * bool(len(walk))
+
+
+def covariance(seen: Iterable[tuple[str, Profile, Profile]]) -> tuple[Array, int]:
+    """(D, D) mean square of the windows' features, left and right alike, each clip counting the same.
+
+    Returns with it how many clips there are.
+    """
+    by_clip: dict[str, list[Array]] = {}
+    for name, walk, healthy in seen:
+        for pair in ((walk, healthy), (mirrored(walk), mirrored(healthy))):
+            by_clip.setdefault(name, []).append(np.array(list(features(*pair).values())))
+    squares = [np.einsum("ni,nj->ij", x, x) / len(x) for x in map(np.array, by_clip.values())]
+    return np.mean(squares, axis=0), len(by_clip)
+
+
+def derive(folder: str | Path, out: str | Path = HEALTHY) -> None:
+    """Write the covariance of each performer, and of how many clips it is the mean."""
+    each = [covariance(healthy_windows(folder, performer)) for performer in REFERENCE]
+    save_npz(
+        out,
+        performers=np.array(list(REFERENCE)),
+        covariances=np.array([square for square, _ in each]),
+        clips=np.array([clips for _, clips in each]),
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    if len(given) not in (1, 2):
+        print("python -m hobble.gait.derive_healthy CMU_FOLDER [HEALTHY.npz]", file=sys.stderr)
+        return 2
+    try:
+        derive(*given)
+    except HobbleError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

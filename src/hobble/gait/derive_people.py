@@ -1,0 +1,59 @@
+"""Write people.npz from the curves of Jun et al.: python -m hobble.gait.derive_people WALKS.npz [PEOPLE.npz].
+
+WALKS.npz holds, for each gait and person, the median over the cycles: `gaits` (6), `curves` (22 names),
+`scalars` (8 names), `curve` (6, people, 22, 50) and `scalar` (6, people, 8), as profile.py defines them.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import load_npz, save_npz
+from hobble.gait.cycles import SCALARS
+from hobble.gait.people import FILE, GAITS
+from hobble.gait.profile import of_curves
+from hobble.gait.signals import CURVES
+
+
+def derive(walks: str | Path, out: str | Path = FILE) -> None:
+    """Mean and spread over people, and each person's profile. Raises InputError for another file."""
+    data = load_npz(walks)
+    for name, wanted in (("gaits", GAITS), ("curves", CURVES), ("scalars", SCALARS)):
+        if tuple(map(str, data[name])) != tuple(wanted):
+            raise InputError(walks, f"`{name}` should be {', '.join(wanted)}")
+    curve, scalar = data["curve"].astype(float), data["scalar"].astype(float)
+    each = [
+        [list(of_curves(c, s).values()) for c, s in zip(*pair, strict=True)]
+        for pair in zip(curve, scalar, strict=True)
+    ]
+    save_npz(
+        out,
+        profiles=np.array(each, np.float32),
+        curve_mean=curve.mean(axis=1).astype(np.float16),
+        curve_spread=curve.std(axis=1).astype(np.float16),
+        scalar_mean=scalar.mean(axis=1).astype(np.float32),
+        scalar_spread=scalar.std(axis=1).astype(np.float32),
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    if len(given) not in (1, 2):
+        print(__doc__.splitlines()[0], file=sys.stderr)
+        return 2
+    try:
+        derive(*given)
+    except HobbleError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

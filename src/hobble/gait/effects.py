@@ -1,0 +1,80 @@
+"""How much a hurt walk differs from the same figure's healthy walk, in sizes that are known of people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hobble.gait.people import GAITS, NORMAL, People
+from hobble.gait.profile import Profile, mirrored
+from hobble.gait.recogniser import LEFT, RIGHT
+
+# name -> what it is. "hurt" and "sound" are the sides; a share is of the healthy walk's.
+EFFECTS: dict[str, str] = {
+    "speed": "speed, share of healthy",
+    "stride": "stride time, share of healthy",
+    "stance": "stance share of the sound leg minus that of the hurt leg, more than healthy",
+    "step_hurt": "step onto the hurt foot, share of healthy",
+    "step_sound": "step onto the sound foot, share of healthy",
+    "knee_hurt": "knee range of the hurt leg, share of healthy",
+    "knee_sound": "knee range of the sound leg, share of healthy",
+    "hip_hurt": "hip flexion range of the hurt leg, share of healthy",
+    "hip_sound": "hip flexion range of the sound leg, share of healthy",
+    "lean": "lean of the trunk from healthy, degrees",
+    "lean_forward": "mean lean of the trunk forward, degrees from healthy",
+    "lean_hurt": "mean lean of the trunk to the hurt side, degrees from healthy",
+    "sway_forward": "range of the trunk forward, degrees from healthy",
+    "sway_sideways": "range of the trunk sideways, degrees from healthy",
+    "pelvis_drop": "mean drop of the pelvis on the sound side, degrees from healthy",
+    "arm_hurt": "swing of the arm of the hurt side, share of healthy",
+    "arm_sound": "swing of the other arm, share of healthy",
+}
+
+
+def effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, float]:
+    """The sizes of EFFECTS of a walk whose `side` is hurt, beside the healthy walk of the same figure."""
+    if side == LEFT:
+        walk, healthy = mirrored(walk), mirrored(healthy)
+
+    def change(name: str) -> float:
+        return walk[name] - healthy[name]
+
+    def share(name: str) -> float:
+        return walk[name] / healthy[name] if healthy[name] else float("nan")
+
+    forward, left = change("mean trunk_forward"), change("mean trunk_left")
+    return {
+        "speed": share("speed_per_leg"),
+        "stride": share("stride_seconds"),
+        "stance": change("stance_share_L") - change("stance_share_R"),
+        "step_hurt": share("step_R"),
+        "step_sound": share("step_L"),
+        "knee_hurt": share("range knee_flexion_R"),
+        "knee_sound": share("range knee_flexion_L"),
+        "hip_hurt": share("range hip_flexion_R"),
+        "hip_sound": share("range hip_flexion_L"),
+        "lean": float(np.hypot(forward, left)),
+        "lean_forward": forward,
+        "lean_hurt": -left,
+        "sway_forward": change("range trunk_forward"),
+        "sway_sideways": change("range trunk_left"),
+        "pelvis_drop": -change("mean pelvis_left_up"),
+        "arm_hurt": share("range arm_forward_R"),
+        "arm_sound": share("range arm_forward_L"),
+    }
+
+
+def effects_of_people(known: People) -> Mapping[str, Mapping[str, tuple[float, float]]]:
+    """For each impairment the mean and the spread over people of each effect."""
+    out = {}
+    for gait in GAITS:
+        if gait == NORMAL:
+            continue
+        each = [
+            effects(known.profile(gait, person), known.profile(NORMAL, person))
+            for person in range(known.count)
+        ]
+        values = {name: [one[name] for one in each] for name in EFFECTS}
+        out[gait] = {name: (float(np.mean(v)), float(np.std(v))) for name, v in values.items()}
+    return out

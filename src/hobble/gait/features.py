@@ -1,0 +1,53 @@
+"""A walk against the same walker's healthy one, in some twenty numbers that tell impairments apart.
+
+Neither speed nor stride time is among them, and most compare the two sides: a healthy walk changes with its
+speed but stays even.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.gait.profile import Profile
+
+LEAST_RANGE = 3.0  # degrees; a joint that moves less keeps still, and a share of nothing would be anything
+MOST = 5.0  # times: larger shares say no more
+TRUNK_FORWARD, TRUNK_LEFT = "mean trunk_forward", "mean trunk_left"
+TRUNK = (TRUNK_FORWARD, TRUNK_LEFT, "range trunk_forward", "range trunk_left")
+ARMS = "range arm_forward R - L"
+
+
+def features(walk: Profile, healthy: Profile) -> dict[str, float]:
+    """What tells the impairments apart: a walk against the same walker's healthy one.
+
+    Degrees, leg lengths, shares of the cycle; of the ranges of knees and hips shares of the healthy range, of
+    arms their logarithm.
+    """
+
+    def change(name: str) -> float:
+        return walk[name] - healthy[name]
+
+    def share(name: str) -> float:
+        own, other = walk[f"range {name}"], healthy[f"range {name}"]
+        return min(max(own, LEAST_RANGE) / max(other, LEAST_RANGE), MOST)
+
+    def sides(name: str) -> float:
+        return change(f"{name}_R") - change(f"{name}_L")
+
+    out = {
+        "stance L - R": -sides("stance_share"),
+        "left landing": change("left_strike_phase"),
+        "step R - L": sides("step"),
+        "step width": change("step_width"),
+        "range hip_abduction R - L": sides("range hip_abduction"),
+        "range ankle_height R - L": sides("range ankle_height"),
+    }
+    for part in ("knee_flexion", "hip_flexion"):
+        out[f"range {part} R - L"] = share(f"{part}_R") - share(f"{part}_L")
+    arms = np.log(share("arm_forward_R") / share("arm_forward_L"))
+    out[ARMS] = float(np.clip(arms, -np.log(MOST), np.log(MOST)))
+    for part in ("knee_flexion", "hip_flexion", "hip_abduction"):
+        out |= {f"mean {part} {side}": change(f"mean {part}_{side}") for side in "RL"}
+    for part in ("trunk_forward", "trunk_left", "pelvis_left_up"):
+        out |= {f"{kind} {part}": change(f"{kind} {part}") for kind in ("range", "mean")}
+    return out

@@ -1,0 +1,161 @@
+"""What hurts, which side, and how much of what people showed: a recogniser that is made for mild limps too.
+
+Each impairment is a direction in which people's walks leave their normal walks. A walk at strength s lies
+near s times the mean over people, spread like s times the spread over people plus the spread of healthy
+walks; a healthy walk has the latter alone. The strengths in between are thus people's own walks, half-way
+and so on, and nothing that a generator of limps has made. What the data cannot tell apart has one label:
+see PARTS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from pathlib import Path
+
+import numpy as np
+
+from hobble.core.files import load_npz
+from hobble.core.quat import Array
+from hobble.gait.features import ARMS, TRUNK, TRUNK_FORWARD, TRUNK_LEFT, features
+from hobble.gait.people import NORMAL, People, people
+from hobble.gait.profile import Profile
+from hobble.gait.recogniser import RIGHT, SIDES, examples
+
+HEALTHY = Path(__file__).with_name("healthy.npz")
+GUARDED_ARM, LEANING = "guarded_arm", "leaning_trunk"
+WAYS = {"forward": (1, 0), "backward": (-1, 0), "to the left": (0, 1), "to the right": (0, -1)}
+# label -> the parts of the body that it can mean. Pain in thigh, shank or foot looks alike in people's
+# data, and an arm is seen by its swing alone, wherever in it the pain is.
+PARTS: Mapping[str, tuple[str, ...]] = {
+    NORMAL: (),
+    "antalgic": ("thigh", "shank", "foot"),
+    "stiff_legged": ("thigh", "shank"),
+    "steppage": ("shank", "foot"),
+    "trendelenburg": ("pelvis", "hip"),
+    "lurch": ("hip", "back"),
+    GUARDED_ARM: ("shoulder", "upper arm", "forearm", "hand"),
+    LEANING: ("back",),
+}
+STRENGTHS = np.array([0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.2])  # of what people showed, all as likely
+HEALTHY_SPREAD = 2.5  # times the measured covariance: a figure that nobody measured is less like itself
+SHRINKAGE = 0.5  # of both covariances towards their diagonals
+
+
+@dataclass(frozen=True)
+class Grade:
+    """What hurts. label: a key of PARTS. side: "right", "left", or None where it is neither's.
+
+    strength: 0 where the label is normal; 1 is as much as people showed who imitated the impairment.
+    distance: from the nearest walk that is known, in spreads a feature. People who were left out are 0.7
+    from it, at most 1.5; further off is like nobody's walk, and its label is less to be trusted.
+    probabilities: of each label, both sides together; sides: of each label and side, or where the trunk
+    leans.
+    """
+
+    label: str
+    side: str | None
+    strength: float
+    distance: float
+    probabilities: Mapping[str, float] = field(repr=False)
+    sides: Mapping[tuple[str, str], float] = field(repr=False)
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The parts that may be what hurts."""
+        return PARTS[self.label]
+
+    @property
+    def impaired(self) -> bool:
+        """Whether something hurting is likelier than nothing."""
+        return self.probabilities[NORMAL] < 0.5
+
+
+@dataclass(frozen=True)
+class Grader:
+    """What walks of each kind look like.
+
+    kinds: (label, side or way to lean) -> the mean (D,) at strength 1 and the covariance (D, D) over people
+    there. healthy: (D, D) covariance of healthy walks.
+    """
+
+    kinds: Mapping[tuple[str, str], tuple[Array, Array]] = field(repr=False)
+    healthy: Array = field(repr=False)
+
+    @cached_property
+    def _densities(self) -> tuple[Array, Array, Array]:
+        """Mean, whitening, log of the peak density: of a healthy walk, then of each kind at each strength."""
+        each = [(s * mean, s**2 * spread) for mean, spread in self.kinds.values() for s in STRENGTHS]
+        means, spreads = zip((np.zeros(len(self.healthy)), 0 * self.healthy), *each, strict=True)
+        factors = np.linalg.cholesky(self.healthy + np.array(spreads))
+        top = -np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
+        top[1:] -= np.log(len(each))  # healthy or not is as likely; of the others each is
+        return np.array(means), np.linalg.inv(factors), top
+
+    def grade(self, walk: Profile, healthy: Profile) -> Grade:
+        """What hurts in the walk of a figure, beside its healthy walk."""
+        x = np.array(list(features(walk, healthy).values()))
+        means, whiten, top = self._densities
+        squares = np.sum(np.einsum("nij,nj->ni", whiten, x - means) ** 2, axis=1)
+        scores = top - 0.5 * squares
+        distance = float(np.sqrt(squares[np.argmax(scores)] / len(x)))
+        likely = np.exp(scores - scores.max())
+        likely /= likely.sum()
+        each = likely[1:].reshape(len(self.kinds), len(STRENGTHS))
+        sides = {key: float(p) for key, p in zip(self.kinds, each.sum(axis=1), strict=True)}
+        labels = {label: sum(p for key, p in sides.items() if key[0] == label) for label in PARTS}
+        labels[NORMAL] = float(likely[0])
+        label = max(labels, key=labels.__getitem__)
+        if label == NORMAL:
+            return Grade(label, None, 0.0, distance, labels, sides)
+        key = max((key for key in sides if key[0] == label), key=sides.__getitem__)
+        row = each[list(sides).index(key)]
+        side, strength = key[1] if key[1] in SIDES else None, float(STRENGTHS @ row / row.sum())
+        return Grade(label, side, strength, distance, labels, sides)
+
+
+def learn_grader(known: People, whose: Iterable[int], healthy: Array) -> Grader:
+    """From the walks of some people and the covariance (D, D) of healthy walks."""
+    values, classes = examples(known, whose)
+    names = list(features(known.normal(), known.normal()))
+    labels = np.array(classes)
+    means = {name: values[labels == name].mean(axis=0) for name in dict.fromkeys(classes) if name != NORMAL}
+    rest = np.concatenate([values[labels == name] - mean for name, mean in means.items()])
+    spread = _shrunk(rest.T @ rest / len(rest))
+    kinds = {tuple(name.split(" ")): (mean, spread) for name, mean in means.items()}
+    for side in SIDES:
+        kinds[GUARDED_ARM, side] = _only(names, (ARMS,), kinds["antalgic", side][0], spread)
+    lean = abs(kinds["lurch", RIGHT][0][names.index(TRUNK_FORWARD)])
+    for way, (forward, left) in WAYS.items():
+        mean = np.zeros(len(names))
+        mean[[names.index(TRUNK_FORWARD), names.index(TRUNK_LEFT)]] = lean * forward, lean * left
+        kinds[LEANING, way] = _only(names, TRUNK, mean, spread)
+    return Grader({(a, b): kind for (a, b), kind in kinds.items()}, HEALTHY_SPREAD * _shrunk(healthy))
+
+
+@cache
+def grader() -> Grader:
+    """Learnt from all that the package knows."""
+    return learn_grader(people(), range(people().count), healthy_covariance())
+
+
+def healthy_covariance() -> Array:
+    """(D, D) mean square of the features of healthy walks, each beside the walker's others."""
+    known = load_npz(HEALTHY)
+    return np.average(known["covariances"], axis=0, weights=known["clips"])
+
+
+def grade(walk: Profile, healthy: Profile) -> Grade:
+    """What hurts in the walk of a figure, beside its healthy walk."""
+    return grader().grade(walk, healthy)
+
+
+def _only(names: list[str], kept: Iterable[str], mean: Array, spread: Array) -> tuple[Array, Array]:
+    """A kind in which nothing but the features `kept` differs from a healthy walk."""
+    on = np.isin(names, list(kept))
+    return mean * on, np.diag(np.diag(spread) * on)
+
+
+def _shrunk(covariance: Array) -> Array:
+    return (1 - SHRINKAGE) * covariance + SHRINKAGE * np.diag(np.diag(covariance))

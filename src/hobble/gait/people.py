@@ -1,0 +1,71 @@
+"""What is known of people who walk with an impaired right leg.
+
+From skeleton recordings of ten people, each walking normally and with five impairments that they imitated,
+as told: Jun et al. (2020), "Pathological gait classification using Kinect v2 and gated recurrent neural
+networks", IEEE Access 8. `people.npz` holds statistics of them; `derive_people.py` writes it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+from hobble.core.files import load_npz
+from hobble.core.quat import Array
+from hobble.gait.cycles import SCALARS
+from hobble.gait.profile import NAMES, Profile
+from hobble.gait.signals import CURVES
+
+FILE = Path(__file__).with_name("people.npz")
+SOURCE = "Jun et al. 2020, IEEE Access 8, ten people"
+NORMAL = "normal"
+GAITS = (NORMAL, "antalgic", "stiff_legged", "steppage", "trendelenburg", "lurch")
+
+
+@dataclass(frozen=True)
+class People:
+    """Ten people walking in the six ways of GAITS, the impaired leg on the right.
+
+    profiles: (6, 10, 52) of each person, columns as profile.NAMES. curve_mean, curve_spread: (6, 22, 50)
+    mean and standard deviation over people, rows as CURVES, phase 0 the right landing, degrees and leg
+    lengths. scalar_mean, scalar_spread: (6, 8), columns as SCALARS.
+    """
+
+    profiles: Array = field(repr=False)
+    curve_mean: Array = field(repr=False)
+    curve_spread: Array = field(repr=False)
+    scalar_mean: Array = field(repr=False)
+    scalar_spread: Array = field(repr=False)
+
+    @property
+    def count(self) -> int:
+        """How many people."""
+        return self.profiles.shape[1]
+
+    def profile(self, gait: str, person: int) -> Profile:
+        """One person's walk."""
+        row = self.profiles[GAITS.index(gait), person]
+        return dict(zip(NAMES, map(float, row), strict=True))
+
+    def normal(self) -> Profile:
+        """The mean of their normal walks: the reference where a walker has none of his own."""
+        return dict(zip(NAMES, map(float, self.profiles[0].mean(axis=0)), strict=True))
+
+    def curve(self, gait: str, name: str) -> tuple[Array, Array]:
+        """Mean (50,) and spread (50,) over people of one curve."""
+        g, c = GAITS.index(gait), CURVES.index(name)
+        return self.curve_mean[g, c], self.curve_spread[g, c]
+
+    def scalar(self, gait: str, name: str) -> tuple[float, float]:
+        """Mean and spread over people of one scalar."""
+        g, s = GAITS.index(gait), SCALARS.index(name)
+        return float(self.scalar_mean[g, s]), float(self.scalar_spread[g, s])
+
+
+@cache
+def people() -> People:
+    """The statistics of the package."""
+    data = load_npz(FILE)
+    names = ("profiles", "curve_mean", "curve_spread", "scalar_mean", "scalar_spread")
+    return People(*(data[name].astype(float) for name in names))

@@ -1,0 +1,64 @@
+"""A walk in some fifty numbers: the medians of its cycles, as they are known of people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hobble.core.errors import HobbleError
+from hobble.core.quat import Array
+from hobble.gait.cycles import SCALARS, Cycle, Walk
+from hobble.gait.signals import CURVES, TURNS_ROUND
+
+Profile = Mapping[str, float]
+NO_CYCLE = "there is no whole cycle of walking straight ahead to measure"
+NAMES = (*SCALARS, *(f"{kind} {curve}" for curve in CURVES for kind in ("range", "mean")))
+
+
+def profile(walk: Walk) -> dict[str, float]:
+    """The numbers of NAMES: each scalar, and each curve's range and mean over the cycle.
+
+    Of the median over the cycles, that of the cycles of the right leg and that of the left, seen in a mirror,
+    in equal parts, so that the mirrored walk has exactly the mirrored profile. Degrees, leg lengths, seconds.
+    Raises HobbleError where the walk has no cycle.
+    """
+    if not len(walk):
+        raise HobbleError(NO_CYCLE)
+    right, left = _of_cycles(walk.right), mirrored(_of_cycles(walk.left))
+    return {name: (right[name] + left[name]) / 2 for name in NAMES}
+
+
+def of_curves(curves: Array, scalars: Array) -> dict[str, float]:
+    """The profile of curves (22, 50) in the order of CURVES and scalars (8,) in that of SCALARS."""
+    out = {name: float(value) for name, value in zip(SCALARS, scalars, strict=True)}
+    for name, curve in zip(CURVES, curves, strict=True):
+        out[f"range {name}"] = float(np.ptp(curve))
+        out[f"mean {name}"] = float(np.mean(curve))
+    return {name: out[name] for name in NAMES}
+
+
+def mirrored(values: Profile) -> dict[str, float]:
+    """The profile of the same walk seen in a mirror."""
+    out = {}
+    for name in NAMES:
+        kind, _, curve = name.rpartition(" ")
+        if name == "left_strike_phase":
+            out[name] = 1 - values[name]
+        elif kind == "mean" and curve in TURNS_ROUND:
+            out[name] = -values[name]
+        else:
+            out[name] = values[_across(name)]
+    return out
+
+
+def _across(name: str) -> str:
+    if name.endswith("_R"):
+        return f"{name[:-1]}L"
+    return f"{name[:-1]}R" if name.endswith("_L") else name
+
+
+def _of_cycles(cycles: Sequence[Cycle]) -> dict[str, float]:
+    curves = np.median([cycle.curves for cycle in cycles], axis=0)
+    scalars = np.median([[cycle.scalars[name] for name in SCALARS] for cycle in cycles], axis=0)
+    return of_curves(curves, scalars)

@@ -1,0 +1,23 @@
+"""Clips as they are measured: on their own rig and its own bone lengths."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hobble.core.clip import Clip
+from hobble.motion.make import load_source, resample
+from hobble.motion.options import Motion
+from hobble.motion.read import read_bvh
+from hobble.motion.rig import load_skeleton
+
+SKELETONS = "config/skeletons"
+
+
+def read_clip(path: str | Path, skeletons: str | Path = SKELETONS) -> Clip:
+    """A BVH file at 60 Hz on its own rig, which must be one of those that the folder `skeletons` describes.
+
+    Raises InputError for a file that cannot be read and for an unknown rig.
+    """
+    options = Motion().model_dump()
+    target = load_skeleton(Path(skeletons) / "holden31.yaml")
+    return resample(load_source(read_bvh(path), target, skeletons, options).clip, options["fps"])

@@ -1,0 +1,96 @@
+"""Which impairment a walk looks like, of those that people showed, and on which side.
+
+A linear classifier of people's walks, each against that person's own normal walk, with either leg impaired:
+the left one is the right one in a mirror. Neither speed nor stride time is a feature, and most features
+compare the two sides, since a healthy walk changes with its speed but stays even.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.gait.cycles import Walk
+from hobble.gait.discriminant import Discriminant, learn
+from hobble.gait.features import features
+from hobble.gait.people import GAITS, NORMAL, People, people
+from hobble.gait.profile import Profile, mirrored
+
+SHRINKAGE = 0.2  # of the covariance towards its diagonal: 110 examples for some twenty features
+LEAST_CYCLES = 3  # in a window that is judged, both legs together: two of one and one of the other
+RIGHT, LEFT = "right", "left"
+SIDES = (RIGHT, LEFT)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a walk is called.
+
+    label: one of people.GAITS. side: of the impaired leg, None where the label is normal. probabilities: of
+    each label, both sides together; they sum to 1. sides: of each impairment and side, such as
+    ("antalgic", "right").
+    """
+
+    label: str
+    side: str | None
+    probabilities: Mapping[str, float] = field(repr=False)
+    sides: Mapping[tuple[str, str], float] = field(repr=False)
+
+    @property
+    def impaired(self) -> bool:
+        """Whether some impairment is likelier than none."""
+        return self.probabilities[NORMAL] < 0.5
+
+
+def examples(known: People, whose: Iterable[int]) -> tuple[Array, list[str]]:
+    """Features (n, D) and classes of the walks of some people, each with the right and with the left leg.
+
+    A class is "normal", or "antalgic right" and so on.
+    """
+    values, classes = [], []
+    for person in whose:
+        healthy = known.profile(NORMAL, person)
+        for gait in GAITS:
+            walk = known.profile(gait, person)
+            for side, w, h in ((RIGHT, walk, healthy), (LEFT, mirrored(walk), mirrored(healthy))):
+                values.append(list(features(w, h).values()))
+                classes.append(gait if gait == NORMAL else f"{gait} {side}")
+    return np.array(values), classes
+
+
+@cache
+def classifier() -> Discriminant:
+    """Learnt from all people that the package knows."""
+    return learn(*examples(people(), range(people().count)), shrinkage=SHRINKAGE)
+
+
+def recognise(walk: Profile, healthy: Profile, judge: Discriminant | None = None) -> Answer:
+    """What the walk of a figure is called beside its healthy walk."""
+    judge = judge or classifier()
+    scores = judge.scores(np.array([list(features(walk, healthy).values())]))[0]
+    likely = np.exp(scores - scores.max())
+    likely /= likely.sum()
+    sides, labels = {}, dict.fromkeys(GAITS, 0.0)
+    for name, p in zip(judge.classes, map(float, likely), strict=True):
+        gait, _, which = name.partition(" ")
+        labels[gait] += p
+        if which:
+            sides[gait, which] = p
+    label = max(labels, key=labels.__getitem__)
+    side = None if label == NORMAL else max(SIDES, key=lambda s: sides[label, s])
+    return Answer(label, side, labels, sides)
+
+
+def windows(walk: Walk, frames: int, seconds: float = 4.0, step: float = 1.0) -> list[tuple[int, Walk]]:
+    """(first frame, its cycles) of each window of a clip of `frames` with at least LEAST_CYCLES cycles.
+
+    Windows begin every `step` seconds and last `seconds`.
+    """
+    long = round(seconds * walk.fps)
+    starts = range(0, max(frames - long, 0) + 1, max(1, round(step * walk.fps)))
+    parts = ((start, walk.within(start, start + long)) for start in starts)
+    return [(a, p) for a, p in parts if len(p) and len(p.right) + len(p.left) >= LEAST_CYCLES]

@@ -1,0 +1,183 @@
+"""A walking body in 22 curves over time, the same that are known of people who walk with an impaired leg.
+
+Joints are found by role, so that any rig of config/skeletons/ will do. Angles are measured against the
+vertical and the direction of travel, which is what a viewer beside the path sees.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.core.smooth import gaussian
+
+SIDES = ("L", "R")
+NAMES = {"L": "left", "R": "right"}
+LIMBS = (
+    "hip_flexion",
+    "hip_abduction",
+    "knee_flexion",
+    "foot_pitch",
+    "ankle_height",
+    "ankle_forward",
+    "arm_forward",
+    "elbow_flexion",
+)
+MIDDLE = (
+    "trunk_forward",
+    "trunk_left",
+    "pelvis_left_up",
+    "pelvis_turn_left",
+    "shoulders_turn_left",
+    "hips_height",
+)
+CURVES = (*(f"{limb}_{side}" for side in SIDES for limb in LIMBS), *MIDDLE)
+TURNS_ROUND = (
+    "trunk_left",
+    "pelvis_left_up",
+    "pelvis_turn_left",
+    "shoulders_turn_left",
+)  # negated in a mirror
+TRAVEL = 0.5  # s, sigma of the smoothing after which the hips' velocity is the direction of travel
+
+
+@dataclass(frozen=True)
+class Signals:
+    """F frames of a body on the move; every length is in leg lengths.
+
+    curves: name of CURVES -> (F,), degrees and leg lengths. heading: (F,) where the body goes, degrees from
+    +Z towards +X, without jumps. ahead: (F,) cosine of the angle between where the body faces and where it
+    goes. hips: (F, 2) path over the ground. ankle_speed: side -> (F,), leg lengths a second, over the
+    ground. across: side -> (F,) how far the ankle is to the left of the hips. leg: cm.
+    """
+
+    fps: float
+    leg: float
+    curves: dict[str, Array] = field(repr=False)
+    heading: Array = field(repr=False)
+    ahead: Array = field(repr=False)
+    hips: Array = field(repr=False)
+    ankle_speed: dict[str, Array] = field(repr=False)
+    across: dict[str, Array] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.ahead)
+
+
+def mirrored(signals: Signals) -> Signals:
+    """The same walk seen in a mirror: left and right swapped."""
+    curves = {}
+    for name in CURVES:
+        other = name[:-1] + {"L": "R", "R": "L"}[name[-1]] if name not in MIDDLE else name
+        curves[name] = -signals.curves[name] if name in TURNS_ROUND else signals.curves[other]
+    speed = {"L": signals.ankle_speed["R"], "R": signals.ankle_speed["L"]}
+    across = {"L": -signals.across["R"], "R": -signals.across["L"]}
+    hips = signals.hips * [-1.0, 1.0]
+    return Signals(signals.fps, signals.leg, curves, -signals.heading, signals.ahead, hips, speed, across)
+
+
+def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
+    """The curves of joint positions (F, J, 3), cm, Y up, at `fps` frames a second; F is 2 or more.
+
+    Hip flexion and abduction are the thigh's angles from the vertical, forward and outward; the arm's is that
+    from shoulder to elbow, forward; knee and elbow 0 where straight; foot pitch that of the line from ankle
+    to toe, up positive; the trunk's is the line from hips to neck. A rig without elbows or wrists has none
+    (0).
+    """
+    at = {role: positions[:, skeleton.role(role)].astype(float) for role in skeleton.roles}
+    ahead, left = _travel(at["hips"], fps)
+    leg = _leg(at)
+    side_curves = {side: _limb(at, NAMES[side], ahead, left if side == "L" else -left, leg) for side in SIDES}
+    curves = {f"{limb}_{side}": side_curves[side][limb] for side in SIDES for limb in LIMBS}
+    trunk = at[_trunk_top(skeleton)] - at["hips"]
+    pelvis, shoulders = (at[f"left_{part}"] - at[f"right_{part}"] for part in ("hip", "shoulder"))
+    curves |= {
+        "trunk_forward": _angle(_dot(trunk, ahead), trunk[:, 1]),
+        "trunk_left": _angle(_dot(trunk, left), trunk[:, 1]),
+        "pelvis_left_up": _angle(pelvis[:, 1], np.hypot(_dot(pelvis, left), _dot(pelvis, ahead))),
+        "pelvis_turn_left": _angle(-_dot(pelvis, ahead), _dot(pelvis, left)),
+        "shoulders_turn_left": _angle(-_dot(shoulders, ahead), _dot(shoulders, left)),
+        "hips_height": at["hips"][:, 1] / leg,
+    }
+    across = pelvis / np.maximum(np.linalg.norm(pelvis, axis=1, keepdims=True), 1e-9)
+    across = across + shoulders / np.maximum(np.linalg.norm(shoulders, axis=1, keepdims=True), 1e-9)
+    facing = gaussian(np.cross(across, [0.0, 1.0, 0.0]), TRAVEL * fps)
+    facing = facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-9)
+    ankles = {side: at[f"{NAMES[side]}_heel"] for side in SIDES}
+    return Signals(
+        fps,
+        leg,
+        curves,
+        np.degrees(np.unwrap(np.arctan2(ahead[:, 0], ahead[:, 2]))),
+        _dot(facing, ahead),
+        at["hips"][:, ::2] / leg,
+        {side: _speed(ankle, fps) / leg for side, ankle in ankles.items()},
+        {side: _dot(ankle - at["hips"], left) / leg for side, ankle in ankles.items()},
+    )
+
+
+def _travel(hips: Array, fps: float) -> tuple[Array, Array]:
+    """Unit vectors (F, 3), level: where the body goes, and the left of that."""
+    velocity = gaussian(np.gradient(hips, axis=0), TRAVEL * fps) * [1.0, 0.0, 1.0]
+    ahead = velocity / np.maximum(np.linalg.norm(velocity, axis=1, keepdims=True), 1e-9)
+    return ahead, np.cross([0.0, 1.0, 0.0], ahead)
+
+
+def _leg(at: dict[str, Array]) -> float:
+    """Thigh and shank, mean of both sides, cm."""
+    bones = [("hip", "knee"), ("knee", "heel")]
+    return float(
+        sum(
+            np.median(np.linalg.norm(at[f"{side}_{a}"] - at[f"{side}_{b}"], axis=1))
+            for side in NAMES.values()
+            for a, b in bones
+        )
+        / 2
+    )
+
+
+def _trunk_top(skeleton: Skeleton) -> str:
+    """The highest role of the trunk that the rig has."""
+    return next(role for role in ("neck", "chest", "head") if role in skeleton.roles)
+
+
+def _limb(at: dict[str, Array], side: str, ahead: Array, outward: Array, leg: float) -> dict[str, Array]:
+    hip, knee, ankle, toe, shoulder = (at[f"{side}_{p}"] for p in ("hip", "knee", "heel", "toe", "shoulder"))
+    still = np.zeros(len(hip))
+    elbow, wrist = (at.get(f"{side}_{part}") for part in ("elbow", "wrist"))
+    thigh, foot = knee - hip, toe - ankle
+    hand = elbow if elbow is not None else wrist
+    arm = None if hand is None else hand - shoulder
+    level = foot * [1.0, 0.0, 1.0]
+    return {
+        "hip_flexion": _angle(_dot(thigh, ahead), -thigh[:, 1]),
+        "hip_abduction": _angle(_dot(thigh, outward), -thigh[:, 1]),
+        "knee_flexion": _bend(hip, knee, ankle),
+        "foot_pitch": _angle(foot[:, 1], np.linalg.norm(level, axis=1)),
+        "ankle_height": ankle[:, 1] / leg,
+        "ankle_forward": _dot(ankle - at["hips"], ahead) / leg,
+        "arm_forward": still if arm is None else _angle(_dot(arm, ahead), -arm[:, 1]),
+        "elbow_flexion": still if elbow is None or wrist is None else _bend(shoulder, elbow, wrist),
+    }
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.sum(a * b, axis=-1)
+
+
+def _angle(part: Array, rest: Array) -> Array:
+    return np.degrees(np.arctan2(part, rest))
+
+
+def _bend(a: Array, b: Array, c: Array) -> Array:
+    """Degrees by which the joint at b is bent between a and c, all (F, 3); 0 is straight."""
+    u, v = b - a, c - b
+    return _angle(np.linalg.norm(np.cross(u, v), axis=-1), _dot(u, v))
+
+
+def _speed(points: Array, fps: float) -> Array:
+    """(F,) speed of points (F, 3) over the ground, per second."""
+    return np.linalg.norm(np.gradient(points, axis=0)[:, ::2], axis=1) * fps

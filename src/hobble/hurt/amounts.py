@@ -1,0 +1,132 @@
+"""How much a hurt part of the body changes, at severity 10: people's profiles mixed, and what they do not
+tell.
+
+The three tables say which profiles of people a part mixes, and what is added where the recordings tell
+nothing: feet and toes are poor in them, arms, shoulders, neck and back were not hurt. Values of a side are
+those of a hurt right side; `_sound` is the other.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.hurt.people import CURVES, HARMONICS, profiles
+
+# Profiles and their weights. A part that is not here changes only what OWN says.
+MIXES: dict[str, dict[str, float]] = {
+    "pelvis": {"trendelenburg": 0.55, "lurch": 0.25, "antalgic": 0.2},
+    "hip": {"trendelenburg": 0.75, "antalgic": 0.25},
+    "thigh": {"antalgic": 0.6, "stiff_legged": 0.4},
+    "shank": {"antalgic": 0.95, "steppage": 0.05},
+    "foot": {"antalgic": 0.65, "steppage": 0.35},
+    "back": {"lurch": 1.0},
+}
+BOTH_SIDES = ("back",)  # parts whose profile is taken from both sides alike
+# Gains on people's curves of trunk, pelvis and shoulders.
+GAIN: dict[str, float] = {"pelvis": 1.6, "hip": 1.9, "thigh": 1.25, "shank": 1.0, "foot": 0.9}
+# speed, stride: ratios. lift, push, strike: ratios of the height of the swing, and of the foot's pitch with
+# its heel up (push-off) and its toe up (heel strike). out: leg lengths that the foot swings outward. toe_out:
+# degrees. crouch: degrees of knee flexion added in stance. arms: ratio of both arms' swing. back, head: ratio
+# of the movement of trunk and head in themselves. forward, side, list, nod: degrees, of the trunk forward and
+# to the hurt side, of the pelvis up on the hurt side while that leg swings, of the head forward.
+OWN: dict[str, dict[str, float]] = {
+    "pelvis": {"speed": 0.74, "stride": 1.15, "push": 0.65, "back": 0.6, "lift": 0.8, "list": 2.0},
+    "hip": {"speed": 0.66, "stride": 1.2, "push": 0.6, "lift": 0.75, "forward": 2.0, "out": 0.02},
+    "thigh": {
+        "speed": 0.62,
+        "stride": 1.04,
+        "push": 0.3,
+        "lift": 0.1,
+        "out": 0.07,
+        "strike": 0.4,
+        "list": 5.0,
+    },
+    "shank": {
+        "speed": 0.62,
+        "stride": 1.02,
+        "push": 0.25,
+        "lift": 0.08,
+        "strike": 0.0,
+        "crouch": 10.0,
+        "toe_out": 4.0,
+    },
+    "foot": {"speed": 0.66, "stride": 1.03, "push": 0.3, "lift": 0.7, "strike": 0.9, "toe_out": 14.0},
+    "back": {
+        "speed": 0.68,
+        "push": 0.6,
+        "push_sound": 0.6,
+        "stride": 1.12,
+        "forward": 21.0,
+        "back": 0.3,
+        "arms": 0.4,
+        "nod": -5.0,
+    },
+    "neck": {"speed": 0.85, "head": 0.25, "back": 0.6, "forward": 3.0, "nod": 8.0, "arms": 0.6},
+    "shoulder": {"speed": 0.88, "side": 2.5, "forward": 2.0, "back": 0.8},
+    "upper arm": {"speed": 0.88, "side": 2.0, "forward": 3.0},
+    "forearm": {"speed": 0.90, "forward": 2.0},
+    "hand": {"speed": 0.94},
+}
+RATIOS = (
+    "speed",
+    "stride",
+    "push",
+    "push_sound",
+    "lift",
+    "strike",
+    "arm",
+    "arm_sound",
+    "arms",
+    "back",
+    "head",
+)
+# The recordings take a slow ankle for a stance, which an early landing changes by half only; and
+# the network smooths what it learns from.
+TIMING = 2.0
+STEP = {"thigh": 0.44, "shank": 0.42, "foot": 0.48}  # of the hurt foot, where the mix would say less
+
+
+@functools.cache
+def amounts(part: str) -> dict[str, float | Array]:
+    """What hurting a part on the right at severity 10 adds, by name; for RATIOS what is added to 1.
+
+    Also `off`, `off_sound`, `land_sound`: cycles by which a foot leaves and lands later. `step`: share of its
+    length by which the step onto the hurt foot is longer than that of a body that is only slower.
+    `curves`: (5, 5) factors of CURVES.
+    """
+    own = dict(OWN[part])
+    out: dict[str, float | Array] = {"curves": np.zeros((len(CURVES), 1 + 2 * HARMONICS))}
+    if mix := MIXES.get(part):
+        own, out = _of_people(part, mix, own)
+    for name, value in own.items():
+        out[name] = value - 1.0 if name in RATIOS else value
+    return out
+
+
+def _of_people(
+    part: str, mix: dict[str, float], own: dict[str, float]
+) -> tuple[dict[str, float], dict[str, float | Array]]:
+    known = profiles()
+
+    def mean(name: str) -> float:
+        return float(sum(share * getattr(known[p], name) for p, share in mix.items()))
+
+    curves = sum(share * known[p].harmonics() for p, share in mix.items()) * GAIN.get(part, 1.0)
+    ratios = {"stride": mean("stride"), "arm": mean("arm_hurt"), "arm_sound": min(mean("arm_sound"), 1.0)}
+    if part in BOTH_SIDES:
+        # A back that hurts is no side's: people's lurch, its size halved on either side, without its lean.
+        return {"stride": mean("stride") ** 0.5, **own}, {"curves": np.zeros_like(curves)}
+    speed = own["speed"]
+    slower = speed * own.get("stride", mean("stride"))  # of the length of a stride
+    step = STEP.get(part, mean("step_hurt"))
+    return {**ratios, **own}, {
+        "curves": curves,
+        "land_sound": TIMING * mean("strike"),
+        "off": TIMING * mean("stance_hurt"),
+        "off_sound": TIMING * (mean("strike") + mean("stance_sound")),
+        "step": min(step - slower, 0.25),
+        "width": mean("width"),
+    }

@@ -1,0 +1,145 @@
+"""Trunk, pelvis, head and arms: what people's curves add to them, and how an arm that hurts is held."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.ik import aim
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.core.smooth import gaussian
+from hobble.hurt.effects import Effects
+from hobble.hurt.parts import LEFT, RIGHT, SIDES, ancestors
+from hobble.hurt.people import HARMONICS
+from hobble.hurt.source import Source
+
+X, Y, Z = np.eye(3)
+PELVIS = 0.35  # share of the trunk's lean that the pelvis tilts
+MEAN = 0.5  # seconds, of the Gaussian that leaves of a joint's turns its mean posture
+LOOK = {"neck": 0.5, "head": 0.85}  # share of the trunk's lean that neck and head take back
+MOST_GUARD = 0.93  # of an arm's own movement that holding it takes away
+# Upper arm and forearm of a guarded left arm, forward, left and up in the heading's frame.
+GUARDS = {
+    "upper": ((0.10, 0.16, -0.98), (0.80, -0.58, 0.10)),
+    "fore": ((0.28, 0.20, -0.94), (0.70, -0.55, 0.46)),
+    "carry": ((0.10, 0.14, -0.98), (0.92, -0.25, 0.30)),
+}
+HAND = 0.75  # of a hand that hurts: it is only carried
+
+
+def change_body(source: Source, effects: Effects) -> Array:
+    """World rotations (F, J, 4) of the source's frames, changed; those of the legs are the source's still."""
+    skeleton = source.clip.skeleton
+    local = _stiffened(source, effects)
+    world = _world(skeleton, local)
+    pelvis, chest, head = _turns(source, effects)
+    given = _shares(skeleton)
+    for j in range(len(skeleton.joints)):
+        where, share = given[j]
+        if where == "pelvis":
+            turn = quat.slerp(pelvis, chest, np.full(len(source), share))
+        else:
+            turn = quat.slerp(chest, head, np.full(len(source), share))
+        world[:, j] = quat.mul(turn, world[:, j])
+    for side in (LEFT, RIGHT):
+        _guard(source, effects, world, side)
+    return world
+
+
+def _world(skeleton: Skeleton, local: Array) -> Array:
+    world = np.empty_like(local)
+    for j, parent in enumerate(skeleton.parents):
+        world[:, j] = local[:, j] if parent < 0 else quat.mul(world[:, parent], local[:, j])
+    return world
+
+
+def _stiffened(source: Source, effects: Effects) -> Array:
+    """Local rotations with less movement of back, neck and arms about their mean posture."""
+    skeleton, local = source.clip.skeleton, source.clip.rotations.copy()
+    back = _between(skeleton, "chest", "hips")
+    neck = _between(skeleton, "head", "chest")
+    ratios = [(back, effects.ratio("back")), (neck, effects.ratio("head"))]
+    for side in (LEFT, RIGHT):
+        arm = _between(skeleton, f"{SIDES[side]}_wrist", "chest")
+        ratios.append((arm[1:], effects.ratio("arm")[:, side]))  # not the hand's own
+    for joints, ratio in ratios:
+        for j in joints:
+            mean = quat.normalize(gaussian(quat.continuous(local[:, j]), MEAN * source.clip.fps))
+            local[:, j] = quat.slerp(mean, local[:, j], ratio)
+    return local
+
+
+def _between(skeleton: Skeleton, role: str, above: str) -> list[int]:
+    """The joints from that of `role` up to the one below that of `above`."""
+    path = ancestors(skeleton, skeleton.role(role))
+    return path[: path.index(skeleton.role(above))]
+
+
+def _shares(skeleton: Skeleton) -> list[tuple[str, float]]:
+    """For each joint how far it is on from pelvis to chest, or from chest to head."""
+    out: list[tuple[str, float]] = [("pelvis", 0.0)] * len(skeleton.joints)
+    back = _between(skeleton, "chest", "hips")[::-1]
+    neck = _between(skeleton, "head", "chest")[::-1]
+    for j, parent in enumerate(skeleton.parents):
+        if j in back:
+            out[j] = ("pelvis", (back.index(j) + 1) / len(back))
+        elif j in neck:
+            out[j] = ("head", (neck.index(j) + 1) / len(neck))
+        elif parent >= 0:
+            out[j] = ("head", 0.0) if out[parent] == ("pelvis", 1.0) else out[parent]
+    return out
+
+
+def _turns(source: Source, effects: Effects) -> tuple[Array, Array, Array]:
+    """(F, 4) each: by how much pelvis, chest and head are turned in the world."""
+    phase, going = source.phase, np.clip(source.walking, 0.0, 1.0)
+    rows = [np.ones(len(source))]
+    for h in range(1, HARMONICS + 1):
+        rows += [going * np.cos(2 * np.pi * h * phase), going * np.sin(2 * np.pi * h * phase)]
+    forward, left, left_up, turn, shoulders = np.einsum("fck,kf->cf", effects.curves, np.stack(rows))
+    side, hike = effects.sided["side"], effects.sided["list"] * source.swing
+    forward = forward + effects.whole["forward"]
+    left = left + side[:, LEFT] - side[:, RIGHT]
+    left_up = left_up + hike[:, LEFT] - hike[:, RIGHT]
+    pelvis = _lean(source, turn, left_up, PELVIS * forward)
+    chest = _lean(source, shoulders, -left, forward)
+    calm = 1 - LOOK["head"]
+    head = _lean(source, calm * shoulders, -calm * left, calm * forward + effects.whole["nod"])
+    return pelvis, chest, head
+
+
+def _lean(source: Source, turn: Array, roll: Array, forward: Array) -> Array:
+    """(F, 4) in the world: degrees to the left, left side up, and forward, in the heading's frame."""
+    yaw, roll_, pitch = (
+        quat.from_axis_angle(axis, np.radians(angle)) for axis, angle in ((Y, turn), (Z, roll), (X, forward))
+    )
+    own = quat.mul(yaw, quat.mul(roll_, pitch))
+    return quat.mul(source.heading, quat.mul(own, quat.inv(source.heading)))
+
+
+def _guard(source: Source, effects: Effects, world: Array, side: int) -> None:
+    """Hold an arm that hurts: elbow bent, against the body or before the chest; changes `world`."""
+    skeleton = source.clip.skeleton
+    weights = {name: np.clip(effects.sided[name][:, side], 0.0, 1.0) for name in GUARDS}
+    weights["carry"] = HAND * weights["carry"]
+    held = MOST_GUARD * np.max(list(weights.values()), axis=0)
+    if not held.any():
+        return
+    total = np.sum(list(weights.values()), axis=0)
+    weights["carry"] = np.where(total > 1e-9, weights["carry"], 1.0)  # a direction where nothing is held, too
+    total = np.maximum(total, 1e-9) + (total <= 1e-9)
+    sign = np.array([1.0 if side == LEFT else -1.0, 1.0, 1.0])
+    shoulder, elbow, wrist = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("shoulder", "elbow", "wrist"))
+    for bone, (joint, end) in enumerate(((shoulder, elbow), (elbow, wrist))):
+        goal = np.zeros((len(source), 3))
+        for name, dirs in GUARDS.items():
+            ahead, out, up = dirs[bone]
+            goal += (weights[name] / total)[:, None] * np.array([out, up, ahead]) * sign
+        toward = quat.rotate(source.heading, goal)
+        bone_now = skeleton.offsets[end]
+        full = aim(world[:, joint], np.broadcast_to(bone_now, toward.shape), toward)
+        turn = quat.mul(quat.slerp(world[:, joint], full, held), quat.inv(world[:, joint]))
+        for j in range(len(skeleton.joints)):
+            if joint in ancestors(skeleton, j):
+                world[:, j] = quat.mul(turn, world[:, j])

@@ -1,0 +1,137 @@
+"""A healthy clip as a body that hurts would have walked it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.errors import HobbleError
+from hobble.core.quat import Array
+from hobble.core.skeleton import local_rotations
+from hobble.core.smooth import gaussian
+from hobble.hurt.body import change_body
+from hobble.hurt.effects import HIGHEST, Effects, effects
+from hobble.hurt.feet import Foot, move_foot, places, rolled_foot
+from hobble.hurt.legs import Leg, hips_height, knee_flexion, place_leg, reach_of, read_leg
+from hobble.hurt.parts import LEFT, RIGHT, SIDES
+from hobble.hurt.path import Path, ground_below, shorten
+from hobble.hurt.relabel import relabel
+from hobble.hurt.sampling import at_frames, turns_at
+from hobble.hurt.source import Source, read_source
+from hobble.hurt.timing import Timing, retime
+from hobble.labels.model import Labels
+
+
+@dataclass(frozen=True)
+class HurtClip:
+    """A clip of N frames with its severities (N, L) and its labels. when: (N,) the source frame, fractions
+    included, that the body shows in each."""
+
+    clip: Clip
+    severity: Array = field(repr=False)
+    labels: Labels = field(repr=False)
+    when: Array = field(repr=False)
+
+
+def hurt_clip(
+    clip: Clip,
+    labels: Labels,
+    severity: Array,
+    name: str | None = None,
+    flat: bool = True,
+    zero: str = "right",
+    margins: str = "extend",
+) -> HurtClip:
+    """The clip as it would have been walked with these severities (F, L), 0 to 10, of the skeleton's links.
+
+    It takes longer where the cadence falls; its path keeps its shape and is shortened where steps are. Where
+    nothing hurts at all the clip comes back as it is. labels: of the clip. flat: whether its ground is flat;
+    on other ground rises shrink with the steps. zero, margins: as in the section `labels`. Raises HobbleError
+    for severities of another shape or range, and for joints that are moved, not turned.
+    """
+    severity = np.asarray(severity, float)
+    if severity.shape != (len(clip), len(clip.skeleton.links)):
+        raise HobbleError(
+            f"clip {clip.name}: severities {severity.shape} for {len(clip)} frames and "
+            f"{len(clip.skeleton.links)} links"
+        )
+    if not np.isfinite(severity).all() or severity.min(initial=0) < 0 or severity.max(initial=0) > HIGHEST:
+        raise HobbleError(f"clip {clip.name}: a severity is not in 0..10")
+    name = clip.name if name is None else name
+    if not severity.any() or len(clip) < 3:
+        same = Clip(name, clip.skeleton, clip.fps, clip.rotations, clip.root, clip.translations)
+        return HurtClip(same, severity, labels, np.arange(len(clip), dtype=float))
+    if clip.translations is not None:
+        raise HobbleError(f"clip {clip.name} moves its joints, not only turns them: it cannot be hurt")
+    source = read_source(clip, labels)
+    changes = effects(clip.skeleton, severity, clip.fps)
+    timing = retime(source, changes)
+    feet = [rolled_foot(source, changes, side) for side in (LEFT, RIGHT)]
+    path = shorten(source, changes, timing.slower, None if flat else _ground(source, feet))
+    feet = [move_foot(source, changes, path, feet[side], side) for side in (LEFT, RIGHT)]
+    out = _assembled(source, changes, timing, path, feet, name)
+    which = np.clip(np.floor(timing.body + 1e-6).astype(int), 0, len(clip) - 1)
+    return HurtClip(out, severity[which], relabel(labels, timing, zero, margins), timing.body)
+
+
+def _ground(source: Source, feet: list[Foot]) -> Array:
+    heights = []
+    for side in (LEFT, RIGHT):
+        stances = source.stances[side]
+        heights.append(
+            [(s.middle, float(p[1])) for s, p in zip(stances, places(feet[side], stances), strict=True)]
+        )
+    return ground_below(source, heights)
+
+
+def _assembled(
+    source: Source, changes: Effects, timing: Timing, path: Path, feet: list[Foot], name: str
+) -> Clip:
+    """Body, hips and legs at the new frames."""
+    clip, skeleton = source.clip, source.clip.skeleton
+    world = turns_at(change_body(source, changes), timing.body)
+    shift = np.stack(
+        [path.new[:, 0] - path.old[:, 0], path.new_ground - path.old_ground, path.new[:, 1] - path.old[:, 1]],
+        axis=1,
+    )
+    root = at_frames(clip.root + shift, timing.body)
+    legs = [read_leg(clip, side) for side in (LEFT, RIGHT)]
+    pelvis = world[:, skeleton.role("hips")]
+    hips = [_from_root(source, world, side) for side in (LEFT, RIGHT)]
+    ankles = [at_frames(feet[side].ankle, timing.legs[:, side]) for side in (LEFT, RIGHT)]
+    stands = [
+        at_frames(gaussian(1.0 - source.up[:, side], 2.0), timing.legs[:, side]) for side in (LEFT, RIGHT)
+    ]
+    reaches = [_reach(legs[side], changes, source, timing, side) for side in (LEFT, RIGHT)]
+    root[:, 1] = hips_height(root, hips, ankles, reaches, stands, [leg.longest for leg in legs])
+    for side in (LEFT, RIGHT):
+        thigh, knee, heel, toe = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("hip", "knee", "heel", "toe"))
+        when = timing.legs[:, side]
+        world[:, thigh], world[:, knee] = place_leg(
+            skeleton, side, legs[side], when, pelvis, root + hips[side], ankles[side]
+        )
+        world[:, heel] = turns_at(feet[side].turn, when)
+        world[:, toe] = quat.mul(world[:, heel], turns_at(feet[side].toes, when))
+    return Clip(name, skeleton, clip.fps, local_rotations(skeleton, world), root)
+
+
+def _from_root(source: Source, world: Array, side: int) -> Array:
+    """(N, 3) of a hip joint from the root joint."""
+    skeleton = source.clip.skeleton
+    joint, out = skeleton.role(f"{SIDES[side]}_hip"), np.zeros((len(world), 3))
+    while (parent := skeleton.parents[joint]) >= 0:
+        out += quat.rotate(world[:, parent], skeleton.offsets[joint])
+        joint = parent
+    return out
+
+
+def _reach(leg: Leg, changes: Effects, source: Source, timing: Timing, side: int) -> Array:
+    """(N,) cm from hip to ankle of a leg that stands, its knee bent more where it is spared."""
+    crouch = np.radians(changes.sided["crouch"][:, side]) * (1 - source.swing[:, side])
+    bent = knee_flexion(leg.reach, leg.upper, leg.lower) + crouch
+    return at_frames(
+        np.where(crouch > 0, reach_of(bent, leg.upper, leg.lower), leg.reach), timing.legs[:, side]
+    )

@@ -1,0 +1,155 @@
+"""Where each foot goes, on the source's frames: shorter steps, less roll over the toe, a lower or wider
+swing.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from hobble.core import quat
+from hobble.core.quat import Array
+from hobble.core.smooth import gaussian
+from hobble.hurt.effects import Effects
+from hobble.hurt.parts import SIDES
+from hobble.hurt.path import Path
+from hobble.hurt.sampling import smoothstep
+from hobble.hurt.source import UP, Source, Stance
+
+SIGN = (1.0, -1.0)  # +X is the figure's left
+LEVEL = np.radians(
+    8.0
+)  # of pitch over which what is left of it goes from the heel strike's share to the push's
+SHORT = 12.0  # cm: a swing that goes less far is shared out by its time, not by its way
+CLEARANCE = 1.3  # cm of a swinging toe joint over its height in stance, or as little as in the source
+EVEN = 4.0  # cm of height between two stances that leaves the swing as high as it was
+JOGGING = 0.65  # share of what steps differ that a jog does not take on
+ENDS = 0.3  # share of the swing over which its lower height sets in and goes
+
+
+@dataclass(frozen=True)
+class Foot:
+    """One foot over F source frames. ankle, ball: (F, 3) of heel and toe joint; turn: (F, 4) of the foot in
+    the world; toes: (F, 4) local, of the toe joint.
+    """
+
+    ankle: Array = field(repr=False)
+    ball: Array = field(repr=False)
+    turn: Array = field(repr=False)
+    toes: Array = field(repr=False)
+
+
+def rolled_foot(source: Source, effects: Effects, side: int) -> Foot:
+    """The source's foot with less pitch: turned about its ball while its heel is up, else about its ankle."""
+    clip, skeleton = source.clip, source.clip.skeleton
+    heel, toe = (skeleton.role(f"{SIDES[side]}_{role}") for role in ("heel", "toe"))
+    ankle, ball, turn = clip.positions[:, heel], clip.positions[:, toe], clip.global_rotations[:, heel]
+    along = ball - ankle
+    axis = _hinge(turn, along, ~source.up[:, side])
+    ahead = np.cross(UP, axis)
+    pitch = np.arctan2(np.sum(along * np.cross(axis, ahead), axis=1), np.sum(along * ahead, axis=1))
+    middles = np.array([s.middle for s in source.stances[side]])
+    flat = np.interp(np.arange(len(clip)), middles, [_middle(pitch, s) for s in source.stances[side]])
+    raised = pitch - flat
+    heel_up = smoothstep(-raised / LEVEL)
+    push, strike = (effects.ratio(name)[:, side] for name in ("push", "strike"))
+    # Toes that point down without a push-off reach for the ground as they land: less of that too.
+    share = strike + (push - strike) * heel_up
+    tilt = quat.from_axis_angle(axis, raised * (share - 1))
+    new_along = quat.rotate(tilt, along)
+    ankle = ankle + np.where(raised < 0, 1.0, 0.0)[:, None] * (along - new_along)
+    rest = quat.normalize(gaussian(quat.continuous(clip.rotations[:, toe]), 0.5 * clip.fps))
+    toes = quat.slerp(rest, clip.rotations[:, toe], share)
+    return Foot(ankle, ankle + new_along, quat.mul(tilt, turn), toes)
+
+
+def _hinge(turn: Array, along: Array, stands: np.ndarray) -> Array:
+    """(F, 3) the axis about which the foot is pitched, + toe up: level and across a standing foot."""
+    across = np.cross(along, UP)
+    size = np.linalg.norm(across, axis=1)
+    own = quat.rotate(quat.inv(turn), across)[stands & (size > 0.3 * np.linalg.norm(along, axis=1))]
+    usual = own.sum(axis=0) if len(own) else np.array([-1.0, 0.0, 0.0])
+    return quat.rotate(turn, usual / max(float(np.linalg.norm(usual)), 1e-9))
+
+
+def _middle(values: Array, stance: Stance) -> Array:
+    """Median of values (F, ...) over the middle half of a stance."""
+    a, b = stance.land + 0.25 * (stance.off - stance.land), stance.land + 0.75 * (stance.off - stance.land)
+    return np.median(values[int(a) : int(np.ceil(b)) + 1], axis=0)
+
+
+def places(foot: Foot, stances: list[Stance]) -> list[Array]:
+    """Where the ankle is in each stance, (3,) each."""
+    return [_middle(foot.ankle, stance) for stance in stances]
+
+
+def move_foot(source: Source, effects: Effects, path: Path, foot: Foot, side: int) -> Foot:
+    """The foot's way where the body takes the new path."""
+    stances = source.stances[side]
+    old = places(foot, stances)
+    new = [
+        _moved(place, s.middle, source, effects, path, side) for place, s in zip(old, stances, strict=True)
+    ]
+    yaw = quat.yaw(np.radians(SIGN[side] * effects.sided["toe_out"][:, side]))
+    ankle, least = np.empty_like(foot.ankle), np.empty(len(source))
+    ball = source.clip.positions[:, source.clip.skeleton.role(f"{SIDES[side]}_toe"), 1]
+    soles = [float(_middle(ball, stance)) for stance in stances]
+    rises = [float(b[1] - a[1]) for a, b in zip(old, new, strict=True)]
+    spans = [(int(s.land), int(s.off)) for s in stances]
+    for (first, last), place, there, sole, rise in zip(spans, old, new, soles, rises, strict=True):
+        part = slice(first, last + 1)
+        least[part] = sole + rise + np.minimum(ball[part] - sole, 0.0)
+        ankle[part] = there + quat.rotate(yaw[part], foot.ankle[part] - place)
+    along = quat.rotate(yaw, foot.ball - foot.ankle)
+    lift = effects.ratio("lift")[:, side]
+    out = effects.sided["out"][:, side] * source.leg * SIGN[side]
+    outward = quat.rotate(source.heading, np.array([1.0, 0.0, 0.0])) * out[:, None]
+    for i, ((_, off), (land, _)) in enumerate(itertools.pairwise(spans)):
+        if land - off < 2:
+            continue
+        part = slice(off, land + 1)
+        way = _way(foot.ankle[part])
+        line = foot.ankle[off] + (foot.ankle[land] - foot.ankle[off]) * way
+        moved = ankle[off] + (ankle[land] - ankle[off]) * way + foot.ankle[part] - line
+        u = np.linspace(0.0, 1.0, land - off + 1)
+        edge = smoothstep(u / ENDS) * smoothstep((1 - u) / ENDS)
+        even = np.exp(-abs(foot.ankle[land, 1] - foot.ankle[off, 1]) / EVEN)
+        moved[:, 1] -= (1 - lift[part]) * even * edge * (foot.ankle[part, 1] - line[:, 1])
+        moved += outward[part] * (np.sin(np.pi * u) ** 2)[:, None]
+        under = soles[i] + (soles[i + 1] - soles[i]) * way[:, 0]
+        up = rises[i] + (rises[i + 1] - rises[i]) * way[:, 0]
+        own = ball[part] - under
+        least[part] = under + up + np.minimum(own, CLEARANCE * np.sin(np.pi * u))
+        ankle[part] = moved
+    ankle[:, 1] += smooth_above(np.maximum(least - ankle[:, 1] - along[:, 1], 0.0), 1)
+    return Foot(ankle, ankle + along, quat.mul(yaw, foot.turn), foot.toes)
+
+
+def _way(ankle: Array) -> Array:
+    """(n, 1) share of its level way from first to last that a swinging foot has gone."""
+    level = ankle * [1, 0, 1]
+    way = level[-1] - level[0]
+    time = smoothstep(np.linspace(0.0, 1.0, len(ankle)))
+    return ((((level - level[0]) @ way) + SHORT**2 * time) / (way @ way + SHORT**2))[:, None]
+
+
+def _moved(place: Array, when: float, source: Source, effects: Effects, path: Path, side: int) -> Array:
+    """A footprint in the new world: carried along with the body, the hurt one less far ahead, both wider."""
+    frames = np.arange(len(source))
+    at = min(round(when), len(source) - 1)
+    speed = np.gradient(source.path, axis=0)[at] if len(source) > 1 else np.zeros(2)
+    step = effects.sided["step"] * (1 - JOGGING * source.jog)[:, None]
+    ahead = np.interp(when, frames, step[:, side] - step[:, 1 - side]) / 2 * speed * source.cycle[at] / 2
+    width = np.interp(when, frames, effects.sided["width"].max(axis=1)) * source.leg / 2
+    outward = quat.rotate(source.heading[at], np.array([SIGN[side] * width, 0.0, 0.0]))
+    return path.moved(place, when) + np.array([ahead[0], 0.0, ahead[1]]) + outward
+
+
+def smooth_above(values: Array, frames: int) -> Array:
+    """A smooth curve nowhere below `values`: their running maximum, averaged over as wide a window."""
+    wide = maximum_filter1d(values, 4 * frames + 1, mode="nearest")
+    kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
+    return np.convolve(np.pad(wide, 2 * frames, mode="edge"), kernel / kernel.sum(), mode="valid")

@@ -1,0 +1,143 @@
+"""The hips' height, so that the standing leg keeps its bend, and legs that put the feet in their places."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.ik import two_bone_knee
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.core.smooth import gaussian
+from hobble.hurt.feet import smooth_above
+from hobble.hurt.parts import SIDES
+from hobble.hurt.sampling import at_frames, turns_at
+
+BENT = np.radians([6.0, 18.0])  # knee flexion from which on the bend itself shows where the knee points
+STRETCH = (0.985, 0.9985)  # of the leg's length: never held below, never above
+
+
+@dataclass(frozen=True)
+class Leg:
+    """What the source's leg does, over F frames. reach: (F,) cm from hip to ankle. thigh, shank: (F, 4) and
+    hinge: (F, 3), the axis about which the knee bends, in the pelvis's frame. upper, lower: bone lengths.
+    """
+
+    reach: Array = field(repr=False)
+    thigh: Array = field(repr=False)
+    shank: Array = field(repr=False)
+    hinge: Array = field(repr=False)
+    upper: float
+    lower: float
+
+    @property
+    def longest(self) -> float:
+        """The furthest that the ankle is taken from the hip."""
+        length = self.upper + self.lower
+        return float(np.clip(self.reach.max(), STRETCH[0] * length, STRETCH[1] * length))
+
+
+def read_leg(clip: Clip, side: int) -> Leg:
+    """The source's leg; where it is nearly straight, its knee points where the thigh usually has it."""
+    skeleton = clip.skeleton
+    hip, knee, heel = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("hip", "knee", "heel"))
+    at = clip.positions
+    along = at[:, heel] - at[:, hip]
+    reach = np.linalg.norm(along, axis=1)
+    unit = along / np.maximum(reach, 1e-9)[:, None]
+    out = at[:, knee] - at[:, hip]
+    out = out - unit * np.sum(out * unit, axis=1, keepdims=True)
+    size = np.linalg.norm(out, axis=1, keepdims=True)
+    upper, lower = (float(np.linalg.norm(skeleton.offsets[j])) for j in (knee, heel))
+    bend = knee_flexion(reach, upper, lower)
+    sure = np.clip((bend - BENT[0]) / (BENT[1] - BENT[0]), 0.0, 1.0)[:, None]
+    thigh = clip.global_rotations[:, hip]
+    own = quat.rotate(quat.inv(thigh), out / np.maximum(size, 1e-9))
+    usual = np.sum(own * sure, axis=0) if sure.sum() > 5 else _forward(clip, side, thigh)
+    usual = usual / max(float(np.linalg.norm(usual)), 1e-9)
+    points = quat.rotate(thigh, own * sure + usual * (1 - sure))
+    pelvis = quat.inv(clip.global_rotations[:, skeleton.role("hips")])
+    return Leg(
+        reach,
+        quat.mul(pelvis, thigh),
+        quat.mul(pelvis, clip.global_rotations[:, knee]),
+        quat.rotate(pelvis, np.cross(points, unit)),
+        upper,
+        lower,
+    )
+
+
+def _forward(clip: Clip, side: int, thigh: Array) -> Array:
+    """(3,) where the foot points, in the thigh's frame: of a knee that never bends."""
+    heel, toe = (clip.skeleton.role(f"{SIDES[side]}_{r}") for r in ("heel", "toe"))
+    return np.mean(quat.rotate(quat.inv(thigh), clip.positions[:, toe] - clip.positions[:, heel]), axis=0)
+
+
+def knee_flexion(reach: Array, upper: float, lower: float) -> Array:
+    """(...) radians of knee flexion, 0 straight, by how far the ankle is from the hip."""
+    cosine = (reach**2 - upper**2 - lower**2) / (2 * upper * lower)
+    return np.arccos(np.clip(cosine, -1.0, 1.0))
+
+
+def reach_of(flexion: Array, upper: float, lower: float) -> Array:
+    """The inverse of `knee_flexion`."""
+    return np.sqrt(upper**2 + lower**2 + 2 * upper * lower * np.cos(flexion))
+
+
+def hips_height(
+    root: Array,
+    hips: list[Array],
+    ankles: list[Array],
+    reaches: list[Array],
+    stands: list[Array],
+    longest: list[float],
+) -> Array:
+    """(N,) heights of the root. root: (N, 3) as it would be. hips: (N, 3) of each leg from the root. ankles:
+    (N, 3). reaches: (N,) cm that hip and ankle of a standing leg should be apart. stands: (N,) 0 to 1.
+    """
+    needed = np.zeros(len(root))
+    weight = np.full(len(root), 1e-9)
+    for hip, ankle, reach, stand in zip(hips, ankles, reaches, stands, strict=True):
+        apart = (root + hip - ankle)[:, [0, 2]]
+        level = np.minimum(np.sum(apart**2, axis=1), (0.97 * reach) ** 2)
+        higher = ankle[:, 1] + np.sqrt(reach**2 - level) - hip[:, 1] - root[:, 1]
+        needed += stand * higher
+        weight += stand
+    height = root[:, 1] + gaussian(needed, 3.0) / gaussian(weight, 3.0)
+    excess = np.zeros(len(root))
+    for hip, ankle, most in zip(hips, ankles, longest, strict=True):
+        apart = (root + hip - ankle)[:, [0, 2]]
+        level = np.minimum(np.sum(apart**2, axis=1), (0.97 * most) ** 2)
+        excess = np.maximum(excess, height + hip[:, 1] - ankle[:, 1] - np.sqrt(most**2 - level))
+    return height - smooth_above(np.maximum(excess, 0.0), 2)
+
+
+def place_leg(
+    skeleton: Skeleton, side: int, leg: Leg, when: Array, pelvis: Array, hip: Array, ankle: Array
+) -> tuple[Array, Array]:
+    """World rotations (N, 4) of thigh and shank that put the ankle where it should be.
+
+    when: (N,) source frames whose leg is bent so. pelvis: (N, 4). hip, ankle: (N, 3) in the world.
+    """
+    bones = [skeleton.offsets[skeleton.role(f"{SIDES[side]}_{r}")] for r in ("knee", "heel")]
+    thigh, shank = (quat.mul(pelvis, turns_at(own, when)) for own in (leg.thigh, leg.shank))
+    hinge = quat.rotate(pelvis, at_frames(leg.hinge, when))
+    knee, end = two_bone_knee(hip, ankle, np.cross(ankle - hip, hinge), leg.upper, leg.lower)
+    return _turned(thigh, hinge, bones[0], knee - hip), _turned(shank, hinge, bones[1], end - knee)
+
+
+def _turned(world: Array, hinge: Array, bone: Array, along: Array) -> Array:
+    """World rotations (N, 4) turned so that the local `bone` lies `along`, the knee's axis kept."""
+    turn = _frame(along, hinge) @ np.swapaxes(_frame(quat.rotate(world, bone), hinge), -1, -2)
+    return quat.mul(quat.from_matrix(turn), world)
+
+
+def _frame(along: Array, hinge: Array) -> Array:
+    """(N, 3, 3) columns: the hinge as far as it is across a bone, along the bone, and across both."""
+    y = along / np.linalg.norm(along, axis=-1, keepdims=True)
+    x = hinge - y * np.sum(hinge * y, axis=-1, keepdims=True)
+    x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-9)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)

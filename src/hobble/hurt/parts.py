@@ -1,0 +1,58 @@
+"""Which part of the body a link belongs to, by the roles of its joints, whatever the rig calls them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hobble.core.skeleton import Skeleton
+
+LEFT, RIGHT = 0, 1
+SIDES = ("left", "right")
+LEG = (("hip", "hip"), ("knee", "thigh"), ("heel", "shank"))  # up to and with this joint it is that part
+ARM = (("shoulder", "shoulder"), ("elbow", "upper arm"), ("wrist", "forearm"))
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the body: pelvis, hip, thigh, shank, foot, back, neck, shoulder, upper arm, forearm or hand.
+
+    side: LEFT, RIGHT, or None on the midline.
+    """
+
+    name: str
+    side: int | None
+
+
+def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> Part:
+    """The part that a link (parent joint, child joint) of the skeleton belongs to."""
+    child = skeleton.index(link[1])
+    for side, word in enumerate(SIDES):
+        for first, table, last in (("hip", LEG, "foot"), ("shoulder", ARM, "hand")):
+            root = skeleton.role("hips" if first == "hip" else "chest")
+            for role, name in table:
+                joint = skeleton.role(f"{word}_{role}")
+                if child in _chain(skeleton, joint, root):
+                    near = role == "hip" and child != joint
+                    return Part("pelvis" if near else name, side)
+                root = joint
+            if root in ancestors(skeleton, child):
+                return Part(last, side)
+    if child in _chain(skeleton, skeleton.role("chest"), skeleton.role("hips")):
+        return Part("back", None)
+    if skeleton.role("chest") in ancestors(skeleton, child):
+        return Part("neck", None)
+    return Part("back", None)
+
+
+def ancestors(skeleton: Skeleton, joint: int) -> list[int]:
+    """The joint, its parent, and so on to the root."""
+    out = [joint]
+    while skeleton.parents[out[-1]] >= 0:
+        out.append(skeleton.parents[out[-1]])
+    return out
+
+
+def _chain(skeleton: Skeleton, joint: int, above: int) -> list[int]:
+    """The joints from `joint` up to the one below `above`; none where `above` is no ancestor."""
+    path = ancestors(skeleton, joint)
+    return path[: path.index(above)] if above in path else []

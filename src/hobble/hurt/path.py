@@ -1,0 +1,66 @@
+"""Where the body goes: the source's path, each bit of it shortened by as much as the steps are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.smooth import gaussian
+from hobble.hurt.effects import Effects
+from hobble.hurt.source import Source
+
+SLOPE = 0.3  # seconds, of the Gaussian over the heights of the ground under the feet
+
+
+@dataclass(frozen=True)
+class Path:
+    """Old and new level path (F, 2) and height of the ground (F,) at each source frame. The ground of a clip
+    on flat ground is 0 and stays so; on other ground its rises shrink as the way does, so that slopes stay.
+    """
+
+    old: Array = field(repr=False)
+    new: Array = field(repr=False)
+    old_ground: Array = field(repr=False)
+    new_ground: Array = field(repr=False)
+
+    def moved(self, point: Array, when: float) -> Array:
+        """(3,) a point of the old world that belongs to source frame `when`, in the new world."""
+        frames = np.arange(len(self.old))
+        shift = [np.interp(when, frames, self.new[:, i] - self.old[:, i]) for i in (0, 1)]
+        return point + np.array(
+            [shift[0], np.interp(when, frames, self.new_ground - self.old_ground), shift[1]]
+        )
+
+
+def shorten(source: Source, effects: Effects, slower: Array, ground: Array | None) -> Path:
+    """The path at the speed of `effects`; slower: (F,) how much longer a stride takes.
+
+    ground: (F,) height of the ground below the body, None where it is flat.
+    """
+    share = effects.ratio("speed") * slower
+    flat = np.zeros(len(source))
+    return Path(
+        source.path,
+        _shrunk(source.path, share[:, None]),
+        flat if ground is None else ground,
+        flat if ground is None else _shrunk(ground, share),
+    )
+
+
+def ground_below(source: Source, heights: list[list[tuple[float, float]]]) -> Array:
+    """(F,) cm, the ground below the body by the feet that stand; heights: (middle, height) of each foot's
+    stances.
+
+    Each foot's height is counted from its median, so that legs of two lengths make no waves.
+    """
+    points = sorted((when, y - float(np.median([h for _, h in own]))) for own in heights for when, y in own)
+    line = np.interp(np.arange(len(source)), [p[0] for p in points], [p[1] for p in points])
+    return gaussian(line, SLOPE * source.clip.fps)
+
+
+def _shrunk(values: Array, share: Array) -> Array:
+    """The same curve from its first value on, every change times its share."""
+    steps = np.diff(values, axis=0) * (share[1:] + share[:-1]) / 2
+    return values[:1] + np.concatenate([np.zeros_like(values[:1]), np.cumsum(steps, axis=0)])

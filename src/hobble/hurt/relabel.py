@@ -1,0 +1,37 @@
+"""The labels of a hurt clip: those of its source, at the times that the hurt body takes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.hurt.parts import LEFT, RIGHT
+from hobble.hurt.sampling import at_frames
+from hobble.hurt.timing import Timing
+from hobble.labels.model import Labels
+from hobble.labels.phase import dropped_frames, find_cycles, phase_of_footsteps
+
+
+def relabel(labels: Labels, timing: Timing, zero: str, margins: str) -> Labels:
+    """Contacts, footsteps, phase and gait at the new frames; a walk that limps is a walk still.
+
+    zero: the foot that lands at phase 0. margins: which cycles are kept, as in `hobble.labels.phase`.
+    """
+    frames = len(timing)
+    last = len(labels) - 1
+    nearest = [np.clip(np.round(timing.legs[:, side]).astype(int), 0, last) for side in (LEFT, RIGHT)]
+    contacts = np.stack([labels.contacts[nearest[column // 2], column] for column in range(4)], axis=1)
+    footsteps = labels.footsteps.copy()
+    for column, side in ((0, RIGHT), (1, LEFT)):
+        footsteps[:, column] = timing.new_frames(footsteps[:, column], side)
+    phase, known = phase_of_footsteps(footsteps, frames)
+    known &= ~dropped_frames(footsteps, frames)
+    body = np.clip(np.round(timing.body).astype(int), 0, last)
+    cycles, _ = find_cycles(footsteps, frames, zero, margins)
+    return Labels(
+        contacts=contacts,
+        phase=phase if zero == "right" else (phase + 0.5) % 1.0,
+        phase_known=known & labels.phase_known[body],
+        gait=at_frames(labels.gait, timing.body),
+        footsteps=footsteps,
+        cycles=cycles,
+    )

@@ -1,0 +1,140 @@
+"""What is read of the healthy clip before it is changed: stances, heading, path, how long its cycles are."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.quat import Array
+from hobble.core.smooth import gaussian
+from hobble.hurt.parts import LEFT, RIGHT, SIDES
+from hobble.labels.footfall import find_swings
+from hobble.labels.model import GAITS, Labels
+from hobble.labels.options import Labels as LabelOptions
+from hobble.labels.phase import phase_of_footsteps
+
+UP = np.array([0.0, 1.0, 0.0])
+CYCLE = 1.1  # seconds, where a clip has no cycle of its own
+LONGEST_CYCLE = 2.5
+LEAST_SWING = 6  # frames
+PATH = 0.25  # seconds, of the Gaussian that leaves of the root's way its path
+FACING = 0.2
+
+
+@dataclass(frozen=True)
+class Stance:
+    """A foot on the ground from source frame `land` to `off`; `real` ends are not those of the clip."""
+
+    land: float
+    off: float
+
+    @property
+    def middle(self) -> float:
+        """The source frame half way."""
+        return (self.land + self.off) / 2
+
+
+@dataclass(frozen=True)
+class Source:
+    """A healthy clip of F frames and what its change starts from; pairs are left and right.
+
+    stances: of each foot in order, one at least. up: (F, 2) whether a foot swings. swing: (F, 2) 0 to 1 and
+    back to 0 over a swing. phase: (F,) cycles, unwrapped, 0 as the right foot lands. walking: (F,) 0 to 1,
+    whether the phase is known. jog: (F,) share. cycle: (F,) frames that a cycle takes about then. path: (F,
+    2) level path of the root, x and z. heading: (F, 4) turn about Y of the pelvis. leg: cm from hip to ankle
+    at full stretch.
+    """
+
+    clip: Clip
+    labels: Labels
+    stances: tuple[list[Stance], list[Stance]] = field(repr=False)
+    up: np.ndarray = field(repr=False)
+    swing: Array = field(repr=False)
+    phase: Array = field(repr=False)
+    walking: Array = field(repr=False)
+    jog: Array = field(repr=False)
+    cycle: Array = field(repr=False)
+    path: Array = field(repr=False)
+    heading: Array = field(repr=False)
+    leg: float
+
+    def __len__(self) -> int:
+        return len(self.clip)
+
+
+def read_source(clip: Clip, labels: Labels) -> Source:
+    """Everything about a healthy clip that its change needs; labels as `hobble.labels` makes them."""
+    frames, skeleton = len(clip), clip.skeleton
+    options = LabelOptions()
+    found = find_swings(clip, options.heel_speed, options.toe_speed, options.valley_factor)
+    stances, up, swing = [], np.zeros((frames, 2), bool), np.zeros((frames, 2))
+    for side in (LEFT, RIGHT):
+        own = [
+            (s.start, min(s.end, frames - 1)) for s in found if s.foot == 1 - side
+        ]  # there the right foot is 0
+        touches = np.asarray(labels.contacts[:, 2 * side : 2 * side + 2].any(axis=1))
+        own = [_in_the_air(start, end, touches) for start, end in own]
+        for start, end in own:
+            up[start:end, side] = True
+            u = (np.arange(start, end) - start + 0.5) / max(end - start, 1)
+            swing[start:end, side] = np.sin(np.pi * u) ** 2
+        ends = [0, *(x for pair in own for x in pair), frames - 1]
+        stances.append(
+            [Stance(float(a), float(max(a, b))) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+        )
+    phase, known = phase_of_footsteps(labels.footsteps, frames)
+    step = np.diff(phase, prepend=phase[:1])
+    phase = phase[0] + np.cumsum(np.where(step < -0.5, step + 1.0, step)) if frames else phase
+    legs = [_length(clip, side) for side in SIDES]
+    return Source(
+        clip,
+        labels,
+        (stances[LEFT], stances[RIGHT]),
+        up,
+        swing,
+        phase,
+        gaussian(known.astype(float), 0.2 * clip.fps),
+        gaussian(labels.gait[:, GAITS.index("jog")], 0.1 * clip.fps),
+        _cycles((stances[LEFT], stances[RIGHT]), frames, clip.fps),
+        gaussian(clip.positions[:, skeleton.role("hips")][:, [0, 2]], PATH * clip.fps),
+        _heading(clip),
+        float(np.mean(legs)),
+    )
+
+
+def _in_the_air(start: int, end: int, touches: np.ndarray) -> tuple[int, int]:
+    """A swing without the frames at its ends in which the foot touches the ground by its labels."""
+    while end - start > LEAST_SWING and touches[start]:
+        start += 1
+    while end - start > LEAST_SWING and touches[end - 1]:
+        end -= 1
+    return start, end
+
+
+def _length(clip: Clip, side: str) -> float:
+    offsets = clip.skeleton.offsets
+    return float(sum(np.linalg.norm(offsets[clip.skeleton.role(f"{side}_{b}")]) for b in ("knee", "heel")))
+
+
+def _cycles(stances: tuple[list[Stance], list[Stance]], frames: int, fps: float) -> Array:
+    """(frames,) frames from a foot's landing to its next about then, from all landings of both feet."""
+    middles, lengths = [], []
+    for own in stances:
+        for a, b in itertools.pairwise(own[1:]):
+            if b.land - a.land <= LONGEST_CYCLE * fps:
+                middles.append((a.land + b.land) / 2)
+                lengths.append(b.land - a.land)
+    if not middles:
+        return np.full(frames, CYCLE * fps)
+    order = np.argsort(middles)
+    return np.interp(np.arange(frames), np.array(middles)[order], np.array(lengths)[order])
+
+
+def _heading(clip: Clip) -> Array:
+    left, right = (clip.positions[:, clip.skeleton.role(f"{side}_hip")] for side in SIDES)
+    forward = gaussian(np.cross(left - right, UP), FACING * clip.fps)
+    return quat.yaw(np.arctan2(forward[:, 0], forward[:, 2]))

@@ -1,0 +1,85 @@
+"""When everything happens: how the hurt clip's frames look back at the source's, for the body and for each
+leg.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from hobble.core.quat import Array
+from hobble.hurt.effects import Effects
+from hobble.hurt.parts import LEFT, RIGHT
+from hobble.hurt.source import Source
+
+SQUEEZE = 0.6  # of the time between two events of a leg that is left to it at least
+JOG_STRIDE = 0.15  # share of a longer stride's time that a jog takes on: its flight cannot last longer
+MOST_SHIFT = 0.17  # cycles
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Source frames, fractions included, that show in each of N new frames.
+
+    body: (N,). legs: (N, 2) left and right. begins: (F,) new frame at which each source frame would show if
+    only the cadence changed. slower: (F,) how many times as long a stride takes.
+    """
+
+    body: Array = field(repr=False)
+    legs: Array = field(repr=False)
+    begins: Array = field(repr=False)
+    slower: Array = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.body)
+
+    def new_frames(self, when: Array, leg: int | None = None) -> Array:
+        """The new frames (fractions included) in which source frames `when` show, for the body or a leg."""
+        looked = self.body if leg is None else self.legs[:, leg]
+        return np.interp(when, looked, np.arange(len(looked)))
+
+
+def retime(source: Source, effects: Effects) -> Timing:
+    """Slow the cadence, and shift each foot's landing and leaving within the cycle."""
+    stride = 1 + effects.whole["stride"] * (1 - (1 - JOG_STRIDE) * source.jog)
+    begins = np.concatenate([[0.0], np.cumsum((stride[1:] + stride[:-1]) / 2)])
+    unit = source.cycle * stride
+    new = np.arange(int(begins[-1] + 1e-6) + 1, dtype=float)
+    legs = []
+    landings: list[tuple[float, float]] = []
+    for side in (LEFT, RIGHT):
+        land = _limited(effects.sided["land"][:, side]) * unit
+        off = _limited(effects.sided["off"][:, side]) * unit
+        events = []
+        for stance in source.stances[side]:
+            events += [(stance.land, land), (stance.off, off)]
+        own = [(at, float(np.interp(at, np.arange(len(source)), shift))) for at, shift in events[1:-1]]
+        landings += own[1::2]
+        legs.append(_looking_back(own, begins, new))
+    return Timing(_looking_back(sorted(landings), begins, new), np.stack(legs, axis=1), begins, stride)
+
+
+def _limited(shift: Array) -> Array:
+    return MOST_SHIFT * np.tanh(shift / MOST_SHIFT)
+
+
+def _looking_back(events: list[tuple[float, float]], begins: Array, new: Array) -> Array:
+    """(N,) source frames shown in the frames `new`; events: (source frame, new frames that it is later)."""
+    last = len(begins) - 1
+    at, goal = [0.0], [0.0]
+    for when, later in events:
+        if at[-1] + 1.0 <= when <= last - 1.0:
+            at.append(when)
+            goal.append(float(np.interp(when, np.arange(last + 1), begins)) + later)
+    at.append(float(last))
+    goal.append(float(begins[-1]))
+    least = SQUEEZE * np.diff(np.interp(at, np.arange(last + 1), begins))
+    for i, gap in enumerate(least[:-1]):
+        goal[i + 1] = max(goal[i + 1], goal[i] + gap)
+    for i in range(len(at) - 2, 0, -1):
+        goal[i] = min(goal[i], goal[i + 1] - least[i])
+    if last < 1:
+        return np.zeros(len(new))
+    return np.clip(PchipInterpolator(goal, at)(new), 0.0, last)

@@ -1,0 +1,52 @@
+"""A hurt version of a clip of a data set: what hurts in it, by its turn, and how long it may be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.hurt.clip import HurtClip, hurt_clip
+from hobble.hurt.options import Hurt
+from hobble.hurt.schedule import severities
+from hobble.labels.model import LabelReport, Labels
+from hobble.labels.phase import find_cycles
+
+WHOLE = 6.0  # seconds: a version of a shorter clip is not cut, which might leave no cycle of it
+
+
+def hurt_version(
+    clip: Clip, labels: Labels, report: LabelReport, options: Hurt, *, name: str, turn: int, ground: str
+) -> tuple[HurtClip, LabelReport]:
+    """The version `name` of a healthy clip, and its labels' report. turn: among all versions, from 0."""
+    severity = severities(clip.skeleton, len(clip), clip.fps, options, name, turn)
+    flat = ground == "flat"
+    hurt = hurt_clip(clip, labels, severity, name, flat=flat, zero=report.phase_zero, margins=report.margins)
+    if len(clip) >= WHOLE * clip.fps:
+        hurt = cut(hurt, round(options.longest * len(clip)), report)
+    _, dropped = find_cycles(hurt.labels.footsteps, len(hurt.clip), report.phase_zero, report.margins)
+    return hurt, replace(report, clip=name, cycles_dropped=dropped)
+
+
+def cut(hurt: HurtClip, frames: int, report: LabelReport) -> HurtClip:
+    """The first `frames` of a hurt clip; all of it where it has no more."""
+    if frames >= len(hurt.clip):
+        return hurt
+    clip, labels = hurt.clip, hurt.labels
+    footsteps = labels.footsteps.copy()
+    steps = footsteps[:, :2]
+    steps[steps > frames - 1] = np.nan
+    ends = np.isnan(labels.footsteps[:, :2]).all(axis=1)
+    footsteps = footsteps[ends | ~np.isnan(steps).all(axis=1)]
+    cycles, _ = find_cycles(footsteps, frames, report.phase_zero, report.margins)
+    short = Labels(
+        labels.contacts[:frames],
+        labels.phase[:frames],
+        labels.phase_known[:frames],
+        labels.gait[:frames],
+        footsteps,
+        cycles,
+    )
+    part = Clip(clip.name, clip.skeleton, clip.fps, clip.rotations[:frames], clip.root[:frames])
+    return HurtClip(part, hurt.severity[:frames], short, hurt.when[:frames])

@@ -1,0 +1,167 @@
+"""Arrays and facts of a network's file, taken one by one: right, or refused with the file's name.
+
+A file may come from anywhere, and compiled code indexes memory by what it says. So nothing of it gets further
+than here before its type, shape, count and range are known.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+
+MOST_LAYERS = 16
+LARGEST_WEIGHT = 1e6  # trained ones are below 10
+LARGEST_MEAN = 1e9
+LARGEST_STD = 1e20  # a joint that is left out of the input has its own, times 1e11
+MOST_NAMES = 4096
+LONGEST_NAME = 200
+FARTHEST = 1e5  # centimetres from a joint to its parent
+NEEDED_ROLES = ("hips", *(f"{s}_{p}" for s in ("left", "right") for p in ("hip", "knee", "heel", "toe")))
+STATISTICS = {"Xmean": "x_mean", "Xstd": "x_std", "Ymean": "y_mean", "Ystd": "y_std"}
+DIVERGED = "The training diverged, or the file is damaged."
+
+
+def numbers(
+    path: str | Path, arrays: Mapping[str, Any], name: str, axes: int, largest: float = LARGEST_WEIGHT
+) -> Array:
+    """The array `name` as float32: of so many axes, none of them empty, finite, none beyond `largest`."""
+    if name not in arrays:
+        raise InputError(path, f"not a network: no {name}")
+    array = np.asarray(arrays[name])
+    if array.dtype.kind not in "fiu" or array.ndim != axes or not array.size:
+        raise InputError(
+            path, f"{name} has shape {array.shape} and type {array.dtype}, not numbers along {axes} axes"
+        )
+    beyond = np.abs(array.astype(np.float64)).max()
+    if not np.isfinite(beyond):
+        raise InputError(path, f"{name} holds weights that are not finite numbers", fix=DIVERGED)
+    if beyond > largest:
+        raise InputError(path, f"{name} holds {beyond:.3g}, which is beyond {largest:g}", fix=DIVERGED)
+    return np.ascontiguousarray(array, np.float32)
+
+
+def layers(path: str | Path, arrays: Mapping[str, Any], *prefixes: str) -> int:
+    """How many layers W0, W1, ... there are; with W, every prefix has to be there for each of them."""
+    found = {name for name in arrays if re.fullmatch(rf"{prefixes[0]}\d{{1,4}}", name)}
+    if not found:
+        raise InputError(path, f"not a network: no {prefixes[0]}0")
+    if len(found) > MOST_LAYERS:
+        raise InputError(path, f"{len(found)} layers; {MOST_LAYERS} at most are read")
+    missing = [f"{k}{i}" for i in range(len(found)) for k in prefixes if f"{k}{i}" not in arrays]
+    if missing:
+        raise InputError(path, f"not a network: no {', '.join(missing)}")
+    return len(found)
+
+
+def statistics(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Array]:
+    """x_mean, x_std (X,), y_mean, y_std (Y,)."""
+    out = {}
+    for name, key in STATISTICS.items():
+        is_std = key.endswith("std")
+        out[key] = numbers(path, arrays, name, 1, LARGEST_STD if is_std else LARGEST_MEAN)
+        if is_std and out[key].min() < 0:
+            raise InputError(path, f"{name} holds {out[key].min():g}: no standard deviation is below 0")
+    for block in "xy":
+        mean, std = out[f"{block}_mean"], out[f"{block}_std"]
+        if mean.shape != std.shape:
+            raise InputError(
+                path, f"{block.upper()}mean has {len(mean)} columns and {block.upper()}std {len(std)}"
+            )
+    return out
+
+
+def names(path: str | Path, what: str, value: Any) -> tuple[str, ...]:
+    """A list of different short names."""
+    if not isinstance(value, Sequence) or isinstance(value, str | bytes) or len(value) > MOST_NAMES:
+        raise InputError(path, f"{what} is {_short(value)}, not a list of names")
+    for name in value:
+        if not isinstance(name, str) or not 0 < len(name) <= LONGEST_NAME or not name.isprintable():
+            raise InputError(path, f"{what} holds {_short(name)}, which is no name")
+    if len(set(value)) != len(value):
+        raise InputError(path, f"{what} holds a name twice")
+    return tuple(value)
+
+
+def whole(path: str | Path, what: str, value: Any, least: int, most: int) -> int:
+    """A whole number from `least` to `most`."""
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise InputError(path, f"{what} is {_short(value)}, not a whole number from {least} to {most}")
+    return value
+
+
+def length(path: str | Path, what: str, value: Any, most: float, least: float = 0.0) -> float:
+    """A finite number above `least` and up to `most`."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not least < value <= most:
+        raise InputError(path, f"{what} is {_short(value)}, not a number above {least:g} and up to {most:g}")
+    return float(value)
+
+
+def mapping(path: str | Path, what: str, value: Any) -> dict[str, Any]:
+    """A mapping from names to anything."""
+    if not isinstance(value, dict):
+        raise InputError(path, f"{what} is {_short(value)}, not keys and values")
+    return value
+
+
+def skeleton(path: str | Path, value: Any) -> Skeleton:
+    """The skeleton of a file, as `Skeleton.to_dict` writes it, with the joints that a character needs."""
+    data = mapping(path, "its skeleton", value)
+    joints = mapping(path, "its skeleton's joints", data.get("joints"))
+    names(path, "its skeleton's joints", list(joints))
+    if not joints:
+        raise InputError(path, "its skeleton has no joints")
+    seen: set[str] = set()
+    for joint, entry in joints.items():
+        parent = mapping(path, f"joint {joint}", entry).get("parent")
+        if (parent is None) != (not seen) or (parent is not None and not _one_of(parent, seen)):
+            raise InputError(path, f"joint {joint}: its parent {_short(parent)} does not stand above it")
+        _place(path, f"joint {joint}: its offset", entry.get("offset"))
+        seen.add(joint)
+    _named_joints(path, data, seen)
+    return Skeleton.from_dict({**data, "name": names(path, "its skeleton's name", [data.get("name")])[0]})
+
+
+def _named_joints(path: str | Path, data: Mapping[str, Any], joints: set[str]) -> None:
+    """Roles, links, ends and unseen joints name joints that there are."""
+    roles = mapping(path, "its skeleton's roles", data.get("roles"))
+    if missing := [role for role in NEEDED_ROLES if role not in roles]:
+        raise InputError(path, f"its skeleton has no joint for {', '.join(missing)}")
+    links = data.get("links", [])
+    if not isinstance(links, list) or not all(isinstance(pair, list) and len(pair) == 2 for pair in links):
+        raise InputError(path, f"its skeleton's links are {_short(links)}, not pairs of joints")
+    ends = mapping(path, "its skeleton's end sites", data.get("end_sites", {}))
+    for end in ends.values():
+        _place(path, "an end site", end)
+    unseen = names(path, "its skeleton's unseen joints", data.get("unseen", []))
+    for name in (*roles.values(), *(joint for link in links for joint in link), *ends, *unseen):
+        if not _one_of(name, joints):
+            raise InputError(path, f"its skeleton names {_short(name)}, which is no joint of it")
+
+
+def _one_of(name: Any, joints: set[str]) -> bool:
+    return isinstance(name, str) and name in joints
+
+
+def _place(path: str | Path, what: str, value: Any) -> None:
+    """Three finite numbers, centimetres."""
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise InputError(path, f"{what} is {_short(value)}, not three numbers")
+    for number in value:
+        length(path, what, number, FARTHEST, -FARTHEST)
+
+
+def _short(value: Any) -> str:
+    """A value for a message: one line, printable, not long."""
+    if isinstance(value, list | tuple | dict) and len(value) > 8:
+        return f"a {type(value).__name__} of {len(value)}"
+    text = ascii(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

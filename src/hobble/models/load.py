@@ -1,0 +1,171 @@
+"""Reading a network from disk: whatever its kind, wherever it comes from, whole and sound or not at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.channels import NAMES, channel, every
+from hobble.core.errors import InputError
+from hobble.core.files import load_npz
+from hobble.core.skeleton import Skeleton
+from hobble.core.untrusted import read_yaml
+from hobble.models import DEFAULT, MODELS, checks, model
+from hobble.models.network import TERRAIN_SIDE, Network
+from hobble.rows.layout import GAITS, RowLayout
+
+MOST_META = 1 << 22  # characters
+WIDEST = 1e4  # centimetres from the path to the heights at its sides
+LARGEST_Y = 1e9  # of a prediction for the mean input; a sound one is below 1000
+
+
+def read_skeleton(path: str | Path) -> Skeleton:
+    """The skeleton of a file of config/skeletons. Raises InputError where it is none."""
+    data = checks.mapping(path, "a skeleton", read_yaml(path))
+    keys = {key: value for key, value in data.items() if key != "maps"}
+    return checks.skeleton(path, {"name": Path(path).stem, **keys})
+
+
+def load_network(path: str | Path, skeleton: Skeleton | str | Path | None = None) -> Network:
+    """Read weights.npz, a folder that holds one, or a folder of the original release's .bin files.
+
+    skeleton: for files that carry none (the original release's); it, or a file of config/skeletons.
+    Raises InputError where something is missing, damaged, not finite, out of range or of shapes that do not
+    fit: what is returned can run.
+    """
+    path = Path(path)
+    if isinstance(skeleton, str | Path):
+        skeleton = read_skeleton(skeleton)
+    if path.is_dir():
+        if (path / "weights.npz").exists():
+            return load_network(path / "weights.npz", skeleton)
+        for kind in MODELS:
+            if (arrays := model(kind).read_folder(path)) is not None:
+                return network_from_arrays(path, arrays, skeleton)
+        raise InputError(
+            path,
+            "holds no weights.npz, and no Xmean.bin, W0_000.bin, ...: not a network",
+            fix="Train one (snakemake results/<configuration>/network/weights.npz), or name its folder.",
+        )
+    return network_from_arrays(path, load_npz(path), skeleton)
+
+
+def network_from_arrays(
+    path: str | Path, arrays: Mapping[str, Any], skeleton: Skeleton | None = None
+) -> Network:
+    """Check the arrays and the `meta` of a file named `path` and build the network that they are."""
+    meta = _meta(path, arrays)
+    kind = meta.get("kind", DEFAULT)
+    if kind not in MODELS:
+        raise InputError(path, f"is a network of kind {kind!a:.40}; there are: {', '.join(MODELS)}")
+    statistics = checks.statistics(path, arrays)
+    layout = _layout(path, meta, len(statistics["x_mean"]), len(statistics["y_mean"]), skeleton)
+    if meta.get("skeleton"):
+        skeleton = checks.skeleton(path, meta["skeleton"])
+    if skeleton is not None and len(skeleton.joints) != layout.joints:
+        raise InputError(
+            path, f"{layout.joints} joints, but skeleton {skeleton.name} has {len(skeleton.joints)}"
+        )
+    common = {
+        **statistics,
+        "layout": layout,
+        "skeleton": skeleton,
+        "gaits": _gaits(path, meta),
+        "channels": {name: _labels(path, name, meta, layout, skeleton) for name, _ in layout.channels},
+        "terrain_side": checks.length(path, "terrain_side", meta.get("terrain_side", TERRAIN_SIDE), WIDEST),
+        "meta": meta,
+    }
+    network = model(kind).read(path, arrays, common)
+    _try(path, network)
+    return network
+
+
+def _meta(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Any]:
+    if "meta" not in arrays:
+        return {}
+    array = np.asarray(arrays["meta"])
+    if array.shape != () or array.dtype.kind != "U":
+        raise InputError(path, f"meta is an array of shape {array.shape} of {array.dtype}, not a text")
+    text = str(array)
+    if len(text) > MOST_META:
+        raise InputError(path, f"meta is longer than {MOST_META} characters")
+    try:
+        return checks.mapping(path, "meta", json.loads(text))
+    except (ValueError, RecursionError) as error:
+        raise InputError(path, f"meta is not valid JSON: {error}") from None
+
+
+def _layout(
+    path: str | Path, meta: Mapping[str, Any], x_size: int, y_size: int, skeleton: Skeleton | None
+) -> RowLayout:
+    """The columns that the file states, which have to be as many as it has."""
+    if "layout" not in meta:
+        layout = _guess_layout(x_size, y_size, skeleton)
+    else:
+        given = checks.mapping(path, "layout", meta["layout"])
+        known = {"joints": (1, y_size), "window": (1, x_size), "step": (1, x_size)}
+        if not set(known) <= set(given):
+            keys = ", ".join(map(ascii, given))[:80]
+            raise InputError(path, f"layout has the keys {keys}, not {', '.join(known)} and channels")
+        for key, (least, most) in known.items():
+            checks.whole(path, f"layout.{key}", given[key], least, most)
+        if given["window"] % given["step"]:
+            raise InputError(path, f"layout: a window of {given['window']} is no multiple of {given['step']}")
+        try:
+            layout = RowLayout.from_dict(given)
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(path, f"its layout cannot be understood: {error}") from None
+        for name, columns in layout.channels:
+            if name not in NAMES:
+                raise InputError(
+                    path, f"is told {name!a:.40}, a channel that is not here: {', '.join(NAMES)}"
+                )
+            checks.whole(path, f"layout.channels.{name}", columns, 0, x_size)
+    if (layout.x_size, layout.y_size) != (x_size, y_size):
+        raise InputError(path, f"{x_size} inputs and {y_size} outputs do not fit {layout}")
+    return layout
+
+
+def _guess_layout(x_size: int, y_size: int, skeleton: Skeleton | None) -> RowLayout:
+    """The layout of a file without one: the default window, joints from Y, and what X has left is the first
+    channel of so many columns."""
+    joints = max(1, (y_size - RowLayout(0).y_size) // 9)
+    left = x_size - RowLayout(joints).x_size
+    if left <= 0:
+        return RowLayout(joints)
+    fitting = (one.name for one in every() if skeleton is not None and len(one.columns(skeleton)) == left)
+    return RowLayout(joints, channels=((next(fitting, NAMES[0]), left),))
+
+
+def _gaits(path: str | Path, meta: Mapping[str, Any]) -> tuple[str, ...]:
+    gaits = checks.names(path, "gaits", meta.get("gaits", GAITS))
+    if sorted(gaits) != sorted(GAITS):
+        raise InputError(path, f"gaits are not {', '.join(GAITS)} in any order")
+    return gaits
+
+
+def _labels(
+    path: str | Path, name: str, meta: Mapping[str, Any], layout: RowLayout, skeleton: Skeleton | None
+) -> tuple[str, ...]:
+    """The labels of a channel, by the file, else by the skeleton. Raises InputError where they do not fit."""
+    said = checks.mapping(path, "channels", meta.get("channels", {})).get(name)
+    given = said or next((meta[key] for key in channel(name).former if meta.get(key)), None)
+    if given is None and skeleton is not None:
+        given = channel(name).columns(skeleton)
+    labels, columns = checks.names(path, f"channel {name}", given or ()), dict(layout.channels)[name]
+    if len(labels) != columns:
+        raise InputError(path, f"{columns} inputs of channel {name}, but {len(labels)} are named")
+    return labels
+
+
+def _try(path: str | Path, network: Network) -> None:
+    """Its weights may each be sound and overflow together: ask it for the mean input around the cycle."""
+    phase = np.arange(8) / 8
+    with np.errstate(all="ignore"):
+        y = network.predict(np.repeat(network.x_mean[None], len(phase), axis=0), phase)
+    if not np.all(np.abs(y) < LARGEST_Y):
+        raise InputError(path, "predicts no finite pose, not even for its mean input", fix=checks.DIVERGED)

@@ -1,0 +1,11 @@
+"""What every kind's section `network` of a configuration has."""
+
+from __future__ import annotations
+
+from hobble.core.section import Section
+
+
+class Options(Section):
+    """The keys of a configuration's `network` section; each kind adds its own."""
+
+    kind: str = ""

@@ -1,0 +1,30 @@
+"""Arrays as text for the page: little-endian bytes in base64, weights as 16-bit integers."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hobble.core.quat import Array
+
+
+def packed(array: NDArray[Any]) -> str:
+    """The little-endian bytes of an array as base64."""
+    array = np.ascontiguousarray(array)
+    return base64.b64encode(array.astype(array.dtype.newbyteorder("<")).tobytes()).decode("ascii")
+
+
+def packed_rows(weights: Array, biases: Array) -> dict[str, Any]:
+    """Weights (K, out, in) as integers of -32767..32767 with a factor for each row; biases (K, out)."""
+    scale = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30).astype(np.float32)
+    return {
+        "points": weights.shape[0],
+        "rows": weights.shape[1],
+        "columns": weights.shape[2],
+        "weights": packed(np.round(weights / scale[..., None]).astype(np.int16)),
+        "scale": packed(scale),
+        "biases": packed(biases.astype(np.float32)),
+    }

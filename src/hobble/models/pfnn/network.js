@@ -1,0 +1,50 @@
+// The phase-functioned network: a prediction from a row of inputs and a phase. What Python's `Predictor` does in
+// cubic mode: the outputs of the four control points around the phase are blended, never the weights.
+import { bytes } from "../../report/web/numbers.js";
+
+export const createNetwork = (spec) => {
+  const floats = (text) => new Float32Array(bytes(text));
+  const layers = spec.network.layers.map(({ points, rows, columns, weights, scale, biases }) => {
+    const integers = new Int16Array(bytes(weights)), factors = floats(scale);
+    const w = new Float32Array(integers.length);
+    for (let r = 0, i = 0; r < points * rows; r++) for (let c = 0; c < columns; c++, i++) w[i] = integers[i] * factors[r];
+    return { rows, columns, w, b: floats(biases), out: new Float32Array(rows) };
+  });
+  const K = spec.network.layers[0].points, mean = floats(spec.xMean), inverse = floats(spec.xScale);
+  const seen = Int32Array.from(spec.seen), yMean = floats(spec.yMean), yStd = floats(spec.yStd), z = new Float32Array(mean.length);
+  const index = new Int32Array(4), share = new Float64Array(4);
+
+  const around = (phase) => {
+    const scaled = (phase - Math.floor(phase)) * K, first = Math.min(Math.floor(scaled), K - 1), t = scaled - first;
+    for (let k = 0; k < 4; k++) index[k] = (first + k - 1 + K) % K;
+    share[0] = .5 * (-t + 2 * t * t - t * t * t);
+    share[1] = .5 * (2 - 5 * t * t + 3 * t * t * t);
+    share[2] = .5 * (t + 4 * t * t - 3 * t * t * t);
+    share[3] = .5 * (-t * t + t * t * t);
+  };
+  const layer = ({ rows, columns, w, b, out }, x, last) => {
+    const size = rows * columns, [i, j, m, n] = index, [p, q, s, u] = share;
+    for (let r = 0; r < rows; r++) {
+      let a0 = 0, a1 = 0, a2 = 0, a3 = 0, at = r * columns;
+      for (let c = 0; c < columns; c++, at++) {
+        const v = x[c];
+        a0 += w[i * size + at] * v;
+        a1 += w[j * size + at] * v;
+        a2 += w[m * size + at] * v;
+        a3 += w[n * size + at] * v;
+      }
+      const y = p * (a0 + b[i * rows + r]) + q * (a1 + b[j * rows + r]) + s * (a2 + b[m * rows + r]) + u * (a3 + b[n * rows + r]);
+      out[r] = last || y >= 0 ? y : Math.exp(y) - 1;
+    }
+    return out;
+  };
+  // x: inputs as they are, of which those that weigh nothing are not looked at; returns the outputs as they are, in an array that the next call writes over.
+  return (x, phase) => {
+    for (let c = 0; c < z.length; c++) z[c] = (x[seen[c]] - mean[c]) * inverse[c];
+    around(phase);
+    let h = z;
+    layers.forEach((one, l) => { h = layer(one, h, l === layers.length - 1); });
+    for (let r = 0; r < h.length; r++) h[r] = h[r] * yStd[r] + yMean[r];
+    return h;
+  };
+};

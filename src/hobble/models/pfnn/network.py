@@ -1,0 +1,126 @@
+"""The trained phase-functioned network: its control points, and what each part of Hobble gets of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.models.checks import layers, numbers
+from hobble.models.network import Export, Network, standardised
+from hobble.models.packing import packed_rows
+from hobble.models.pfnn.forward import binned, forward
+from hobble.models.pfnn.predictor import MODES, PfnnPredictor
+
+FEWEST, MOST = 4, 64  # control points: a cyclic cubic needs four
+
+
+@dataclass(frozen=True)
+class Pfnn(Network):
+    """Layers whose weights and biases are cyclic cubic splines of the phase.
+
+    weights: per layer (K, out, in) float32; biases: per layer (K, out) float32.
+    """
+
+    kind: ClassVar[str] = "pfnn"
+    modes: ClassVar[tuple[str, ...]] = tuple(MODES)
+
+    weights: tuple[Array, ...] = field(repr=False)
+    biases: tuple[Array, ...] = field(repr=False)
+
+    @classmethod
+    def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Pfnn:
+        """From the arrays W0 (K, out, in), b0 (K, out), ... of a file; see `hobble.models.load`."""
+        count = layers(path, arrays, "W", "b")
+        weights = tuple(numbers(path, arrays, f"W{i}", 3) for i in range(count))
+        biases = tuple(numbers(path, arrays, f"b{i}", 2) for i in range(count))
+        size, points = len(common["x_mean"]), len(weights[0])
+        if not FEWEST <= points <= MOST:
+            raise InputError(
+                path, f"{points} control points; there are {FEWEST} or more in a cyclic cubic, {MOST} at most"
+            )
+        for i, (w, b) in enumerate(zip(weights, biases, strict=True)):
+            if w.shape[0] != points or w.shape[2] != size or b.shape != w.shape[:2] or not w.shape[1]:
+                raise InputError(
+                    path, f"W{i} {w.shape} and b{i} {b.shape} do not follow a layer of {size} units"
+                )
+            size = w.shape[1]
+        if size != len(common["y_mean"]):
+            raise InputError(path, f"its last layer has {size} units for {len(common['y_mean'])} outputs")
+        return cls(weights=weights, biases=biases, **common)
+
+    @property
+    def control_points(self) -> int:
+        """K, control points of each weight."""
+        return len(self.weights[0])
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Units of each layer, the input first: (342, 512, 512, 311)."""
+        return (self.weights[0].shape[2], *(w.shape[1] for w in self.weights))
+
+    @property
+    def parameters(self) -> int:
+        """Weights and biases of one phase: sum of n_l n_(l+1) + n_(l+1)."""
+        return sum(a * b + b for a, b in pairwise(self.sizes))
+
+    @property
+    def described(self) -> str:
+        """As in `Network`."""
+        hidden = len(self.sizes) - 2
+        return (
+            f"phase-functioned network of {hidden} hidden layer{'s' * (hidden != 1)} and "
+            f"{self.control_points} control points"
+        )
+
+    def predict(self, x: Array, phase: Array, constant: bool = False) -> Array:
+        """As in `Network`. constant: with the weights of the phase's bin, as the original's constant mode."""
+        z = standardised(self, x)
+        y = forward(self.weights, self.biases, z, binned(phase) if constant else phase)
+        return y * self.y_std + self.y_mean
+
+    def predictor(self, mode: str | None = None, storage: str = "float32") -> PfnnPredictor:
+        """As in `Network`: mode "constant" (50 phases), "linear" (10, blended) or "cubic" (exact)."""
+        return PfnnPredictor(self, mode or "cubic", storage)
+
+    def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
+        """As in `Network`: control points as integers with a factor for each row."""
+        weights, biases = list(self.weights), list(self.biases)
+        weights[0] = weights[0][:, :, inputs]
+        weights[-1], biases[-1] = weights[-1][:, outputs], biases[-1][:, outputs]
+        return {"layers": [packed_rows(w, b) for w, b in zip(weights, biases, strict=True)]}
+
+    @property
+    def exports(self) -> dict[str, Export]:
+        """ONNX and the original release's .bin files."""
+
+        def onnx(target: Path, mode: str) -> str:
+            from hobble.models.pfnn.onnx_export import write_checked
+
+            return f"{target}: within {write_checked(target, self, mode):.1g} of the runtime"
+
+        def release(target: Path, mode: str) -> str:
+            from hobble.models.pfnn.release import write_release
+
+            write_release(target, self)
+            return f"{target}: weights at 50 phases"
+
+        return {"onnx": onnx, "bin": release}
+
+
+def formula(hidden: int) -> str:
+    """What a file of `hidden` hidden layers computes, in a line."""
+    inside = "x"
+    for i in range(hidden):
+        inside = f"elu(W{i} {inside} + b{i})"
+    return (
+        f"y = W{hidden} {inside} + b{hidden} on standardised x and y; W and b are cyclic "
+        "Catmull-Rom splines of the phase through their control points at k / control_points"
+    )

@@ -1,0 +1,22 @@
+"""The keys of a configuration's `network` section where its kind is pfnn."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from hobble.models.options import Options
+
+
+class PfnnOptions(Options):
+    """The phase-functioned network. Two hidden layers is what the published weight sizes show."""
+
+    kind: Literal["pfnn"] = "pfnn"
+    hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
+    units: Annotated[int, Field(gt=0, le=8192)] = 512
+    control_points: Annotated[int, Field(ge=4, le=16)] = 4
+
+    def sizes(self, inputs: int, outputs: int) -> tuple[int, ...]:
+        """Units of each layer, the input first."""
+        return (inputs, *[self.units] * self.hidden_layers, outputs)

@@ -1,0 +1,95 @@
+"""The folder of .bin files of the original release, read and written: its ports play what Hobble trains.
+
+W0_000.bin .. W2_049.bin and b0_000.bin .. b2_049.bin hold the weights at phases i / 50, Xmean.bin, Xstd.bin,
+Ymean.bin and Ystd.bin the statistics: raw little-endian float32, row-major (out, in).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.core.files import atomic_path
+from hobble.core.quat import Array
+from hobble.core.untrusted import read_bytes
+from hobble.models.checks import LARGEST_WEIGHT, MOST_LAYERS, STATISTICS
+from hobble.models.pfnn.forward import phase_shares, weights_at
+
+if TYPE_CHECKING:
+    from hobble.models.pfnn.network import Pfnn
+
+PHASES = 50
+CONTROL_POINTS = 4
+MOST_COLUMNS = 1 << 16  # of a row, or units of a layer
+# Of single precision weights near 1; a folder of another spline than ours is off by far more.
+LARGEST_RESIDUAL = 1e-4
+
+
+def write_release(folder: str | Path, network: Pfnn) -> None:
+    """Write the network's weights at 50 phases and its statistics, creating the folder."""
+    folder = Path(folder)
+    phases = np.arange(PHASES) / PHASES
+    for name, key in STATISTICS.items():
+        _write(folder / f"{name}.bin", getattr(network, key))
+    for i, (w, b) in enumerate(zip(network.weights, network.biases, strict=True)):
+        for letter, points in (("W", w), ("b", b)):
+            for k, array in enumerate(weights_at(points, phases)):
+                _write(folder / f"{letter}{i}_{k:03d}.bin", array)
+
+
+def read_release(folder: str | Path) -> Mapping[str, Array]:
+    """The folder as arrays W0 (4, out, in), b0 (4, out), ..., Xmean, ...: control points by least squares.
+
+    Raises InputError where a file is missing, of a wrong size or not of finite numbers, or the 50 phases do
+    not lie on one cyclic cubic with 4 control points.
+    """
+    folder = Path(folder)
+    arrays = {name: _read(folder / f"{name}.bin") for name in STATISTICS}
+    layers = sum(1 for _ in folder.glob("b[0-9]*_000.bin"))
+    if not 0 < layers <= MOST_LAYERS:
+        raise InputError(
+            folder, f"{layers} layers of weights b0_000.bin, b1_000.bin, ...; there are 1 to {MOST_LAYERS}"
+        )
+    size = len(arrays["Xmean"])
+    for i in range(layers):
+        rows = len(_read(folder / f"b{i}_000.bin"))
+        biases = np.stack([_read(folder / f"b{i}_{k:03d}.bin", rows) for k in range(PHASES)])
+        weights = np.stack([_read(folder / f"W{i}_{k:03d}.bin", rows * size) for k in range(PHASES)])
+        arrays[f"b{i}"] = _control_points(folder, f"b{i}", biases)
+        arrays[f"W{i}"] = _control_points(folder, f"W{i}", weights).reshape(CONTROL_POINTS, rows, size)
+        size = rows
+    return arrays
+
+
+def _control_points(folder: Path, name: str, phases: Array) -> Array:
+    """(4, n) control points of weights (50, n)."""
+    if beyond := np.flatnonzero(~(np.abs(phases) <= LARGEST_WEIGHT).all(axis=1)).tolist():
+        raise InputError(
+            folder / f"{name}_{beyond[0]:03d}.bin",
+            f"holds numbers that are not finite or beyond {LARGEST_WEIGHT:g}",
+        )
+    shares = phase_shares(np.arange(PHASES) / PHASES, CONTROL_POINTS)
+    points = np.linalg.lstsq(shares, phases.astype(float), rcond=None)[0]
+    residual = float(np.abs(shares @ points - phases).max())
+    if not residual < LARGEST_RESIDUAL:
+        raise InputError(
+            folder, f"{name} at 50 phases is no cyclic cubic of 4 control points (off by {residual:.2g})"
+        )
+    return points.astype(np.float32)
+
+
+def _read(path: Path, size: int | None = None) -> Array:
+    """`size` float32 numbers, or as many as the file holds up to MOST_COLUMNS."""
+    data = read_bytes(path, 4 * (MOST_COLUMNS if size is None else size))
+    if len(data) % 4 or not data or (size is not None and len(data) != 4 * size):
+        raise InputError(path, f"{len(data)} bytes" + (f", expected {4 * size}" if size else ""))
+    return np.frombuffer(data, "<f4").astype(np.float32)
+
+
+def _write(path: Path, array: Array) -> None:
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(np.ascontiguousarray(array, "<f4").tobytes())

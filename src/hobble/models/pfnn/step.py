@@ -1,0 +1,90 @@
+"""One batch: loss and gradient by hand, as three large products for each layer.
+
+With e the inputs of a layer, a 1 behind them, times each of the K spline coefficients: (B, K (in + 1)), and W
+its weights and biases, (out, K (in + 1)):
+
+    a = e W'        dW = da' e        de = da W        dx = sum_k c_k de_k
+
+This is the network whose weights are blended for each sample, since sum_k c_k (W_k x) = (sum_k c_k W_k) x, at
+a fraction of the memory traffic.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from hobble.models.pfnn.trainable import TrainablePfnn, coefficients, expand
+from hobble.models.products import product
+
+
+class Step:
+    """The gradient of the mean squared error of a network under dropout, in PyTorch, on any device.
+
+    network: what is trained; read anew at every call.
+    dropout: share of units dropped before each layer, the input included; the rest is scaled up to make up
+    for it. half: round the factors of the products to bfloat16; their sums, and all else, stay float32.
+    gradients: of the last call, (out, K (in + 1)) for each layer, in bfloat16 with `half`. error: of the last
+    call, (B, Y), prediction minus y.
+    """
+
+    def __init__(self, network: TrainablePfnn, dropout: float, half: bool = False) -> None:
+        self.network = network
+        self.keep = 1.0 - dropout
+        self.half = half
+        self.factors = network.flat.to(torch.bfloat16) if half else network.flat
+        self.generator = torch.Generator(network.flat.device)
+        self.gradients: list[Tensor] = []
+        self.error = torch.empty(0, network.sizes[-1], device=network.flat.device)
+
+    def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
+        """Find `gradients` for x (B, X), y (B, Y), p (B,); returns the mean squared error, a scalar tensor.
+
+        masks: one for each layer, as `masks` draws them.
+        """
+        if self.half:
+            self.factors.copy_(self.network.flat)
+        weights = [layer.flatten(1) for layer in self.network.views(self.factors)]
+        c = self.coefficients(p)
+        expanded, slopes = [], []
+        for number, weight in enumerate(weights):
+            x = torch.nn.functional.elu(x) if number else x
+            e, slope = self.expanded(number, x, c, masks[number])
+            expanded.append(e)
+            slopes.append(slope)
+            x = product(e, weight).to(y.dtype)
+        self.error = x.sub_(y)
+        d = self.error * (2.0 / y.numel())
+        self.gradients = [d] * len(weights)
+        for number in range(len(weights) - 1, -1, -1):
+            d = d.to(self.factors.dtype)
+            self.gradients[number] = product(d.T, expanded[number].T)
+            if number:
+                d = self.contracted(number, product(d, weights[number].T), c, slopes[number])
+        return torch.mean(torch.square(self.error))
+
+    def seed(self, seed: int) -> None:
+        """Begin a new sequence of dropout masks, 0 <= seed < 2^63."""
+        self.generator.manual_seed(seed)
+
+    def masks(self, rows: int) -> list[Tensor]:
+        """What each layer's inputs (rows, in) are multiplied by: 0 for those dropped, 1 / keep for others."""
+        flat, widths = self.network.flat, self.network.sizes[:-1]
+        drawn = torch.rand(rows, sum(widths), generator=self.generator, device=flat.device)
+        return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(widths, dim=1))
+
+    def coefficients(self, p: Tensor) -> Tensor:
+        """(B, K) of phases (B,)."""
+        return coefficients(p, self.network.control_points)
+
+    def expanded(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
+        """Layer `number`'s inputs x (B, n) under its mask, expanded (B, K (n + 1)), and the slopes (B, n).
+
+        The slope is that of the ELU which gave x, found from its value (e^a = x + 1 below 0), times the mask.
+        """
+        return expand(x * mask, c).to(self.factors.dtype), mask * torch.clamp(x + 1, max=1)
+
+    def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
+        """(B, n): the gradient before layer `number`'s ELU, from that of what is expanded, (B, K (n + 1))."""
+        parts = de.to(c.dtype).view(len(c), c.shape[1], -1)[:, :, :-1]
+        return torch.bmm(c[:, None, :], parts)[:, 0, :] * slope

@@ -1,0 +1,121 @@
+"""The phase-functioned network while it is trained: parameters, their spline, what it computes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, ClassVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from hobble.models.pfnn.network import formula
+from hobble.models.products import product
+from hobble.models.trainable import Step, Trainable, uniform_start
+
+
+@dataclass(frozen=True)
+class TrainablePfnn(Trainable):
+    """Layers of `sizes` units whose weights and biases are cyclic cubic splines of the phase.
+
+    sizes: units from the input to the output, such as (342, 512, 512, 311). control_points: K knots of the
+    spline, equally spaced over a cycle.
+    """
+
+    kind: ClassVar[str] = "pfnn"
+
+    sizes: tuple[int, ...]
+    control_points: int
+
+    @property
+    def shapes(self) -> list[tuple[int, int, int]]:
+        """(out, K, in + 1) of each layer."""
+        return [(out, self.control_points, size + 1) for size, out in pairwise(self.sizes)]
+
+    @property
+    def inputs(self) -> int:
+        """Columns of X."""
+        return self.sizes[0]
+
+    @property
+    def outputs(self) -> int:
+        """Columns of Y."""
+        return self.sizes[-1]
+
+    def __call__(self, x: Tensor, p: Tensor) -> Tensor:
+        """Standardised outputs (B, Y) of standardised inputs (B, X) at phases (B,), without dropout."""
+        c = coefficients(p, self.control_points)
+        for number, layer in enumerate(self.layers):
+            if number:
+                x = torch.nn.functional.elu(x)
+            x = product(expand(x, c), layer.flatten(1))
+        return x
+
+    def step(self, dropout: float, half: bool) -> Step:
+        """Compiled loops on a CPU, PyTorch elsewhere."""
+        from hobble.models.pfnn import fused, step
+
+        on_cpu = self.flat.device.type == "cpu"
+        return (fused.FusedStep if on_cpu else step.Step)(self, dropout, half)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """`W0` (K, out, in), `b0` (K, out), ..."""
+        arrays = {}
+        for number, layer in enumerate(self.layers):
+            values = layer.cpu().numpy()
+            arrays[f"W{number}"] = np.ascontiguousarray(values[:, :, :-1].swapaxes(0, 1))
+            arrays[f"b{number}"] = np.ascontiguousarray(values[:, :, -1].T)
+        return arrays
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """As in `Trainable`."""
+        return {"control_points": self.control_points, "network": formula(len(self.sizes) - 2)}
+
+    @property
+    def described(self) -> str:
+        """As in `Trainable`."""
+        units, count = "-".join(map(str, self.sizes)), parameters(self.sizes, self.control_points)
+        return f"{units} units and {self.control_points} control points ({count:,} parameters)"
+
+
+def parameters(sizes: tuple[int, ...], control_points: int) -> int:
+    """How many numbers a network is: the length of its `flat`."""
+    return control_points * sum((size + 1) * out for size, out in pairwise(sizes))
+
+
+def initialise(sizes: tuple[int, ...], control_points: int, seed: int) -> TrainablePfnn:
+    """Weights uniform within +-sqrt(6 / (in * out)), biases 0 (Holden et al. 2017, as released)."""
+    flat = torch.zeros(parameters(sizes, control_points))
+    network = TrainablePfnn(flat, tuple(sizes), control_points)
+    uniform_start(network.layers, np.random.default_rng([seed, 0]))
+    return network
+
+
+def coefficients(p: Tensor, control_points: int) -> Tensor:
+    """(B, K) weights of the control points at phases (B,): the cyclic cubic Catmull-Rom spline.
+
+    They sum to 1; at p = k / K they single out control point k.
+    """
+    position = torch.remainder(p, 1.0) * control_points
+    knot = torch.floor(position)
+    t = (position - knot)[:, None]
+    index = knot.long()[:, None] + torch.arange(-1, 3, device=p.device)
+    cubic = torch.cat(
+        [
+            ((2 - t) * t - 1) * t / 2,
+            ((3 * t - 5) * t * t + 2) / 2,
+            ((4 - 3 * t) * t + 1) * t / 2,
+            (t - 1) * t * t / 2,
+        ],
+        dim=1,
+    )
+    knots = torch.arange(control_points, device=p.device)
+    picked = torch.remainder(index, control_points)[:, :, None] == knots
+    return torch.sum(cubic[:, :, None] * picked, dim=1)
+
+
+def expand(x: Tensor, c: Tensor) -> Tensor:
+    """(B, K (n + 1)): each row of x (B, n), with a 1 behind it, times each of its coefficients (B, K)."""
+    return torch.cat([c[:, :, None] * x[:, None, :], c[:, :, None]], dim=2).flatten(1)

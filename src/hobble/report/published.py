@@ -1,0 +1,20 @@
+"""Where a published figure was printed, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def cited(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
+    """Source and table of a figure, and what the same publication says of it elsewhere.
+
+    >>> cited({"source": "a", "table": "5.2", "elsewhere": "3 in Appendix A"}, {"a": "Author (2021)"})
+    'Author (2021), Table 5.2 (but 3 in Appendix A)'
+    >>> cited({"source": "a"}, {"a": "Author (2021)"})
+    'Author (2021)'
+    """
+    text = sources.get(row["source"], row["source"])
+    if row.get("table"):
+        text += f", Table {row['table']}"
+    return f"{text} (but {row['elsewhere']})" if row.get("elsewhere") else text

@@ -1,0 +1,165 @@
+"""Rows of X, Y and P for one clip: what the network sees in each frame of its cycles, and what comes next.
+
+The columns and their root frames are those of Holden, Komura, Saito (2017), as in their released pipeline.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hobble.channels import channel
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.motion.root import RootFrames, continued, local_pose, points_to_root, root_frames, vectors_to_root
+from hobble.rows.clip_rows import ClipRows
+from hobble.rows.layout import RowLayout
+
+Arrays = Mapping[str, np.ndarray]
+
+
+def clip_rows(
+    name: str,
+    clip: Clip,
+    labels: Arrays,
+    channels: Arrays,
+    terrain: Arrays,
+    *,
+    window: int,
+    step: int,
+    facing_sigma: float,
+) -> ClipRows:
+    """The rows of a clip's locomotion cycles, one after another, factorised.
+
+    labels, terrain: the arrays that docs/artefacts.md lists for these stages. channels: name -> values (F,
+    columns). window, step, facing_sigma: frames. Past the clip's ends the root goes on as `continued` has it
+    and the gait is held. Raises InputError where the files do not belong together or a cycle lacks a frame
+    before or after it.
+    """
+    skeleton = clip.skeleton
+    told = tuple((name, values.shape[1]) for name, values in channels.items())
+    layout = RowLayout(len(skeleton.joints), window, step, told)
+    frame, cycle = cycle_frames(labels["cycles"])
+    _check(name, clip, labels, channels, terrain, frame)
+    root = root_frames(clip, facing_sigma)
+    path, here = continued(root, window), frame + window
+    position, velocity, rotation = local_pose(clip, root)
+    x = [
+        *trajectory(path, here, here, layout.offsets),
+        gait_columns(labels["gait"], frame, layout.offsets),
+        position[frame - 1],
+        velocity[frame - 1],
+    ]
+    hips = skeleton.role("hips")
+    y = [
+        velocity[frame, hips][:, [0, 2]],
+        root.turn[frame],
+        phase_change(labels["phase"])[frame],
+        labels["contacts"][frame],
+        *trajectory(path, here + 1, here + 1, layout.offsets[layout.future :]),
+        position[frame],
+        velocity[frame],
+        rotation[frame],
+    ]
+    centre = terrain["heights"][:, layout.samples : 2 * layout.samples]
+    mean = centre.mean(axis=1, dtype=np.float64)
+    return ClipRows(
+        clip=name,
+        layout=layout,
+        skeleton=skeleton.to_dict(),
+        x=_table(x, len(frame)),
+        y=_table(y, len(frame)),
+        p=cycle_phase(labels["phase"], labels["cycles"]),
+        channels={name: values[frame] for name, values in channels.items()},
+        frame=frame,
+        cycle=cycle,
+        fits=terrain["fits"],
+        heights=terrain["heights"] - mean[:, None],
+        mean=mean,
+        visits=terrain["patch"].shape[1],
+    )
+
+
+def cycle_frames(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Frames (R,) and cycle numbers (R,) of cycles (C, 2), first to last frame inclusive, one after another.
+
+    >>> cycle_frames(np.array([[60, 62], [62, 63]]))
+    (array([60, 61, 62, 62, 63]), array([0, 0, 0, 1, 1]))
+    """
+    lengths = cycles[:, 1] - cycles[:, 0] + 1
+    cycle = np.repeat(np.arange(len(cycles)), lengths)
+    within = np.arange(len(cycle)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    return np.repeat(cycles[:, 0], lengths) + within, cycle
+
+
+def cycle_phase(phase: Array, cycles: np.ndarray) -> Array:
+    """Phase (R,) of the cycles' frames; that of each first and last frame is forced to 0 and 1."""
+    frame, cycle = cycle_frames(cycles)
+    out = phase[frame].astype(float)
+    out[frame == cycles[cycle, 0]] = 0.0
+    out[frame == cycles[cycle, 1]] = 1.0
+    return out
+
+
+def phase_change(phase: Array) -> Array:
+    """(F - 1,) cycles from each frame to the next, 1 more where phase starts anew."""
+    change = np.diff(phase.astype(float))
+    return np.where(change < 0, change + 1, change)
+
+
+def trajectory(root: RootFrames, frame: np.ndarray, seen_from: np.ndarray, offsets: range) -> list[Array]:
+    """The root's positions and directions at `frame` + offsets, from the roots `seen_from`: x, z, x, z.
+
+    frame, seen_from: (R,). Returns four arrays (R, samples).
+    """
+    at = frame[:, None] + np.array(offsets)
+    ground = np.zeros((*at.shape, 3))
+    ground[..., [0, 2]] = root.position[at]
+    position = points_to_root(root, ground, seen_from)
+    direction = vectors_to_root(root, root.direction[at], seen_from)
+    return [position[..., 0], position[..., 2], direction[..., 0], direction[..., 2]]
+
+
+def gait_columns(gait: Array, frame: np.ndarray, offsets: range) -> Array:
+    """(R, gaits * samples): for each gait (column of `gait`, (F, gaits)) its share at every sample, held
+    past the ends."""
+    at = np.clip(frame[:, None] + np.array(offsets), 0, len(gait) - 1)
+    return np.swapaxes(gait[at], 1, 2)
+
+
+def _table(columns: list[Array], rows: int) -> Array:
+    flat = [
+        np.asarray(c, np.float32).reshape(rows, -1 if rows else int(np.prod(c.shape[1:]))) for c in columns
+    ]
+    return np.concatenate(flat, axis=1)
+
+
+def _check(
+    name: str,
+    clip: Clip,
+    labels: Arrays,
+    channels: Arrays,
+    terrain: Arrays,
+    frame: np.ndarray,
+) -> None:
+    where = name
+    lengths = {"labels": len(labels["phase"]), **{name: len(values) for name, values in channels.items()}}
+    for what, length in lengths.items():
+        if length != len(clip):
+            raise InputError(where, f"{what} of {length} frames for a clip of {len(clip)}")
+    for channel_name, values in channels.items():
+        columns = len(channel(channel_name).columns(clip.skeleton))
+        if values.shape[1] != columns:
+            problem = f"{channel_name} of {values.shape[1]} columns for a skeleton of {columns}"
+            raise InputError(where, problem)
+    if not np.array_equal(terrain["frame"], frame):
+        raise InputError(
+            where,
+            "terrain was fitted to other cycles than the labels have",
+            fix="Make both again from the same clip.",
+        )
+    if len(frame) and (frame.min() < 1 or frame.max() + 2 > len(clip)):
+        outside = int(frame.min() if frame.min() < 1 else frame.max())
+        raise InputError(where, "a cycle has no frame before it or none after it", frame=outside)

@@ -1,0 +1,177 @@
+"""The rows of one clip: what depends on the frame once, what depends on the terrain fit once per fit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.core.files import load_npz, save_npz
+from hobble.core.quat import Array
+from hobble.rows.compose import body_columns, compose, of_frame
+from hobble.rows.layout import RowLayout
+
+CHANNEL = "channel_"  # before the names of the channels' arrays in a file
+HINT = "Delete it; the next run makes it again."
+
+
+@dataclass(frozen=True)
+class ClipRows:
+    """R rows of a clip, factorised. S is the sum of `fits`.
+
+    x: (R, columns of X without terrain and channels); y: (R, Y). Joint heights are above the world's zero.
+    p: (R,) phase. channels: name -> (R, its columns). frame, cycle, fits: (R,) int; `fits` counts the terrain
+    fits of a row.
+    heights: (S, 3 * samples) less the mean of their centre ones; mean: (S,) that mean, to be taken off the
+    joint heights. The fits of a row lie together, in the order of the rows.
+    visits: how often each row counts in a pass over the data; a row of one fit is used with it so often.
+    layout: of the rows with every channel of the data set.
+    """
+
+    clip: str
+    layout: RowLayout
+    skeleton: Mapping[str, Any] = field(repr=False)
+    x: Array = field(repr=False)
+    y: Array = field(repr=False)
+    p: Array = field(repr=False)
+    channels: Mapping[str, Array] = field(repr=False)
+    frame: np.ndarray = field(repr=False)
+    cycle: np.ndarray = field(repr=False)
+    fits: np.ndarray = field(repr=False)
+    heights: Array = field(repr=False)
+    mean: Array = field(repr=False)
+    visits: int = 10
+
+    def __len__(self) -> int:
+        return len(self.p)
+
+    @property
+    def first_fit(self) -> np.ndarray:
+        """(R,) where each row's fits begin in `heights` and `mean`."""
+        return np.cumsum(self.fits) - self.fits
+
+    def check(self, where: str | Path) -> None:
+        """Raise InputError, naming `where`, unless all shapes agree, fits are there and values are finite."""
+        layout, rows, fits = self.layout, len(self.p), int(np.sum(self.fits))
+        expected = {
+            "x": (rows, body_columns(layout)),
+            "y": (rows, layout.y_size),
+            "frame": (rows,),
+            "cycle": (rows,),
+            "fits": (rows,),
+            "heights": (fits, 3 * layout.samples),
+            "mean": (fits,),
+        }
+        if set(self.channels) != set(dict(layout.channels)):
+            raise InputError(where, "it has other channels than its layout says", fix=HINT)
+        tables = {name: getattr(self, name) for name in expected} | dict(self.channels)
+        expected |= {name: (rows, columns) for name, columns in layout.channels}
+        for name, shape in expected.items():
+            if tables[name].shape != shape:
+                raise InputError(where, f"{name} is {tables[name].shape} where {shape} belongs", fix=HINT)
+        if rows and np.min(self.fits) < 1:
+            frame = int(self.frame[np.argmin(self.fits)])
+            raise InputError(where, "a row has no terrain fit", frame=frame)
+        for name in ("x", "y", "p", *self.channels):
+            finite = np.isfinite(self.p if name == "p" else tables[name])
+            bad = ~(finite if finite.ndim == 1 else finite.all(axis=1))
+            if bad.any():
+                raise InputError(where, f"{name} is not a number", frame=int(self.frame[np.argmax(bad)]))
+        if not (np.isfinite(self.heights).all() and np.isfinite(self.mean).all()):
+            raise InputError(where, "terrain heights are not numbers")
+
+
+class Pairs(NamedTuple):
+    """n (frame, fit) pairs as the original has its rows, float32: x (n, X), y (n, Y), p (n,).
+
+    row: (n,) index of the row; weight: (n,) 1 / fits of the row, so that every frame counts the same.
+    """
+
+    x: Array
+    y: Array
+    p: Array
+    row: np.ndarray
+    weight: Array
+
+
+def expanded(rows: ClipRows, layout: RowLayout, batch: int = 2048) -> Iterator[Pairs]:
+    """A clip's (frame, fit) pairs in raw units, `batch` or so at a time, laid out as `layout`.
+
+    layout: the rows' own, or one with fewer of its channels.
+    """
+    first = rows.first_fit
+    start = 0
+    while start < len(rows):
+        stop = max(start + 1, int(np.searchsorted(first, first[start] + batch)))
+        fits = rows.fits[start:stop]
+        row = np.repeat(np.arange(start, stop), fits)
+        yield pairs(rows, layout, row, np.arange(first[start], first[stop - 1] + fits[-1]))
+        start = stop
+
+
+def pairs(rows: ClipRows, layout: RowLayout, row: np.ndarray, fit: np.ndarray) -> Pairs:
+    """The pairs of rows `row` (n,) with the fits `fit` (n,) of `heights`, in raw units."""
+    x = np.empty((len(row), layout.x_size), np.float32)
+    y = rows.y[row].astype(np.float32)
+    told = {name: rows.channels[name][row] for name, _ in layout.channels}
+    compose(layout, of_frame(layout, rows.x[row], told), rows.heights[fit], rows.mean[fit, None], x, y)
+    return Pairs(x, y, rows.p[row], row, 1.0 / rows.fits[row])
+
+
+def save_clip_rows(path: str | Path, rows: ClipRows) -> None:
+    """Write rows as one npz, floats as float32."""
+    floats = {n: getattr(rows, n).astype(np.float32) for n in ("x", "y", "p", "heights", "mean")}
+    floats |= {CHANNEL + name: values.astype(np.float32) for name, values in rows.channels.items()}
+    integers = {n: getattr(rows, n).astype(np.int32) for n in ("frame", "cycle", "fits")}
+    save_npz(
+        path,
+        clip=np.array(rows.clip),
+        layout=np.array(json.dumps(rows.layout.to_dict(), sort_keys=True)),
+        skeleton=np.array(json.dumps(rows.skeleton)),  # not sorted: its joints are in the columns' order
+        visits=np.array(rows.visits),
+        **floats,
+        **integers,
+    )
+
+
+class Outline(NamedTuple):
+    """What a merge needs to know of a clip's rows before it reads them. fits: (R,)."""
+
+    layout: RowLayout
+    skeleton: Mapping[str, Any]
+    fits: np.ndarray
+    visits: int
+
+
+def outline(source: ClipRows | str | Path) -> Outline:
+    """The outline of rows, or of a file of them, of which only a few kilobytes are read."""
+    if isinstance(source, ClipRows):
+        return Outline(source.layout, source.skeleton, source.fits, source.visits)
+    data = load_npz(source, ("layout", "skeleton", "fits", "visits"))
+    try:
+        layout = RowLayout.from_dict(json.loads(str(data["layout"])))
+        return Outline(layout, json.loads(str(data["skeleton"])), data["fits"], int(data["visits"]))
+    except (TypeError, ValueError) as error:
+        raise InputError(source, f"not a file of rows ({error})", fix=HINT) from error
+
+
+def load_clip_rows(path: str | Path) -> ClipRows:
+    """Read what `save_clip_rows` wrote; raises InputError where it is damaged or of another layout."""
+    data: dict[str, Any] = load_npz(path)
+    try:
+        data["clip"] = str(data["clip"])
+        data["layout"] = RowLayout.from_dict(json.loads(str(data["layout"])))
+        data["skeleton"] = json.loads(str(data["skeleton"]))
+        data["visits"] = int(data["visits"])
+        named = [key for key in data if key.startswith(CHANNEL)]
+        data["channels"] = {key.removeprefix(CHANNEL): data.pop(key) for key in named}
+        rows = ClipRows(**data)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(path, f"not a file of rows ({error})", fix=HINT) from error
+    rows.check(path)
+    return rows

@@ -1,0 +1,193 @@
+"""Where everything stands in a row: columns by name, of the skeleton, the window and the channels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from hobble.channels import formerly
+
+GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
+CONTACTS = ("left_heel", "left_toe", "right_heel", "right_toe")
+SIDES = ("left", "centre", "right")
+# Blocks of X that every network has, in the order of the original.
+BODY = ("position", "direction", "gait", "joint_position", "joint_velocity", "terrain")
+
+
+@dataclass(frozen=True)
+class RowLayout:
+    """The columns of X and Y for J joints, a window of `window` frames to each side, and channels.
+
+    With 31 joints, window 60, step 10: X has 342 columns (372 with a channel of 30) and Y 311. Every block is
+    a slice. Blocks that hold vectors are joint-major: x, y, z of joint 0, then joint 1, ...; trajectory
+    blocks are component-major: x of every sample, then z of every sample.
+    channels: (name, columns) of what the body is told. order: the blocks of X by name, in column order;
+    empty: those of BODY, then the channels. Raises ValueError where `order` names other blocks.
+    """
+
+    joints: int
+    window: int = 60
+    step: int = 10
+    channels: tuple[tuple[str, int], ...] = ()
+    order: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.order and sorted(self.order) != sorted((*BODY, *dict(self.channels))):
+            raise ValueError(f"the blocks of X are {', '.join((*BODY, *dict(self.channels)))}, each once")
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> RowLayout:
+        """The inverse of `to_dict`; files older than channels have columns under an old key."""
+        known = {key: data[key] for key in ("joints", "window", "step") if key in data}
+        channels = dict(data.get("channels", {}))
+        for key in set(data) - {"joints", "window", "step", "channels", "order"}:
+            if data[key]:
+                channels[formerly(key)] = data[key]
+        pairs = tuple((str(name), int(columns)) for name, columns in channels.items())
+        return cls(**known, channels=pairs, order=tuple(data.get("order", ())))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for a file."""
+        own = {"order": list(self.order)} if self.order else {}
+        sizes = {"joints": self.joints, "window": self.window, "step": self.step}
+        return {**sizes, "channels": [list(pair) for pair in self.channels], **own}
+
+    def told(self, names: Iterable[str]) -> RowLayout:
+        """The same layout with those of its channels alone, in the order of `names`.
+
+        Raises KeyError for a channel that it does not have.
+        """
+        size = dict(self.channels)
+        kept = tuple((name, size[name]) for name in names)
+        order = tuple(name for name in self.order if name in BODY or name in dict(kept))
+        return replace(self, channels=kept, order=order)
+
+    @property
+    def offsets(self) -> range:
+        """Frames of the trajectory samples relative to the present one: -60, -50, ..., 50."""
+        return range(-self.window, self.window, self.step)
+
+    @property
+    def samples(self) -> int:
+        """Trajectory samples in X (12)."""
+        return 2 * self.window // self.step
+
+    @property
+    def future(self) -> int:
+        """Trajectory samples in Y (6)."""
+        return self.window // self.step
+
+    @cached_property
+    def _x(self) -> dict[str, slice]:
+        trajectory, joints = 2 * self.samples, 3 * self.joints
+        sizes = dict(
+            zip(
+                BODY,
+                (trajectory, trajectory, len(GAITS) * self.samples, joints, joints, 3 * self.samples),
+                strict=True,
+            )
+        )
+        sizes |= dict(self.channels)
+        found, start = {}, 0
+        for name in self.order or sizes:
+            found[name] = slice(start, start + sizes[name])
+            start += sizes[name]
+        return found
+
+    @property
+    def x_position(self) -> slice:
+        """Trajectory x of every sample, then z; root frame of the present frame, cm."""
+        return self._x["position"]
+
+    @property
+    def x_direction(self) -> slice:
+        """Trajectory facing direction, x then z."""
+        return self._x["direction"]
+
+    @property
+    def x_gait(self) -> slice:
+        """Six blocks of samples, in the order of GAITS."""
+        return self._x["gait"]
+
+    @property
+    def x_joint_position(self) -> slice:
+        """Joint positions of the previous frame in its root frame, y less the mean terrain height."""
+        return self._x["joint_position"]
+
+    @property
+    def x_joint_velocity(self) -> slice:
+        """Joint velocities of the previous frame, cm a frame."""
+        return self._x["joint_velocity"]
+
+    @property
+    def x_terrain(self) -> slice:
+        """Heights: +X side (left), centre, other side; less the mean of the centre ones."""
+        return self._x["terrain"]
+
+    def x_channel(self, name: str) -> slice:
+        """The columns of a channel; raises KeyError where there is none of that name."""
+        return self._x[name]
+
+    @property
+    def x_size(self) -> int:
+        """Columns of X."""
+        return max(block.stop for block in self._x.values())
+
+    @property
+    def y_root_velocity(self) -> slice:
+        """Root velocity x, z in the root frame, cm a frame."""
+        return slice(0, 2)
+
+    @property
+    def y_turn(self) -> slice:
+        """Yaw velocity, radians a frame."""
+        return slice(2, 3)
+
+    @property
+    def y_phase_change(self) -> slice:
+        """Cycles a frame."""
+        return slice(3, 4)
+
+    @property
+    def y_contacts(self) -> slice:
+        """In the order of CONTACTS, 0 or 1."""
+        return slice(4, 8)
+
+    @property
+    def y_position(self) -> slice:
+        """Future trajectory x then z, root frame of the next frame."""
+        return slice(8, 8 + 2 * self.future)
+
+    @property
+    def y_direction(self) -> slice:
+        """Future facing direction x then z."""
+        return slice(8 + 2 * self.future, 8 + 4 * self.future)
+
+    @property
+    def y_joint_position(self) -> slice:
+        """Joint positions of the present frame, root frame, y less the mean terrain height."""
+        return slice(self.y_direction.stop, self.y_direction.stop + 3 * self.joints)
+
+    @property
+    def y_joint_velocity(self) -> slice:
+        """Joint velocities of the present frame."""
+        return slice(self.y_joint_position.stop, self.y_joint_position.stop + 3 * self.joints)
+
+    @property
+    def y_joint_rotation(self) -> slice:
+        """Joint rotations of the present frame in the root frame: axis times half the angle."""
+        return slice(self.y_joint_velocity.stop, self.y_joint_velocity.stop + 3 * self.joints)
+
+    @property
+    def y_size(self) -> int:
+        """Columns of Y."""
+        return self.y_joint_rotation.stop
+
+    def blocks(self, prefix: str) -> dict[str, slice]:
+        """Every block of "x" or "y" by name, in column order: {"position": slice(0, 24), ...}."""
+        if prefix == "x":
+            return {name: block for name, block in self._x.items() if block.stop > block.start}
+        names = [n for n in vars(type(self)) if n.startswith("y_") and n != "y_size"]
+        return {name[2:]: getattr(self, name) for name in names}

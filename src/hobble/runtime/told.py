@@ -1,0 +1,87 @@
+"""What a caller tells a character by the names of channels, as the columns of its state."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from hobble.channels import NAMES, channel
+from hobble.core.quat import Array
+from hobble.models.network import Network
+
+
+class UnknownName(KeyError):
+    """A label of a channel, or a gait, that the network does not have; the text names the nearest."""
+
+    def __init__(self, what: str, name: object, known: Iterable[str]) -> None:
+        names = list(known)
+        near = difflib.get_close_matches(str(name), names, 3, 0.5)
+        hint = f"; did you mean {' or '.join(near)}?" if near else f": there are {', '.join(names)}"
+        super().__init__(f"{what} {name!r}{hint}")
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class Told:
+    """The channels of a network; `columns`: name -> those of the state, all channels side by side."""
+
+    def __init__(self, network: Network, scales: Mapping[str, float]) -> None:
+        self.labels = {
+            name: {label: i for i, label in enumerate(of)} for name, of in network.channels.items()
+        }
+        self.scales = dict(scales)
+        self.columns: dict[str, slice] = {}
+        start = 0
+        for name, count in network.layout.channels:
+            self.columns[name] = slice(start, start + count)
+            start += count
+
+    def values(self, name: str, given: Any, characters: int) -> tuple[slice, Array]:
+        """The columns of channel `name` and what they are to be, (C, columns).
+
+        given: label -> value, or (C,) values; or (columns,) or (C, columns). Raises as
+        `ProceduralAnimation.next_pose` says.
+        """
+        if name not in NAMES:
+            raise TypeError(f"next_pose() got an unexpected keyword argument {name!r}")
+        one, labels = channel(name), self.labels.get(name, {})
+        values = np.zeros((characters, len(labels)))
+        if isinstance(given, Mapping):
+            for label, value in given.items():
+                self._name(name, label)
+                if np.shape(value) not in ((), (1,), (characters,)):
+                    shape = np.shape(value)
+                    raise ValueError(f"{label}: one {one.value}, or {characters}, not of shape {shape}")
+                values[:, labels[label]] = value
+        else:
+            array = np.asarray(given, float)
+            if not labels and array.size:
+                raise ValueError(f"{array.size} numbers given for {name}, but {_blind(name)}")
+            if array.shape not in (values.shape, values.shape[1:]):
+                raise ValueError(
+                    f"{name} is {values.shape[1:]} or {values.shape} numbers, not of shape {array.shape}"
+                )
+            values[:] = array
+        wrong = ~((values >= 0) & (values <= one.highest))
+        if wrong.any():
+            c, k = np.argwhere(wrong)[0]
+            raise ValueError(
+                f"the {one.value} of {list(labels)[k]} is {values[c, k]:g}, but it is a number from 0 to "
+                f"{one.highest:g}"
+            )
+        return self.columns.get(name, slice(0, 0)), values / self.scales.get(name, 1.0)
+
+    def _name(self, name: str, label: str) -> None:
+        labels = self.labels.get(name, {})
+        if not labels:
+            raise ValueError(f"{label} cannot be told: {_blind(name)}")
+        if label not in labels:
+            raise UnknownName(f"{name} has no", label, labels)
+
+
+def _blind(name: str) -> str:
+    return f"this network is not told {name}; train a configuration with `channels: [{name}]`"

@@ -1,0 +1,105 @@
+"""Makes the environment: python environment.py .venv, with any Python from 3.11 on and nothing beside it.
+
+pip says either nothing or a hundred lines. Here one line says what is fetched and how far it is.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import time
+import venv
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TextIO
+
+OLDEST = (3, 11)
+ROOM = "2.0 GB"  # on disk, on Linux with the constraints as they are
+EVERY = 10.0  # seconds between lines where they go to a file
+# torch first and alone: that it can be had decides whether the rest is worth fetching.
+STEPS = (["torch==2.13.0"], ["--editable", ".[dev]"])
+FETCHES = re.compile(r"\s*(?:Downloading|Using cached) (\S+?)(?:-\d\S*)? \(([\d.]+) (kB|MB|GB)\)")
+SO_FAR = re.compile(r"Progress (\d+) of (\d+)")
+BYTES = {"kB": 1e3, "MB": 1e6, "GB": 1e9}
+
+
+class Line:
+    """The line of progress, written over on a terminal."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream, self.live = stream, stream.isatty()
+        self.fetched, self.name, self.size, self.now = 0.0, "", 0.0, 0.0
+        self.last = float("-inf")
+
+    def take(self, said: str) -> None:
+        """Follow a line of pip's."""
+        if found := FETCHES.match(said):
+            self.fetched += self.size
+            self.name, self.size, self.now = found[1], float(found[2]) * BYTES[found[3]], 0.0
+        elif found := SO_FAR.match(said):
+            self.now = float(found[1])
+        elif said.startswith("Installing collected packages"):
+            self.fetched, self.size = self.fetched + self.size, 0.0
+            self.name = f"unpacking {said.count(',') + 1} packages, which takes a while"
+            self.last = float("-inf")  # to be said at once: pip is silent from here on
+        else:
+            return
+        self._show()
+
+    def _show(self) -> None:
+        of = f" {self.now / 1e6:.0f} of {self.size / 1e6:.0f} MB" if self.size >= 1e6 else ""
+        text = f"environment: {(self.fetched + self.now) / 1e6:.0f} MB fetched; {self.name}{of}"
+        if self.live:
+            self.stream.write(f"\r\x1b[K{text[:78]}")
+        elif time.monotonic() - self.last >= EVERY:
+            self.last = time.monotonic()
+            self.stream.write(f"{text}\n")
+        self.stream.flush()
+
+    def end(self) -> None:
+        """Leave the terminal a clean line."""
+        if self.live:
+            self.stream.write("\r\x1b[K")
+
+
+def follow(said: Iterable[str], line: Line) -> list[str]:
+    """Show what pip says as progress; returns its last words, for a message."""
+    words: list[str] = []
+    for text in said:
+        line.take(text)
+        if not SO_FAR.match(text):
+            words = [*words[-30:], text]
+    line.end()
+    return words
+
+
+def install(python: Path, arguments: list[str], line: Line) -> None:
+    """One call of pip; ends the program with its last words where it fails."""
+    command = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as pip:
+        assert pip.stdout is not None
+        words = follow(pip.stdout, line)
+    if pip.returncode:
+        sys.exit("".join(words) + f"\nThe environment could not be made: {' '.join(command)}")
+
+
+def main(folder: Path) -> None:
+    """Make the environment in `folder`, or complete it."""
+    if sys.version_info < OLDEST:
+        sys.exit("Hobble needs Python 3.11 or later: make env PYTHON=/path/to/python3.11")
+    print(f"Making the environment in {folder}: PyTorch, Snakemake, SciPy and what they need.")
+    print(
+        f"It is fetched from the package index and takes {ROOM} of disk; with a fast network, some minutes."
+    )
+    began = time.monotonic()
+    venv.create(folder, with_pip=True)
+    python, line = folder / "bin" / "python", Line(sys.stdout)
+    install(python, ["--quiet", "--upgrade", "pip>=25"], line)  # an older one does not say how far it is
+    for packages in STEPS:
+        install(python, ["--progress-bar", "raw", "--constraint", "constraints.txt", *packages], line)
+    print(f"The environment is there, after {time.monotonic() - began:.0f} s.")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

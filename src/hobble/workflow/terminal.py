@@ -1,0 +1,178 @@
+"""What a run says on the terminal: one line of progress, each failure once, and a summary at the end.
+
+Snakemake hands over what it would say (`snakemake_logger_plugin_hobble`); `snakemake -p` says all of it.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+EVERY = 10.0  # seconds between lines of progress where they go to a file
+WIDTH = 100  # columns of the line that is written over
+MOST_NAMED = 20  # failures that the summary names
+TAIL = 1 << 16  # bytes at the end of a job's log in which its message stands
+MESSAGE = re.compile(r"^\S+ \S+ ERROR (.*)$", re.M)
+# What Snakemake says and a person need not read: it is said in fewer words here.
+JOB_ENDED = re.compile(r"CalledProcessError|Command 'set -euo pipefail|returned non-zero exit status")
+SUPERFLUOUS = re.compile(
+    r"Exiting because a job execution failed|Look below for error messages|^Shutting down|"
+    r"^At least one job did not complete|^WorkflowError:\s*At least one job did not complete"
+)
+SAID = re.compile(r"^Nothing to be done|^Reasons:|^This was a dry-run|^Unlocking|^Touching|^Error")
+STOPPED = "Terminating processes on user request"
+SEE_JOBS = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job as it is named to a person."""
+
+    rule: str
+    about: str
+    log: str
+
+    @property
+    def name(self) -> str:
+        """Rule and wildcards."""
+        return f"{self.rule} {self.about}".strip()
+
+
+class Terminal:
+    """One run's talk. live: the last line is written over, as on a terminal; else lines come now and then."""
+
+    def __init__(
+        self, stream: TextIO, live: bool, dryrun: bool = False, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        self.stream, self.live, self.dryrun, self.now = stream, live, dryrun, now
+        self.began = self.last = now()
+        self.jobs: dict[int, Job] = {}
+        self.running: dict[int, Job] = {}
+        self.failed: list[Job] = []
+        self.done = self.total = 0
+        self.stopped = self.told = self.shown = self.closed = False
+
+    def take(self, record: logging.LogRecord) -> None:
+        """Say what there is to say of a record of Snakemake's logger."""
+        event = str(getattr(record, "event", None) or "")
+        handle = getattr(self, f"_{event}", None)
+        if handle is not None:
+            handle(record.__dict__)
+        elif event in ("", "error"):
+            self._words(record)
+
+    def close(self) -> None:
+        """The summary, where jobs have run; once, though logging closes handlers again at exit."""
+        self._wipe()
+        if self.closed or self.dryrun or not (self.jobs or self.failed):
+            return
+        self.closed = True
+        took = _duration(self.now() - self.began)
+        count = f"{self.done} of {self.total or len(self.jobs)} jobs done in {took}"
+        if self.failed:
+            self._line(f"{count}, {len(self.failed)} failed:")
+            for job in self.failed[:MOST_NAMED]:
+                self._line(f"  {job.name}: {job.log}")
+            if len(self.failed) > MOST_NAMED:
+                self._line(f"  and {len(self.failed) - MOST_NAMED} more")
+            self._line("The same command goes on from here once this is put right.")
+        elif self.stopped:
+            self._line(f"{count}, then stopped. The same command goes on from here.")
+        else:
+            self._line(f"{count}.")
+
+    # Snakemake's events, by their names
+
+    def _run_info(self, data: Mapping[str, Any]) -> None:
+        stats = data.get("stats") or {}
+        self.total = stats.get("total", self.total)
+        if self.dryrun and not self.told:
+            self._line(str(data["msg"]))
+        elif not self.told:
+            rules = Counter({rule: n for rule, n in stats.items() if rule != "total"})
+            most = ", ".join(f"{n} {rule}" for rule, n in rules.most_common(6))
+            self._line(f"{self.total} jobs: {most}{', ...' if len(rules) > 6 else ''}")
+        self.told = True
+
+    def _job_info(self, data: Mapping[str, Any]) -> None:
+        about = " ".join(str(value) for value in dict(data.get("wildcards") or {}).values())
+        log = ", ".join(map(str, data.get("log") or ()))
+        job = Job(str(data["rule_name"]), about, log)
+        self.jobs[data["jobid"]] = self.running[data["jobid"]] = job
+        self._progress({})
+
+    def _job_finished(self, data: Mapping[str, Any]) -> None:
+        self.running.pop(data["job_id"], None)
+
+    def _progress(self, data: Mapping[str, Any]) -> None:
+        self.done, self.total = data.get("done", self.done), data.get("total", self.total)
+        if self.dryrun or not self.total:
+            return
+        took = self.now() - self.began
+        what = ", ".join(Counter(job.rule for job in self.running.values()))
+        line = f"{self.done}/{self.total} jobs, {_duration(took)}" + (f": {what}" if what else "")
+        if self.live:
+            self.stream.write(f"\r\x1b[K{line[:WIDTH]}")
+            self.stream.flush()
+            self.shown = True
+        elif self.now() - self.last >= EVERY:
+            self.last = self.now()
+            self._line(line)
+
+    def _job_error(self, data: Mapping[str, Any]) -> None:
+        job = self.jobs.get(data["jobid"]) or Job(
+            str(data["rule_name"]), "", ", ".join(map(str, data["log"] or ()))
+        )
+        self.running.pop(data["jobid"], None)
+        if self.stopped:
+            return
+        self.failed.append(job)
+        if not _message(job.log):  # else the job has said it itself
+            self._line(f"{job.name}: ended without a message, killed perhaps. Its log: {job.log}")
+
+    def _words(self, record: logging.LogRecord) -> None:
+        text = str(record.msg or "").strip()
+        if STOPPED in text:
+            self.stopped = True
+            self._line("Stopping the jobs that run.")
+        elif record.levelno >= logging.ERROR:
+            if not (JOB_ENDED.search(text) or SUPERFLUOUS.search(text)) and text:
+                self._line(text)
+        elif record.levelno >= logging.WARNING or SAID.search(text):
+            self._line(SEE_JOBS.sub("", text))
+
+    def _line(self, text: str) -> None:
+        self._wipe()
+        self.stream.write(f"{text}\n")
+        self.stream.flush()
+
+    def _wipe(self) -> None:
+        if self.shown:
+            self.stream.write("\r\x1b[K")
+            self.shown = False
+
+
+def _message(log: str) -> str:
+    """The last error in a job's log, "" where there is none."""
+    try:
+        with open(Path(log), "rb") as file:
+            file.seek(0, 2)
+            file.seek(max(0, file.tell() - TAIL))
+            found = MESSAGE.findall(file.read().decode(errors="replace"))
+    except OSError:
+        return ""
+    return found[-1] if found else ""
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes:02} min"
+    return f"{minutes} min {rest:02} s" if minutes else f"{rest} s"

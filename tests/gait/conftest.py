@@ -1,0 +1,169 @@
+"""Walkers made joint by joint, so that what is to be measured of them is known exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core.clip import Clip
+from hobble.core.ik import two_bone_knee
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.gait.read import read_clip
+
+CYCLE = 60  # frames
+THIGH, SHANK = 41.0, 40.0
+LEG = THIGH + SHANK
+FOOT = np.array([0.0, -4.0, 13.0])
+SIDES = {"left": 1.0, "right": -1.0}  # +X is the left
+
+
+def place(skeleton: Skeleton, at: Mapping[str, Array]) -> Array:
+    """(F, J, 3) with the joints of the roles where they are told, all others at the hips."""
+    positions = np.repeat(at["hips"][:, None], len(skeleton.joints), axis=1)
+    for role, points in at.items():
+        positions[:, skeleton.role(role)] = points
+    return positions
+
+
+def body(frames: int, speed: float, height: float = 72.0) -> dict[str, Array]:
+    """An upright figure that goes ahead at `speed` cm a frame, its arms hanging, without knees and ankles."""
+
+    def up(height: float, left: float = 0.0) -> Array:
+        return np.array([left, height, 0.0])
+
+    hips = np.stack([np.zeros(frames), np.full(frames, height), speed * np.arange(frames)], axis=1)
+    at = {"hips": hips, "spine": hips, "chest": hips + up(40), "neck": hips + up(50)}
+    at["head"] = hips + up(60)
+    for side, sign in SIDES.items():
+        at[f"{side}_hip"] = hips + up(0, 9 * sign)
+        at[f"{side}_shoulder"] = hips + up(45, 18 * sign)
+        at[f"{side}_elbow"] = at[f"{side}_shoulder"] - up(29)
+        at[f"{side}_wrist"] = at[f"{side}_elbow"] - up(23)
+    return at
+
+
+@dataclass(frozen=True)
+class Stepper:
+    """A walker whose feet stand, in frames of a cycle of CYCLE, and land `ahead` of the hips, cm.
+
+    right_lands, left_lands: frame of the cycle. The feet stand still in stance and swing at one speed.
+    """
+
+    stance_right: int = 36
+    stance_left: int = 36
+    ahead_right: float = 25.0
+    ahead_left: float = 25.0
+    left_lands: int = 30
+    speed: float = 1.5
+    width: float = 18.0
+
+    def positions(self, skeleton: Skeleton, cycles: int = 6) -> Array:
+        """(F, J, 3); the right foot lands at frame 0, CYCLE, 2 CYCLE and so on."""
+        frames = cycles * CYCLE + 1
+        at = body(frames, self.speed)
+        for side, sign in SIDES.items():
+            ahead = self.relative(side, np.arange(frames))
+            ankle = at["hips"] * [1, 0, 1] + np.stack([0 * ahead, 0 * ahead + 8, ahead], axis=1)
+            ankle[:, 0] += sign * self.width / 2
+            hip = at[f"{side}_hip"]
+            at[f"{side}_knee"], reached = two_bone_knee(hip, ankle, np.array([0.0, 0, 1]), THIGH, SHANK)
+            assert np.allclose(reached, ankle)
+            at[f"{side}_heel"] = ankle
+            at[f"{side}_toe"] = ankle + FOOT
+        return place(skeleton, at)
+
+    def relative(self, side: str, frame: Array) -> Array:
+        """How far the ankle is ahead of the hips, cm."""
+        stance = self.stance_right if side == "right" else self.stance_left
+        lands = 0 if side == "right" else self.left_lands
+        ahead = self.ahead_right if side == "right" else self.ahead_left
+        since = (frame - lands) % CYCLE
+        swung = np.maximum(since - stance, 0) / (CYCLE - stance) * self.speed * CYCLE
+        return ahead - self.speed * since + swung
+
+
+@dataclass(frozen=True)
+class Swinger:
+    """A figure whose joints swing by known angles, degrees; each is (middle, half of the range).
+
+    The right leg is furthest ahead at frame 0 of each cycle, the left one half a cycle later. Knees bend
+    from 0.
+    """
+
+    hip: Mapping[str, tuple[float, float]]
+    knee: Mapping[str, float]
+    arm: Mapping[str, tuple[float, float]]
+    elbow: float = 20.0
+    trunk_forward: tuple[float, float] = (5.0, 2.0)
+    trunk_left: tuple[float, float] = (3.0, 4.0)
+    pelvis_left_up: float = 6.0
+
+    def positions(self, skeleton: Skeleton, cycles: int = 6) -> Array:
+        """(F, J, 3)."""
+        frames = cycles * CYCLE + 1
+        at, wave = body(frames, 1.2), np.cos(2 * np.pi * np.arange(frames) / CYCLE)
+        up = np.radians(self.pelvis_left_up)
+        for side, sign in SIDES.items():
+            beat = wave * -sign
+            at[f"{side}_hip"] = at["hips"] + sign * 9 * np.array([np.cos(up), np.sin(up), 0])
+            hip, knee = _swing(self.hip[side], beat), self.knee[side] * (1 - beat) / 2
+            at[f"{side}_knee"] = at[f"{side}_hip"] + THIGH * _down(hip)
+            at[f"{side}_heel"] = at[f"{side}_knee"] + SHANK * _down(hip - knee)
+            at[f"{side}_toe"] = at[f"{side}_heel"] + FOOT
+            arm = _swing(self.arm[side], beat)
+            at[f"{side}_elbow"] = at[f"{side}_shoulder"] + 29 * _down(arm)
+            at[f"{side}_wrist"] = at[f"{side}_elbow"] + 23 * _down(arm + self.elbow)
+        forward, left = (
+            np.tan(np.radians(_swing(lean, wave))) for lean in (self.trunk_forward, self.trunk_left)
+        )
+        at["neck"] = at["hips"] + 50 * np.stack([left, np.ones(frames), forward], axis=1)
+        return place(skeleton, at)
+
+
+def _swing(middle_and_half: tuple[float, float], wave: Array) -> Array:
+    return middle_and_half[0] + middle_and_half[1] * wave
+
+
+def _down(degrees: Array) -> Array:
+    """Unit vectors (F, 3) that hang down and point forward by an angle."""
+    angle = np.radians(degrees)
+    return np.stack([0 * angle, -np.cos(angle), np.sin(angle)], axis=1)
+
+
+def in_a_mirror(skeleton: Skeleton, positions: Array) -> Array:
+    """Joint positions with left and right swapped."""
+    return positions[:, skeleton.mirror_joints] * [-1.0, 1.0, 1.0]
+
+
+@pytest.fixture(scope="session")
+def stepper() -> type[Stepper]:
+    return Stepper
+
+
+@pytest.fixture(scope="session")
+def swinger() -> type[Swinger]:
+    return Swinger
+
+
+@pytest.fixture(scope="session")
+def mirror() -> Callable[[Skeleton, Array], Array]:
+    return in_a_mirror
+
+
+@pytest.fixture(scope="session")
+def cmu(shared: Path, root: Path) -> Callable[[str], Clip]:
+    """A clip of the CMU database or of Ferre et al. by name, read once."""
+    read: dict[str, Clip] = {}
+
+    def get(name: str) -> Clip:
+        if name not in read:
+            folder = "ferre" if name.startswith("Injured") else "cmu"
+            read[name] = read_clip(shared / "mocap" / folder / f"{name}.bvh", root / "config" / "skeletons")
+        return read[name]
+
+    return get

@@ -1,0 +1,114 @@
+"""The commands of hobble.gait, and the walker of the embedded data set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from hobble.core.bvh import write_bvh
+from hobble.core.clip import Clip
+from hobble.core.files import load_npz, save_npz
+from hobble.gait import derive_healthy, derive_people
+from hobble.gait.__main__ import main
+from hobble.gait.compare import compare, healthy_profile
+from hobble.gait.graded import HEALTHY
+from hobble.motion.mirror import mirror_clip
+from hobble.synthetic.clip import walk
+from hobble.synthetic.recipes import WALK, Segment
+
+
+@pytest.fixture(scope="module")
+def walker(holden31) -> Callable[[float], Clip]:
+    """The embedded walker, straight ahead for ten seconds at a speed in cm/s."""
+
+    def make(speed: float) -> Clip:
+        segments = [Segment(WALK, speed, seconds=12.0)]
+        return walk(f"at-{speed:g}", holden31, segments, 600, None, "flat", 60.0, 1).clip
+
+    return make
+
+
+@pytest.fixture
+def file(tmp_path):
+    def write(clip: Clip) -> str:
+        path = tmp_path / f"{clip.name}.bvh"
+        write_bvh(path, clip)
+        return str(path)
+
+    return write
+
+
+@pytest.fixture(autouse=True)
+def at_the_checkout(monkeypatch, root):
+    monkeypatch.chdir(root)
+
+
+@pytest.mark.parametrize("speed", [65, 80, 100, 150])
+def test_the_embedded_walker_is_healthy_at_any_speed(walker, speed):
+    seen = compare(walker(speed), healthy_profile([walker(125)]))
+    assert seen.windows
+    assert seen.named() == {"normal": 1.0}
+    assert seen.effects["right"]["speed"] == pytest.approx(speed / 125, abs=0.03)
+
+
+def test_any_rig_and_the_other_side(walker):
+    clip = walker(120)
+    seen = compare(mirror_clip(clip, "mirrored"), healthy_profile([clip]))
+    assert seen.answer.label == "normal"
+
+
+def test_the_command_tells_of_each_clip(walker, file, capsys):
+    healthy, slow = file(walker(125)), file(walker(80))
+    assert main([slow, healthy, "--healthy", healthy, "--side", "left"]) == 0
+    said = capsys.readouterr().out
+    assert said.count("effects, hurt side left") == 2
+    assert "at-80: normal" in said
+    assert "at-125: normal" in said
+    assert "No healthy walk" not in said
+    assert main([healthy]) == 0
+    assert "No healthy walk was given" in capsys.readouterr().out
+
+
+def test_a_clip_without_a_step_is_named_and_refused(holden31, walker, file, capsys):
+    rotations = np.zeros((90, len(holden31.joints), 4))
+    rotations[..., 0] = 1
+    still = Clip("standing", holden31, 60.0, rotations, np.tile([0, 93.0, 0], (90, 1)))
+    assert main([file(still), "--healthy", file(walker(125))]) == 1
+    said = capsys.readouterr().err
+    assert "standing.bvh" in said
+    assert "no whole cycle" in said
+
+
+def test_a_healthy_clip_without_a_step_is_named_too(holden31, walker, file, capsys):
+    rotations = np.zeros((90, len(holden31.joints), 4))
+    rotations[..., 0] = 1
+    still = Clip("standing", holden31, 60.0, rotations, np.tile([0, 93.0, 0], (90, 1)))
+    assert main([file(walker(125)), "--healthy", file(still)]) == 1
+    assert "standing.bvh" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("window", ["0", "-1", "nan", "x"])
+def test_a_window_that_is_no_time_is_refused(walker, file, window, capsys):
+    with pytest.raises(SystemExit):
+        main([file(walker(125)), "--window", window])
+    assert "--window" in capsys.readouterr().err
+
+
+def test_other_curves_than_those_known_are_refused(tmp_path, capsys):
+    path = tmp_path / "walks.npz"
+    save_npz(path, gaits=np.array(["normal"]), curves=np.array(["knee"]), scalars=np.array(["speed"]))
+    assert derive_people.main([str(path), str(tmp_path / "out.npz")]) == 1
+    assert "`gaits` should be normal, antalgic" in capsys.readouterr().err
+    assert not (tmp_path / "out.npz").exists()
+    assert derive_people.main([]) == derive_healthy.main([]) == 2
+
+
+@pytest.mark.shared
+def test_the_spread_of_healthy_walks_is_derived_from_the_database(shared):
+    made, clips = derive_healthy.covariance(derive_healthy.healthy_windows(shared / "mocap" / "cmu", "07"))
+    known = load_npz(HEALTHY)
+    at = list(known["performers"]).index("07")
+    assert clips == known["clips"][at] == 8
+    np.testing.assert_allclose(made, known["covariances"][at], rtol=1e-6, atol=1e-9)

@@ -1,0 +1,156 @@
+"""Cycles and their numbers, on walkers whose steps, stances and angles are known exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hobble.gait.cycles import SAMPLES, joined, landings, measure
+from hobble.gait.signals import CURVES
+
+CYCLE, LEG = 60, 81.0
+
+
+def test_landings_stances_and_steps_are_those_that_were_made(holden31, stepper):
+    made = stepper(stance_right=30, stance_left=42, ahead_right=10, ahead_left=30, left_lands=24)
+    walk = measure(holden31, made.positions(holden31))
+    # the ends of a clip are no landings: what the ankle did beyond is not known
+    assert [cycle.start for cycle in walk.right] == [60, 120, 180, 240]
+    assert [cycle.start for cycle in walk.left] == [24, 84, 144, 204, 264]
+    for cycle in walk.right:
+        assert cycle.end - cycle.start == CYCLE
+        scalars = cycle.scalars
+        assert scalars["stride_seconds"] == 1.0
+        assert scalars["speed_per_leg"] == pytest.approx(90 / LEG)
+        assert scalars["left_strike_phase"] == 24 / 60
+        # A foot that stands from its landing to 30 frames later moves in the first and the last of them.
+        assert scalars["stance_share_R"] == pytest.approx(29 / 60)
+        assert scalars["stance_share_L"] == pytest.approx(41 / 60)
+        left_then = made.relative("left", np.array(0))
+        right_then = made.relative("right", np.array(24))
+        assert scalars["step_R"] == pytest.approx((10 - left_then) / LEG)
+        assert scalars["step_L"] == pytest.approx((30 - right_then) / LEG)
+        assert scalars["step_width"] == pytest.approx(18 / LEG)
+
+
+def test_a_left_cycle_is_the_right_one_of_the_mirrored_walk(holden31, stepper):
+    made = stepper(stance_right=30, stance_left=42, ahead_right=10, ahead_left=30, left_lands=24)
+    cycle = measure(holden31, made.positions(holden31)).left[0]
+    assert cycle.scalars["left_strike_phase"] == pytest.approx(36 / 60)
+    assert cycle.scalars["stance_share_R"] == pytest.approx(41 / 60)
+    assert cycle.scalars["stance_share_L"] == pytest.approx(29 / 60)
+
+
+def test_a_foot_that_never_passes_the_other_still_lands(holden31, stepper):
+    made = stepper(ahead_right=-8, ahead_left=40, stance_right=24, stance_left=40, speed=0.8)
+    cycles = measure(holden31, made.positions(holden31)).right
+    assert len(cycles) == 4
+    assert cycles[0].scalars["step_R"] < 0
+
+
+@pytest.fixture(scope="module")
+def swinging(holden31, swinger):
+    made = swinger(
+        hip={"right": (2.0, 14.0), "left": (5.0, 20.0)},
+        knee={"right": 16.0, "left": 40.0},
+        arm={"right": (1.0, 5.0), "left": (-4.0, 17.0)},
+    )
+    return measure(holden31, made.positions(holden31))
+
+
+@pytest.mark.parametrize(
+    ("name", "mean", "whole"),
+    [
+        ("hip_flexion_R", 2, 28),
+        ("hip_flexion_L", 5, 40),
+        ("knee_flexion_R", 8, 16),
+        ("knee_flexion_L", 20, 40),
+        ("hip_abduction_R", 0, 0),
+        ("arm_forward_R", 1, 10),
+        ("arm_forward_L", -4, 34),
+        ("elbow_flexion_R", 20, 0),
+        ("trunk_forward", 5, 4),
+        ("trunk_left", 3, 8),
+        ("pelvis_left_up", 6, 0),
+        ("pelvis_turn_left", 0, 0),
+        ("shoulders_turn_left", 0, 0),
+        ("foot_pitch_L", -np.degrees(np.arctan2(4, 13)), 0),
+        ("hips_height", 72 / LEG, 0),
+    ],
+)
+def test_curves_have_the_means_and_ranges_that_were_made(swinging, name, mean, whole):
+    for cycle in swinging.right:
+        curve = cycle.curves[CURVES.index(name)]
+        assert curve.shape == (SAMPLES,)
+        assert np.ptp(curve) == pytest.approx(whole, abs=1e-6)
+        assert curve.mean() == pytest.approx(mean, abs=1e-6)
+
+
+def test_phase_zero_is_the_landing(swinging):
+    curve = swinging.right[0].curves[CURVES.index("hip_flexion_R")]
+    assert np.argmax(curve) == 0
+    assert np.argmin(curve) == SAMPLES // 2
+
+
+def test_place_size_and_direction_of_a_walk_do_not_matter(holden31, stepper):
+    positions = stepper(ahead_left=35).positions(holden31)
+    turn = np.radians(130)
+    rotation = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
+    moved = 1.3 * positions @ rotation.T + [500, 0, -300]
+    for a, b in zip(measure(holden31, positions).right, measure(holden31, moved).right, strict=True):
+        assert (a.start, a.end) == (b.start, b.end)
+        assert a.scalars == pytest.approx(b.scalars)
+        np.testing.assert_allclose(a.curves, b.curves, atol=1e-6)
+
+
+def test_the_frame_rate_hardly_matters(holden31, stepper):
+    positions = stepper(stance_left=42).positions(holden31)
+    at = np.arange(2 * len(positions) - 1) / 2
+    low, share = np.floor(at).astype(int), (at % 1)[:, None, None]
+    twice = (1 - share) * positions[low] + share * positions[np.minimum(low + 1, len(positions) - 1)]
+    a, b = (measure(holden31, p, fps).right[1].scalars for p, fps in ((positions, 60), (twice, 120)))
+    assert a == pytest.approx(b, abs=1.01 / CYCLE)
+
+
+def standing(positions):
+    return positions - [0, 0, 1.5] * np.arange(len(positions))[:, None, None]
+
+
+def backward(positions):
+    return positions[::-1]
+
+
+def on_a_circle(positions):
+    """Bent onto a circle that is gone round in four cycles."""
+    radius = 4 * 90 / (2 * np.pi)
+    angle, out = positions[..., 2] / radius, positions[..., 0] + radius
+    return np.stack([out * np.cos(angle) - radius, positions[..., 1], out * np.sin(angle)], axis=-1)
+
+
+@pytest.mark.parametrize("change", [standing, backward, on_a_circle, lambda p: p[:20], lambda p: p[:1]])
+def test_what_is_no_walk_straight_ahead_has_no_cycle(holden31, stepper, change):
+    assert len(measure(holden31, change(stepper().positions(holden31)))) == 0
+
+
+def test_a_wide_curve_is_walked_as_well(holden31, stepper):
+    positions = stepper().positions(holden31, cycles=8)
+    radius = 90 * 360 / 15 / (2 * np.pi)  # 15 degrees a cycle
+    angle, out = positions[..., 2] / radius, positions[..., 0] + radius
+    curved = np.stack([out * np.cos(angle) - radius, positions[..., 1], out * np.sin(angle)], axis=-1)
+    assert len(measure(holden31, curved).right) >= 5
+
+
+def test_landings_need_a_real_step():
+    wave = 0.3 * np.cos(2 * np.pi * np.arange(300) / 60)
+    assert landings(wave, 60.0) == [60, 120, 180, 240]
+    small = wave + 0.02 * np.cos(2 * np.pi * np.arange(300) / 7)
+    assert len(landings(small, 60.0)) == len(landings(wave, 60.0))
+    assert landings(0.01 * wave, 60.0) == []
+
+
+def test_windows_hold_whole_cycles_and_walks_join(holden31, stepper):
+    walk = measure(holden31, stepper().positions(holden31))
+    part = walk.within(60, 185)
+    assert [cycle.start for cycle in part.right] == [60, 120]
+    assert [cycle.start for cycle in part.left] == [90]
+    assert len(joined([walk, part]).right) == len(walk.right) + 2

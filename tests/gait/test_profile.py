@@ -1,0 +1,135 @@
+"""A walk in numbers, and the same walk seen in a mirror."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import HobbleError
+from hobble.gait.cycles import Walk, measure
+from hobble.gait.effects import effects
+from hobble.gait.features import features
+from hobble.gait.graded import grade
+from hobble.gait.profile import NAMES, mirrored, profile
+from hobble.gait.recogniser import recognise, windows
+
+
+@pytest.fixture(scope="module")
+def uneven(holden31, swinger):
+    """A limp of the right leg, with every joint shaken a little, so that nothing is even by chance."""
+    made = swinger(
+        hip={"right": (-6.0, 11.0), "left": (5.0, 20.0)},
+        knee={"right": 14.0, "left": 40.0},
+        arm={"right": (1.0, 5.0), "left": (-4.0, 17.0)},
+        trunk_forward=(9.0, 3.0),
+        pelvis_left_up=-4.0,
+    )
+    positions = made.positions(holden31)
+    return positions + np.random.default_rng(1).normal(0, 0.3, positions.shape)
+
+
+@pytest.fixture(scope="module")
+def healthy(holden31, swinger):
+    even = {"left": (3.0, 20.0), "right": (3.0, 20.0)}
+    made = swinger(hip=even, knee={"left": 40.0, "right": 40.0}, arm=even, pelvis_left_up=0.0)
+    return profile(measure(holden31, made.positions(holden31)))
+
+
+def test_the_mirrored_clip_has_the_mirrored_profile(holden31, uneven, mirror):
+    own = profile(measure(holden31, uneven))
+    other = profile(measure(holden31, mirror(holden31, uneven)))
+    assert other == pytest.approx(mirrored(own), abs=1e-9)
+    assert other["range knee_flexion_L"] == pytest.approx(own["range knee_flexion_R"])
+    assert other["range knee_flexion_L"] < 0.6 * other["range knee_flexion_R"]
+    assert mirrored(mirrored(own)) == pytest.approx(own)
+
+
+def test_what_is_said_of_the_mirrored_clip_is_the_same_of_the_other_side(holden31, uneven, mirror, healthy):
+    own = profile(measure(holden31, uneven))
+    other = profile(measure(holden31, mirror(holden31, uneven)))
+    beside = mirrored(healthy)
+    assert effects(own, healthy, "right") == pytest.approx(effects(other, beside, "left"))
+    for judge in (recognise, grade):
+        one, two = judge(own, healthy), judge(other, beside)
+        assert (one.label, one.side, two.side) == (two.label, "right", "left")
+        assert two.probabilities == pytest.approx(one.probabilities, abs=1e-6)
+
+
+def test_a_walk_beside_itself_differs_in_nothing(holden31, uneven):
+    own = profile(measure(holden31, uneven))
+    assert set(features(own, own).values()) == {0.0}
+    assert recognise(own, own).label == "normal"
+    assert grade(own, own).label == "normal"
+    sizes = effects(own, own)
+    assert all(sizes[name] == 1.0 for name in ("speed", "step_hurt", "knee_hurt", "hip_sound", "arm_hurt"))
+    assert all(sizes[name] == 0.0 for name in ("stance", "lean", "lean_hurt", "pelvis_drop", "sway_forward"))
+
+
+def test_effects_are_those_that_were_made(holden31, swinger, healthy):
+    even = (3.0, 20.0)
+    made = swinger(
+        hip={"right": (3.0, 15.0), "left": even},
+        knee={"right": 10.0, "left": 40.0},
+        arm={"right": (3.0, 5.0), "left": even},
+        trunk_forward=(9.0, 2.0),
+        trunk_left=(0.0, 4.0),
+        pelvis_left_up=-2.0,
+    )
+    sizes = effects(profile(measure(holden31, made.positions(holden31))), healthy)
+    assert sizes["knee_hurt"] == pytest.approx(0.25)
+    assert sizes["knee_sound"] == pytest.approx(1.0)
+    assert sizes["hip_hurt"] == pytest.approx(0.75)
+    assert sizes["arm_hurt"] == pytest.approx(0.25)
+    assert sizes["arm_sound"] == pytest.approx(1.0)
+    assert sizes["lean_forward"] == pytest.approx(4.0)
+    assert sizes["lean_hurt"] == pytest.approx(3.0)  # from 3 degrees to the left to none: towards the right
+    assert sizes["lean"] == pytest.approx(5.0)
+    assert sizes["pelvis_drop"] == pytest.approx(2.0)
+
+
+def test_a_shorter_stance_and_step_are_the_hurt_legs(holden31, stepper):
+    even, limp = stepper(), stepper(stance_right=30, stance_left=42, ahead_right=10)
+    walk, healthy = (profile(measure(holden31, made.positions(holden31))) for made in (limp, even))
+    right, left = effects(walk, healthy, "right"), effects(walk, healthy, "left")
+    assert right["stance"] == pytest.approx(12 / 60)
+    assert left["stance"] == pytest.approx(-12 / 60)
+    # The right ankle lands 10 instead of 25 cm ahead of the hips; the left one is 20 cm behind them then.
+    assert right["step_hurt"] == pytest.approx(30 / 45)
+    assert left["step_sound"] == right["step_hurt"]
+
+
+def test_no_cycle_is_refused():
+    with pytest.raises(HobbleError, match="no whole cycle"):
+        profile(Walk(60.0, (), ()))
+
+
+def test_names_are_unique():
+    assert len(set(NAMES)) == len(NAMES) == 52
+
+
+def test_features_are_those_that_their_names_say(holden31, stepper):
+    even, limp = stepper(), stepper(stance_right=30, stance_left=42, ahead_right=10)
+    told = features(*(profile(measure(holden31, made.positions(holden31))) for made in (limp, even)))
+    assert told["stance L - R"] == pytest.approx(12 / 60)
+    assert told["step R - L"] == pytest.approx(-30 / 81)  # 30 and 60 cm, where both were 45
+    assert told["left landing"] == pytest.approx(0)
+    assert told["step width"] == pytest.approx(0)
+    healthy = profile(measure(holden31, even.positions(holden31)))
+    walk = healthy | {"range knee_flexion_R": 0.4 * healthy["range knee_flexion_R"]}
+    walk["range arm_forward_L"] = 100.0  # of nothing: five times, the most that is said
+    told = features(walk, healthy)
+    assert told["range knee_flexion R - L"] == pytest.approx(-0.6)
+    assert told["range arm_forward R - L"] == pytest.approx(-np.log(5))
+
+
+def test_windows_begin_every_second_and_hold_three_cycles(holden31, stepper):
+    """Right cycles begin at frames 60, 120, .. 240, left ones at 30, 90, .. 270; each has 60 frames."""
+    positions = stepper().positions(holden31)
+    walk = measure(holden31, positions)
+    found = windows(walk, len(positions), seconds=2.5)
+    assert [start for start, _ in found] == [0, 60, 120, 180]
+    right, left = ([[c.start for c in getattr(part, s)] for _, part in found] for s in ("right", "left"))
+    assert right == [[60], [60, 120], [120, 180], [180, 240]]
+    assert left == [[30, 90], [90, 150], [150, 210], [210, 270]]
+    short = windows(walk, len(positions), seconds=2.0)
+    assert short[0][0] == 60  # the first two seconds hold one cycle of each leg

@@ -1,0 +1,93 @@
+"""Healthy clips, made and captured, with their labels."""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core.clip import Clip
+from hobble.core.skeleton import Skeleton
+from hobble.labels.label import label_clip
+from hobble.labels.model import Labels
+from hobble.labels.options import Labels as LabelOptions
+from hobble.motion.make import make_clip
+from hobble.motion.options import Motion
+from hobble.synthetic.clip import walk
+from hobble.synthetic.recipes import Segment
+
+# The tests of this folder measure walks alike; as a module of its own, since tests are no package.
+SPEC = importlib.util.spec_from_file_location("hurt_gait", Path(__file__).with_name("gait.py"))
+assert SPEC is not None
+assert SPEC.loader is not None
+sys.modules["hurt_gait"] = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(sys.modules["hurt_gait"])
+
+Healthy = tuple[Clip, Labels, bool]  # the bool: on flat ground
+SEGMENTS = {
+    "straight": ([Segment("walk", 130, seconds=20)], "flat"),
+    "turning": ([Segment("walk", 120, 60, 4), Segment("walk", 110, -90, 4)], "flat"),
+    "jog": ([Segment("jog", 280, seconds=8)], "flat"),
+    "starting": ([Segment("stand", seconds=2), Segment("walk", 120, seconds=5)], "flat"),
+    "uneven": ([Segment("walk", 105, 20, 8)], "uneven"),
+}
+CAPTURED = {
+    "07_01": ("walk", "flat"),
+    "105_29": ("walk", "flat"),
+    "09_01": ("jog", "flat"),
+    "03_01": ("walk", "rocky"),
+}
+
+
+def labelled(clip: Clip, gait: str, flat: bool) -> Healthy:
+    options = LabelOptions().model_dump(mode="json")
+    report = {"source_frames": len(clip), "source_fps": clip.fps}
+    labels, _ = label_clip(clip, [], report, gait, "flat" if flat else "rocky", options)
+    return clip, labels, flat
+
+
+@pytest.fixture(scope="session")
+def made(holden31: Skeleton) -> Callable[[str], Healthy]:
+    @functools.cache
+    def make(name: str) -> Healthy:
+        segments, ground = SEGMENTS[name]
+        frames = round(60 * sum(s.seconds for s in segments))
+        result = walk(name, holden31, segments, frames, None, ground, 60, 1)
+        return labelled(result.clip, "jog" if name == "jog" else "walk", ground == "flat")
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def captured(shared: Path, root: Path) -> Callable[[str], Healthy]:
+    skeletons = root / "config/skeletons"
+
+    @functools.cache
+    def make(name: str) -> Healthy:
+        gait, ground = CAPTURED[name]
+        options = {**Motion().model_dump(mode="json"), "ground": ground}
+        file = shared / "mocap/cmu" / f"{name}.bvh"
+        clip, _ = make_clip(
+            file, skeletons / "holden31.yaml", skeletons, clip=name, skeleton_name="holden31", options=options
+        )
+        return labelled(clip, gait, ground == "flat")
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def hurting(holden31: Skeleton) -> Callable[..., np.ndarray]:
+    """`hurting(frames, {link: severity})`: severities (frames, 30)."""
+
+    def severities(frames: int, links: dict[str, float]) -> np.ndarray:
+        out = np.zeros((frames, len(holden31.links)))
+        for link, severity in links.items():
+            out[:, holden31.link_names.index(link)] = severity
+        return out
+
+    return severities

@@ -1,0 +1,130 @@
+"""A hurt clip is the same body with its feet on the ground; nothing hurt is nothing changed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hurt_gait import SIDES, fastest, knee, measures, slide, toe_heights
+
+from hobble.core import quat
+from hobble.core.errors import HobbleError
+from hobble.core.skeleton import other_side
+from hobble.hurt.clip import hurt_clip
+from hobble.labels.label import mirror_labels
+from hobble.labels.model import LabelReport
+from hobble.motion.mirror import mirror_clip
+
+MADE = ("straight", "turning", "jog", "starting", "uneven")
+CAPTURED = ("07_01", "105_29", "09_01", "03_01")
+HURT = (
+    {"RightUpLeg-RightLeg": 10.0},
+    {"LeftLeg-LeftFoot": 10.0},
+    {"RightFoot-RightToeBase": 10.0},
+    {"LHipJoint-LeftUpLeg": 10.0, "LowerBack-Spine": 7.0},
+    {"RightForeArm-RightHand": 10.0, "Neck-Neck1": 5.0},
+)
+
+
+def test_severity_zero_is_the_clip_bit_for_bit(made, hurting) -> None:
+    clip, labels, flat = made("turning")
+    same = hurt_clip(clip, labels, hurting(len(clip), {}), flat=flat)
+    assert same.clip.rotations.tobytes() == clip.rotations.tobytes()
+    assert same.clip.root.tobytes() == clip.root.tobytes()
+    assert same.labels is labels
+    assert not same.severity.any()
+
+
+def test_what_comes_before_an_injury_stays_as_it_was(made, hurting) -> None:
+    clip, labels, flat = made("straight")
+    severity = hurting(len(clip), {"RightUpLeg-RightLeg": 10.0})
+    severity[:600] = 0.0
+    hurt = hurt_clip(clip, labels, severity, flat=flat)
+    np.testing.assert_allclose(hurt.clip.positions[:480], clip.positions[:480], atol=0.02)
+    assert np.abs(hurt.clip.positions[600:900] - clip.positions[600:900]).max() > 20
+
+
+@pytest.mark.parametrize("links", HURT, ids=lambda links: next(iter(links)))
+@pytest.mark.parametrize("name", MADE)
+def test_made_clips_stay_on_the_ground_and_whole(made, hurting, name, links) -> None:
+    _keeps_to_the_ground(made(name), hurting, links)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("links", HURT, ids=lambda links: next(iter(links)))
+@pytest.mark.parametrize("name", CAPTURED)
+def test_captured_clips_stay_on_the_ground_and_whole(captured, hurting, name, links) -> None:
+    _keeps_to_the_ground(captured(name), hurting, links)
+
+
+def _keeps_to_the_ground(healthy, hurting, links) -> None:
+    clip, labels, flat = healthy
+    hurt = hurt_clip(clip, labels, hurting(len(clip), links), flat=flat)
+    assert np.isfinite(hurt.clip.rotations).all()
+    assert np.isfinite(hurt.clip.root).all()
+    # A stance that is a tenth shorter takes the same slide in less time; and a walker without any slide gets
+    # next to none: .3 mm a frame is a fifth of what counts as contact.
+    assert slide(hurt.clip, hurt.labels) <= max(1.1 * slide(clip, labels), 0.03)
+    assert fastest(hurt.clip) <= 1.5 * fastest(clip)
+    for side in SIDES:
+        assert knee(hurt.clip, side).min() > min(-1.0, knee(clip, side).min() - 1.0)
+    if flat:
+        before, after = toe_heights(clip, labels), toe_heights(hurt.clip, hurt.labels)
+        if len(before) and len(after):
+            assert after.min() > before.min() - 1.0
+            assert np.percentile(after, 99) < np.percentile(before, 99) + 1.0
+            assert abs(np.median(after) - np.median(before)) < 0.5
+    lengths = np.linalg.norm(
+        hurt.clip.positions[:, 1:] - hurt.clip.positions[:, list(clip.skeleton.parents[1:])], axis=2
+    )
+    assert np.ptp(lengths, axis=0).max() < 1e-6
+
+
+@pytest.mark.parametrize("links", HURT, ids=lambda links: next(iter(links)))
+def test_hurting_the_mirrored_clip_on_the_other_side_is_the_mirror_of_the_hurt_clip(
+    made, hurting, links
+) -> None:
+    clip, labels, _ = made("turning")
+    across = {"-".join(other_side(joint) for joint in link.split("-")): s for link, s in links.items()}
+    report = LabelReport("turning", "automatic", "automatic", "right", "extend", 0)
+    image = mirror_clip(clip, "image")
+    image_labels, _ = mirror_labels(labels, report, image)
+    one = mirror_clip(hurt_clip(clip, labels, hurting(len(clip), links)).clip, "image")
+    two = hurt_clip(image, image_labels, hurting(len(clip), across)).clip
+    assert len(one) == len(two)
+    # A half cycle is no whole number of frames, so that the phase of the mirrored labels is a frame's share
+    # off.
+    np.testing.assert_allclose(two.root, one.root, atol=0.05)
+    assert np.degrees(quat.angle(one.rotations, two.rotations)).max() < 0.5
+
+
+def test_labels_are_the_source_s_at_the_new_times(made, hurting) -> None:
+    clip, labels, flat = made("straight")
+    hurt = hurt_clip(clip, labels, hurting(len(clip), {"RightUpLeg-RightLeg": 10.0}), flat=flat)
+    assert len(hurt.labels) == len(hurt.clip) == len(hurt.severity) == len(hurt.when)
+    assert np.isfinite(hurt.labels.footsteps[:, 0]).sum() == np.isfinite(labels.footsteps[:, 0]).sum()
+    assert hurt.labels.gait[:, 1].mean() > 0.99  # a limping walk stays a walk
+    assert np.all(np.diff(hurt.when) > 0)
+    assert len(hurt.labels.cycles) >= len(labels.cycles) - 1
+    moved = np.abs(hurt.clip.positions[hurt.labels.footsteps[2:-2, 0].astype(int)])
+    assert np.isfinite(moved).all()
+
+
+def test_two_injuries_are_at_least_as_slow_as_the_worse(made, hurting) -> None:
+    clip, labels, flat = made("straight")
+
+    def length(links: dict[str, float]) -> float:
+        hurt = hurt_clip(clip, labels, hurting(len(clip), links), flat=flat)
+        return measures(hurt.clip, hurt.labels)["speed"]
+
+    thigh, foot, back = ("RightUpLeg-RightLeg", 7.0), ("LeftFoot-LeftToeBase", 10.0), ("LowerBack-Spine", 5.0)
+    for one, two in ((thigh, foot), (thigh, back), (foot, back)):
+        assert length(dict([one, two])) <= 1.01 * min(length(dict([one])), length(dict([two])))
+
+
+@pytest.mark.parametrize("bad", [-1.0, 10.5, np.nan])
+def test_severities_out_of_range_are_refused(made, hurting, bad) -> None:
+    clip, labels, _ = made("turning")
+    with pytest.raises(HobbleError, match=r"turning: a severity is not in 0\.\.10"):
+        hurt_clip(clip, labels, hurting(len(clip), {"RightUpLeg-RightLeg": bad}))
+    with pytest.raises(HobbleError, match="turning: severities"):
+        hurt_clip(clip, labels, np.zeros((3, 30)))

@@ -1,0 +1,94 @@
+"""What hurts when: every link in a clip that is trained on, always the same, within the options."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+import yaml
+
+from hobble.core.errors import HobbleError
+from hobble.hurt.options import Hurt
+from hobble.hurt.parts import part_of_link
+from hobble.hurt.schedule import severities
+
+
+def of_the_walker(root):
+    """Name -> frames of the clips of config/datasets/synthetic.yaml."""
+    data = yaml.safe_load((root / "config/datasets/synthetic.yaml").read_text())
+    total = sum(entry.get("share", 1) for entry in data["clips"].values())
+    frames = data["synthetic"]["frames"]
+    return data, {name: round(frames * e.get("share", 1) / total) for name, e in data["clips"].items()}
+
+
+def seconds_hurt(skeleton, data, frames):
+    """(30,) seconds for which each link hurts in the training clips."""
+    options = Hurt.model_validate(data["hurt"])
+    out = np.zeros(len(skeleton.links))
+    for turn, (name, count) in enumerate(frames.items()):
+        if name not in data["held_out"]:
+            out += (severities(skeleton, count, 60.0, options, f"{name}_hurt1", turn) > 0).sum(axis=0) / 60
+    return out
+
+
+def test_the_walker_s_clips_hurt_all_thirty_links(root, holden31) -> None:
+    seconds = seconds_hurt(holden31, *of_the_walker(root))
+    assert seconds.min() > 2
+    legs = [
+        i for i, link in enumerate(holden31.links) if part_of_link(holden31, link).name in ("thigh", "shank")
+    ]
+    assert seconds[legs].min() > 8
+
+
+@pytest.mark.shared
+def test_captured_clips_hurt_all_thirty_links(root, shared, holden31) -> None:
+    data = yaml.safe_load((root / "config/datasets/cmu.yaml").read_text())
+    with open(shared / "mocap/clips.csv") as file:
+        known = {row["file"]: int(row["frames"]) // 2 for row in csv.DictReader(file)}
+    frames = {clip: known[f"cmu/{clip}.bvh"] for clip, e in data["clips"].items() if "channels" not in e}
+    assert seconds_hurt(holden31, data, frames).min() > 2
+
+
+def test_a_clip_s_severities_are_its_own_and_always_the_same(holden31) -> None:
+    options = Hurt()
+    one = severities(holden31, 900, 60.0, options, "a_hurt1", 3)
+    assert one.tobytes() == severities(holden31, 900, 60.0, options, "a_hurt1", 3).tobytes()
+    assert not np.array_equal(one, severities(holden31, 900, 60.0, options, "a_hurt1", 4))
+    assert set(np.unique(one)) <= {0.0, *options.severities}
+    assert (one > 0).any(axis=1).all()
+    assert (one > 0).sum(axis=1).max() <= options.at_once
+
+
+def test_only_the_links_asked_for_are_hurt(holden31) -> None:
+    links = ("LeftUpLeg-LeftLeg", "Neck-Neck1")
+    out = severities(holden31, 6000, 60.0, Hurt(links=links, severities=(4.0,), at_once=1), "a", 0)
+    hurt = {holden31.link_names[i] for i in np.flatnonzero(out.any(axis=0))}
+    assert hurt == set(links)
+    assert set(np.unique(out)) == {0.0, 4.0}
+    with pytest.raises(HobbleError, match="holden31 has no link LeftKnee-LeftShin"):
+        severities(holden31, 600, 60.0, Hurt(links=("LeftKnee-LeftShin",)), "a", 0)
+
+
+def test_every_link_belongs_to_a_part_and_its_mirror_image_to_the_same(holden31) -> None:
+    for link, other in zip(holden31.links, holden31.mirror_links, strict=True):
+        one, two = part_of_link(holden31, link), part_of_link(holden31, holden31.links[other])
+        assert one.name == two.name
+        assert (one.side is None) == (two.side is None)
+        assert one.side is None or one.side != two.side
+    parts = [part_of_link(holden31, link).name for link in holden31.links]
+    assert sorted(set(parts)) == sorted(
+        [
+            "pelvis",
+            "hip",
+            "thigh",
+            "shank",
+            "foot",
+            "back",
+            "neck",
+            "shoulder",
+            "upper arm",
+            "forearm",
+            "hand",
+        ]
+    )

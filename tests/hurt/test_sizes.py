@@ -1,0 +1,74 @@
+"""Each injury is as large as people's, at every severity, on both sides, on made and on captured clips."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hurt_gait import effects, measures
+
+from hobble.core.skeleton import other_side
+from hobble.hurt.clip import hurt_clip
+
+LEG = {
+    "hip": "RHipJoint-RightUpLeg",
+    "thigh": "RightUpLeg-RightLeg",
+    "shank": "RightLeg-RightFoot",
+    "foot": "RightFoot-RightToeBase",
+}
+ARM = {"upper arm": "RightArm-RightForeArm", "forearm": "RightForeArm-RightHand"}
+
+
+def seen(source, hurting, link, severity):
+    clip, labels, flat = source
+    healthy = measures(clip, labels)
+    hurt = hurt_clip(clip, labels, hurting(len(clip), {link: severity}), flat=flat)
+    return effects(healthy, hurt, "left" if "Left" in link or link.startswith("LHip") else "right")
+
+
+def meets_the_goals(part: str, size: dict[str, float]) -> None:
+    if part in LEG:
+        assert 0.55 <= size["speed"] <= 0.75, size
+    if part in ("thigh", "shank", "foot"):
+        assert size["stance"] >= 0.10, size
+        assert size["step"] <= 0.60, size
+    if part in ("thigh", "shank"):
+        assert size["knee"] <= 0.60, size
+    if part in ("hip", "thigh", "back"):
+        assert size["lean"] >= 3.5, size
+    if part in ARM:
+        assert size["arm"] <= 0.35, size
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize("part", [*LEG, *ARM, "back"])
+def test_a_made_walk_at_ten(made, hurting, part, side) -> None:
+    link = {**LEG, **ARM, "back": "LowerBack-Spine"}[part]
+    link = "-".join(other_side(joint) for joint in link.split("-")) if side == "left" else link
+    meets_the_goals(part, seen(made("straight"), hurting, link, 10.0))
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("part", [*LEG, *ARM, "back"])
+def test_a_captured_walk_at_ten(captured, hurting, part) -> None:
+    meets_the_goals(
+        part, seen(captured("105_29"), hurting, {**LEG, **ARM, "back": "LowerBack-Spine"}[part], 10.0)
+    )
+
+
+@pytest.mark.parametrize("part", ["thigh", "shank", "foot"])
+def test_at_five_between_one_and_two_thirds_and_at_three_a_quarter_or_more(made, hurting, part) -> None:
+    sizes = {s: seen(made("straight"), hurting, LEG[part], float(s)) for s in (3, 5, 7, 10)}
+    for name, none in (("speed", 1.0), ("stance", 0.0), ("step", 1.0)):
+        change = {s: sizes[s][name] - none for s in sizes}
+        assert 1 / 3 <= change[5] / change[10] <= 2 / 3, (name, change)
+        assert 0.22 <= change[3] / change[10] <= 0.5, (name, change)
+        assert np.all(np.diff(np.abs(list(change.values()))) > 0)
+
+
+def test_links_of_one_leg_can_be_told_apart(made, hurting) -> None:
+    thigh, shank, foot, hip = (
+        seen(made("straight"), hurting, LEG[p], 10.0) for p in ("thigh", "shank", "foot", "hip")
+    )
+    assert foot["knee"] > max(thigh["knee"], shank["knee"]) + 0.05
+    assert hip["stance"] < foot["stance"] - 0.05
+    assert thigh["lean"] > shank["lean"] > foot["lean"]

@@ -1,0 +1,84 @@
+"""What every measurement has to say of itself, and how the options of all become one section."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+
+import pytest
+
+from hobble.core.section import Positive, Section
+from hobble.evaluation.options import together
+from hobble.measures.joints import Joints
+from hobble.measures.measure import INPUTS, Measure
+from hobble.measures.registry import MEASURES, measure, modules, of_channels
+
+NAMES = [one.name for one in MEASURES]
+# Part -> its functions and what they are given.
+FUNCTIONS = {
+    "run": {"run": 2},
+    "page": {"section": 2, "figures": 2, "hints": 2},
+    "comparison": {"compared": 2, "tables": 1},
+    "comparison_page": {"section": 1, "columns": 1},
+}
+
+
+class Laps(Section):
+    laps: Positive = 2
+
+
+class Rounds(Section):
+    laps: Positive = 3
+
+
+class Far(Joints):
+    far: Positive = 4
+
+
+@pytest.mark.parametrize("one", MEASURES, ids=NAMES)
+def test_asks_for_what_there_is_and_has_the_parts_that_are_called(one: Measure) -> None:
+    assert one.has("run")
+    earlier = NAMES[: NAMES.index(one.name)]
+    assert set(one.inputs) <= {*INPUTS, *earlier}
+    assert measure(one.name) is one
+    for part, functions in FUNCTIONS.items():
+        module = one.part(part)
+        present = {name for name in functions if hasattr(module, name)}
+        assert present or module is None, f"{part} has none of {', '.join(functions)}"
+        for name in present:
+            assert len(inspect.signature(getattr(module, name)).parameters) == functions[name], (part, name)
+
+
+def test_channels_bring_their_own() -> None:
+    brought = [one.name for one in MEASURES if one.package.startswith("hobble.channels.")]
+    assert brought == ["injury", "recognition"] == [one.name for one in of_channels()]
+
+
+def test_names_are_unique() -> None:
+    assert len(set(NAMES)) == len(NAMES)
+    assert not set(NAMES) & set(INPUTS)
+    assert len(modules("run")) == len(NAMES)
+
+
+def test_the_list_and_the_options_are_read_without_what_measures() -> None:
+    """They are read before anything is planned, and again in every job of a cluster."""
+    code = "import sys, hobble.measures.registry, hobble.config.sections; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = done.stdout.split()
+    assert [name for name in loaded if name in ("numpy", "numba", "torch") or name.endswith(".run")] == []
+
+
+def test_options_of_all_are_one_section() -> None:
+    both = together([Joints, Section, Far, Laps, Joints])
+    assert both().model_dump() == {"joints": "all", "far": 4, "laps": 2}
+    assert list(both.model_fields) == ["joints", "far", "laps"]
+    with pytest.raises(ValueError, match="greater than 0"):
+        both(laps=0)
+    with pytest.raises(ValueError, match="Extra inputs"):
+        both(lap=1)
+
+
+def test_a_key_that_two_measurements_define_is_refused() -> None:
+    with pytest.raises(TypeError, match="laps is a key of"):
+        together([Laps, Rounds])

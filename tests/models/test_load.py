@@ -1,0 +1,320 @@
+"""A network's file may come from anywhere: sound, or refused by one message that names it."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zipfile
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.models.load import load_network
+from hobble.models.pfnn.release import PHASES
+from hobble.report.playable import playable
+from hobble.rows.layout import CONTACTS, GAITS, RowLayout
+from hobble.runtime import ProceduralAnimation
+from hobble.runtime.options import Runtime
+
+Content = dict[str, Any]
+Change = Callable[[Content], None]
+
+
+def content(skeleton: Skeleton, links: int = 30) -> Content:
+    """The arrays and the meta (still a mapping) of a sound file."""
+    layout = RowLayout(len(skeleton.joints), channels=(("injury", links),) if links else ())
+    rng = np.random.default_rng(1)
+    sizes = (layout.x_size, 6, 5, layout.y_size)
+    arrays: Content = {}
+    for i, (a, b) in enumerate(pairwise(sizes)):
+        arrays[f"W{i}"] = rng.normal(0, a**-0.5, (4, b, a)).astype(np.float32)
+        arrays[f"b{i}"] = rng.normal(0, 0.1, (4, b)).astype(np.float32)
+    for name, size in (("X", layout.x_size), ("Y", layout.y_size)):
+        arrays[f"{name}mean"] = rng.normal(0, 10, size).astype(np.float32)
+        arrays[f"{name}std"] = rng.uniform(1, 5, size).astype(np.float32)
+    arrays["meta"] = {
+        "kind": "pfnn",
+        "layout": {"joints": layout.joints, "window": layout.window, "step": layout.step, "links": links},
+        "skeleton": skeleton.to_dict(),
+        "gaits": list(GAITS),
+        "contacts": list(CONTACTS),
+        "links": list(skeleton.link_names[:links]),
+        "terrain_side": 25.0,
+    }
+    return arrays
+
+
+def meta(**changes: Any) -> Change:
+    return lambda c: c["meta"].update(changes)
+
+
+def layout(**changes: Any) -> Change:
+    return lambda c: c["meta"]["layout"].update(changes)
+
+
+def skeleton(**changes: Any) -> Change:
+    return lambda c: c["meta"]["skeleton"].update(changes)
+
+
+def joint(name: str, **changes: Any) -> Change:
+    return lambda c: c["meta"]["skeleton"]["joints"][name].update(changes)
+
+
+def put(name: str, at: Any, value: float) -> Change:
+    return lambda c: c[name].__setitem__(at, value)
+
+
+def array(**changes: Any) -> Change:
+    return lambda c: c.update(changes)
+
+
+def text(value: Any) -> Change:
+    return lambda c: c.update(meta=np.array(value))
+
+
+def no(name: str) -> Change:
+    return lambda c: c.pop(name)
+
+
+def cut(name: str, axis: int) -> Change:
+    return lambda c: c.update({name: np.delete(c[name], 0, axis)})
+
+
+def no_role(name: str) -> Change:
+    return lambda c: c["meta"]["skeleton"]["roles"].pop(name)
+
+
+def scaled(name: str, factor: float) -> Change:
+    return lambda c: c.update({name: c[name] * np.float32(factor)})
+
+
+def each(*names: str, factor: float) -> Change:
+    return lambda c: c.update({name: c[name] * np.float32(factor) for name in names})
+
+
+MALFORMED: dict[str, tuple[Change, str]] = {
+    "meta is no JSON": (text("{"), "not valid JSON"),
+    "meta is a list": (text("[1]"), "not keys and values"),
+    "meta is a number": (text(7), "not a text"),
+    "meta is many texts": (text(["{}", "{}"]), "not a text"),
+    "meta nests without end": (text("[" * 100_000), "not valid JSON"),
+    "meta holds a number of 9,000 digits": (text(f'{{"a": {"9" * 9000}}}'), "not valid JSON"),
+    "another kind": (meta(kind="diffusion"), "is a network of kind"),
+    "a kind that is a path": (meta(kind="../../evil"), "is a network of kind"),
+    "a kind that is a list": (meta(kind=["pfnn"]), "is a network of kind"),
+    "no W1": (no("W1"), "no W2|no W1"),
+    "no b2": (no("b2"), "no b2"),
+    "no Ystd": (no("Ystd"), "no Ystd"),
+    "scalar W0": (array(W0=np.float32(3)), "W0 has shape"),
+    "W0 of text": (array(W0=np.array([[["a"]]])), "W0 has shape"),
+    "W0 of complex numbers": (array(W0=np.ones((4, 6, 372), complex)), "W0 has shape"),
+    "an empty W1": (array(W1=np.zeros((4, 0, 6), np.float32)), "W1 has shape"),
+    "W1 of too few inputs": (cut("W1", 2), "W1 .* do not follow"),
+    "b1 of too few units": (cut("b1", 1), "do not follow"),
+    "other control points in one layer": (cut("W2", 0), "do not follow"),
+    "one control point": (
+        lambda c: c.update({k: v[:1] for k, v in c.items() if k[0] in "Wb"}),
+        "control points",
+    ),
+    "a hundred control points": (
+        lambda c: c.update({k: np.repeat(v, 25, axis=0) for k, v in c.items() if k[0] in "Wb"}),
+        "control points",
+    ),
+    "a last layer of too few outputs": (lambda c: [cut("W2", 1)(c), cut("b2", 1)(c)], "outputs"),
+    "seventeen layers": (
+        lambda c: c.update({f"W{i}": c["W1"] for i in range(3, 17)}),
+        "17 layers",
+    ),
+    "NaN in W0": (put("W0", (0, 0, 0), np.nan), "not finite"),
+    "infinity in b2": (put("b2", (1, 3), np.inf), "not finite"),
+    "1e30 in W1": (put("W1", (2, 1, 1), 1e30), "beyond"),
+    "layers that overflow together": (each("W0", "W1", "W2", "b0", factor=3e5), "no finite pose"),
+    "NaN in Xmean": (put("Xmean", 5, np.nan), "not finite"),
+    "infinity in Ystd": (put("Ystd", 0, np.inf), "not finite"),
+    "Xstd below 0": (put("Xstd", 9, -1.0), "below 0"),
+    "1e30 in Ymean": (put("Ymean", 4, 1e30), "beyond"),
+    "Xmean longer than Xstd": (cut("Xstd", 0), "Xstd 371"),
+    "a window of 6e8 frames": (layout(window=600_000_000), "layout.window"),
+    "a window of half a frame": (layout(window=0.5), "layout.window"),
+    "step 0": (layout(step=0), "layout.step"),
+    "step -10": (layout(step=-10), "layout.step"),
+    "a window that is no multiple of the step": (layout(window=65), "no multiple"),
+    "joints that are true": (layout(joints=True), "layout.joints"),
+    "links below 0": (layout(links=-1), "layout.channels.injury"),
+    "more links than columns": (layout(links=31), "do not fit"),
+    "a layout without joints": (lambda c: c["meta"]["layout"].pop("joints"), "layout has the keys"),
+    "a layout of another program": (
+        layout(phase=1),
+        "layout cannot be understood: there is no such key: phase",
+    ),
+    "a layout that is a list": (meta(layout=[31, 60, 10, 30]), "layout is"),
+    "3,000 gaits": (meta(gaits=[f"gait {i}" for i in range(3000)]), "gaits"),
+    "seven gaits": (meta(gaits=[*GAITS, "fly"]), "gaits"),
+    "one gait six times": (meta(gaits=["walk"] * 6), "gaits"),
+    "gaits that are a text": (meta(gaits="walk"), "gaits"),
+    "gaits that are numbers": (meta(gaits=[1, 2, 3, 4, 5, 6]), "gaits"),
+    "5 links for 30 columns": (meta(links=["a", "b", "c", "d", "e"]), "are named"),
+    "a link with a control character": (
+        meta(links=["a\x1b[31m", *"bcdefghijklmnopqrstuvwxyzABCD"]),
+        "channel injury",
+    ),
+    "links that are a number": (meta(links=30), "channel injury"),
+    "a side that is text": (meta(terrain_side="wide"), "terrain_side"),
+    "a side that is NaN": (meta(terrain_side=float("nan")), "terrain_side"),
+    "a side of 1e30": (meta(terrain_side=1e30), "terrain_side"),
+    "a skeleton that is a list": (meta(skeleton=[1]), "skeleton"),
+    "no joints": (skeleton(joints={}), "joints"),
+    "joints that are a list": (skeleton(joints=["Hips"]), "joints"),
+    "no role for a heel": (no_role("left_heel"), "left_heel"),
+    "no roles at all": (skeleton(roles={}), "hips"),
+    "a role for a joint that is not there": (
+        lambda c: c["meta"]["skeleton"]["roles"].update(hips="Tail"),
+        "Tail",
+    ),
+    "a parent that comes later": (joint("LHipJoint", parent="LeftLeg"), "does not stand above"),
+    "a joint that is its own parent": (joint("LHipJoint", parent="LHipJoint"), "does not stand above"),
+    "two roots": (joint("LHipJoint", parent=None), "does not stand above"),
+    "an offset of two numbers": (joint("LHipJoint", offset=[1, 2]), "offset"),
+    "an offset that is NaN": (joint("LHipJoint", offset=[0, float("nan"), 0]), "offset"),
+    "an offset of 1e300": (joint("LHipJoint", offset=[0, 1e300, 0]), "offset"),
+    "links of three joints": (skeleton(links=[["Hips", "LHipJoint", "LeftLeg"]]), "links"),
+    "an end without place": (skeleton(end_sites={"Head": None}), "end site"),
+    "one joint fewer": (
+        lambda c: [
+            c["meta"]["skeleton"]["joints"].pop("RThumb"),
+            c["meta"]["skeleton"].update(links=[], end_sites={}, unseen=[]),
+        ],
+        "31 joints, but skeleton",
+    ),
+}
+
+
+def save(path: Path, made: Content) -> None:
+    told = made["meta"]
+    np.savez(path, **{**made, "meta": told if isinstance(told, np.ndarray) else np.array(json.dumps(told))})
+
+
+def test_a_sound_file_is_read(tmp_path: Path, holden31: Skeleton) -> None:
+    save(tmp_path / "weights.npz", content(holden31))
+    network = load_network(tmp_path)
+    assert (network.sizes, network.gaits, network.terrain_side) == ((372, 6, 5, 311), GAITS, 25.0)
+
+
+@pytest.mark.parametrize("name", MALFORMED)
+def test_a_malformed_network_is_refused(name: str, tmp_path: Path, holden31: Skeleton) -> None:
+    change, message = MALFORMED[name]
+    made = content(holden31)
+    change(made)
+    save(tmp_path / "weights.npz", made)
+    with pytest.raises(InputError, match=message) as error:
+        load_network(tmp_path)
+    assert str(error.value).startswith(str(tmp_path / "weights.npz"))
+    assert len(str(error.value)) < 600
+    assert "\x1b" not in str(error.value)
+
+
+def released(folder: Path, made: Content) -> None:
+    """The same network as a folder of .bin files: every phase has the first control point's weights."""
+    for name, values in made.items():
+        if name[0] in "Wb":
+            for k in range(PHASES):
+                (folder / f"{name}_{k:03d}.bin").write_bytes(values[0].astype("<f4").tobytes())
+        elif name != "meta":
+            (folder / f"{name}.bin").write_bytes(values.astype("<f4").tobytes())
+
+
+def numbers(*values: float) -> bytes:
+    return np.array(values, "<f4").tobytes()
+
+
+BROKEN_BINS = {
+    "no statistics": ("Xmean.bin", None),
+    "no phase": ("W1_017.bin", None),
+    "no first layer": ("b0_000.bin", None),
+    "half a number": ("Ystd.bin", b"\0\0\0"),
+    "nothing": ("Xstd.bin", b""),
+    "a row too few": ("W0_003.bin", numbers(1.0)),
+    "another size of one phase": ("b1_004.bin", numbers(1, 2)),
+    "fewer units in every phase": ("b1_000.bin", numbers(1, 2)),
+    "NaN": ("b0_007.bin", numbers(*[np.nan] * 6)),
+    "1e30": ("b0_007.bin", numbers(*[1e30] * 6)),
+    "no spline": ("b0_007.bin", numbers(1, 2, 3, 4, 5, 6)),
+    "NaN in the statistics": ("Ymean.bin", numbers(*[np.nan] * 311)),
+    "a longer row": ("Xmean.bin", numbers(*[1.0] * 400)),
+    "a larger file than any": ("Xmean.bin", b"\0" * (1 << 19)),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN_BINS)
+def test_a_malformed_folder_of_bins_is_refused(name: str, tmp_path: Path, holden31: Skeleton) -> None:
+    released(tmp_path, content(holden31, links=0))
+    assert load_network(tmp_path, holden31).sizes == (342, 6, 5, 311)
+    file, written = BROKEN_BINS[name]
+    if written is None:
+        (tmp_path / file).unlink()
+    else:
+        (tmp_path / file).write_bytes(written)
+    with pytest.raises(InputError) as error:
+        load_network(tmp_path, holden31)
+    assert str(tmp_path) in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["weights.npz", "Xmean.bin"])
+def test_what_is_no_file_is_refused_and_not_waited_for(name: str, tmp_path: Path, holden31: Skeleton) -> None:
+    released(tmp_path, content(holden31, links=0))
+    (tmp_path / name).unlink(missing_ok=True)
+    os.mkfifo(tmp_path / name)
+    with pytest.raises(InputError, match=f"{name}: a device or a pipe"):
+        load_network(tmp_path, holden31)
+    (tmp_path / name).unlink()
+    (tmp_path / name).symlink_to("/dev/zero")
+    with pytest.raises(InputError, match=f"{name}: a device or a pipe"):
+        load_network(tmp_path, holden31)
+
+
+def test_entries_that_overlap_take_no_memory(tmp_path: Path, holden31: Skeleton) -> None:
+    """Many names for the same bytes: a small file that would fill the memory."""
+    path, one = tmp_path / "weights.npz", io.BytesIO()
+    np.save(one, np.zeros(1 << 18, np.float32))
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("W0.npy", one.getvalue())
+        first = archive.infolist()[0]
+        for i in range(1, 40):
+            again = zipfile.ZipInfo(f"W{i}.npy")
+            for key in ("header_offset", "CRC", "compress_size", "file_size"):
+                setattr(again, key, getattr(first, key))
+            archive.filelist.append(again)
+            archive.NameToInfo[again.filename] = again
+    with pytest.raises(InputError, match=r"over each other|overlap"):
+        load_network(path)
+
+
+def test_the_ground_is_looked_up_where_it_was_in_training(tmp_path: Path, holden31: Skeleton) -> None:
+    """By the runtime and by the page, as far aside as the file says, and 25 cm where it says nothing."""
+    for side in (40.0, None):
+        made = content(holden31)
+        if side is None:
+            del made["meta"]["terrain_side"]
+        else:
+            made["meta"]["terrain_side"] = side
+        save(tmp_path / "weights.npz", made)
+        network = load_network(tmp_path)
+        asked: list[np.ndarray] = []
+
+        def ground(x: np.ndarray, z: np.ndarray, asked: list[np.ndarray] = asked) -> np.ndarray:
+            asked.append(np.stack([x, z], axis=-1))
+            return np.zeros_like(x)
+
+        ProceduralAnimation(network).next_pose((0, 0.5), terrain=ground)
+        left, path, right = asked[0].reshape(-1, 3, 2).transpose(1, 0, 2)
+        expected = side or 25.0
+        np.testing.assert_allclose(np.linalg.norm(left - path, axis=-1), expected, rtol=1e-6)
+        np.testing.assert_allclose(np.linalg.norm(right - path, axis=-1), expected, rtol=1e-6)
+        assert playable(network, Runtime())["constants"]["side"] == expected

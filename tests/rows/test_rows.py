@@ -1,0 +1,303 @@
+"""Rows: those of the original database, and what they must be on motion known in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.config import sections
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.labels.label import label_clip
+from hobble.motion.make import make_clip
+from hobble.rows.build import clip_rows, cycle_frames, cycle_phase, phase_change
+from hobble.rows.clip_rows import ClipRows, expanded
+from hobble.rows.layout import GAITS, RowLayout
+from hobble.terrain.clip_fits import clip_fits
+from hobble.terrain.heightmaps import Heightmap
+from hobble.terrain.options import Sampling
+from hobble.terrain.patches import draw_patches
+
+NAME = "LocomotionFlat09_000"
+OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0}
+# A data set as the original made it: what differs from the defaults, as a configuration would say it.
+ORIGINAL = {
+    "motion": {"proportions": "clip", "defects": "refuse"},
+    "labels": {"margins": "drop"},
+    "terrain": {
+        "flat_level": "feet",
+        "heel_height": 5.0,
+        "toe_height": 4.0,
+        "held_up": None,
+        "deepest": None,
+        "bend_flat": False,
+    },
+    "database": {},
+}
+IN_CENTIMETRES = ("position", "joint_position")
+
+
+def flat_terrain(cycles: np.ndarray, levels: np.ndarray) -> dict[str, np.ndarray]:
+    """Terrain fits of flat ground, as the terrain stage writes them."""
+    frame, cycle = cycle_frames(cycles)
+    return {
+        "frame": frame,
+        "cycle": cycle,
+        "fits": np.ones(len(frame), np.int32),
+        "heights": np.repeat(levels[cycle, None], 36, axis=1),
+        "patch": np.full((len(cycles), 10), -1),
+    }
+
+
+@pytest.fixture(scope="module")
+def original(shared: Path) -> dict[str, np.ndarray]:
+    with np.load(shared / "reference" / f"original_rows_{NAME}.npz") as file:
+        return dict(file)
+
+
+def options(section: str, **changed: object) -> dict[str, Any]:
+    """A section of the original's data set, as its stage gets it."""
+    model = getattr(sections, section.capitalize())
+    return model(**ORIGINAL[section] | changed).model_dump(mode="json")
+
+
+def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrain: object) -> ClipRows:
+    """The rows of the reference clip, stage by stage, by nothing but the configuration."""
+    skeletons = root / "config" / "skeletons"
+    folder = shared / "mocap" / "pfnn"
+    clip, report = make_clip(
+        folder / f"{NAME}.bvh", skeletons / "holden31.yaml", skeletons, NAME, "holden31", options("motion")
+    )
+    files = [folder / f"{NAME}{end}" for end in (".phase", ".gait", "_footsteps.txt", "_gait.txt")]
+    labels = vars(label_clip(clip, files, report, "walk", "flat", options("labels", margins=margins))[0])
+    ground, database = options("terrain", **terrain), options("database")
+    any_map = Heightmap("any", np.zeros((200, 200)), ground["cell"])
+    drawn = {name: ground[name] for name in ("cell", "size", "highest", "seed")}
+    patches = draw_patches([any_map], count=10, **drawn)
+    sampling = Sampling(**{name: database[name] for name in Sampling.model_fields})
+    fits = clip_fits(clip, labels, patches, "flat", sections.Terrain(**ground), sampling)
+    severity = np.zeros((len(clip), len(clip.skeleton.links)), np.float32)
+    window = {name: database[name] for name in OPTIONS}
+    return clip_rows(NAME, clip, labels, {"injury": severity}, vars(fits), **window)
+
+
+@pytest.fixture(scope="module")
+def rows(shared: Path, root: Path) -> ClipRows:
+    return rows_as_configured(shared, root)
+
+
+@pytest.mark.shared
+def test_the_original_rows_column_by_column(rows, original):
+    layout = replace(rows.layout, channels=())
+    (pairs,) = expanded(rows, rows.layout.told(()))
+    np.testing.assert_array_equal(np.bincount(rows.cycle), original["cycle_length"])
+    np.testing.assert_allclose(pairs.p, original["P"], atol=1e-6)
+    differing = []
+    for prefix, ours, theirs in (("x", pairs.x, original["X"]), ("y", pairs.y, original["Y"])):
+        assert ours.shape == theirs.shape
+        for block, columns in layout.blocks(prefix).items():
+            allowed = 1e-2 if block in IN_CENTIMETRES else 1e-3
+            error = np.abs(ours[:, columns] - theirs[:, columns]).max(axis=0)
+            for i in np.flatnonzero(error > allowed):
+                at = f" ({rows_joint(rows, block, i)})" if block.startswith("joint") else ""
+                differing.append(f"{prefix} {block}{at}, column {columns.start + i}: off by {error[i]:.5f}")
+    assert not differing, "\n".join(differing)
+
+
+def rows_joint(rows: ClipRows, block: str, column: int) -> str:
+    return f"{list(rows.skeleton['joints'])[column // 3]} {'xyz'[column % 3]}"
+
+
+@pytest.mark.shared
+def test_the_comparison_would_notice_a_millimetre(rows, original):
+    column = rows.layout.y_joint_position.start + 5 * 3
+    moved = replace(rows, y=rows.y + 0.1 * (np.arange(rows.y.shape[1]) == column))
+    with pytest.raises(
+        AssertionError, match=r"y joint_position \(LeftToeBase x\), column 47: off by 0\.1000"
+    ):
+        test_the_original_rows_column_by_column(moved, original)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    "change", [{"flat_level": "zero"}, {"held_up": 2.0}, {"heel_height": "auto"}, {"toe_height": "auto"}]
+)
+def test_each_of_the_originals_settings_is_needed(shared, root, original, change):
+    """All but `deepest` and `bend_flat`, since this clip's feet are nowhere off by that much."""
+    other = rows_as_configured(shared, root, **change)
+    with pytest.raises(AssertionError, match="x joint_position"):
+        test_the_original_rows_column_by_column(other, original)
+
+
+@pytest.fixture(scope="module")
+def walk() -> Clip:
+    """A stiff figure that goes 2 cm a frame along +X while it turns by a hundredth of a radian a frame."""
+    names = ("Hips", "LeftUpLeg", "RightUpLeg", "LeftArm", "RightArm")
+    offsets = np.array([[0, 0, 0], [10, -5, 0], [-10, -5, 0], [20, 40, 3], [-20, 40, 3]], float)
+    roles = dict(
+        zip(("hips", "left_hip", "right_hip", "left_shoulder", "right_shoulder"), names, strict=True)
+    )
+    skeleton = Skeleton(
+        "stiff", names, (-1, 0, 0, 0, 0), offsets, roles, (("Hips", "LeftUpLeg"), ("Hips", "LeftArm"))
+    )
+    frames = 300
+    t = np.arange(frames)
+    rotations = np.tile(quat.IDENTITY, (frames, 5, 1))
+    rotations[:, 0] = quat.yaw(0.01 * t)
+    root = np.stack([2.0 * t, np.full(frames, 90.0), np.zeros(frames)], axis=1)
+    return Clip("walk", skeleton, 60.0, rotations, root)
+
+
+@pytest.fixture
+def labels() -> dict[str, np.ndarray]:
+    t = np.arange(300)
+    gait = np.zeros((300, 6))
+    gait[:, 1], gait[:, 4] = 1 - t / 300, t / 300
+    contacts = np.stack([t % 2 == 0, t % 3 == 0, t % 5 == 0, t % 7 == 0], axis=1)
+    return {
+        "cycles": np.array([[60, 100], [100, 130], [200, 239]]),
+        "phase": (t / 37) % 1,
+        "gait": gait,
+        "contacts": contacts,
+    }
+
+
+@pytest.fixture
+def terrain(labels) -> dict[str, np.ndarray]:
+    return flat_terrain(labels["cycles"], np.array([3.0, 4.0, 5.0]))
+
+
+def test_a_stiff_turning_figure_in_closed_form(walk, labels, terrain):
+    severity = np.random.default_rng(0).random((300, 2)) * 10
+    rows = clip_rows("walk", walk, labels, {"injury": severity}, terrain, **{**OPTIONS, "facing_sigma": 0.0})
+    layout, frame = rows.layout, rows.frame
+    assert layout == RowLayout(5, channels=(("injury", 2),))
+    np.testing.assert_array_equal(frame, np.r_[60:101, 100:131, 200:240])
+    (pairs,) = expanded(rows, rows.layout)
+    x, y = ({n: v[:, s] for n, s in layout.blocks(p).items()} for p, v in (("x", pairs.x), ("y", pairs.y)))
+    ahead = np.arange(-60, 60, 10)
+    turned = 0.01 * frame[:, None]  # facing (sin, 0, cos); the root's x axis is (cos, 0, -sin)
+    expected = np.concatenate([2 * ahead * np.cos(turned), 2 * ahead * np.sin(turned)], axis=1)
+    np.testing.assert_allclose(x["position"], expected, atol=1e-3)
+    direction = np.concatenate([np.sin(0.01 * ahead), np.cos(0.01 * ahead)])
+    np.testing.assert_allclose(x["direction"], np.tile(direction, (len(frame), 1)), atol=1e-4)
+    local = walk.skeleton.offsets + np.array([0, 90, 0])
+    local = np.tile(local, (len(frame), 1, 1))
+    local[..., 1] -= np.array([3.0, 4.0, 5.0])[rows.cycle][:, None]
+    np.testing.assert_allclose(x["joint_position"], local.reshape(len(frame), -1), atol=1e-3)
+    np.testing.assert_allclose(y["joint_position"], x["joint_position"], atol=1e-3)
+    np.testing.assert_allclose(y["joint_rotation"], 0, atol=1e-4)
+    along = np.stack([2 * np.cos(turned[:, 0]), 2 * np.sin(turned[:, 0])], axis=1)
+    np.testing.assert_allclose(y["root_velocity"], along, atol=1e-3)
+    np.testing.assert_allclose(y["turn"][:, 0], -0.01, atol=1e-4)  # the runtime applies its negative
+    before = np.stack([2 * np.cos(turned[:, 0] - 0.01), 2 * np.sin(turned[:, 0] - 0.01)], axis=1)
+    np.testing.assert_allclose(x["joint_velocity"][:, [0, 2]], before, atol=1e-3)
+    future = np.arange(0, 60, 10)
+    next_turn = turned + 0.01
+    expected = np.concatenate([2 * future * np.cos(next_turn), 2 * future * np.sin(next_turn)], axis=1)
+    np.testing.assert_allclose(y["position"], expected, atol=1e-3)
+    np.testing.assert_allclose(y["contacts"], labels["contacts"][frame])
+    np.testing.assert_allclose(x["injury"], severity[frame], rtol=1e-6)
+    np.testing.assert_allclose(x["terrain"], 0, atol=1e-5)
+    shares = x["gait"].reshape(len(frame), len(GAITS), 12)
+    np.testing.assert_allclose(shares[:, 4], (frame[:, None] + ahead) / 300, atol=1e-6)
+    np.testing.assert_allclose(shares[:, 1], 1 - shares[:, 4], atol=1e-6)
+    assert not shares[:, [0, 2, 3, 5]].any()
+    np.testing.assert_allclose(y["phase_change"][:, 0], 1 / 37, atol=1e-6)
+
+
+def test_phase_is_forced_at_the_ends_and_its_change_is_not(labels):
+    phase = cycle_phase(labels["phase"], labels["cycles"])
+    frame, cycle = cycle_frames(labels["cycles"])
+    first, last = frame == labels["cycles"][cycle, 0], frame == labels["cycles"][cycle, 1]
+    assert (phase[first] == 0).all()
+    assert (phase[last] == 1).all()
+    np.testing.assert_array_equal(phase[~first & ~last], labels["phase"][frame[~first & ~last]])
+    np.testing.assert_allclose(phase_change(labels["phase"]), 1 / 37)
+    np.testing.assert_allclose(phase_change(np.array([0.2, 0.2, 0.1])), [0, 0.9])
+
+
+def test_fits_of_a_row_share_its_frame_and_differ_in_the_ground(walk, labels, terrain):
+    rng = np.random.default_rng(1)
+    n = len(terrain["frame"])
+    hilly = {**terrain, "fits": np.full(n, 10), "heights": rng.normal(0, 9, (10 * n, 36))}
+    rows = clip_rows("walk", walk, labels, {"injury": np.zeros((300, 2))}, hilly, **OPTIONS)
+    layout = rows.layout
+    x, y = (
+        np.concatenate(parts) for parts in list(zip(*expanded(rows, rows.layout.told(())), strict=True))[:2]
+    )
+    centre = hilly["heights"][:, 12:24].mean(axis=1)
+    np.testing.assert_allclose(x[:, layout.x_terrain], hilly["heights"] - centre[:, None], atol=1e-4)
+    hips = y[:, layout.y_joint_position.start + 1]
+    np.testing.assert_allclose(hips, 90 - centre, atol=1e-3)
+    np.testing.assert_allclose(y[::10, -5:], y[5::10, -5:])
+
+
+def test_a_clip_without_cycles_has_no_rows(walk, labels):
+    nothing = {**labels, "cycles": np.zeros((0, 2), int)}
+    rows = clip_rows(
+        "walk",
+        walk,
+        nothing,
+        {"injury": np.zeros((300, 2))},
+        flat_terrain(nothing["cycles"], np.zeros(0)),
+        **OPTIONS,
+    )
+    rows.check("walk")
+    assert len(rows) == 0
+    assert list(expanded(rows, rows.layout)) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"phase": np.zeros(299)}, "labels of 299 frames for a clip of 300"),
+        ({"cycles": np.array([[60, 100], [100, 130], [200, 241]])}, "other cycles"),
+    ],
+)
+def test_files_that_do_not_belong_together_are_refused(walk, labels, terrain, change, message):
+    with pytest.raises(InputError, match=f"^walk: .*{message}"):
+        clip_rows("walk", walk, {**labels, **change}, {"injury": np.zeros((300, 2))}, terrain, **OPTIONS)
+
+
+def test_severities_and_cycles_that_do_not_fit_are_refused(walk, labels, terrain):
+    with pytest.raises(InputError, match="injury of 3 columns for a skeleton of 2"):
+        clip_rows("walk", walk, labels, {"injury": np.zeros((300, 3))}, terrain, **OPTIONS)
+    for cycle, frame in (([0, 40], 0), ([260, 299], 299)):
+        near = {**labels, "cycles": np.array([cycle])}
+        ground = flat_terrain(near["cycles"], np.zeros(1))
+        with pytest.raises(InputError, match=f"walk, frame {frame}: a cycle has no frame before it or none"):
+            clip_rows("walk", walk, near, {"injury": np.zeros((300, 2))}, ground, **OPTIONS)
+
+
+def test_past_the_ends_of_the_clip_the_root_goes_straight_on_and_the_gait_is_held(walk, labels):
+    """Rows next to an end are those of a longer clip that does so."""
+    ends = {**labels, "cycles": np.array([[1, 40], [260, 298]])}
+    still = replace(walk, rotations=np.tile(walk.rotations[:1], (300, 1, 1)))
+    once = clip_rows(
+        "a", still, ends, {"injury": np.zeros((300, 2))}, flat_terrain(ends["cycles"], np.zeros(2)), **OPTIONS
+    )
+    n = np.arange(-70, 370)
+    longer = replace(
+        still,
+        rotations=np.tile(walk.rotations[:1], (440, 1, 1)),
+        root=np.stack([2.0 * n, np.full(440, 90.0), np.zeros(440)], axis=1),
+    )
+    held = {name: values[np.clip(n, 0, 299)] for name, values in labels.items() if len(values) == 300}
+    held["cycles"] = ends["cycles"] + 70
+    twice = clip_rows(
+        "a",
+        longer,
+        held,
+        {"injury": np.zeros((440, 2))},
+        flat_terrain(held["cycles"], np.zeros(2)),
+        **OPTIONS,
+    )
+    np.testing.assert_allclose(once.x, twice.x, atol=1e-4)
+    np.testing.assert_allclose(once.y, twice.y, atol=1e-4)

@@ -1,0 +1,144 @@
+"""A measurement that nobody has heard of: a folder, and one line in the list."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.workflow
+
+DECLARATION = '''"""How high the hips of the captured figure are."""
+
+from hobble.core.section import Positive, Section
+from hobble.measures.measure import Cost, Measure
+
+
+class Options(Section):
+    """Its keys of the section `evaluation`."""
+
+    every: Positive = 1
+
+
+MEASURE = Measure(
+    name="hips",
+    package=__name__,
+    inputs=("clips", "skeleton", "accuracy"),
+    options=Options,
+    cost=Cost(memory_each=10, minutes=1),
+)
+'''
+RUN = """from hobble.rows.clip_rows import load_clip_rows
+from hobble.evaluation.captured import captured
+from hobble.measures.given import Given, Outcome
+from hobble.measures.hips import Options
+
+
+def run(given: Given, options: Options) -> Outcome:
+    joint = list(given.skeleton["joints"]).index(given.skeleton["roles"]["hips"])
+    rows = []
+    for clip, path in given.clips.items():
+        parts = captured(load_clip_rows(path))
+        heights = [h for part in parts for h in part.local[:: options.every, joint, 1]]
+        rows.append({"clip": clip, "frames": len(heights), "highest": round(float(max(heights)), 3)})
+    known = [entry["clip"] for entry in given.measured("accuracy")["clips"]]
+    return Outcome({"every": options.every, "clips": rows, "known": known}, {"clips": rows}, "<hips>")
+"""
+PAGE = """from hobble.report.parts import Part, Section, Words
+from hobble.report.summary import Figure, Hint
+from hobble.report.tables import Column, Table
+
+
+def section(found, material):
+    rows = [[row["clip"], row["highest"]] for row in found["clips"]]
+    table = Table("hips", [Column("clip"), Column.number("highest, cm")], rows)
+    return Section("hips", [Part(10, table), Part(0, Words("How high <they> are."))], title="Hips", at=15)
+
+
+def figures(found, material):
+    yield Figure("Highest hips", f"{max(row['highest'] for row in found['clips']):.1f}", "cm", at=35)
+
+
+def hints(found, material):
+    yield Hint("note", "The hips were looked at.", f"In {len(found['clips'])} clips.")
+"""
+COMPARISON = """from hobble.evaluation.side_by_side import SideBySide
+
+
+def compared(all_measured, published):
+    highest = {m.name: max(row["highest"] for row in m.found("hips")["clips"]) for m in all_measured}
+    return SideBySide([{"configuration": name, "highest": value} for name, value in highest.items()])
+
+
+def tables(compared):
+    return {"hips": compared["hips"]}
+"""
+COMPARISON_PAGE = """from hobble.report.measured import Overview
+from hobble.report.parts import Part, Section, Words
+from hobble.report.tables import Column
+
+
+def columns(compared):
+    values = {entry["configuration"]: entry["highest"] for entry in compared["hips"]}
+    yield Overview(25, Column.number("highest hips, cm", 4), values)
+
+
+def section(compared):
+    return Section("hips", [Part(0, Words("Hips of all."))], at=15)
+"""
+PARTS = {
+    "__init__": DECLARATION,
+    "run": RUN,
+    "page": PAGE,
+    "comparison": COMPARISON,
+    "comparison_page": COMPARISON_PAGE,
+}
+
+
+def add(package: Path) -> None:
+    """The new folder, and the one existing file that changes: the list."""
+    folder = package / "measures" / "hips"
+    folder.mkdir()
+    for name, text in PARTS.items():
+        (folder / f"{name}.py").write_text(text)
+    listed = package / "measures" / "registry.py"
+    text = listed.read_text()
+    text, imported = re.subn(r"(from hobble\.measures import .*)", r"\1, hips", text, count=1)
+    text, entered = re.subn(r"( +)accuracy\.MEASURE,\n", r"\g<0>\1hips.MEASURE,\n", text, count=1)
+    assert imported == entered == 1
+    listed.write_text(text)
+
+
+def test_a_new_measurement_is_run_shown_and_compared_and_nothing_else_is_measured_again(copied) -> None:
+    add(copied.own_source())
+    copied.edit("config/test.yaml", "evaluation:", "evaluation:\n  every: 2")
+    target = "results/test/report.html"
+    assert copied.planned(target) == {"measure": 1, "configuration": 1, "pipeline_summary": 1, "report": 1}
+    copied.run("-c2", target, "results/compare/report.html", "--config", "compare=test")
+    results = copied.folder / "results/test"
+    found = json.loads((results / "evaluation/hips.json").read_text())
+    assert found["every"] == 2
+    assert sorted(row["clip"] for row in found["clips"]) == found["known"]
+    assert all(70 < row["highest"] < 110 for row in found["clips"])
+    with open(results / "evaluation/hips/clips.csv", newline="") as file:
+        assert sorted(row["clip"] for row in csv.DictReader(file)) == found["known"]
+    assert "<hips>" in (results / "logs/evaluation/hips.log").read_text()
+    stages = json.loads((results / "pipeline.json").read_text())["stages"]
+    evaluation = next(stage for stage in stages if stage["stage"] == "evaluation")
+    assert "hips" in [rule["rule"] for rule in evaluation["rules"]]
+    assert "every: 2" in (results / "configuration.yaml").read_text()
+    highest = max(row["highest"] for row in found["clips"])
+    page = (results / "report.html").read_text()
+    assert page.index('<section id="accuracy"') < page.index('<section id="hips">')
+    assert "How high &lt;they&gt; are." in page
+    assert f'<dd class="value">{highest:.1f}<small>cm</small>' in page
+    assert "The hips were looked at." in page
+    compared = copied.folder / "results/compare"
+    assert json.loads((compared / "compare.json").read_text())["hips"][0]["highest"] == highest
+    assert (compared / "tables/hips.csv").read_text().splitlines()[0] == "configuration,highest"
+    page = (compared / "report.html").read_text()
+    assert '<a href="#hips">Hips</a>' in page
+    assert "highest hips, cm" in page

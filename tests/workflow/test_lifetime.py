@@ -1,0 +1,126 @@
+"""Whose a lock is, and that a job ends when its run does."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from hobble.workflow import lifetime
+
+JOB = """
+import os, time
+from types import SimpleNamespace
+from hobble.workflow.job import job
+with job(SimpleNamespace(log=[{log!r}], rule="stage")):
+    print("begun", flush=True)
+    {work}
+"""
+
+
+@pytest.fixture
+def locks(tmp_path: Path) -> Path:
+    """A lock that this process has taken."""
+    folder = tmp_path / ".snakemake/locks"
+    folder.mkdir(parents=True)
+    (folder / "0.output.lock").write_text("results/a\n")
+    lifetime.own_lock(folder)
+    return folder
+
+
+def owned_by(locks: Path, **changed: object) -> None:
+    owner = json.loads((locks / lifetime.OWNER).read_text())
+    (locks / lifetime.OWNER).write_text(json.dumps(owner | changed))
+
+
+def ended() -> int:
+    """The number of a process that is no more."""
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    return process.pid
+
+
+def test_the_lock_of_a_living_run_stays(locks: Path) -> None:
+    assert not lifetime.clear_stale_lock(locks)
+    assert (locks / "0.output.lock").is_file()
+
+
+def test_the_lock_of_a_dead_one_is_taken_away(locks: Path) -> None:
+    owned_by(locks, pid=ended())
+    assert lifetime.clear_stale_lock(locks)
+    assert list(locks.iterdir()) == []
+    assert [path.name for path in locks.parent.iterdir()] == ["locks"]
+
+
+def test_another_process_with_the_number_of_a_dead_one_owns_nothing(locks: Path) -> None:
+    owned_by(locks, began="1")
+    assert lifetime.clear_stale_lock(locks)
+
+
+def test_of_another_machine_nothing_is_known(locks: Path) -> None:
+    owned_by(locks, host=f"not-{platform.node()}", pid=ended())
+    assert not lifetime.clear_stale_lock(locks)
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", "not json", '{"host": 1, "pid": "x", "began": 2}'])
+def test_a_lock_that_does_not_say_whose_it_is_stays(locks: Path, text: str) -> None:
+    (locks / lifetime.OWNER).write_text(text)
+    assert not lifetime.clear_stale_lock(locks)
+    (locks / lifetime.OWNER).unlink()
+    assert not lifetime.clear_stale_lock(locks)
+    assert (locks / "0.output.lock").is_file()
+
+
+def started(tmp_path: Path, work: str, run: int) -> subprocess.Popen[str]:
+    """A job of the run with that process, as soon as its work has begun."""
+    script = JOB.format(log=str(tmp_path / "job.log"), work=work)
+    environment = {**os.environ, lifetime.RUN: f"{run} {lifetime._began(run)}"}
+    command = [sys.executable, "-c", script]
+    piped = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    process = subprocess.Popen(command, env=environment, **piped)
+    assert process.stdout.readline() == "begun\n"
+    return process
+
+
+DEAF = "while True:\n        try: time.sleep(60)\n        except BaseException: pass"
+
+
+@pytest.mark.parametrize(
+    ("work", "status"),
+    [("time.sleep(60)", 128 + signal.SIGTERM), (DEAF, -signal.SIGKILL)],
+    ids=["willing", "deaf"],
+)
+def test_a_job_ends_soon_after_its_run(tmp_path: Path, work: str, status: int) -> None:
+    run = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+    process = started(tmp_path, work, run.pid)
+    assert process.poll() is None
+    run.kill()  # and not waited for: a zombie is no run either
+    before = time.monotonic()
+    assert process.wait(timeout=10) == status
+    assert time.monotonic() - before < 5
+    assert process.stdout.read() == ""
+    run.wait()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_job_that_is_told_to_end_tidies_up_without_a_word(tmp_path: Path, number: signal.Signals) -> None:
+    path = str(tmp_path / "out.txt")
+    work = f"""
+    from hobble.core.files import atomic_path
+    with atomic_path({path!r}) as part:
+        part.write_text("half")
+        print("begun", flush=True)
+        time.sleep(60)"""
+    process = started(tmp_path, work, os.getpid())
+    assert process.stdout.readline() == "begun\n"
+    process.send_signal(number)
+    assert process.wait(timeout=10) == 128 + number
+    assert process.stdout.read() == ""
+    assert [file.name for file in tmp_path.iterdir()] == ["job.log"]

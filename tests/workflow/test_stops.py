@@ -1,0 +1,125 @@
+"""Runs that are stopped: by Ctrl-C, by a signal to Snakemake alone, by SIGKILL; the same command goes on."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+
+pytestmark = pytest.mark.workflow
+
+WEIGHTS = "results/test/network/weights.npz"
+DATABASE = "results/datasets/tiny/database"
+LIMIT = 120  # seconds within which a job must have begun
+
+
+def started(workflow, *arguments: str, until: Callable[[], object]) -> subprocess.Popen[bytes]:
+    """The command, as soon as `until` says that it is where it shall be stopped."""
+    process = workflow.start(*arguments, said=workflow.folder / "said.txt")
+    deadline = time.monotonic() + LIMIT
+    while not until() and time.monotonic() < deadline and process.poll() is None:
+        time.sleep(0.005)
+    assert process.poll() is None, (workflow.folder / "said.txt").read_text()
+    return process
+
+
+def without_network(workflow) -> Callable[[], object]:
+    """Take the network away, so that it is trained again; the sign that its training has begun."""
+    for part in ("network", "checkpoints"):
+        shutil.rmtree(workflow.folder / "results/test" / part)
+    return lambda: list(workflow.folder.glob("results/test/checkpoints/*/*.npz"))
+
+
+def jobs_of(process: subprocess.Popen[bytes]) -> list[psutil.Process]:
+    return psutil.Process(process.pid).children(recursive=True)
+
+
+def running(jobs: list[psutil.Process]) -> list[psutil.Process]:
+    return [job for job in jobs if job.is_running() and job.status() != psutil.STATUS_ZOMBIE]
+
+
+def ended(jobs: list[psutil.Process], within: float) -> bool:
+    deadline = time.monotonic() + within
+    while running(jobs) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return not running(jobs)
+
+
+def same_network(one: Path, other: Path) -> bool:
+    a, b = np.load(one / WEIGHTS), np.load(other / WEIGHTS)
+    return all(np.array_equal(a[name], b[name]) for name in a.files)
+
+
+@pytest.mark.parametrize(
+    ("number", "to_all"),
+    [(signal.SIGINT, True), (signal.SIGINT, False), (signal.SIGTERM, False)],
+    ids=["Ctrl-C", "SIGINT", "SIGTERM"],
+)
+def test_a_signal_ends_the_jobs_at_once_and_leaves_no_lock(
+    finished, copied, number: signal.Signals, to_all: bool
+) -> None:
+    process = started(copied, "-c2", WEIGHTS, until=without_network(copied))
+    jobs = jobs_of(process)
+    assert running(jobs)
+    asked = time.monotonic()
+    (os.killpg if to_all else os.kill)(process.pid, number)
+    assert process.wait(timeout=20) == 1
+    assert time.monotonic() - asked < 5
+    assert not running(jobs)
+    assert "Traceback" not in (copied.folder / "said.txt").read_text()
+    assert not list(copied.folder.glob(".snakemake/locks/*"))
+    copied.run("-c2", WEIGHTS)
+    assert same_network(finished.folder, copied.folder)
+    assert not list(copied.folder.rglob("*.part"))
+
+
+def test_a_training_ends_soon_after_the_snakemake_that_was_killed(finished, copied) -> None:
+    process = started(copied, "-c2", WEIGHTS, until=without_network(copied))
+    jobs = jobs_of(process)
+    process.kill()
+    assert ended(jobs, within=5)
+    process.wait()
+    copied.run("-c2", WEIGHTS)
+    assert same_network(finished.folder, copied.folder)
+
+
+def test_killed_in_the_merge_the_plain_command_goes_on(finished, copied) -> None:
+    shutil.rmtree(copied.folder / DATABASE)
+    there = copied.folder / DATABASE / "all"
+    process = started(copied, "-c2", f"{DATABASE}/all", until=there.exists)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert list(copied.folder.glob(".snakemake/incomplete/*"))
+    assert list(copied.folder.glob(".snakemake/locks/*.lock"))
+    copied.run("-c2", f"{DATABASE}/all")
+    manifests = [(w.folder / DATABASE / "all/manifest.json").read_bytes() for w in (finished, copied)]
+    assert manifests[0] == manifests[1]
+
+
+def test_a_second_run_beside_a_living_one_is_refused(copied) -> None:
+    process = started(copied, "-c2", WEIGHTS, until=without_network(copied))
+    jobs = jobs_of(process)
+    for job in jobs:
+        job.suspend()
+    assert "cannot be locked" in copied.run("-c2", WEIGHTS, ok=False)
+    os.kill(process.pid, signal.SIGTERM)
+    assert process.wait(timeout=5) == 1  # jobs that are deaf to SIGTERM are killed
+    assert not running(jobs)
+
+
+def test_after_touch_of_every_file_nothing_runs_again(copied) -> None:
+    """As in a fresh clone into which results are put: times say nothing, content does."""
+    copied.own_source()
+    for path in copied.folder.rglob("*"):
+        inside = path.relative_to(copied.folder).parts[0]
+        if path.is_file() and inside in ("Snakefile", "config", "profiles", "src", "workflow"):
+            path.touch()
+    assert "Nothing to be done" in copied.run("-n", "results/test/report.html")

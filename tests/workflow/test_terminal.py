@@ -1,0 +1,170 @@
+"""What a run says on the terminal: one line of progress, each failure once, a summary at the end."""
+
+from __future__ import annotations
+
+import io
+import logging
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from hobble.workflow.terminal import Terminal
+
+CALLED = (
+    "RuleException:\nCalledProcessError in file x.smk, line 3:\nCommand 'set -euo pipefail;  python s.py'"
+)
+
+
+class Run:
+    """A terminal, its clock, and records as Snakemake makes them."""
+
+    def __init__(self, live: bool = False, dryrun: bool = False) -> None:
+        self.clock, self.out = 0.0, io.StringIO()
+        self.terminal = Terminal(self.out, live, dryrun, now=lambda: self.clock)
+
+    def say(
+        self, event: str | None, text: str | None = "", level: int = logging.INFO, **data: object
+    ) -> None:
+        record = logging.LogRecord("snakemake", level, "", 0, text, None, None)
+        record.__dict__.update(data)
+        if event is not None:
+            record.event = event
+        self.terminal.take(record)
+
+    def job(self, number: int, rule: str, log: str = "", **wildcards: str) -> None:
+        self.say("job_info", jobid=number, rule_name=rule, wildcards=wildcards, log=[log])
+
+    def finish(self, number: int, done: int, total: int) -> None:
+        self.say("job_finished", job_id=number)
+        self.say("progress", None, done=done, total=total)
+
+    @property
+    def lines(self) -> list[str]:
+        return self.out.getvalue().splitlines()
+
+
+def test_a_run_is_its_plan_a_line_now_and_then_and_a_summary() -> None:
+    run = Run()
+    run.say("workflow_started", "SNAKEMAKE\n=====")
+    run.say(None, "Building DAG of jobs...")
+    run.say("run_info", "Job stats:\n...", stats={"motion_clip": 30, "training": 1, "total": 31})
+    for number in range(30):
+        run.clock += 1
+        run.job(number, "motion_clip", clip=f"walk-{number}")
+        run.finish(number, number + 1, 31)
+    run.job(30, "training", configuration="holden")
+    run.clock += 170
+    run.finish(30, 31, 31)
+    run.terminal.close()
+    run.terminal.close()
+    assert run.lines[0] == "31 jobs: 30 motion_clip, 1 training"
+    assert run.lines[-1] == "31 of 31 jobs done in 3 min 20 s."
+    assert len([line for line in run.lines if "jobs done in" in line]) == 1
+    assert run.lines[1].startswith("9/31 jobs, 10 s: motion_clip")
+    assert len(run.lines) <= 2 + 200 / 10
+
+
+def test_on_a_terminal_one_line_is_written_over_and_wiped() -> None:
+    run = Run(live=True)
+    run.say("run_info", "", stats={"motion_clip": 2, "total": 2})
+    run.job(1, "motion_clip", clip="a")
+    run.finish(1, 1, 2)
+    assert run.out.getvalue().count("\n") == 1
+    run.say(None, "something odd", logging.WARNING)
+    assert run.out.getvalue().endswith("\r\x1b[Ksomething odd\n")
+
+
+def test_a_failure_is_told_once_and_named_in_the_end(tmp_path: Path) -> None:
+    said, silent = tmp_path / "said.log", tmp_path / "silent.log"
+    said.write_text("2026-01-01 00:00:00,000 INFO x\n2026-01-01 00:00:00,000 ERROR a.bvh: is torn\n")
+    silent.write_text("2026-01-01 00:00:00,000 INFO x\n")
+    run = Run()
+    run.say("run_info", "", stats={"motion_clip": 2, "total": 2})
+    for number, log in enumerate((said, silent)):
+        run.job(number, "motion_clip", str(log), clip="ab"[number])
+        run.say("error", CALLED, logging.ERROR)
+        run.say("job_error", "Error in rule", logging.ERROR, jobid=number, rule_name="motion_clip", log=[log])
+    run.say(None, "Exiting because a job execution failed. Look below for error messages", logging.ERROR)
+    run.terminal.close()
+    assert run.lines[1:] == [
+        f"motion_clip b: ended without a message, killed perhaps. Its log: {silent}",
+        "0 of 2 jobs done in 0 s, 2 failed:",
+        f"  motion_clip a: {said}",
+        f"  motion_clip b: {silent}",
+        "The same command goes on from here once this is put right.",
+    ]
+
+
+def test_what_snakemake_itself_refuses_is_said() -> None:
+    run = Run()
+    run.say("error", "WorkflowError:\nconfig/nope.yaml: no such file", logging.ERROR)
+    run.say("error", "LockException:\nError: Directory cannot be locked.", logging.ERROR)
+    run.terminal.close()
+    assert "config/nope.yaml: no such file" in run.lines
+    assert "Error: Directory cannot be locked." in run.lines
+
+
+def test_jobs_that_end_because_the_run_is_stopped_have_not_failed() -> None:
+    run = Run()
+    run.say("run_info", "", stats={"training": 1, "total": 1})
+    run.job(1, "training")
+    run.say(None, "Terminating processes on user request, this might take some time.")
+    run.say("job_error", "", logging.ERROR, jobid=1, rule_name="training", log=[])
+    run.terminal.close()
+    assert run.lines[1:] == [
+        "Stopping the jobs that run.",
+        "0 of 1 jobs done in 0 s, then stopped. The same command goes on from here.",
+    ]
+
+
+def test_a_dry_run_is_its_table_once_and_the_reasons() -> None:
+    run = Run(dryrun=True)
+    for _ in range(2):
+        run.say("run_info", "Job stats:\njob  count", stats={"total": 1})
+        run.job(1, "training")
+    run.say(None, "Reasons:\n    (check individual jobs above for details)\n    code: training")
+    run.terminal.close()
+    assert run.lines == ["Job stats:", "job  count", "Reasons:", "    code: training"]
+
+
+@pytest.mark.workflow
+def test_a_whole_run_takes_few_lines(workflow) -> None:
+    target = "results/datasets/tiny/channels/injury/walk-straight-1.npz"
+    dry = workflow.run("-n", target)
+    assert len(dry.splitlines()) < 20
+    text = workflow.run("-c2", target)
+    lines = [line for line in text.splitlines() if not line.startswith("Using workflow specific profile")]
+    assert lines[0] == "3 jobs: 1 synthetic_clip, 1 motion_clip, 1 channel_clip"
+    assert re.fullmatch(r"3 of 3 jobs done in .*\.", lines[-1])
+    assert len([line for line in lines if not line.startswith(("0/3 ", "1/3 ", "2/3 ", "3/3 "))]) == 2
+    assert "Error in rule" not in text
+    assert "rule synthetic_clip:" in workflow.run("-np", "-F", target)
+
+
+@pytest.mark.workflow
+def test_on_a_terminal_a_failure_stands_on_a_line_of_its_own(workflow) -> None:
+    """In a pseudo-terminal, where progress is written over."""
+    folder = workflow.folder / "data/mine"
+    folder.mkdir(parents=True)
+    (folder / "torn.bvh").write_text("HIERARCHY\n")
+    (workflow.folder / "config/datasets/mine.yaml").write_text("skeleton: holden31\nfolder: mine\n")
+    ours, theirs = os.openpty()
+    command = workflow.command("-c2", "results/datasets/mine/motion/torn.npz")
+    environment = workflow.environment()
+    process = subprocess.Popen(command, cwd=workflow.folder, env=environment, stdout=theirs, stderr=theirs)
+    os.close(theirs)
+    said = b""
+    try:
+        while block := os.read(ours, 65536):
+            said += block
+    except OSError:
+        pass  # the other side is closed
+    assert process.wait() == 1
+    shown = [line.rpartition("\x1b[K")[2] for line in said.decode().splitlines()]
+    assert len([line for line in shown if line.startswith("motion_clip: ") and "torn.bvh" in line]) == 1, (
+        shown
+    )
+    assert "0 of 1 jobs done in" in said.decode()
