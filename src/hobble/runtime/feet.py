@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from hobble.core.compiled import njit
+from numba import njit
 
 from hobble.core.skeleton import Skeleton
 from hobble.models.network import Network

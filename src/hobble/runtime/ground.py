@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from hobble.core.compiled import njit
+from numba import njit
 
 from hobble.core.quat import Array
 from hobble.runtime.axes import Axes

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from hobble.core.compiled import njit
+from numba import njit
 
 from hobble.core.quat import Array
 from hobble.models.network import STORAGES, inverse
