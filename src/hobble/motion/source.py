@@ -16,7 +16,7 @@ from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import Axes, straighten
 from hobble.motion.body import SIDES, Body, body_by_roles, pairs, with_fingers
 from hobble.motion.decode import Decoded, decode, frame_rate
-from hobble.motion.defects import flips, repair
+from hobble.motion.defects import Repaired, flips, repair
 from hobble.motion.draft import refusal
 from hobble.motion.find_body import Doubt, Found, find_body
 from hobble.motion.floor import on_floor
@@ -185,8 +185,9 @@ def _mended(
     options: Mapping[str, Any],
 ) -> Source:
     """The source, without what is broken in it, its floor at height zero."""
-    repaired = repair(clip)
-    flat = options.get("ground", "flat") == "flat"
+    leave = options["defects"] == "leave"
+    repaired = Repaired(clip, 0, []) if leave else repair(clip)
+    flat = options.get("ground", "flat") == "flat" and not leave
     clip, moved, uneven = on_floor(repaired.clip) if flat else (repaired.clip, [], [])
     mended = repaired.sentences + moved
     if mended and options["defects"] == "refuse":
