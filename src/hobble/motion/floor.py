@@ -13,7 +13,7 @@ from hobble.motion.rig import leg_length
 SOLE = 3.0  # cm that a toe joint is above the floor on which it stands
 OFF = 3.0  # cm from which on a floor is off
 CRAWLS = 15.0  # and from which on, where a figure does not stand on its toes: how they lie there is not told
-UPRIGHT = 0.6  # height of the hips above the toes of a figure that stands, to the length of its legs
+UPRIGHT = 0.8  # height of the hips above the toes of a figure that stands, to the length of its legs
 EVEN = 12.0  # cm between high and low steps; running on flat ground gives 9, gentle bumps 14
 SLOW = 0.3  # cm a frame at 60 Hz: a toe that rises or falls faster is in the air
 FEWEST = 10  # frames from which a floor can be told
