@@ -1,8 +1,8 @@
 """Clips rewritten as other programs would have written them: the oracle of everything that reads a rig.
 
 A real clip of the 31 joints is told anew under other names, from another zero pose, with other bone lengths,
-joints added and left out, in other axes and units and at another rate. Where its joints are in the world stays  # noqa: E501
-known, so that what comes of it has to be what comes of the clip itself.
+joints added and left out, in other axes and units and at another rate. Where its joints are in the world
+stays known, so that what comes of it has to be what comes of the clip itself.
 
     python -m tests.motion.scramble ../shared/mocap/cmu --count 240
 """
@@ -506,7 +506,7 @@ def main() -> None:
 def compare(first: Clip, second: Clip, names: dict[str, str]) -> Array:
     """(N,) mean distance in centimetres of each joint that both have.
 
-    A rig without toes does not tell how high its ankles are above the balls of its feet: how much higher or lower  # noqa: E501
+    A rig without toes does not tell how high its ankles are above the balls of its feet: how much higher or lower
     all of the figure stands for that, 3 cm at most, is taken off.
     """
     frames = min(len(first), len(second))

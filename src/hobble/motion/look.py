@@ -191,8 +191,8 @@ def standing_notes(clips: Sequence[Look]) -> list[str]:
     if not clips or any(clip.stands > 0 or clip.refused for clip in clips):
         return []
     return [
-        "Nobody stands in these clips: the character will not have learned to stand, to start or to stop. Add "
-        "a clip of somebody who stands, starts and stops."
+        "Nobody stands in these clips: the character will not have learned to stand, to start or to stop. "
+        "Add a clip of somebody who stands, starts and stops."
     ]
 
 

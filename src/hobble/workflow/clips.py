@@ -53,7 +53,7 @@ class Clips:
         if odd := [name for name in listed if name.endswith(MIRROR)]:
             raise HobbleError(
                 f"data set {dataset}: {', '.join(odd)}: only a mirror is called so, which `mirror: true` "
-                "makes from its original. Set `mirror: true`, which accepts such files beside their originals, "
+                "makes from its original. Set `mirror: true`, which accepts such files beside originals, "
                 "or take it out, or rename its file."
             )
         if odd := [name for name in listed if HURT.search(name)]:
