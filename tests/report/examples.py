@@ -64,10 +64,10 @@ def walker(skeleton: Skeleton, frames: int, speed: float, limp: float = 0.0) -> 
     step = speed * np.stack([np.sin(heading), np.zeros(frames), np.cos(heading)], axis=1)
     root = np.cumsum(step, axis=0) + np.array([0, 91.0, 0])
     root[:, 1] += 2 * np.cos(2 * angle)
-    _, positions = forward_kinematics(skeleton, rotations, root)
+    world, positions = forward_kinematics(skeleton, rotations, root)
     left = np.sin(angle + 0.4) < 0
     contacts = np.stack([left, left, ~left, ~left], axis=1).astype(float)
-    return {"positions": positions, "contacts": contacts, "phase": phase}
+    return {"positions": positions, "rotations": world, "contacts": contacts, "phase": phase}
 
 
 def scenarios(path: Path, skeleton: Skeleton, hurt: bool = True) -> None:
@@ -300,6 +300,7 @@ def rows(path: Path, skeleton: Skeleton, frames: int = 200, links: bool = True) 
     frame = frame[frame < frames]
     y = np.zeros((len(frame), layout.y_size))
     y[:, layout.y_joint_position] = local[frame].reshape(len(frame), -1)
+    y[:, layout.y_joint_rotation] = quat.log(made["rotations"])[frame].reshape(len(frame), -1)
     root = made["positions"][:, 0][:, [0, 2]]
     y[:, layout.y_root_velocity] = np.diff(root, axis=0)[frame]
     count = len(frame)

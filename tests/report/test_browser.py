@@ -103,7 +103,7 @@ def test_what_hurts_is_told(tab: Any) -> None:
     show(tab, "stage")
     choose(tab, "scenario", 3)
     scrub(tab, 200)
-    assert tab.until("document.getElementById('reading').textContent.includes('LeftUpLeg-LeftLeg: 8.')")
+    assert tab.until("document.getElementById('reading').textContent.includes('left thigh: 8.')")
     assert tab.run("!document.getElementById('legend').hidden")
 
 

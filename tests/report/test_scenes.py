@@ -1,15 +1,18 @@
 from __future__ import annotations
 
 import base64
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from hobble.core import quat
 from hobble.core.skeleton import Skeleton
-from hobble.report.body import body
-from hobble.report.loft import triangles, vertices
-from hobble.report.scenes import UNIT, pack_positions
+from hobble.figure.mesh import body
+from hobble.figure.pack import TURN
+from hobble.report.scenes import UNIT, pack_positions, scenes
+from hobble.report.words import spoken_links
 
 
 def unpacked(text: str, kind: str) -> np.ndarray:
@@ -39,50 +42,43 @@ def test_every_scenario_is_thinned_to_thirty_hertz(play: dict[str, Any]) -> None
     assert not np.delete(severity, knee, axis=1).any()
 
 
-def coloured(dressed: dict[str, Any], link: int) -> set[int]:
-    """Joints between which the sections lie that a link colours."""
-    found = set()
-    for tube in dressed["tubes"]:
-        for section in tube["sections"]:
-            if link in dressed["parts"][section[-1]]:
-                found |= set(tube.get("ends") or section[:2])
-    return {dressed["keep"][j] for j in found}
+def test_bones_lie_where_rotations_put_them_and_keep_their_lengths(
+    play: dict[str, Any], holden31: Skeleton
+) -> None:
+    walk, count = play["scenarios"][0], play["joints"]
+    keep = body(holden31).bones.tolist()
+    pose = UNIT * unpacked(walk["pose"], "<i2").reshape(-1, count, 3)
+    turn = unpacked(walk["turn"], "<i2").reshape(-1, count, 4) / TURN
+    assert np.abs(np.linalg.norm(turn, axis=-1) - 1).max() < 1e-3
+    for upper, lower in (
+        ("left_hip", "left_knee"),
+        ("right_knee", "right_heel"),
+        ("left_shoulder", "left_elbow"),
+    ):
+        a, b = holden31.role(upper), holden31.role(lower)
+        reach = pose[:, keep.index(b)] - pose[:, keep.index(a)]
+        assert np.abs(np.linalg.norm(reach, axis=-1) - np.linalg.norm(holden31.offsets[b])).max() < 0.03
+        there = quat.rotate(turn[:, keep.index(a)], holden31.offsets[b])
+        assert np.abs(there - reach).max() < 0.05
 
 
-def test_a_link_colours_the_part_that_it_is(holden31: Skeleton) -> None:
-    dressed = body(holden31.joints, holden31.parents, holden31.roles, holden31.link_names)
-
-    def between(link: str) -> set[str]:
-        return {holden31.joints[j] for j in coloured(dressed, holden31.link_names.index(link))}
-
-    assert between("LeftUpLeg-LeftLeg") == {"LeftUpLeg", "LeftLeg"}
-    assert between("RightArm-RightForeArm") == {"RightArm", "RightForeArm"}
-    assert between("Hips-LowerBack") == {"Hips", "Spine1"}
-    assert {i for part in dressed["parts"] for i in part} == set(range(len(holden31.links)))
-
-
-def test_a_body_of_unknown_roles_has_every_bone() -> None:
-    dressed = body(("a", "b", "c"), (-1, 0, 1), {}, ("b-c",))
-    assert [tube["sections"][0][:2] for tube in dressed["tubes"]] == [[0, 1], [1, 2]]
-    assert coloured(dressed, 0) == {1, 2}
+def test_motion_without_rotations_is_fitted(
+    inputs: dict[str, Any], material: Any, play: dict[str, Any], tmp_path: Path
+) -> None:
+    """Files from before rotations were kept: bones lie where they lay, whatever their twist."""
+    data = {name: value for name, value in np.load(inputs["scenarios"]).items() if "/rotations" not in name}
+    np.savez(tmp_path / "old.npz", **data)
+    made = scenes(tmp_path / "old.npz", material.network["skeleton"], material.network["links"])
+    old, new = (unpacked(one["scenarios"][0]["pose"], "<i2").astype(int) for one in (made, play))
+    apart = UNIT * np.abs(old - new)
+    assert apart.max() < 5
+    assert np.median(apart) <= 0.011
 
 
-def test_links_of_joints_with_hyphens() -> None:
-    assert coloured(body(("a-b", "c"), (-1, 0), {}, ("a-b-c",)), 0) == {0, 1}
-
-
-def test_the_surface_of_a_body_is_closed_and_of_a_grown_persons_volume(holden31: Skeleton) -> None:
-    dressed = body(holden31.joints, holden31.parents, holden31.roles)
-    place = np.zeros((len(holden31.joints), 3))
-    for j, p in enumerate(holden31.parents):
-        place[j] = holden31.offsets[j] + (place[p] if p >= 0 else 0)
-    corners, faces = vertices(dressed, place[dressed["keep"]]), triangles(dressed)
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    assert len(np.unique(edges, axis=0)) == len(edges), "every edge is walked once each way"
-    assert {tuple(e) for e in edges.tolist()} == {tuple(e[::-1]) for e in edges.tolist()}
-    a, b, c = corners[faces].transpose(1, 0, 2)
-    assert 45 < (a * np.cross(b, c)).sum() / 6 / 1000 < 75  # litres; positive, so seen from outside
-    size = corners.max(axis=0) - corners.min(axis=0)
-    assert size[1] == pytest.approx(164, abs=4)
-    mirrored = corners * [-1, 1, 1]
-    assert np.abs(np.sort(mirrored[:, 0]) - np.sort(corners[:, 0])).max() < 1e-6
+def test_what_hurts_is_named_in_words(play: dict[str, Any], holden31: Skeleton) -> None:
+    assert play["scenarios"][-1]["description"] == "Walks while the left thigh hurts more and more"
+    words = spoken_links(holden31, holden31.link_names)
+    assert len(set(words)) == len(words)
+    assert words[:2] == ["left hip", "left hip (LHipJoint-LeftUpLeg)"]
+    assert {"left thigh", "right foot", "lower back", "neck", "left hand"} <= set(words)
+    assert spoken_links(Skeleton("x", ("a", "b"), (-1, 0), np.zeros((2, 3))), ("a-b",)) == ["a-b"]

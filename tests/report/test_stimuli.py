@@ -11,19 +11,23 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
+from hobble.figure.mesh import body
+from hobble.figure.pack import regions
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.motion.read import read_bvh
 from hobble.report import stimuli
-from hobble.report.body import body
 from hobble.report.raster import BODY, Camera, Studio
+
+UPRIGHT = np.tile(quat.IDENTITY, (19, 1))
 
 
 @pytest.fixture(scope="module")
 def studio(holden31: Skeleton) -> Studio:
-    return Studio(body(holden31.joints, holden31.parents, holden31.roles, holden31.link_names))
+    return Studio(body(holden31), regions(holden31, holden31.link_names))
 
 
 @pytest.fixture(scope="module")
@@ -31,8 +35,7 @@ def standing(holden31: Skeleton) -> np.ndarray:
     place = np.zeros((len(holden31.joints), 3))
     for j, p in enumerate(holden31.parents):
         place[j] = holden31.offsets[j] + (place[p] if p >= 0 else 0)
-    keep = body(holden31.joints, holden31.parents, holden31.roles)["keep"]
-    return place[keep] - [0, place[:, 1].min() - 2.7, 0]
+    return place[body(holden31).bones] - [0, place[:, 1].min() - 2.7, 0]
 
 
 def test_thirteen_are_asked_about_and_each_preset_is_shown(network: Network) -> None:
@@ -46,8 +49,8 @@ def test_thirteen_are_asked_about_and_each_preset_is_shown(network: Network) -> 
 
 def test_the_body_stands_where_the_camera_says(studio: Studio, standing: np.ndarray) -> None:
     camera = Camera(np.array([0.0, 82.0, 0.0]), yaw=0.0, pitch=0.1, size=200)
-    picture = studio.draw(standing, camera).astype(float)
-    bare = studio.draw(standing + np.array([0, 0, -5000.0]), camera).astype(float)
+    picture = studio.draw(standing, UPRIGHT, camera).astype(float)
+    bare = studio.draw(standing + np.array([0, 0, -5000.0]), UPRIGHT, camera).astype(float)
     drawn = np.abs(picture - bare).max(axis=-1) > 25
     x, y, _ = camera.project(standing).T
     rows, columns = np.nonzero(drawn)
@@ -64,12 +67,12 @@ def test_what_hurts_is_coloured_where_asked(studio: Studio, standing: np.ndarray
     severity = np.zeros(len(holden31.link_names))
     severity[holden31.link_names.index("LeftLeg-LeftFoot")] = 10
     plain, shown = (
-        studio.draw(standing, camera).astype(int),
-        studio.draw(standing, camera, severity).astype(int),
+        studio.draw(standing, UPRIGHT, camera).astype(int),
+        studio.draw(standing, UPRIGHT, camera, severity).astype(int),
     )
     rows, columns = np.nonzero((shown[..., 0] - shown[..., 2] > 50) & (plain[..., 0] - plain[..., 2] <= 20))
     assert len(rows) > 50
-    keep = body(holden31.joints, holden31.parents, holden31.roles)["keep"]
+    keep = body(holden31).bones.tolist()
     x, y, _ = camera.project(standing).T
     knee, heel = (keep.index(holden31.joints.index(name)) for name in ("LeftLeg", "LeftFoot"))
     assert y[knee] - 10 < rows.min() <= rows.max() < y[heel] + 10

@@ -59,8 +59,10 @@ def test_a_run_is_its_plan_a_line_now_and_then_and_a_summary() -> None:
     run.clock += 170
     run.finish(30, 31, 31)
     run.terminal.close()
+    run.terminal.close()
     assert run.lines[0] == "31 jobs: 30 motion_clip, 1 training"
     assert run.lines[-1] == "31 of 31 jobs done in 3 min 20 s."
+    assert len([line for line in run.lines if "jobs done in" in line]) == 1
     assert run.lines[1].startswith("9/31 jobs, 10 s: motion_clip")
     assert len(run.lines) <= 2 + 200 / 10
 
@@ -137,7 +139,7 @@ def test_a_whole_run_takes_few_lines(workflow) -> None:
     lines = [line for line in text.splitlines() if not line.startswith("Using workflow specific profile")]
     assert lines[0] == "3 jobs: 1 synthetic_clip, 1 motion_clip, 1 channel_clip"
     assert re.fullmatch(r"3 of 3 jobs done in .*\.", lines[-1])
-    assert len(lines) <= 4
+    assert len([line for line in lines if not line.startswith(("0/3 ", "1/3 ", "2/3 ", "3/3 "))]) == 2
     assert "Error in rule" not in text
     assert "rule synthetic_clip:" in workflow.run("-np", "-F", target)
 

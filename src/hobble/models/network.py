@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
@@ -126,8 +127,9 @@ class Network(ABC):
         """
 
     @abstractmethod
-    def page(self, outputs: int) -> dict[str, Any]:
-        """What `network.js` of its folder needs, as JSON, to predict the first `outputs` columns."""
+    def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
+        """What `network.js` of its folder needs, as JSON, to predict the columns `outputs` of Y from the
+        columns `inputs` of X; the others weigh nothing."""
 
     @property
     def exports(self) -> dict[str, Export]:

@@ -14,7 +14,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import Axes, straighten
-from hobble.motion.body import SIDES, Body, body_of, pairs
+from hobble.motion.body import SIDES, Body, body_by_roles, pairs, with_fingers
 from hobble.motion.decode import Decoded, decode, frame_rate
 from hobble.motion.defects import flips, repair
 from hobble.motion.draft import refusal
@@ -32,7 +32,7 @@ from hobble.motion.rig import (
     missing_bone,
     unit_of,
 )
-from hobble.motion.stance import stands, upright
+from hobble.motion.stance import Spine, stands, upright
 
 STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
 FOUND = "found"  # what a report calls a rig that no skeleton file describes
@@ -56,6 +56,7 @@ class Source:
     notes: list[str]
     stance: str
     moving: bool
+    told: bool
 
 
 def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[str, Any]) -> Source:
@@ -94,6 +95,7 @@ def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: Mapp
         notes,
         "its zero pose",
         moving,
+        False,
         options,
     )
 
@@ -117,8 +119,8 @@ def _unknown(
     standing = stands(body, rest_positions(rig)) is None
     clip, axes, unsure = straighten(clip, options["up"], options["handedness"], standing)
     axes = axes if standing else replace(axes, facing="+Z")
-    told = upright(clip, body)
-    theirs = body_of(target.skeleton.parents, {r: target.skeleton.role(r) for r in target.skeleton.roles})
+    theirs = body_by_roles(target.skeleton)
+    told = upright(clip, body, Spine.of(target.skeleton, theirs))
     match = Match(
         known.rig if known else FOUND,
         told.clip.skeleton.roles,
@@ -137,24 +139,24 @@ def _unknown(
         notes,
         told.rest,
         moving,
+        True,
         options,
     )
 
 
 def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: Mapping[str, Any]) -> Found:
     if known is not None:
-        return Found(
-            body_of(rig.parents, {role: rig.index(name) for role, name in known.roles.items()}), True
-        )
+        return Found(body_by_roles(replace(rig, roles=known.roles)), True)
     try:
         found = find_body(rig.joints, rig.parents, raw.positions)
     except Doubt as doubt:
         raise refusal(file, rig, doubt) from None
+    found = replace(found, body=with_fingers(found.body, rig))
     if not found.sided and options["handedness"] == "left":
         body = found.body
         arms = {a: body.arms[b] for a, b in (SIDES, SIDES[::-1])}
         legs = {a: body.legs[b] for a, b in (SIDES, SIDES[::-1])}
-        return Found(replace(body, arms=arms, legs=legs), False)
+        return Found(with_fingers(replace(body, arms=arms, legs=legs), rig), False)
     return found
 
 
@@ -179,6 +181,7 @@ def _mended(
     notes: list[str],
     stance: str,
     moving: bool,
+    told: bool,
     options: Mapping[str, Any],
 ) -> Source:
     """The source, without what is broken in it, its floor at height zero."""
@@ -189,7 +192,7 @@ def _mended(
     if mended and options["defects"] == "refuse":
         raise InputError(file.path, mended[0], fix="Set motion.defects: repair to mend it so.")
     notes = notes + uneven + flips(clip, repaired.first)
-    return Source(clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving)
+    return Source(clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving, told)
 
 
 def _rig(file: Bvh) -> Skeleton:

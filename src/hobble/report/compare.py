@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.evaluation.captured import headings, root_path, turned, unbroken
+from hobble.figure.mesh import body, key
 from hobble.models.network import Network
-from hobble.models.packing import packed
-from hobble.report.body import body
-from hobble.report.scenes import FPS, UNIT, pack_positions
+from hobble.report.scenes import FPS, UNIT, packed_motion
 from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
 
 CLIPS = 6  # that are shown at least, if there are so many; every held-out clip is
@@ -29,8 +29,7 @@ def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[s
     """
     if network.skeleton is None:
         return {}
-    dressed = body(network.skeleton.joints, network.skeleton.parents, network.skeleton.roles)
-    keep = dressed["keep"]
+    keep = body(network.skeleton).bones.tolist()
     order = sorted(paths, key=lambda path: (splits.get(Path(path).stem) != "held_out", Path(path).stem))
     clips = []
     held_out = sum(splits.get(Path(path).stem) == "held_out" for path in order)
@@ -38,14 +37,16 @@ def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[s
         rows = load_clip_rows(path)
         if rows.layout.joints == network.layout.joints and len(rows):
             clips.append(_compared(network, rows, splits.get(rows.clip, "train"), keep))
-    found = {"fps": FPS, "unit": UNIT, "joints": len(keep), "body": dressed, "clips": clips}
+    found = {"fps": FPS, "unit": UNIT, "joints": len(keep), "body": key(network.skeleton), "clips": clips}
     return found if clips else {}
 
 
 def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> dict[str, Any]:
     chosen = max(unbroken(rows.frame), key=len)[:LONGEST]
-    y_position = network.layout.y_joint_position
-    truth, guess = np.zeros((2, len(rows), y_position.stop - y_position.start))
+    layout, figure = network.layout, network.skeleton
+    assert figure is not None
+    pose = slice(layout.y_joint_position.start, layout.y_joint_rotation.stop)
+    truth, guess = np.zeros((2, len(rows), pose.stop - pose.start))
     seen = np.zeros(len(rows), bool)
     for pairs in expanded(rows, network.layout):
         row, first = np.unique(pairs.row, return_index=True)
@@ -53,24 +54,30 @@ def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> 
         row, first = row[wanted], first[wanted]
         if len(row):
             made = network.predict(pairs.x[first], pairs.p[first])
-            truth[row], guess[row] = pairs.y[first][:, y_position], made[:, y_position]
+            truth[row], guess[row] = pairs.y[first][:, pose], made[:, pose]
             seen[row] = True
-    true, predicted = (v[chosen].reshape(len(chosen), -1, 3) for v in (truth, guess))
-    error = np.linalg.norm(true - predicted, axis=-1).mean(axis=1)
+    parts = [v[chosen].reshape(len(chosen), 3, -1, 3) for v in (truth, guess)]
+    error = np.linalg.norm(parts[0][:, 0] - parts[1][:, 0], axis=-1).mean(axis=1)
     lift = rows.mean[rows.first_fit[chosen]][:, None]
     y = rows.y[chosen].astype(float)
-    turn = y[:, network.layout.y_turn][:, 0]
-    place, yaw = root_path(y[:, network.layout.y_root_velocity], turn), headings(turn)
+    turn = y[:, layout.y_turn][:, 0]
+    place, yaw = root_path(y[:, layout.y_root_velocity], turn), headings(turn)
     stride = round(60 / FPS)
-    world = [in_world(p, place, yaw, lift)[::stride] for p in (true, predicted)]
-    captured = pack_positions(world[0], keep)
-    steps = np.round((world[1][:, keep] - world[0][:, :1].astype(np.float32)) / UNIT)
+    captured, predicted = (
+        packed_motion(
+            figure,
+            in_world(part[:, 0], place, yaw, lift)[::stride],
+            quat.mul(quat.yaw(yaw)[:, None], quat.exp(part[:, 2]))[::stride],
+            keep,
+        )
+        for part in parts
+    )
     return {
         "name": rows.clip,
         "split": split,
-        "frames": len(world[0]),
-        **captured,
-        "predicted": packed(np.clip(steps, -32767, 32767).astype(np.int16)),
+        "frames": len(error[::stride]),
+        "captured": captured,
+        "predicted": predicted,
         "error": np.round(error[::stride], 2).tolist(),
     }
 

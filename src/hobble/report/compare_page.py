@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from hobble.figure.pack import packed_body
 from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
 from hobble.report import measured, side_by_side
 from hobble.report.formats import embedded
+from hobble.report.playable import skeleton_of
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
-LARGEST = 24_850_000  # bytes of the page, which is to stay under 25 MB
+LARGEST = 19_850_000  # bytes of the page, which is to stay under 20 MB
 ELSE = 60_000  # of them for words, style and tables
 NAME = "compare"
 
@@ -32,9 +34,11 @@ def render_compared(
     }
     shown, names = measured.compared_sections(compared), side_by_side.names(compared)
     charts = specs([sections, shown])
-    room = LARGEST - ELSE - len(bundle.encode()) - len(embedded(charts).encode())
-    kept, left_out = fitting(playables or {}, room)
-    data = {"name": NAME, "charts": charts, "playable": kept}
+    bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in (playables or {}).values()}
+    used = len(bundle.encode()) + len(embedded(charts).encode()) + len(embedded(bodies).encode())
+    kept, left_out = fitting(playables or {}, LARGEST - ELSE - used)
+    bodies = {spec["body"]: bodies[spec["body"]] for spec in kept.values()}
+    data = {"name": NAME, "charts": charts, "playable": kept, "bodies": bodies}
     return template("compare.html.j2").render(
         name=NAME,
         measured=shown,
@@ -44,7 +48,7 @@ def render_compared(
         embedded=embedded(data),
         playable=list(kept),
         left_out=left_out,
-        hurts=any(spec["links"] for spec in kept.values()),
+        hurts=any(spec["parts"] for spec in kept.values()),
         style=style(),
         bundle=trusted("the bundle", bundle),
         provenance={"commit": commit(FOLDER), "machine": machine(), "versions": versions()},

@@ -10,8 +10,11 @@ import numpy as np
 
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.figure.fit import fitted_rotations
+from hobble.figure.mesh import body, key
+from hobble.figure.pack import packed_turns
 from hobble.models.packing import packed
-from hobble.report.body import body
 
 STEPS_PER_CM = 10  # everything is kept in 16-bit steps of a millimetre
 MOST = 24
@@ -21,27 +24,29 @@ PARTS = ("cycle", "x", "z", "ground", "soles", "contacts", "pose")
 def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) -> dict[str, Any]:
     """What the page draws of the pictures in `terrain/clips/<clip>.npz`; flat clips carry none.
 
-    skeleton: as the network's file carries it, for its roles.
+    skeleton: as the network's file carries it.
     """
     pictures: list[dict[str, Any]] = []
-    joints = skeleton.get("joints") or {}
-    names = list(joints)
-    parents = [names.index(j["parent"]) if j["parent"] is not None else -1 for j in joints.values()]
+    if not skeleton:
+        return {"joints": 0, "body": "", "pictures": pictures}
+    figure = Skeleton.from_dict({"name": "", **skeleton})
+    keep = body(figure).bones
     for path in paths:
         data = load_npz(path)
         count = int(data.get("pictures", 0))
         for k in range(min(count, MOST - len(pictures))):
             part = {key: data[f"picture{k}_{key}"] for key in PARTS}
-            if part["pose"].shape[1] == len(names):
+            if part["pose"].shape[1] == len(figure.joints):
                 name = f"{Path(path).stem}, cycle {int(part['cycle']) + 1}"
-                pictures.append({"name": name, **_packed(part)})
-    dressed = body(names, parents, skeleton.get("roles") or {})
-    return {"joints": len(names), "body": dressed, "pictures": pictures}
+                turns = fitted_rotations(figure, np.asarray(part["pose"], float))[:, keep]
+                part["pose"] = part["pose"][:, keep]
+                pictures.append({"name": name, **_packed(part), "turn": packed_turns(turns)})
+    return {"joints": len(keep), "body": key(figure), "pictures": pictures}
 
 
 def _packed(part: Mapping[str, Array]) -> dict[str, Any]:
     """Relative to the figure in the middle, so that 16 bits reach wherever in the world the clip is."""
-    middle = part["pose"][1, 0] * np.array([1.0, 0.0, 1.0])
+    middle = part["pose"][1, 0] * np.array([1.0, 0.0, 1.0])  # any bone is near enough
     return {
         "n": len(part["x"]),
         "x": [float(part["x"][0] - middle[0]), float(part["x"][-1] - middle[0])],

@@ -7,6 +7,9 @@ from typing import Any
 
 import yaml
 
+from hobble.core.skeleton import Skeleton
+from hobble.figure.mesh import key
+from hobble.figure.pack import packed_body
 from hobble.report import (
     cost_section,
     coverage,
@@ -19,6 +22,7 @@ from hobble.report import (
 from hobble.report.formats import embedded, plain
 from hobble.report.gather import Material
 from hobble.report.ground_pictures import ground_pictures
+from hobble.report.hero import opening
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
@@ -41,8 +45,15 @@ def render(
     strips = data_section.strips(material)
     scenes = dict(scenes or {})
     grounds = ground_pictures(material.terrain, material.network["skeleton"])
+    figure = (
+        Skeleton.from_dict({"name": "", **material.network["skeleton"]})
+        if material.network["skeleton"]
+        else None
+    )
     data = {
         "charts": specs([sections, shown]),
+        "bodies": {key(figure): packed_body(figure)} if figure else {},
+        "hero": opening(playable or {}, material.measured.values()),
         "scenes": scenes,
         "strips": strips,
         "grounds": grounds,
@@ -54,6 +65,7 @@ def render(
         material=material,
         name=material.name,
         title=material.title or material.name,
+        titled=bool(material.title),
         eyebrow=f"Hobble report · configuration {material.name} · data set {material.dataset}",
         measured=shown,
         figures=findings.key_figures(material),
@@ -62,7 +74,7 @@ def render(
         embedded=embedded(data),
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable={material.name: playable} if playable else {},
-        hurts=bool((playable or {}).get("links")),
+        hurts=bool((playable or {}).get("parts")),
         compared=[clip["name"] for clip in (compared or {}).get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],

@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hobble.core.skeleton import Skeleton
+from hobble.figure.mesh import body, key
+from hobble.figure.pack import regions
 from hobble.models.network import Network, inverse
 from hobble.models.packing import packed
-from hobble.report.body import body
-from hobble.runtime import animation, feet, trajectory
+from hobble.report.words import PARTS, spoken_links, way
+from hobble.rows.layout import RowLayout
+from hobble.runtime import animation, controller, feet, trajectory
 from hobble.runtime.options import Runtime
 
-# Parts of the body that have a slider and a key of their own: label, roles of the ends, key.
-PARTS = (
-    ("left thigh", "left_hip", "left_knee"),
-    ("left shank", "left_knee", "left_heel"),
-    ("left foot", "left_heel", "left_toe"),
-    ("right thigh", "right_hip", "right_knee"),
-    ("right shank", "right_knee", "right_heel"),
-    ("right foot", "right_heel", "right_toe"),
-    ("lower back", "hips", "spine"),
-    ("left upper arm", "left_shoulder", "left_elbow"),
-    ("right upper arm", "right_shoulder", "right_elbow"),
-)
+UNSEEN = 1e-7  # an input that is scaled by less than this says nothing
 PRESETS = {
     "Hurt knee": {"left thigh": 7, "left shank": 7},
     "Sprained ankle": {"right shank": 6, "right foot": 8},
@@ -37,27 +30,35 @@ PRESETS = {
 def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     """What the page's second implementation of the runtime needs; {} where the network has no skeleton.
 
-    Joint rotations are left out of the outputs: the page draws
-    positions only.
+    Left out are inputs that weigh nothing (joints that a network is not shown), and the rotations of joints
+    that move no part of the body, such as fingers: these stay at rest on the joint above.
     """
     skeleton = network.skeleton
     if skeleton is None:
         return {}
     layout = network.layout
-    outputs = layout.y_joint_rotation.start
+    turning = turning_joints(skeleton)
+    rows, scale = _rows(layout, turning), inverse(network.x_std)
+    seen = np.flatnonzero(scale > UNSEEN)
     legs = feet.leg_joints(skeleton)
-    parts = body_parts(skeleton, network.links, network.hurt_links)
+    felt = network.hurt_links  # hurting another would change nothing
+    parts = {
+        label: i for label, i in body_parts(skeleton, network.links, felt).items() if network.links[i] in felt
+    }
     sole = feet.sole_heights(network, legs).tolist()
     return {
-        "network": {"kind": network.kind, **network.page(outputs)},
-        "xMean": packed(network.x_mean.astype(np.float32)),
-        "xScale": packed(inverse(network.x_std).astype(np.float32)),
-        "yMean": packed(network.y_mean[:outputs].astype(np.float32)),
-        "yStd": packed(network.y_std[:outputs].astype(np.float32)),
+        "network": {"kind": network.kind, **network.page(seen, rows)},
+        "seen": seen.tolist(),
+        "xMean": packed(network.x_mean[seen].astype(np.float32)),
+        "xScale": packed(scale[seen].astype(np.float32)),
+        "yMean": packed(network.y_mean[rows].astype(np.float32)),
+        "yStd": packed(network.y_std[rows].astype(np.float32)),
+        "turning": turning,
         "joints": layout.joints,
         "names": list(skeleton.joints),
         "parents": list(skeleton.parents),
         "offsets": np.round(skeleton.offsets, 4).tolist(),
+        "roles": dict(skeleton.roles),
         "window": layout.window,
         "step": layout.step,
         "x": {name: block.start for name, block in layout.blocks("x").items()} | {"size": layout.x_size},
@@ -68,7 +69,9 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "legs": legs.tolist(),
         "carried": [np.flatnonzero(row).tolist() for row in feet.carried(skeleton, legs)],
         "sole": sole,
-        "body": {**body(skeleton.joints, skeleton.parents, skeleton.roles, network.links), "sole": sole},
+        "body": key(skeleton),
+        "regions": regions(skeleton, network.links),
+        "spoken": spoken_links(skeleton, network.links),
         "severityStep": runtime.rates.get("injury", 10.0) / 60,
         "severityScale": runtime.scales.get("injury", 1.0),
         "footLocking": runtime.foot_locking,
@@ -83,6 +86,29 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     }
 
 
+def turning_joints(skeleton: Skeleton) -> list[int]:
+    """The joints whose rotations are seen: the bones of the body, legs, and all above them."""
+    found: set[int] = set()
+    for joint in (*body(skeleton).bones.tolist(), *feet.leg_joints(skeleton).ravel().tolist()):
+        while joint >= 0 and joint not in found:
+            found.add(joint)
+            joint = skeleton.parents[joint]
+    return sorted(found)
+
+
+def _rows(layout: RowLayout, turning: Sequence[int]) -> NDArray[np.int64]:
+    """Outputs that the page uses: all before the rotations, and those of the joints that turn."""
+    start = layout.y_joint_rotation.start
+    turns = start + 3 * np.asarray(turning)[:, None] + np.arange(3)
+    return np.concatenate([np.arange(start), turns.ravel()])
+
+
+def skeleton_of(spec: Mapping[str, Any]) -> Skeleton:
+    """The skeleton of a character that `playable` packed, as far as its body needs it."""
+    joints, parents = tuple(spec["names"]), tuple(spec["parents"])
+    return Skeleton("", joints, parents, np.array(spec["offsets"]), spec["roles"])
+
+
 def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] = ()) -> dict[str, int]:
     """Label -> index of the link that the part is, for those that the network knows.
 
@@ -91,14 +117,7 @@ def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] =
     """
     found = {}
     for label, upper, lower in PARTS:
-        if upper not in skeleton.roles or lower not in skeleton.roles:
-            continue
-        joint, top = skeleton.role(lower), skeleton.role(upper)
-        way = []
-        while joint != top and skeleton.parents[joint] >= 0:
-            way.append(f"{skeleton.joints[skeleton.parents[joint]]}-{skeleton.joints[joint]}")
-            joint = skeleton.parents[joint]
-        known = [name for name in reversed(way) if name in links]
+        known = [name for name in way(skeleton, upper, lower) if name in links]
         if known:
             best = next((name for name in known if name in hurt), known[0])
             found[label] = list(links).index(best)
@@ -123,6 +142,8 @@ def _constants() -> dict[str, float]:
         "lockAt": feet.LOCK_AT,
         "release": feet.RELEASE,
         "tooFar": feet.TOO_FAR,
+        "fastestTurn": float(controller.FASTEST_TURN),
         "heightMix": feet.HEIGHT_MIX,
         "floating": feet.FLOATING,
+        "mostAdded": feet.MOST_ADDED,
     }

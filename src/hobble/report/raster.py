@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from hobble.core.quat import Array
-from hobble.report.loft import part_of_vertex, triangles, vertices
+from hobble.figure.mesh import Mesh
 
 FINE = 2  # pixels of the body to a pixel of the picture, a side
 PAPER = np.array([0.953, 0.945, 0.925])
@@ -58,15 +58,18 @@ class Camera:
 
 
 class Studio:
-    """Draws one body in any pose; what does not change from frame to frame is worked out once."""
+    """Draws one body in any pose; `regions`: for each of its bones the links that colour it."""
 
-    def __init__(self, body: Mapping[str, Any]) -> None:
-        self._body, self._faces = body, triangles(body)
-        self._parts = part_of_vertex(body)
+    def __init__(self, body: Mesh, regions: Sequence[Sequence[int]] = ()) -> None:
+        self._body, self._faces = body, body.faces
+        self._regions = [list(links) for links in regions] or [[] for _ in body.bones]
 
-    def draw(self, points: Array, camera: Camera, severity: Array | None = None) -> NDArray[np.uint8]:
-        """An RGB picture (size, size, 3). points: (joints kept, 3), cm; severity: (links,), as colours."""
-        corners = vertices(self._body, points)
+    def draw(
+        self, places: Array, turns: Array, camera: Camera, severity: Array | None = None
+    ) -> NDArray[np.uint8]:
+        """An RGB picture (size, size, 3). places (B, 3), cm, and turns (B, 4) of the bones; severity:
+        (links,), as colours."""
+        corners = self._body.posed(places, turns)
         key = np.array([0.55 * np.sin(camera.yaw - 0.85), 0.78, 0.55 * np.cos(camera.yaw - 0.85)])
         key /= np.linalg.norm(key)
         rim = np.array([0.9 * np.sin(camera.yaw + 2.5), 0.35, 0.9 * np.cos(camera.yaw + 2.5)])
@@ -78,8 +81,7 @@ class Studio:
         ground *= 1 - 0.42 * gaussian_filter(cover, camera.size / 130)[..., None]
         normals = _normals(corners, self._faces)
         tone = (
-            0.50
-            + 0.10 * normals[:, 1]
+            (0.50 + 0.10 * normals[:, 1]) * (0.55 + 0.45 * self._body.shade)
             + 0.58 * np.maximum(normals @ key, 0)
             + 0.16 * np.maximum(normals @ rim, 0) ** 2
         )
@@ -91,14 +93,14 @@ class Studio:
 
     def _colours(self, severity: Array | None) -> Array:
         """RGB of every corner: grey where healthy, over amber to red where hurt."""
-        parts = np.tile(BODY, (len(self._body["parts"]), 1))
+        bones = np.tile(BODY, (len(self._body.bones), 1))
         if severity is not None:
-            for i, links in enumerate(self._body["parts"]):
+            for i, links in enumerate(self._regions):
                 t = max((float(severity[link]) for link in links), default=0.0) / 10
                 if t:
                     low = BODY + (HURT_LOW - BODY) * min(1.0, 0.35 + 1.3 * t)
-                    parts[i] = low if t < 0.5 else HURT_LOW + (HURT_HIGH - HURT_LOW) * (2 * t - 1)
-        return parts[self._parts]
+                    bones[i] = low if t < 0.5 else HURT_LOW + (HURT_HIGH - HURT_LOW) * (2 * t - 1)
+        return np.einsum("vk,vkc->vc", self._body.share, bones[self._body.bone])
 
 
 @functools.lru_cache(maxsize=4)

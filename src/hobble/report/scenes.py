@@ -10,8 +10,13 @@ import numpy as np
 
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.figure.fit import fitted_rotations
+from hobble.figure.mesh import body, key
+from hobble.figure.pack import packed_turns, regions
 from hobble.models.packing import packed
-from hobble.report.body import body
+from hobble.report.words import spoken, spoken_links
+from hobble.runtime.export import jointed
 
 FPS = 30
 UNIT = 0.01  # centimetres of one step of the 16-bit joint positions
@@ -32,38 +37,48 @@ WORDS = {
 def scenes(path: str | Path, skeleton: Mapping[str, Any], links: Sequence[str] = ()) -> dict[str, Any]:
     """What the page's figure plays, from `runtime/scenarios.npz`.
 
-    skeleton: roles of the joints, as the network's file carries them. links: names of all links, for colours.
-    Joint positions are kept at 30 Hz, relative to the root joint, in 16-bit steps of 0.1 mm.
+    skeleton: as the network's file carries it. links: names of all links, for colours. Places of bones are
+    kept at 30 Hz, relative to the root joint, in 16-bit steps of 0.1 mm, their rotations in 16 bits too.
     """
     data = load_npz(path)
-    joints = [str(name) for name in data["joints"]]
-    parents = [int(p) for p in data["parents"]]
-    roles = dict(skeleton.get("roles") or {})
+    if not skeleton:
+        return {}
+    figure = Skeleton.from_dict({"name": "", **skeleton})
     stride = max(1, round(float(data["fps"]) / FPS))
     names = [str(name) for name in data["names"]]
-    feet = [joints.index(roles[r]) for r in FEET] if all(r in roles for r in FEET) else []
-    dressed = body(joints, parents, roles, links, feet)
-    keep = dressed["keep"]
+    keep = body(figure).bones.tolist()
+    at = [figure.role(r) if figure.roles.get(r) in figure.joints else -1 for r in FEET]
     return {
         "fps": float(data["fps"]) / stride,
         "joints": len(keep),
         "unit": UNIT,
         "links": list(links),
-        "feet": [keep.index(j) for j in feet],
-        "body": dressed,
-        "scenarios": [_scenario(data, name, stride, links, keep) for name in names],
+        "spoken": spoken_links(figure, links),
+        "feet": [keep.index(j) for j in at] if all(j in keep for j in at) else [],
+        "body": key(figure),
+        "regions": regions(figure, links),
+        "scenarios": [_scenario(data, name, stride, links, figure, keep) for name in names],
     }
 
 
 def _scenario(
-    data: Mapping[str, Array], name: str, stride: int, links: Sequence[str], keep: list[int]
+    data: Mapping[str, Array],
+    name: str,
+    stride: int,
+    links: Sequence[str],
+    figure: Skeleton,
+    keep: list[int],
 ) -> dict[str, Any]:
     positions = np.asarray(data[f"{name}/positions"], float)[::stride]
+    rotations = data.get(f"{name}/rotations")
+    rotations = (
+        fitted_rotations(figure, positions) if rotations is None else np.asarray(rotations, float)[::stride]
+    )
     out: dict[str, Any] = {
         "name": readable(name),
         "description": WORDS.get(name, ""),
         "frames": len(positions),
-        **pack_positions(positions, keep),
+        **packed_motion(figure, positions, rotations, keep),
     }
     contacts, phase = data.get(f"{name}/contacts"), data.get(f"{name}/phase")
     if contacts is not None:
@@ -77,8 +92,19 @@ def _scenario(
         table = np.zeros((len(positions), len(links)), np.uint8)
         table[:, list(links).index(hurt)] = np.clip(np.round(25 * severity), 0, 250)
         out["severity"] = packed(table)
-        out["description"] = f"Walks while {hurt} hurts more and more"
+        out["description"] = f"Walks while the {spoken(figure, hurt)} hurts more and more"
     return out
+
+
+def packed_motion(
+    figure: Skeleton, positions: Array, rotations: Array, keep: Sequence[int]
+) -> dict[str, str]:
+    """Motion (F, J, 3) and (F, J, 4) as it is drawn: bones keep their lengths, and rotations decide.
+
+    `root`, `pose`: of `pack_positions`; `turn`: rotations of the joints to keep, of `packed_turns`.
+    """
+    world, places = jointed(figure, positions, rotations)
+    return {**pack_positions(places, keep), "turn": packed_turns(world[:, keep])}
 
 
 def pack_positions(positions: Array, keep: Sequence[int] | slice = slice(None)) -> dict[str, str]:

@@ -11,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_json
 from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.figure.mesh import body
+from hobble.figure.pack import regions
 from hobble.models.network import Network
-from hobble.report.body import body
 from hobble.report.playable import PRESETS, body_parts
 from hobble.report.raster import GRID, Camera, Studio
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.export import export_bvh, fitted_skeleton
+from hobble.runtime.export import export_bvh, fitted_skeleton, jointed
 from hobble.runtime.options import Runtime
 
 SEVERITY = 8.0
@@ -73,8 +76,8 @@ def write_stimuli(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     skeleton = network.skeleton
-    dressed = body(skeleton.joints, skeleton.parents, skeleton.roles, network.links)
-    studio, rows = Studio(dressed), []
+    figure, rows = body(skeleton), []
+    studio = Studio(figure, regions(skeleton, network.links))
     healthy, trained = walk(network, {}, runtime), hurt_in_training(network)
     for name, hurt, shown in wanted(network):
         loop = walk(network, hurt, runtime) if hurt else healthy
@@ -83,7 +86,7 @@ def write_stimuli(
             own = fitted_skeleton(skeleton, loop.positions, loop.rotations)
         export_bvh(folder / f"{name}.bvh", name, own, loop.positions, loop.rotations)
         severity = np.array([hurt.get(link, 0.0) for link in network.links]) if shown else None
-        save_loop(folder / f"{name}.webp", frames(studio, dressed, loop, severity, size))
+        save_loop(folder / f"{name}.webp", frames(studio, skeleton, loop, severity, size))
         seconds = len(loop.positions) / 60
         rows.append(
             {
@@ -187,23 +190,25 @@ def cut(positions: Array) -> tuple[int, int, float]:
 
 
 def frames(
-    studio: Studio, dressed: Mapping[str, Any], loop: Loop, severity: Array | None, size: int
+    studio: Studio, skeleton: Skeleton, loop: Loop, severity: Array | None, size: int
 ) -> list[NDArray[np.uint8]]:
     """The pictures of a loop. The camera goes along evenly, and the grid under it by whole meshes a round."""
-    count, keep = len(loop.positions), dressed["keep"]
+    count, keep = len(loop.positions), body(skeleton).bones
+    world, places = jointed(skeleton, loop.positions, loop.rotations)
     start, yaw = loop.positions[0, 0], np.arctan2(loop.way[0], loop.way[2])
     middle = loop.positions[:, 0].mean(axis=0) - loop.way * (count - 1) / count / 2 - start
     length = float(np.linalg.norm(loop.way))
     even = max(1, round(length / GRID)) * GRID / max(length, 1e-9)
     turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
+    turns = quat.mul(quat.yaw(-yaw), world[:, keep])
     out = []
     for f in range(0, count - count % STRIDE, STRIDE):
         gone = loop.way * f / count
-        points = (loop.positions[f, keep] - start - gone - middle * [1, 0, 1]) @ turn.T
-        points[:, 1] = loop.positions[f, keep, 1]
+        points = (places[f, keep] - start - gone - middle * [1, 0, 1]) @ turn.T
+        points[:, 1] = places[f, keep, 1]
         travelled = np.array([0.0, 0.0, length * f / count * even])
         camera = Camera(np.array([0.0, 82.0, 0.0]) + travelled, size=size)
-        out.append(studio.draw(points + travelled, camera, severity))
+        out.append(studio.draw(points + travelled, turns[f], camera, severity))
     return out
 
 

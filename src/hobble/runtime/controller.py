@@ -18,13 +18,16 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
+from hobble.character import rule
 from hobble.core.quat import Array
 from hobble.models.network import Predictor
 from hobble.rows.layout import BODY
 from hobble.runtime import feet, trajectory
 from hobble.runtime.character import Character
 
+met = register_jitable(rule.met)
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
 # Radians a frame (1500 degrees a second). No joint of a person who walks or runs turns as fast, but a
@@ -143,8 +146,8 @@ class Controller:
             self._foot_ground[:] = 0.0
         feet.place_feet(
             self.y, self.layout.y_contacts.start, self._foot_ground, self.foot_locking, self._legs,
-            self._carried, self._sole, c.foot_lock, c.foot_hold, c.foot_lift, self.pose_position,
-            self.pose_rotation,
+            self._carried, self._sole, c.foot_lock, c.foot_hold, c.foot_lift, c.foot_added,
+            self.pose_position, self.pose_rotation,
         )  # fmt: skip
 
     def _update(self, velocity: Array) -> None:
@@ -224,9 +227,9 @@ def _take_output(
             velocities[c, j, 2] = y[c, v + 2] * cos - y[c, v] * sin
             new_x = y[c, p] * cos + y[c, p + 2] * sin + root[c, 0]
             new_z = y[c, p + 2] * cos - y[c, p] * sin + root[c, 2]
-            joints[c, j, 0] = 0.5 * (joints[c, j, 0] + velocities[c, j, 0] + new_x)
-            joints[c, j, 1] = 0.5 * (joints[c, j, 1] + velocities[c, j, 1] + y[c, p + 1] + root[c, 1])
-            joints[c, j, 2] = 0.5 * (joints[c, j, 2] + velocities[c, j, 2] + new_z)
+            joints[c, j, 0] = met(joints[c, j, 0] + velocities[c, j, 0], new_x)
+            joints[c, j, 1] = met(joints[c, j, 1] + velocities[c, j, 1], y[c, p + 1] + root[c, 1])
+            joints[c, j, 2] = met(joints[c, j, 2] + velocities[c, j, 2], new_z)
             rx, ry, rz = y[c, r], y[c, r + 1], y[c, r + 2]
             half = np.sqrt(rx * rx + ry * ry + rz * rz)
             scale = np.sin(half) / half if half > 1e-8 else 1.0

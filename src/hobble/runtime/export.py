@@ -26,14 +26,24 @@ def motion_clip(name: str, skeleton: Skeleton, positions: Array, rotations: Arra
     rotations and positions differ by some millimetres, which at the feet is seen as sliding: legs are bent so
     that heels come to where they were predicted.
     """
-    root = np.asarray(positions[:, 0], float)
-    local = local_rotations(skeleton, rotations)
-    world, reached = forward_kinematics(skeleton, local, root)
+    world, _ = jointed(skeleton, positions, rotations)
+    local = quat.continuous(local_rotations(skeleton, world))
+    return Clip(name, skeleton, FPS, local, np.asarray(positions[:, 0], float))
+
+
+def jointed(skeleton: Skeleton, positions: Array, rotations: Array) -> tuple[Array, Array]:
+    """World rotations (F, J, 4) and positions (F, J, 3) of a body whose bones keep their lengths.
+
+    The root is where it was predicted, rotations decide all else, and legs are bent so that toes come to
+    where they were predicted.
+    """
+    local = local_rotations(skeleton, np.asarray(rotations, float))
+    world, reached = forward_kinematics(skeleton, local, np.asarray(positions[:, 0], float))
     for leg in leg_joints(skeleton):
         heel, toe = leg[2], leg[3]
         _reach(world, reached, leg, positions[:, toe] - reached[:, toe] + reached[:, heel])
-    local = quat.continuous(local_rotations(skeleton, world))
-    return Clip(name, skeleton, FPS, local, root)
+    local = local_rotations(skeleton, world)
+    return forward_kinematics(skeleton, local, np.asarray(positions[:, 0], float))
 
 
 def _reach(world: Array, positions: Array, leg: Array, target: Array) -> None:

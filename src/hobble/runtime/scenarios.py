@@ -142,8 +142,9 @@ def generate(network: Network, npz: str | Path, bvh: str | Path, options: Runtim
     """Run every scenario and write `npz` and, into the folder `bvh`, a BVH file each.
 
     npz: names (N,), joints (J,), parents (J,), fps; for scenario <name>: <name>/positions (F, J, 3) float32
-    cm, <name>/contacts (F, 4), <name>/phase (F,), <name>/gait (F,) str, <name>/target (F, 2), <name>/root (F,
-    3), <name>/severity (F,) float32, <name>/hurt: the hurt link or "".
+    cm, <name>/rotations (F, J, 4) world, w first, <name>/contacts (F, 4), <name>/phase (F,), <name>/gait (F,)
+    str, <name>/target (F, 2), <name>/root (F, 3), <name>/severity (F,) float32, <name>/hurt: the hurt link or
+    "".
     """
     assert network.skeleton is not None
     arrays: dict[str, Any] = {}
@@ -151,7 +152,7 @@ def generate(network: Network, npz: str | Path, bvh: str | Path, options: Runtim
     for track in write_motions(network, bvh, options):
         name = track.scenario.name
         names.append(name)
-        for key in ("positions", "contacts", "phase", "target", "root", "severity"):
+        for key in ("positions", "rotations", "contacts", "phase", "target", "root", "severity"):
             arrays[f"{name}/{key}"] = getattr(track, key).astype(np.float32)
         arrays[f"{name}/gait"] = track.gait
         arrays[f"{name}/hurt"] = np.array(track.scenario.hurt or "")

@@ -11,8 +11,12 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
+from hobble.character import rule
 from hobble.rows.layout import RowLayout
+
+phase_change, moving_share = register_jitable(rule.phase_change), register_jitable(rule.moving)
 
 STEERING_LIMIT = 2.0  # with 1, a network that saw few starts stands for seconds before it sets off
 TARGET_MIX = 0.9
@@ -186,7 +190,7 @@ def advance(
                 direction[c, i, k] = direction[c, i + 1, k]
             for k in range(gait.shape[2]):
                 gait[c, i, k] = gait[c, i + 1, k]
-        moving = max(0.0, 1.0 - gait[c, middle, 0]) ** 0.25
+        moving = moving_share(gait[c, middle, 0])
         yaw = np.arctan2(direction[c, middle, 0], direction[c, middle, 1])
         sin, cos = np.sin(yaw), np.cos(yaw)
         vx, vz = y[c, at[0]], y[c, at[0] + 1]
@@ -217,7 +221,7 @@ def advance(
             norm = max(np.sqrt(x * x + z * z), 1e-6)
             direction[c, i, 0] = (x * cos + z * sin) / norm
             direction[c, i, 1] = (z * cos - x * sin) / norm
-        change = (0.9 * moving + 0.1) * y[c, at[2]]
+        change = phase_change(moving, y[c, at[2]])
         phase[c] = phase[c] + change - np.floor(phase[c] + change)
 
 

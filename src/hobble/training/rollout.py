@@ -5,9 +5,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from hobble.character.rule import met
 from hobble.database.reader import Database
-
-HALF = 0.5  # where a joint is carried by its velocity, and where it is predicted, meet
 
 
 class RollOut:
@@ -62,7 +61,7 @@ class RollOut:
         rows = len(error)
         place, speed = error[:, self.y_place], error[:, self.y_speed]
         made = place * self.place_of_place + speed * self.place_of_speed
-        self.place[:rows].add_(made).mul_(HALF)
+        self.place[:rows] = met(self.place[:rows], made)
         torch.mul(speed, self.speed_of_speed, out=self.speed[:rows])
         self.batches += 1
         ended = slice(self.batches % self.frames, None, self.frames)

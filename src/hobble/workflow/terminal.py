@@ -56,7 +56,7 @@ class Terminal:
         self.running: dict[int, Job] = {}
         self.failed: list[Job] = []
         self.done = self.total = 0
-        self.stopped = self.told = self.shown = False
+        self.stopped = self.told = self.shown = self.closed = False
 
     def take(self, record: logging.LogRecord) -> None:
         """Say what there is to say of a record of Snakemake's logger."""
@@ -68,10 +68,11 @@ class Terminal:
             self._words(record)
 
     def close(self) -> None:
-        """The summary, where jobs have run."""
+        """The summary, where jobs have run; once, though logging closes handlers again at exit."""
         self._wipe()
-        if self.dryrun or not (self.jobs or self.failed):
+        if self.closed or self.dryrun or not (self.jobs or self.failed):
             return
+        self.closed = True
         took = _duration(self.now() - self.began)
         count = f"{self.done} of {self.total or len(self.jobs)} jobs done in {took}"
         if self.failed:

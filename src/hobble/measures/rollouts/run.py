@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from hobble.character.rule import met, moving, phase_change
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.evaluation.captured import turned, unbroken
@@ -36,7 +37,6 @@ from hobble.rows.layout import GAITS, RowLayout
 LENGTHS = (1, 10, 60, 300)  # frames
 OVERLAP = 10  # roll-outs of one length that every frame lies in
 BATCH = 1024  # roll-outs side by side
-HALF = 0.5  # where a joint is carried by its velocity, and where it is predicted, meet
 
 log = logging.getLogger("hobble")
 
@@ -107,7 +107,7 @@ def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
         rows.p[chosen].astype(float),
         y[:, layout.y_turn][:, 0].astype(float),
         y[:, layout.y_root_velocity].astype(float),
-        np.maximum(0.0, 1.0 - stand) ** 0.25,
+        moving(stand),
     )
 
 
@@ -143,9 +143,9 @@ def roll_out(
         before = row[:, layout.x_joint_position].reshape(alive, -1, 3).astype(float)
         speed[:alive] = y[:, layout.y_joint_velocity].reshape(alive, -1, 3)
         guess = y[:, layout.y_joint_position].reshape(alive, -1, 3)
-        place[:alive] = HALF * (_carried(before, asked, at) + speed[:alive] + guess)
+        place[:alive] = met(_carried(before, asked, at) + speed[:alive], guess)
         made.append(place[:alive].copy())
-        moved = (0.9 * asked.moving[at] + 0.1) * y[:, layout.y_phase_change][:, 0]
+        moved = phase_change(asked.moving[at], y[:, layout.y_phase_change][:, 0])
         phase[:alive] = np.mod(phase[:alive] + moved, 1.0)
     return made, phase
 

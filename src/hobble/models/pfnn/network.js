@@ -11,7 +11,7 @@ export const createNetwork = (spec) => {
     return { rows, columns, w, b: floats(biases), out: new Float32Array(rows) };
   });
   const K = spec.network.layers[0].points, mean = floats(spec.xMean), inverse = floats(spec.xScale);
-  const yMean = floats(spec.yMean), yStd = floats(spec.yStd), z = new Float32Array(mean.length);
+  const seen = Int32Array.from(spec.seen), yMean = floats(spec.yMean), yStd = floats(spec.yStd), z = new Float32Array(mean.length);
   const index = new Int32Array(4), share = new Float64Array(4);
 
   const around = (phase) => {
@@ -38,9 +38,9 @@ export const createNetwork = (spec) => {
     }
     return out;
   };
-  // x: inputs as they are; returns the outputs as they are, in an array that the next call writes over.
+  // x: inputs as they are, of which those that weigh nothing are not looked at; returns the outputs as they are, in an array that the next call writes over.
   return (x, phase) => {
-    for (let c = 0; c < z.length; c++) z[c] = (x[c] - mean[c]) * inverse[c];
+    for (let c = 0; c < z.length; c++) z[c] = (x[seen[c]] - mean[c]) * inverse[c];
     around(phase);
     let h = z;
     layers.forEach((one, l) => { h = layer(one, h, l === layers.length - 1); });

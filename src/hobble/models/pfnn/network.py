@@ -8,6 +8,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.models.checks import layers, numbers
@@ -87,11 +90,12 @@ class Pfnn(Network):
         """As in `Network`: mode "constant" (50 phases), "linear" (10, blended) or "cubic" (exact)."""
         return PfnnPredictor(self, mode or "cubic", storage)
 
-    def page(self, outputs: int) -> dict[str, Any]:
+    def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`: control points as integers with a factor for each row."""
-        cut = [*self.weights[:-1], self.weights[-1][:, :outputs]]
-        cut_biases = [*self.biases[:-1], self.biases[-1][:, :outputs]]
-        return {"layers": [packed_rows(w, b) for w, b in zip(cut, cut_biases, strict=True)]}
+        weights, biases = list(self.weights), list(self.biases)
+        weights[0] = weights[0][:, :, inputs]
+        weights[-1], biases[-1] = weights[-1][:, outputs], biases[-1][:, outputs]
+        return {"layers": [packed_rows(w, b) for w, b in zip(weights, biases, strict=True)]}
 
     @property
     def exports(self) -> dict[str, Export]:

@@ -1,13 +1,14 @@
-// One character that is played: the controller, its figure, what it leaves on the ground, and its last seconds.
+// One character that is played: the controller, its body and figure, what it leaves on the ground, and its last seconds.
 import { createCharacter } from "./character.js";
 import { createFigure } from "./figure.js";
 import { severityColour } from "./paint.js";
+import { createRig } from "./rig.js";
 
 const KEPT = 1200; // frames that can be saved as motion
 
-export const createActor = (view, spec, { place = [0, 0], tint = null } = {}) => {
-  const figure = createFigure(view, spec.body), { keep } = spec.body, stood = [false, false];
-  const actor = { spec, figure, falls: 0, milliseconds: 0, frames: [] };
+export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = false } = {}) => {
+  const figure = createFigure(view, spec.body, spec.regions, { ghost }), rig = createRig(spec), stood = [false, false];
+  const actor = { spec, figure, rig, place, falls: 0, milliseconds: 0, frames: [] };
   let trail = [], floor = () => 0;
 
   actor.start = (height) => {
@@ -16,41 +17,49 @@ export const createActor = (view, spec, { place = [0, 0], tint = null } = {}) =>
     actor.frames = [];
     trail = [];
   };
-  const point = (j) => {
-    const at = actor.character.pose;
-    return [at[3 * j], at[3 * j + 1], at[3 * j + 2]];
-  };
-  const sole = (j) => { const [x, , z] = point(j); return [x, floor(x, z), z]; };
+  const sole = (j) => { const [x, z] = [rig.places[3 * j], rig.places[3 * j + 2]]; return [x, floor(x, z), z]; };
 
   actor.frame = ({ velocity, ahead, gait }, severity) => {
     const c = actor.character, before = performance.now();
-    spec.links.forEach((link, l) => { c.wished[l] = severity.get(link) / spec.severityScale; });
+    spec.links.forEach((link, l) => { c.wished[l] = (severity.get(link) || 0) / spec.severityScale; });
     c.frame(velocity, ahead, gait, floor);
+    rig.take(c.pose, c.turns);
     actor.milliseconds += .05 * (performance.now() - before - actor.milliseconds);
-    actor.frames.push(Float32Array.from(c.pose));
+    actor.frames.push(Float32Array.from([...rig.places.subarray(0, 3), ...rig.turns]));
     if (actor.frames.length > KEPT) actor.frames.shift();
     trail.forEach((print) => { print.age++; });
     trail = trail.filter((print) => print.age < 360);
     spec.legs.forEach(([, , heel, toe], f) => {
       const down = c.lock[f] === 1;
-      if (down && !stood[f]) trail.push({ from: sole(heel), to: sole(toe), age: 0 });
+      if (down && !stood[f]) trail.push({ from: sole(heel), to: sole(toe), age: 0, side: f });
       stood[f] = down;
     });
     if (!c.pose.every(Number.isFinite)) { actor.falls++; actor.start(floor); } // a network that has learnt nothing runs away
   };
-  actor.draw = () => {
-    const c = actor.character, { paint, marks } = view, healthy = tint ? paint[tint] : paint.body;
-    for (const { from, to, age } of trail) marks.print(from, to, paint.ink, (paint.dark ? .2 : .3) * (1 - age / 360));
+  const drawGround = (way) => {
+    if (way === null) return;
+    const c = actor.character, { paint, marks } = view;
+    for (const { from, to, age } of trail) marks.print(from, to, paint.ink, (paint.dark ? .16 : .13) * (1 - age / 360));
+    if (!way) return;
     for (let i = 5; i < c.px.length; i += 5) {
       const [a, b] = [i - 5, i].map((t) => [c.px[t], floor(c.px[t], c.pz[t]) + .2, c.pz[t]]);
-      marks.strip(a, b, 2.2, tint ? healthy : paint.accent, i > c.px.length / 2 ? .85 : .35);
+      marks.strip(a, b, 2.2, tint ? paint[tint] : paint.accent, i > c.px.length / 2 ? .85 : .35);
     }
-    figure.pose((j) => point(keep[j]), (links) => {
+  };
+  // way: whether the path that the network was and is about to take is drawn on the ground; null: nothing is, no prints either.
+  actor.draw = (way = true) => {
+    const c = actor.character, { paint } = view, healthy = tint ? paint[tint] : paint.body;
+    drawGround(way);
+    figure.take(rig);
+    figure.pose((links) => {
       const most = Math.max(0, ...links.map((l) => c.severity[l])) * spec.severityScale;
       return severityColour(paint, most, healthy);
     });
   };
-  // The links, by name, of the part under a point of the screen.
-  actor.under = (x, y) => figure.under(x, y)?.map((l) => spec.links[l]) ?? null;
+  // What is under a point of the screen: {links, by name, that were hurt in training; deep}; null where nothing is.
+  actor.under = (x, y) => {
+    const found = figure.under(x, y);
+    return found && { deep: found.deep, links: found.links.map((l) => spec.links[l]) };
+  };
   return actor;
 };

@@ -1,7 +1,7 @@
-// Captured (grey) and predicted (blue, seen through), with the distance between them along the time.
+// Captured (seen through) and predicted (blue), with the distance between them along the time.
 import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
-import { bytes, mix } from "./numbers.js";
+import { createMotion } from "./motion.js";
 import { createView } from "./view.js";
 
 (() => {
@@ -11,20 +11,10 @@ import { createView } from "./view.js";
 
   const unpack = (index) => {
     if (!unpacked.has(index)) {
-      const c = shown.clips[index];
-      unpacked.set(index, {
-        ...c, root: new Float32Array(bytes(c.root)), pose: new Int16Array(bytes(c.pose)),
-        guess: new Int16Array(bytes(c.predicted)),
-      });
+      const c = shown.clips[index], of = (motion) => createMotion(motion, J, shown.unit);
+      unpacked.set(index, { ...c, captured: of(c.captured), predicted: of(c.predicted) });
     }
     return unpacked.get(index);
-  };
-  const at = (c, table, frame) => Array.from({ length: J }, (_, j) => (
-    [0, 1, 2].map((i) => c.root[3 * frame + i] + table[3 * (frame * J + j) + i] * shown.unit)));
-  const between = (c, table, time) => {
-    const f = Math.min(c.frames - 1, Math.floor(time)), g = Math.min(c.frames - 1, f + 1);
-    const [a, b] = [at(c, table, f), at(c, table, g)];
-    return a.map((p, j) => mix(p, b[j], time - f));
   };
 
   let clip, time = 0, playing = false, apart = 0, last = null;
@@ -32,14 +22,16 @@ import { createView } from "./view.js";
     if (playing && last !== null) time = (time + Math.min(.1, (now - last) / 1000) * shown.fps) % Math.max(1, clip.frames - 1);
     last = playing ? now : null;
     slider.value = time;
-    const { paint } = view, body = between(clip, clip.pose, time), guess = between(clip, clip.guess, time);
-    const [x, , z] = body[0], yaw = view.orbit.yaw;
+    const { paint } = view, yaw = view.orbit.yaw, { roots } = clip.captured, at = 3 * Math.min(clip.frames - 1, Math.floor(time));
+    const [x, z] = [roots[at], roots[at + 2]];
     view.aim([x, 82, z]);
-    view.land.around([x, 0, z], () => 0);
+    view.land.around([x, 0, z]);
     const aside = [apart * Math.cos(yaw), -apart * Math.sin(yaw)]; // to the right as seen
-    captured.pose((j) => body[j], () => paint.body);
-    predicted.pose((j) => [guess[j][0] + aside[0], guess[j][1], guess[j][2] + aside[1]], () => paint.predicted);
-    predicted.mesh.castShadow = apart > 0;
+    clip.captured.show(captured, time);
+    clip.predicted.show(predicted, time, aside);
+    captured.pose(() => (apart ? paint.body : paint.ghost));
+    predicted.pose(() => paint.predicted);
+    view.land.under([...predicted.balls(), ...(apart ? captured.balls() : [])]);
     const f = Math.min(clip.frames - 1, Math.round(time));
     const split = clip.split === "held_out" ? "held out: never seen in training" : "a training clip";
     find("compare-reading").replaceChildren(split, document.createElement("br"), `${clip.error[f].toFixed(1)} cm a joint apart`);
@@ -48,7 +40,7 @@ import { createView } from "./view.js";
     find("compare-mark").setAttribute("x2", time);
     if (playing) view.ask();
   });
-  const captured = createFigure(view, shown.body), predicted = createFigure(view, shown.body, { opacity: .62, casts: false });
+  const captured = createFigure(view, shown.body, [], { ghost: true }), predicted = createFigure(view, shown.body);
   view.onHidden = () => { last = null; };
 
   const play = (on) => {

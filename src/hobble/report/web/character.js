@@ -2,6 +2,7 @@
 // that one set of vectors tests both. Centimetres, 60 Hz, yaw 0 faces +Z and grows toward +X.
 import { networks } from "networks"; // by kind; the bundle gathers them from the folders of hobble.models
 import { bytes, dot, minus } from "./numbers.js";
+import { at4, between, multiply, rotate } from "./turns.js";
 
 export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const { joints: J, step, x: X, y: Y, gaits, constants: k } = spec, T = 2 * spec.window, M = spec.window;
@@ -14,9 +15,22 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const c = {
     px: filled(T, place[0]), pz: filled(T, place[1]), dx: filled(T, sin(heading)), dz: filled(T, cos(heading)),
     gait: filled(T * G, 0), ground: filled(S * 3, 0), height: 0, phase: 0, joints: filled(3 * J, 0),
-    velocities: filled(3 * J, 0), pose: filled(3 * J, 0), severity: filled(L, 0), wished: filled(L, 0),
+    velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), severity: filled(L, 0), wished: filled(L, 0),
     velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, owed: [0, 0], lock: [0, 0],
-    hold: [[0, 0], [0, 0]], lift: [0, 0], contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
+    hold: [[0, 0], [0, 0]], lift: [0, 0], added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
+  };
+  // The rotation at `i` of the outputs, an axis times half the angle, turned about Y with the root; into q.
+  const q = [1, 0, 0, 0];
+  const turned = (y, i, co, si) => {
+    const half = hypot(y[i], y[i + 1], y[i + 2]), scale = half > 1e-8 ? sin(half) / half : 1, w = cos(half);
+    const [a, b, d] = [y[i] * scale, y[i + 1] * scale, y[i + 2] * scale];
+    [q[0], q[1], q[2], q[3]] = [co * w - si * b, co * a + si * d, co * b + si * w, co * d - si * a];
+  };
+  // The rotations of this frame; joints that move nothing stay at rest on the one above.
+  const rests = spec.parents.flatMap((p, j) => (p < 0 || spec.turning.includes(j) ? [] : [[j, p]]));
+  const settle = () => {
+    c.turns.set(c.rotations);
+    for (const [j, p] of rests) for (let i = 0; i < 4; i++) c.turns[4 * j + i] = c.turns[4 * p + i];
   };
   for (let t = 0; t < T; t++) c.gait[t * G + gaits.indexOf("stand")] = 1;
   for (let j = 0; j < J; j++) {
@@ -26,6 +40,11 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     c.joints[3 * j + 2] = d * cos(heading) - a * sin(heading) + place[1];
   }
   c.pose.set(c.joints);
+  spec.turning.forEach((j, n) => {
+    turned(mean, Y.joint_rotation + 3 * n, cos(heading / 2), sin(heading / 2));
+    c.rotations.set(q, 4 * j);
+  });
+  settle();
 
   // Wishes, as `ProceduralAnimation.next_pose` takes them: velocity [x, z], facing [x, z] or null, gait or null.
 
@@ -146,7 +165,22 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
         c.joints[j + i] = .5 * (c.joints[j + i] + velocity[i] + point[i]);
       }
     }
+    // No joint turns further than fastestTurn in a frame, along the shorter way.
+    const yaw = atan2(si, co), halfCos = cos(yaw / 2), halfSin = sin(yaw / 2), slowest = cos(k.fastestTurn / 2);
+    for (let n = 0; n < spec.turning.length; n++) {
+      const o = 4 * spec.turning[n], old = c.rotations;
+      turned(y, Y.joint_rotation + 3 * n, halfCos, halfSin);
+      const near = old[o] * q[0] + old[o + 1] * q[1] + old[o + 2] * q[2] + old[o + 3] * q[3];
+      let keep = 0, take = 1;
+      if (abs(near) < slowest) {
+        const whole = Math.acos(abs(near));
+        keep = sin(whole - k.fastestTurn / 2) / sin(whole);
+        take = sin(k.fastestTurn / 2) / sin(whole) * (near >= 0 ? 1 : -1);
+      }
+      for (let i = 0; i < 4; i++) old[o + i] = keep * old[o + i] + take * q[i];
+    }
     c.pose.set(c.joints);
+    settle();
     for (let i = 0; i < 4; i++) c.contacts[i] = y[Y.contacts + i];
     for (let f = 0; f < 2; f++) placeFoot(f, ground);
   };
@@ -204,11 +238,33 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     const up = max(...sunk), rise = max(up, 0) + c.lock[f] * min(up + k.floating, 0);
     c.lift[f] += k.heightMix * (rise - c.lift[f]);
     away = away.map((v) => v * c.lock[f]);
-    if (abs(away[0]) + abs(away[1]) + abs(c.lift[f]) < 1e-4) return;
     const before = Array.from(at(heel));
-    reach(at(hip), at(knee), at(heel), [away[0], c.lift[f], away[1]]);
+    bend(at(hip), at(knee), at(heel), [away[0], c.lift[f], away[1]], hip, knee, c.added[f]);
     const moved = at(heel).map((v, i) => v - before[i]);
     for (const j of spec.carried[f]) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
+  };
+  // `held` turned to `aim`, by mostAdded at most; whether that was too little.
+  const approach = (held, aim) => {
+    const near = held[0] * aim[0] + held[1] * aim[1] + held[2] * aim[2] + held[3] * aim[3], to = near < 0 ? aim.map((v) => -v) : aim;
+    const whole = Math.acos(min(abs(near), 1)), most = .5 * k.mostAdded, late = whole > most;
+    const [keep, take] = late ? [sin(whole - most) / sin(whole), sin(most) / sin(whole)] : [0, 1];
+    for (let i = 0; i < 4; i++) held[i] = keep * held[i] + take * to[i];
+    return late;
+  };
+  // `reach`, thigh and shank turning no further than mostAdded beyond the network's own turn.
+  const bend = (hip, knee, heel, shift, h, n, added) => {
+    const thigh = minus(knee, hip), shank = minus(heel, knee);
+    if (abs(shift[0]) + abs(shift[1]) + abs(shift[2]) > 1e-9) reach(hip, knee, heel, shift);
+    const late = [[thigh, minus(knee, hip)], [shank, minus(heel, knee)]].map(([a, b], i) => approach(added[i], between(a, b)));
+    if (late[0] || late[1]) {
+      const [t, s] = [rotate(added[0], thigh), rotate(added[1], shank)];
+      for (let i = 0; i < 3; i++) {
+        knee[i] = hip[i] + t[i];
+        heel[i] = knee[i] + s[i];
+      }
+    }
+    c.turns.set(multiply(added[0], at4(c.turns, h)), 4 * h);
+    c.turns.set(multiply(added[1], at4(c.turns, n)), 4 * n);
   };
   const reach = (hip, knee, heel, shift) => {
     const thigh = minus(knee, hip), shank = minus(heel, knee);
@@ -231,6 +287,17 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     }
   };
 
+  // Become as another is, `by` [x, z] cm aside.
+  c.follow = (other, by = [0, 0]) => {
+    for (const [name, value] of Object.entries(other)) {
+      if (ArrayBuffer.isView(value)) c[name].set(value);
+      else if (typeof value !== "function") c[name] = structuredClone(value);
+    }
+    for (let t = 0; t < T; t++) { c.px[t] += by[0]; c.pz[t] += by[1]; }
+    for (const points of [c.joints, c.pose]) for (let j = 0; j < 3 * J; j += 3) { points[j] += by[0]; points[j + 2] += by[1]; }
+    for (const hold of c.hold) { hold[0] += by[0]; hold[1] += by[1]; }
+    c.root = [c.root[0] + by[0], c.root[1], c.root[2] + by[1]];
+  };
   c.frame = (velocity, ahead, gait, ground) => {
     const [strafe, direction] = facing(velocity, ahead);
     prepare(velocity, direction, strafe, shares(velocity, direction, gait), ground);

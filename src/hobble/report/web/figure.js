@@ -1,51 +1,127 @@
-// The figure: the surface of a body, moved to a pose and coloured frame by frame.
-import { BufferAttribute, BufferGeometry, Color, Mesh, MeshStandardMaterial } from "three";
-import { corners, partOfCorner, posed, surface } from "./body.js";
+// The figure: one surface, moved by the rotations of its bones and coloured frame by frame.
+import {
+  Bone, Color, DetachedBindMode, Matrix4, MeshStandardMaterial, Quaternion, Skeleton, SkinnedMesh, Vector3,
+} from "three";
+import { bodyOf } from "./bodies.js";
 import { linear } from "./paint.js";
 
-export const createFigure = (view, body, { opacity = 1, casts = true } = {}) => {
-  const geometry = new BufferGeometry(), { corners: count, faces } = surface(body), parts = partOfCorner(body);
-  const place = new BufferAttribute(new Float32Array(3 * count), 3), shade = new BufferAttribute(new Float32Array(3 * count), 3);
-  geometry.setAttribute("position", place);
-  geometry.setAttribute("color", shade);
-  geometry.setIndex(faces);
-  const solid = opacity === 1;
-  const material = new MeshStandardMaterial({ vertexColors: true, roughness: .62, metalness: 0, transparent: !solid, opacity });
-  const mesh = new Mesh(geometry, material), colours = body.parts.map(() => new Color());
-  mesh.frustumCulled = false;
-  mesh.castShadow = casts;
-  mesh.receiveShadow = solid;
-  view.scene.add(mesh);
-
-  const figure = { mesh, tubes: [] };
-  // at(j): place [x, y, z] of a kept joint. colour(links): [r, g, b] of a part, 0 to 255.
-  figure.pose = (at, colour) => {
-    figure.tubes = posed(body, at);
-    corners(figure.tubes, place.array);
-    body.parts.forEach((links, i) => linear(colour(links), colours[i]));
-    for (let v = 0; v < count; v++) {
-      const { r, g, b } = colours[parts[v]];
-      shade.array[3 * v] = r;
-      shade.array[3 * v + 1] = g;
-      shade.array[3 * v + 2] = b;
+// What a figure looks like: solid, or a ghost, which is seen through in the middle and not at its outline.
+const look = (tints, ghost) => {
+  const material = new MeshStandardMaterial({ roughness: .78, metalness: 0, transparent: ghost, depthWrite: !ghost });
+  material.onBeforeCompile = (shader) => {
+    shader.uniforms.tints = tints;
+    shader.vertexShader = `attribute float shade; uniform vec3 tints[${tints.value.length}]; varying vec3 vTint; varying float vShade;
+      ${shader.vertexShader}`.replace("#include <skinning_vertex>", `#include <skinning_vertex>
+      vShade = shade;
+      vTint = tints[int(skinIndex.x)] * skinWeight.x + tints[int(skinIndex.y)] * skinWeight.y
+        + tints[int(skinIndex.z)] * skinWeight.z + tints[int(skinIndex.w)] * skinWeight.w;`);
+    shader.fragmentShader = `varying vec3 vTint; varying float vShade;
+${shader.fragmentShader}`
+      .replace("#include <color_fragment>", "#include <color_fragment>\ndiffuseColor.rgb *= vTint;")
+      .replace("#include <aomap_fragment>", `#include <aomap_fragment>
+        reflectedLight.indirectDiffuse *= mix(.25, 1., vShade);
+        reflectedLight.directDiffuse *= mix(.7, 1., vShade);`);
+    if (ghost) {
+      shader.fragmentShader = shader.fragmentShader.replace("#include <opaque_fragment>", `
+        diffuseColor.a *= mix(.16, .85, pow(1. - abs(dot(normalize(vViewPosition), normal)), 1.7));
+        #include <opaque_fragment>`);
     }
-    place.needsUpdate = shade.needsUpdate = true;
-    geometry.computeVertexNormals();
   };
-  // The links of the part under a point of the screen, the nearest one; null where there is none.
+  material.customProgramCacheKey = () => `figure ${tints.value.length} ${ghost}`;
+  return material;
+};
+
+// body: its name in the page; regions: for each bone the links that colour it.
+export const createFigure = (view, body, regions = [], { ghost = false } = {}) => {
+  const { geometry, inverses, keep, balls } = bodyOf(body), B = keep.length, one = new Vector3(1, 1, 1);
+  const bones = keep.map(() => new Bone()), skeleton = new Skeleton(bones, inverses);
+  const tints = { value: keep.map(() => new Color()) }, meshes = [];
+  const add = (material) => {
+    const mesh = new SkinnedMesh(geometry, material);
+    mesh.bindMode = DetachedBindMode;
+    mesh.bind(skeleton, new Matrix4());
+    mesh.frustumCulled = false;
+    view.scene.add(mesh);
+    meshes.push(mesh);
+    return mesh;
+  };
+  if (ghost) { // first only how far away it is, so that no part of it shows through another
+    const deep = add(new MeshStandardMaterial({ colorWrite: false }));
+    deep.renderOrder = 1;
+  }
+  const mesh = add(look(tints, ghost));
+  mesh.renderOrder = ghost ? 2 : 0;
+  mesh.castShadow = !ghost;
+  mesh.receiveShadow = !ghost;
+
+  const figure = { mesh, keep, places: new Float64Array(3 * B), turns: new Float64Array(4 * B) };
+  const spot = new Vector3(), turn = new Quaternion();
+  // Move to where `figure.places` and `figure.turns` of the bones are; colour(links): [r, g, b] of a part, 0 to 255.
+  figure.pose = (colour) => {
+    const { places: p, turns: q } = figure;
+    for (let b = 0; b < B; b++) {
+      spot.set(p[3 * b], p[3 * b + 1], p[3 * b + 2]);
+      turn.set(q[4 * b + 1], q[4 * b + 2], q[4 * b + 3], q[4 * b]);
+      bones[b].matrixWorld.compose(spot, turn, one);
+      linear(colour(regions[b] || []), tints.value[b]);
+    }
+  };
+  // Take the bones out of arrays of all joints.
+  figure.take = ({ places, turns }) => {
+    keep.forEach((j, b) => {
+      for (let i = 0; i < 3; i++) figure.places[3 * b + i] = places[3 * j + i];
+      for (let i = 0; i < 4; i++) figure.turns[4 * b + i] = turns[4 * j + i];
+    });
+  };
+  // The lowest round parts of the body in the world [x, y, z, cm], for the shade on the ground.
+  figure.balls = (count = 10) => {
+    const out = balls.map(([x, y, z, r], b) => {
+      spot.set(x, y, z).applyMatrix4(bones[b].matrixWorld);
+      return [spot.x, spot.y, spot.z, r];
+    });
+    return out.sort((a, b) => a[1] - b[1]).slice(0, count);
+  };
+  figure.show = (shown, fade = 1) => {
+    for (const each of meshes) each.visible = shown;
+    mesh.material.opacity = fade;
+  };
+  figure.remove = () => { for (const each of meshes) { view.scene.remove(each); each.material.dispose(); } };
+
+  // Where the corners are now, as the graphics card works them out.
+  figure.corners = () => {
+    const moved = inverses.map((inverse, b) => new Matrix4().multiplyMatrices(bones[b].matrixWorld, inverse).elements);
+    const { position, skinIndex, skinWeight } = geometry.attributes, out = new Float64Array(position.array.length);
+    for (let v = 0; v < position.count; v++) {
+      const x = position.array[3 * v], y = position.array[3 * v + 1], z = position.array[3 * v + 2];
+      for (let k = 0; k < 4; k++) {
+        const w = skinWeight.array[4 * v + k] / 255;
+        if (!w) continue;
+        const m = moved[skinIndex.array[4 * v + k]];
+        for (let i = 0; i < 3; i++) out[3 * v + i] += w * (m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i]);
+      }
+    }
+    return out;
+  };
+  // The links of the part under a point of the screen, and how far away it is; null where there is none.
   figure.under = (x, y) => {
+    const corners = figure.corners(), n = corners.length / 3, index = geometry.index.array, seen = new Float64Array(3 * n);
+    for (let v = 0; v < n; v++) seen.set(view.project([corners[3 * v], corners[3 * v + 1], corners[3 * v + 2]]), 3 * v);
     let best = null;
-    figure.tubes.forEach((sections, tube) => sections.slice(1).forEach((section, s) => {
-      const [p, q] = [view.project(sections[s].centre), view.project(section.centre)];
-      const way = [q[0] - p[0], q[1] - p[1]];
-      const t = Math.min(1, Math.max(0, ((x - p[0]) * way[0] + (y - p[1]) * way[1]) / (way[0] ** 2 + way[1] ** 2 || 1)));
-      const off = Math.hypot(x - p[0] - t * way[0], y - p[1] - t * way[1]), deep = p[2] + t * (q[2] - p[2]);
-      const half = Math.max(Math.hypot(...section.u), Math.hypot(...section.v));
-      if (off > view.zoom * half / deep) return;
-      const score = deep + 8 * off * deep / view.zoom / half; // where two overlap, the one whose middle is nearer
-      if (!best || score < best.score) best = { score, part: body.tubes[tube].sections[s + (t > .5 ? 1 : 0)].at(-1) };
-    }));
-    return best && body.parts[best.part];
+    for (let f = 0; f < index.length; f += 3) {
+      const [a, b, c] = [3 * index[f], 3 * index[f + 1], 3 * index[f + 2]];
+      const area = (seen[b] - seen[a]) * (seen[c + 1] - seen[a + 1]) - (seen[b + 1] - seen[a + 1]) * (seen[c] - seen[a]);
+      if (!area) continue;
+      const u = ((seen[b] - x) * (seen[c + 1] - y) - (seen[b + 1] - y) * (seen[c] - x)) / area;
+      const w = ((seen[c] - x) * (seen[a + 1] - y) - (seen[c + 1] - y) * (seen[a] - x)) / area;
+      if (u < 0 || w < 0 || u + w > 1) continue;
+      const deep = u * seen[a + 2] + w * seen[b + 2] + (1 - u - w) * seen[c + 2];
+      if (!best || deep < best.deep) best = { deep, corner: index[f] };
+    }
+    if (!best) return null;
+    const { skinIndex, skinWeight } = geometry.attributes;
+    let most = 0;
+    for (let k = 1; k < 4; k++) if (skinWeight.array[4 * best.corner + k] > skinWeight.array[4 * best.corner + most]) most = k;
+    return { links: regions[skinIndex.array[4 * best.corner + most]] || [], deep: best.deep };
   };
   return figure;
 };

@@ -14,10 +14,10 @@ import { createView } from "./view.js";
       const p = grounds.pictures[index], steps = (text) => Array.from(new Int16Array(bytes(text)), (v) => v / 10);
       const triples = (values) => values.reduce((out, v, i) => (i % 3 ? out.at(-1).push(v) : out.push([v]), out), []);
       const soles = triples(steps(p.soles)), down = new Uint8Array(bytes(p.contacts));
-      const joints = triples(steps(p.pose)), J = grounds.joints;
+      const places = steps(p.pose), turns = Array.from(new Int16Array(bytes(p.turn)), (v) => v / 32767), J = grounds.joints;
       unpacked.set(index, {
         heights: steps(p.ground), n: p.n, x: p.x, z: p.z, standing: soles.filter((_, i) => down[i]),
-        poses: [0, 1, 2].map((k) => joints.slice(k * J, (k + 1) * J)),
+        poses: [0, 1, 2].map((k) => [places.slice(3 * k * J, 3 * (k + 1) * J), turns.slice(4 * k * J, 4 * (k + 1) * J)]),
       });
     }
     return unpacked.get(index);
@@ -31,7 +31,12 @@ import { createView } from "./view.js";
       view.marks.piece(DOT.map(([a, b]) => [x + 1.6 * a, y + .4, z + 1.6 * b]), paint.accent, .85);
     }
     const pale = mix(paint.body, paint.dark ? [40, 46, 52] : [244, 243, 239], .6);
-    g.poses.forEach((pose, k) => figures[k].pose((j) => pose[grounds.body.keep[j]], () => (k === 1 ? paint.body : pale)));
+    g.poses.forEach(([places, turns], k) => {
+      figures[k].places.set(places);
+      figures[k].turns.set(turns);
+      figures[k].pose(() => (k === 1 ? paint.body : pale));
+    });
+    view.land.under(figures.flatMap((figure) => figure.balls(8)));
   });
   const figures = [0, 1, 2].map(() => createFigure(view, grounds.body));
   choice.addEventListener("change", view.ask);

@@ -1,7 +1,20 @@
-// The grounds that one may play on: height in cm at x, z.
-export const GROUNDS = {
-  flat: () => 0,
-  rolling: (x, z) => 14 * Math.sin(x / 170) * Math.cos(z / 140) + 8 * Math.sin((x + z) / 260),
-  slope: (x, z) => .14 * z,
-  steps: (x, z) => 12 * Math.round(z / 110),
+// The grounds that one may play on: height in cm at x, z. Those with `tile` are made of level pieces, each `tile` cm
+// along x and z (0: without end), and are drawn so.
+const scattered = (i, k) => { // the same number for the same tile, 0 to 1
+  const n = Math.sin(12.9898 * i + 78.233 * k) * 43758.5453;
+  return n - Math.floor(n);
 };
+const box = (x, z) => {
+  const i = Math.round(x / 80), k = Math.round(z / 80);
+  if (Math.abs(i) <= 1 && Math.abs(k) <= 1) return 0;
+  const much = scattered(i, k);
+  return much > .72 ? 6 + 22 * (much - .72) / .28 : 0;
+};
+
+export const GROUNDS = new Map(Object.entries({
+  flat: { height: () => 0 },
+  rolling: { height: (x, z) => 14 * Math.sin(x / 170) * Math.cos(z / 140) + 8 * Math.sin((x + z) / 260) },
+  slope: { height: (x, z) => .14 * z },
+  steps: { height: (x, z) => 12 * Math.round(z / 110), tile: [0, 110] },
+  boxes: { height: box, tile: [80, 80] },
+}));

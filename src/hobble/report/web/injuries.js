@@ -3,8 +3,11 @@ import { find } from "./base.js";
 
 // specs: of the figures that are played, which may know different links; changed(): called after every change.
 export const createInjuries = (specs, changed) => {
-  const links = [...new Set(specs.flatMap((spec) => spec.links))], severity = new Map(links.map((link) => [link, 0]));
+  // What was never hurt in training changes nothing, and so can not be hurt here.
+  const links = [...new Set(specs.flatMap((spec) => spec.trained))], severity = new Map(links.map((link) => [link, 0]));
   const sliders = [], injuries = { severity, links };
+  injuries.word = (link) => specs.map((spec) => spec.spoken[spec.links.indexOf(link)]).find(Boolean) || link;
+  injuries.say = (text) => { const note = find("play-note"); if (note) note.textContent = text; };
 
   const add = (link, label) => {
     const row = document.createElement("label"), name = document.createElement("span");
@@ -22,6 +25,7 @@ export const createInjuries = (specs, changed) => {
     sliders.push({ input, output, link });
   };
   const told = () => {
+    injuries.say("");
     sliders.forEach(({ input, output, link }) => { input.value = output.value = severity.get(link); });
     changed();
   };
@@ -30,14 +34,15 @@ export const createInjuries = (specs, changed) => {
     links.forEach((link) => severity.set(link, 0));
     for (const [link, value] of pairs) {
       if (!severity.has(link) || !(value >= 0 && value <= 10)) continue;
-      if (value && !sliders.some((slider) => slider.link === link)) add(link, link);
+      if (value && !sliders.some((slider) => slider.link === link)) add(link, injuries.word(link));
       severity.set(link, value);
     }
     told();
   };
   injuries.worse = (link, by) => {
+    if (!severity.has(link)) return;
     severity.set(link, Math.min(10, Math.max(0, severity.get(link) + by)));
-    if (!sliders.some((slider) => slider.link === link)) add(link, link);
+    if (!sliders.some((slider) => slider.link === link)) add(link, injuries.word(link));
     told();
   };
   // The keys 1 to 9; true where one did something.
@@ -47,7 +52,7 @@ export const createInjuries = (specs, changed) => {
     return Boolean(slider);
   };
 
-  const widest = specs.reduce((best, spec) => (spec.links.length > best.links.length ? spec : best), specs[0]);
+  const widest = specs.reduce((best, spec) => (spec.trained.length > best.trained.length ? spec : best), specs[0]);
   const button = (text, act) => {
     const made = document.createElement("button");
     made.type = "button";

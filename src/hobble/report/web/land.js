@@ -1,39 +1,86 @@
-// The ground: a sheet around where the camera looks, lit, with a grid a metre wide, fading out far away.
-import { BufferAttribute, BufferGeometry, Color, Mesh, MeshLambertMaterial } from "three";
+// The ground: a sheet around where the camera looks, lit, with a grid a metre wide, darker under a body, fading far away.
+import { BufferAttribute, BufferGeometry, Color, Mesh, MeshLambertMaterial, Vector4 } from "three";
 import { linear } from "./paint.js";
 
 const REACH = 1100; // cm from the middle to the edge
 const STEP = 12.5;
+const BALLS = 24; // round parts of bodies that the ground is shaded by
 
+const geometryOf = (place, index) => {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(place, 3));
+  geometry.setIndex(index);
+  return geometry;
+};
 const sheet = (n) => {
-  const geometry = new BufferGeometry(), index = [];
-  geometry.setAttribute("position", new BufferAttribute(new Float32Array(3 * n * n), 3));
+  const index = [];
   for (let i = 0; i + 1 < n; i++) {
     for (let k = 0; k + 1 < n; k++) {
       const a = i * n + k;
       index.push(a, a + 1, a + n, a + n, a + 1, a + n + 1);
     }
   }
-  geometry.setIndex(index);
+  return geometryOf(new Float32Array(3 * n * n), index);
+};
+// Level pieces between lines across x and z, and the upright ones where their heights differ.
+const pieces = (xs, zs, height) => {
+  const place = [], index = [];
+  const quad = (...corners) => {
+    const a = place.length / 3;
+    corners.forEach((corner) => place.push(...corner));
+    index.push(a, a + 1, a + 2, a, a + 2, a + 3);
+  };
+  const level = xs.slice(1).map((x, i) => zs.slice(1).map((z, k) => height((x + xs[i]) / 2, (z + zs[k]) / 2)));
+  for (let i = 0; i + 1 < xs.length; i++) {
+    for (let k = 0; k + 1 < zs.length; k++) {
+      const [x0, x1, z0, z1, y] = [xs[i], xs[i + 1], zs[k], zs[k + 1], level[i][k]];
+      quad([x0, y, z0], [x0, y, z1], [x1, y, z1], [x1, y, z0]);
+      const ahead = level[i][k + 1], aside = level[i + 1]?.[k];
+      if (ahead !== undefined && ahead !== y) {
+        const [a, b] = ahead > y ? [x1, x0] : [x0, x1], [low, high] = [Math.min(y, ahead), Math.max(y, ahead)];
+        quad([a, low, z1], [b, low, z1], [b, high, z1], [a, high, z1]);
+      }
+      if (aside !== undefined && aside !== y) {
+        const [a, b] = aside > y ? [z0, z1] : [z1, z0], [low, high] = [Math.min(y, aside), Math.max(y, aside)];
+        quad([x1, low, a], [x1, low, b], [x1, high, b], [x1, high, a]);
+      }
+    }
+  }
+  const geometry = geometryOf(new Float32Array(place), index);
+  geometry.computeVertexNormals();
   return geometry;
 };
 
 export const createLand = (scene) => {
-  const focus = { value: [0, 0] }, reach = { value: REACH }, ink = { value: new Color() };
+  const focus = { value: [0, 0] }, reach = { value: REACH }, ink = { value: new Color() }, used = { value: 0 };
+  const balls = { value: Array.from({ length: BALLS }, () => new Vector4()) };
   const material = new MeshLambertMaterial({ transparent: true });
   material.onBeforeCompile = (shader) => {
-    Object.assign(shader.uniforms, { focus, reach, ink });
-    shader.vertexShader = `varying vec3 vPlace;\n${shader.vertexShader}`
-      .replace("#include <begin_vertex>", "#include <begin_vertex>\nvPlace = position;");
-    shader.fragmentShader = `varying vec3 vPlace; uniform vec2 focus; uniform float reach; uniform vec3 ink;
+    Object.assign(shader.uniforms, { focus, reach, ink, balls, used });
+    shader.vertexShader = `varying vec3 vPlace; varying vec3 vUp;\n${shader.vertexShader}`
+      .replace("#include <begin_vertex>", "#include <begin_vertex>\nvPlace = position; vUp = normal;");
+    shader.fragmentShader = `varying vec3 vPlace; varying vec3 vUp; uniform vec2 focus; uniform float reach; uniform vec3 ink;
+      uniform vec4 balls[${BALLS}]; uniform int used;
       float lines(vec2 at, float width) {
         vec2 pixel = fwidth(at) + 1e-6, off = abs(fract(at - .5) - .5);
         vec2 drawn = (1. - smoothstep(vec2(width), vec2(width) + 1.5 * pixel, off)) * clamp(width / pixel + .35, 0., 1.);
         return max(drawn.x, drawn.y);
+      }
+      // How much of the sky a ball hides from a place with its normal (the share of a sphere above a plane).
+      float hidden() {
+        float sum = 0.;
+        for (int i = 0; i < ${BALLS}; i++) {
+          if (i >= used) break;
+          vec3 way = balls[i].xyz - vPlace;
+          float far = max(length(way), balls[i].w);
+          sum += max(dot(vUp, way), 0.) * balls[i].w * balls[i].w / (far * far * far);
+        }
+        return sum;
       }\n${shader.fragmentShader}`
       .replace("#include <color_fragment>", `#include <color_fragment>
-        diffuseColor.rgb = mix(diffuseColor.rgb, ink, .32 * lines(vPlace.xz / 100., .004) + .08 * lines(vPlace.xz / 25., .008));
-        diffuseColor.a *= 1. - smoothstep(.35, 1., distance(vPlace.xz, focus) / reach);`);
+        diffuseColor.rgb = mix(diffuseColor.rgb, ink, .2 * lines(vPlace.xz / 100., .004) + .045 * lines(vPlace.xz / 25., .008));
+        if (distance(vPlace.xz, focus) < 260.) diffuseColor.rgb *= exp(-.85 * hidden());
+        diffuseColor.a *= 1. - smoothstep(.25, 1., distance(vPlace.xz, focus) / reach);`);
   };
   const mesh = new Mesh(sheet(2), material);
   mesh.frustumCulled = false;
@@ -42,12 +89,10 @@ export const createLand = (scene) => {
   scene.add(mesh);
 
   let drawn = null;
+  const wear = (geometry) => { mesh.geometry.dispose(); mesh.geometry = geometry; };
   // A grid n by n of heights over x in [x0, x1] and z in [z0, z1]; at(i, k) gives the height in cm.
   const fill = (n, [x0, x1], [z0, z1], at) => {
-    if (mesh.geometry.attributes.position.count !== n * n) {
-      mesh.geometry.dispose();
-      mesh.geometry = sheet(n);
-    }
+    if (mesh.geometry.attributes.position.count !== n * n) wear(sheet(n));
     const place = mesh.geometry.attributes.position;
     for (let i = 0, v = 0; i < n; i++) {
       for (let k = 0; k < n; k++) {
@@ -60,20 +105,31 @@ export const createLand = (scene) => {
     place.needsUpdate = true;
     mesh.geometry.computeVertexNormals();
   };
+  // Lines between tiles `size` apart whose middles are at its multiples, within `far` of a place.
+  const between = (size, middle, far) => {
+    if (!size) return [middle - far, middle + far];
+    const from = Math.floor((middle - far) / size), to = Math.ceil((middle + far) / size);
+    return Array.from({ length: to - from + 1 }, (_, i) => (from + i - .5) * size);
+  };
   return {
     colour(paint) {
-      const tone = paint.floor.map((v, i) => v + (paint.dark ? .5 : .45) * (paint.ground[i] - v));
-      linear(tone, material.color);
+      linear(paint.sky.map((v, i) => v + (paint.dark ? .75 : .55) * (paint.ground[i] - v)), material.color);
       linear(paint.line, ink.value);
     },
-    // The ground that height(x, z) tells, around a point [x, y, z]; name: what tells one ground from another.
-    around([x, , z], height, name = "flat") {
+    // Round parts of bodies [x, y, z, cm], which hide the sky from the ground.
+    under(parts) {
+      used.value = Math.min(BALLS, parts.length);
+      for (let i = 0; i < used.value; i++) balls.value[i].set(...parts[i]);
+    },
+    // The ground that `height` tells, around a point [x, y, z]; tile: as of grounds.js; name: what tells one from another.
+    around([x, , z], { height, tile } = { height: () => 0 }, name = "flat") {
       focus.value = [x, z];
-      const flat = name === "flat", key = `${name} ${Math.round(x / 200)} ${Math.round(z / 200)}`;
+      const key = `${name} ${Math.round(x / 200)} ${Math.round(z / 200)}`;
       if (key === drawn) return;
       drawn = key;
       const [cx, cz] = [200 * Math.round(x / 200), 200 * Math.round(z / 200)], far = REACH + 200;
-      const n = flat ? 2 : 2 * Math.round(far / STEP) + 1;
+      if (tile) { wear(pieces(between(tile[0], cx, far), between(tile[1], cz, far), height)); return; }
+      const n = name === "flat" ? 2 : 2 * Math.round(far / STEP) + 1;
       fill(n, [cx - far, cx + far], [cz - far, cz + far], (i, k, u, w) => height(u, w));
     },
     // A piece of ground of its own, all of it shown: n by n heights in rows of x.

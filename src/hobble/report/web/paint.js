@@ -7,9 +7,9 @@ import { mix } from "./numbers.js";
 export const palette = () => {
   const dark = rgb("paper")[0] < 128;
   return {
-    dark, body: dark ? [158, 167, 176] : [186, 193, 199], low: rgb("hurt-low"), high: rgb("hurt-high"),
-    line: rgb("faint"), ink: rgb("ink"), accent: rgb("accent"), predicted: rgb("predicted"), second: rgb("g3"), ground: rgb("ground"),
-    floor: rgb("sunken"),
+    dark, body: dark ? [176, 184, 192] : [214, 214, 210], low: rgb("hurt-low"), high: rgb("hurt-high"),
+    line: rgb("faint"), ink: rgb("ink"), accent: rgb("accent"), predicted: rgb("predicted"), second: rgb("g3"),
+    ground: rgb("ground"), sky: rgb("sky"), zenith: rgb("zenith"), ghost: dark ? [150, 190, 205] : [96, 130, 146],
   };
 };
 

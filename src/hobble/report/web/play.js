@@ -1,45 +1,50 @@
 // Play: the networks run here. One figure in a report of one configuration, two in the same world where two are compared.
 import { createActor } from "./actor.js";
+import { camera, hurts, read } from "./address.js";
 import { bvh } from "./bvh.js";
 import { find, material, save } from "./base.js";
+import { createChase } from "./chase.js";
+import { film } from "./film.js";
 import { GROUNDS } from "./grounds.js";
 import { createInjuries } from "./injuries.js";
 import { createPanel } from "./panel.js";
 import { createSteering } from "./steering.js";
 import { createView } from "./view.js";
 
-const START = { yaw: 3.9, pitch: .24, distance: 470 };
+const START = { yaw: 3.9, pitch: .2, distance: 430 };
 const SIDE = 95; // cm between two figures
 
 const createPlay = (stage, playables) => {
   const canvas = find("play-view"), ground = find("play-ground"), chosen = [find("play-first"), find("play-second")];
   const names = Object.keys(playables), player = { actors: [] };
-  let panels = [], injuries, eye = null, last = null, owed = 0, told = 0, ready = false;
-  const floor = (x, z) => GROUNDS[ground.value](x, z);
+  let panels = [], injuries, last = null, owed = 0, told = 0, ready = false, wish = null;
+  const land = () => GROUNDS.get(ground.value), floor = (x, z) => land().height(x, z);
 
   const view = createView(canvas, START, (now) => {
     move(now);
-    const middle = [0, 1, 2].map((i) => player.actors.reduce((sum, { character: c }) => sum + c.pose[i], 0) / player.actors.length);
-    eye = eye ? eye.map((v, i) => v + .12 * (middle[i] - v)) : middle;
+    const middle = [0, 1, 2].map((i) => player.actors.reduce((sum, { rig }) => sum + rig.places[i], 0) / player.actors.length);
+    const [vx, vz] = wish ? wish.velocity : [0, 0], goes = wish && !wish.ahead && Math.hypot(vx, vz) > .5;
+    const eye = chase.follow(now, middle, goes ? [vx, vz] : null);
     view.aim([eye[0], eye[1] - 8, eye[2]]);
-    view.land.around(eye, floor, ground.value);
+    view.land.around(eye, land(), ground.value);
     player.actors.forEach((actor) => actor.draw());
+    view.land.under(player.actors.flatMap(({ figure }) => figure.balls(view.balls / player.actors.length)));
     if (now - told > 100) { told = now; panels.forEach((panel) => panel.tell(view.milliseconds)); }
     view.ask();
   });
-  const steering = createSteering(stage, view.orbit);
+  const steering = createSteering(stage, view.orbit), chase = createChase(view.orbit, canvas);
   const move = (now) => {
     owed = Math.min(4, owed + (last === null ? 1 : (now - last) * .06));
     last = now;
     for (; owed >= 1; owed--) {
-      const wish = steering.wish();
+      wish = steering.wish();
       player.actors.forEach((actor) => actor.frame(wish, injuries.severity));
     }
   };
-  view.onHidden = () => { last = null; steering.release(); };
+  view.onHidden = () => { last = null; chase.rest(); steering.release(); };
 
   const cast = () => {
-    player.actors.forEach(({ figure }) => view.scene.remove(figure.mesh));
+    player.actors.forEach(({ figure }) => figure.remove());
     panels.forEach(({ box }) => box.remove());
     const who = chosen[0] ? chosen.map((select) => select.value) : names, two = who.length > 1;
     player.actors = who.map((name, i) => createActor(view, playables[name], two
@@ -49,8 +54,8 @@ const createPlay = (stage, playables) => {
     start();
   };
   const start = () => {
-    player.actors.forEach((actor) => actor.start(floor));
-    eye = null;
+    player.actors.forEach((actor) => { actor.start(floor); actor.rig.take(actor.character.pose, actor.character.turns); });
+    chase.reset();
     view.ask();
   };
 
@@ -60,38 +65,41 @@ const createPlay = (stage, playables) => {
     const hurt = [...injuries.severity].filter(([, s]) => s > 0).map(([link, s]) => `${link}:${s}`).join(",");
     const { yaw, pitch, distance } = view.orbit, state = { ground: ground.value };
     if (hurt) state.hurt = hurt;
-    for (const name of ["crouch", "strafe"]) if (steering.on[name]) state[name] = 1;
+    for (const name of ["crouch", "jog", "strafe"]) if (steering.on[name]) state[name] = 1;
     if (chosen[0]) state.of = chosen.map((select) => select.value).join(",");
     state.camera = [yaw.toFixed(2), pitch.toFixed(2), Math.round(distance)].join(",");
     return `#play?${new URLSearchParams(state)}`;
   };
   const restore = () => {
-    const [, text] = location.hash.match(/^#play\?(.*)$/) || [];
-    const state = new URLSearchParams(text || "");
-    if (state.get("ground") in GROUNDS) ground.value = state.get("ground");
-    (state.get("of") || "").split(",").forEach((name, i) => { if (name in playables && chosen[i]) chosen[i].value = name; });
-    for (const name of ["crouch", "strafe"]) if (state.get(name) === "1") steering.toggle(name, true);
-    const [yaw, pitch, distance] = (state.get("camera") || "").split(",").map(Number);
-    if ([yaw, pitch, distance].every(Number.isFinite)) {
-      Object.assign(view.orbit, { yaw, pitch: Math.min(1.45, Math.max(.02, pitch)), distance: Math.min(1500, Math.max(140, distance)) });
-    }
-    injuries.set((state.get("hurt") || "").split(",").map((pair) => pair.split(":")).map(([link, s]) => [link, Number(s)]));
-    return text !== undefined;
+    const state = read(location.hash);
+    if (!state) return false;
+    if (GROUNDS.has(state.get("ground"))) ground.value = state.get("ground");
+    (state.get("of") || "").split(",").forEach((name, i) => {
+      if (Object.hasOwn(playables, name) && chosen[i]) chosen[i].value = name;
+    });
+    for (const name of ["crouch", "jog", "strafe"]) steering.toggle(name, state.get(name) === "1");
+    const eye = camera(state.get("camera"));
+    if (eye) { Object.assign(view.orbit, eye); chase.touch(); }
+    injuries.set(hurts(state.get("hurt")));
+    return true;
   };
 
-  // Hurting by a click on the body
+  // Hurting by a click on the body, healing with Shift held or while the button is down
 
-  let pressed = null;
+  let pressed = null, heals = false;
+  find("play-heal")?.addEventListener("click", (event) => {
+    heals = !heals;
+    event.currentTarget.setAttribute("aria-pressed", String(heals));
+  });
   canvas.addEventListener("pointerdown", (event) => { pressed = [event.offsetX, event.offsetY]; stage.focus({ preventScroll: true }); });
   canvas.addEventListener("pointerup", (event) => {
     if (!pressed || Math.hypot(event.offsetX - pressed[0], event.offsetY - pressed[1]) > 5) return;
-    for (const actor of player.actors) {
-      const links = actor.under(event.offsetX, event.offsetY);
-      if (!links || !links.length) continue;
-      const felt = links.filter((link) => actor.spec.trained.includes(link)); // another would change nothing
-      injuries.worse((felt.length ? felt : links).at(-1), event.shiftKey ? -2 : 2);
-      return;
-    }
+    const hits = player.actors.map((actor) => ({ actor, found: actor.under(event.offsetX, event.offsetY) })).filter(({ found }) => found);
+    if (!hits.length) return;
+    const { actor, found } = hits.reduce((best, hit) => (hit.found.deep < best.found.deep ? hit : best));
+    const felt = found.links.filter((link) => actor.spec.trained.includes(link)); // another would change nothing
+    if (felt.length) injuries.worse(felt.at(-1), event.shiftKey || heals ? -2 : 2);
+    else if (injuries.links.length) injuries.say(`${found.links.length ? injuries.word(found.links.at(-1)) : "this part"}: never hurt in training, so hurting it would change nothing`);
   });
 
   // Buttons
@@ -117,23 +125,12 @@ const createPlay = (stage, playables) => {
   ready = true;
   cast();
   if (asked) find("play").scrollIntoView();
-  return Object.assign(player, { injuries, steering, view, start });
-};
-
-// A button that films the canvas until it is pressed again.
-const film = (button, canvas, name) => {
-  if (!canvas.captureStream || !globalThis.MediaRecorder) { button.hidden = true; return; }
-  let recorder = null;
-  button.addEventListener("click", () => {
-    if (recorder) { recorder.stop(); recorder = null; button.textContent = "Film"; return; }
-    const type = ["video/webm;codecs=vp8", "video/webm", "video/mp4"].find((t) => MediaRecorder.isTypeSupported(t));
-    const chunks = [], made = new MediaRecorder(canvas.captureStream(60), { mimeType: type, videoBitsPerSecond: 8e6 });
-    made.addEventListener("dataavailable", ({ data }) => chunks.push(data));
-    made.addEventListener("stop", () => save(new Blob(chunks, { type }), `${name()}.${type.includes("mp4") ? "mp4" : "webm"}`));
-    made.start();
-    recorder = made;
-    button.textContent = "Stop and save";
+  addEventListener("hashchange", () => { // a link that is pasted into an open page
+    if (!restore()) return;
+    cast();
+    find("play").scrollIntoView();
   });
+  return Object.assign(player, { chase, injuries, steering, view, start });
 };
 
 const stage = find("play-stage");

@@ -9,18 +9,20 @@ const CODES = {
 const SPEED = { crouch: 2, walk: 2.5, jog: 7 }; // cm a frame
 
 export const createSteering = (stage, orbit) => {
-  const held = new Set(), stick = { x: 0, y: 0 }, on = { crouch: false, strafe: false };
+  const held = new Set(), stick = { x: 0, y: 0 }, on = { crouch: false, jog: false, strafe: false };
   const steering = { on };
 
   steering.toggle = (name, value = !on[name]) => {
     on[name] = value;
+    if (value && name === "crouch" && on.jog) steering.toggle("jog", false);
+    if (value && name === "jog" && on.crouch) steering.toggle("crouch", false);
     find(`play-${name}`).setAttribute("aria-pressed", String(value));
   };
   for (const name of Object.keys(on)) find(`play-${name}`).addEventListener("click", () => steering.toggle(name));
 
   // What is wished for now, seen from the camera: velocity [x, z], facing [x, z] or null, gait or null.
   steering.wish = () => {
-    let [right, ahead] = [stick.x, -stick.y], fast = held.has("ShiftLeft") || held.has("ShiftRight"), look = on.strafe;
+    let [right, ahead] = [stick.x, -stick.y], fast = on.jog || held.has("ShiftLeft") || held.has("ShiftRight"), look = on.strafe;
     for (const code of held) if (CODES[code]) { right += CODES[code][0]; ahead += CODES[code][1]; }
     const pad = [...(navigator.getGamepads ? navigator.getGamepads() : [])].find((p) => p && p.connected);
     if (pad) {

@@ -13,6 +13,12 @@ import { palette } from "./paint.js";
 // Draws every view, also those that were never scrolled to: for printing.
 export const views = [];
 
+// How finely is drawn, best first: pixels of the screen to one of the picture, the shadows' map, parts that shade the ground.
+const LEVELS = [{ scale: 2, shadow: 768, balls: 24 }, { scale: 1, shadow: 512, balls: 16 }, { scale: .8, shadow: 0, balls: 12 }];
+const SLOW = 50, PATIENCE = 24; // ms between pictures that are too many, and after how many such pictures less is drawn
+const asked = new URLSearchParams(location.search).get("quality");
+let level = 0, slow = 0;
+
 let renderer = null;
 const shared = () => {
   if (renderer === null) {
@@ -21,6 +27,10 @@ const shared = () => {
       renderer.shadowMap.enabled = true;
       renderer.shadowMap.type = VSMShadowMap;
       renderer.setScissorTest(true);
+      const gl = renderer.getContext(), info = gl.getExtension("WEBGL_debug_renderer_info");
+      const card = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
+      // A processor that draws in place of a graphics card has little time for it.
+      if (asked !== "high" && (asked === "low" || /swiftshader|llvmpipe|software|basic render/i.test(card))) level = LEVELS.length - 1;
     } catch { renderer = false; } // no WebGL here: the page says so where the picture would be
   }
   return renderer;
@@ -28,12 +38,19 @@ const shared = () => {
 
 const lit = (scene) => {
   const sky = new HemisphereLight(), key = new DirectionalLight(), rim = new DirectionalLight();
-  key.castShadow = true;
-  key.shadow.mapSize.set(512, 512);
-  Object.assign(key.shadow, { radius: 5, blurSamples: 10, bias: -.0004, normalBias: 1 });
-  Object.assign(key.shadow.camera, { left: -170, right: 170, top: 170, bottom: -170, near: 100, far: 1200 });
+  key.shadow.mapSize.set(LEVELS[0].shadow, LEVELS[0].shadow);
+  Object.assign(key.shadow, { radius: 6, blurSamples: 12, bias: -.0004, normalBias: 1, intensity: .85 });
+  Object.assign(key.shadow.camera, { left: -190, right: 190, top: 190, bottom: -190, near: 100, far: 1200 });
   scene.add(sky, key, key.target, rim, rim.target);
   return {
+    // The shadows' map may change while the page is open.
+    fine(size) {
+      key.castShadow = size > 0;
+      if (!size || key.shadow.mapSize.x === size) return;
+      key.shadow.mapSize.set(size, size);
+      key.shadow.map?.dispose();
+      key.shadow.map = null;
+    },
     colour(paint) {
       sky.color.set(paint.dark ? 0xaebfd0 : 0xffffff);
       sky.groundColor.set(paint.dark ? 0x30363c : 0xbcb8b0);
@@ -60,12 +77,14 @@ const lit = (scene) => {
 export const createView = (canvas, home, draw) => {
   const context = canvas.getContext("2d"), scene = new Scene(), camera = new PerspectiveCamera(30, 1, 10, 6000);
   const lights = lit(scene);
-  let scale = 1, eye = [0, 0, 1], right, up, ahead, seen = false, waiting = false;
-  const view = { scene, W: 0, H: 0, zoom: 1, paint: {}, milliseconds: 0, onHidden: () => {} };
+  let scale = 1, eye = [0, 0, 1], right, up, ahead, seen = false, waiting = false, drawnAt = 0, drawnFor = -1;
+  // framing: how large what is looked at is drawn, and by how much of the width and height it is moved aside.
+  const view = { scene, W: 0, H: 0, zoom: 1, paint: {}, milliseconds: 0, framing: { size: 1.75, aside: 0, up: 0 }, balls: 12, onHidden: () => {} };
   view.land = createLand(scene);
   view.marks = createMarks(scene);
 
   const paint = (now) => {
+    if (drawnFor < 0) return; // not laid out yet
     if (view.W < 4 || view.H < 4) return; // a window that is being made or folded away
     const gl = shared();
     if (!gl) {
@@ -73,6 +92,11 @@ export const createView = (canvas, home, draw) => {
       context.fillText("This browser draws no 3D pictures (WebGL is off).", 16 * scale, 24 * scale);
       return;
     }
+    if (drawnFor !== level) fit();
+    // Less is drawn where pictures keep coming slowly.
+    slow = now - drawnAt > SLOW && now - drawnAt < 1000 ? slow + 1 : Math.max(0, slow - 2);
+    drawnAt = now;
+    if (slow > PATIENCE && level + 1 < LEVELS.length && !asked) { level++; slow = 0; }
     view.marks.clear();
     draw(now, view);
     const before = performance.now(), [w, h] = [canvas.width, canvas.height], room = gl.domElement;
@@ -81,7 +105,12 @@ export const createView = (canvas, home, draw) => {
     gl.setScissor(0, 0, w, h);
     view.marks.done();
     gl.render(scene, camera);
-    context.clearRect(0, 0, w, h);
+    // The sky lies under the scene, so that saved pictures and films have one.
+    const sky = context.createLinearGradient(0, 0, 0, h), [r, g, b] = view.paint.sky, [u, v, t] = view.paint.zenith;
+    sky.addColorStop(0, `rgb(${u},${v},${t})`);
+    sky.addColorStop(.7, `rgb(${r},${g},${b})`);
+    context.fillStyle = sky;
+    context.fillRect(0, 0, w, h);
     context.drawImage(room, 0, room.height - h, w, h, 0, 0, w, h);
     view.milliseconds += .1 * (performance.now() - before - view.milliseconds);
   };
@@ -98,7 +127,8 @@ export const createView = (canvas, home, draw) => {
     ahead = away.map((v) => -v);
     right = unit(cross(ahead, [0, 1, 0]));
     up = cross(right, ahead);
-    view.zoom = 1.75 * Math.min(view.H, view.W * 1.15);
+    view.zoom = view.framing.size * Math.min(view.H, view.W * 1.15);
+    camera.setViewOffset(view.W, view.H, -view.framing.aside * view.W, view.framing.up * view.H, view.W, view.H);
     camera.fov = 2 * Math.atan(view.H / 2 / view.zoom) * 180 / Math.PI;
     camera.aspect = view.W / view.H;
     camera.position.set(...eye);
@@ -109,7 +139,8 @@ export const createView = (canvas, home, draw) => {
   // Screen x, y and distance along the view.
   view.project = (p) => {
     const d = minus(p, eye), z = Math.max(1, dot(d, ahead));
-    return [view.W / 2 + view.zoom * dot(d, right) / z, view.H / 2 - view.zoom * dot(d, up) / z, z];
+    const { aside, up: raised } = view.framing;
+    return [view.W * (.5 + aside) + view.zoom * dot(d, right) / z, view.H * (.5 - raised) - view.zoom * dot(d, up) / z, z];
   };
 
   const recolour = () => {
@@ -121,13 +152,20 @@ export const createView = (canvas, home, draw) => {
   onTheme.push(recolour);
   recolour();
   views.push(() => paint(performance.now()));
-  new ResizeObserver(() => {
+  const fit = () => {
+    drawnFor = level;
     view.W = canvas.clientWidth;
     view.H = canvas.clientHeight;
-    scale = Math.min(2, devicePixelRatio || 1);
+    scale = Math.min(LEVELS[level].scale, level ? 1 : devicePixelRatio || 1);
     [canvas.width, canvas.height] = [Math.round(view.W * scale), Math.round(view.H * scale)];
+    lights.fine(LEVELS[level].shadow);
+    view.balls = LEVELS[level].balls;
+  };
+  new ResizeObserver(() => {
+    shared();
+    fit();
     if (seen) paint(performance.now()); // at once: a canvas loses its picture with its size
   }).observe(canvas);
-  new IntersectionObserver(([entry]) => { seen = entry.isIntersecting; view.onHidden(); view.ask(); }).observe(canvas);
+  new IntersectionObserver((entries) => { seen = entries.at(-1).isIntersecting; if (!seen) view.onHidden(); view.ask(); }).observe(canvas);
   return view;
 };

@@ -1,7 +1,8 @@
 // The figure walking: motion that lies in the page, played with footprints, readings and a scrubber.
 import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
-import { bytes, mix } from "./numbers.js";
+import { createMotion } from "./motion.js";
+import { bytes } from "./numbers.js";
 import { severityColour } from "./paint.js";
 import { createView } from "./view.js";
 
@@ -15,7 +16,7 @@ import { createView } from "./view.js";
     if (!unpacked.has(index)) {
       const s = scenes.scenarios[index], octets = (text) => text && new Uint8Array(bytes(text));
       const scene = {
-        ...s, root: new Float32Array(bytes(s.root)), pose: new Int16Array(bytes(s.pose)),
+        ...s, motion: createMotion(s, J, scenes.unit),
         contacts: octets(s.contacts), phase: octets(s.phase), severity: octets(s.severity),
       };
       scene.focus = followed(scene);
@@ -24,18 +25,15 @@ import { createView } from "./view.js";
     }
     return unpacked.get(index);
   };
-  const joint = (s, frame, j) => {
-    const r = 3 * frame, p = 3 * (frame * J + j);
-    return [0, 1, 2].map((i) => s.root[r + i] + s.pose[p + i] * scenes.unit);
-  };
+  const joint = (s, frame, b) => s.motion.at(frame, b);
   // Where the camera looks: the root over the second around a frame, so that it glides and scrubbing is repeatable.
   const followed = (s) => {
-    const half = Math.round(fps / 2), out = new Float32Array(s.root.length);
+    const half = Math.round(fps / 2), { roots } = s.motion, out = new Float32Array(roots.length);
     for (let f = 0; f < s.frames; f++) {
       const a = Math.max(0, f - half), b = Math.min(s.frames - 1, f + half);
       for (let i = 0; i < 3; i++) {
         let sum = 0;
-        for (let k = a; k <= b; k++) sum += s.root[3 * k + i];
+        for (let k = a; k <= b; k++) sum += roots[3 * k + i];
         out[3 * f + i] = sum / (b - a + 1);
       }
     }
@@ -44,7 +42,7 @@ import { createView } from "./view.js";
   // {frame, heel, toe}: where a foot stands, every other frame, so that one that slides leaves a smear.
   const footprints = (s) => {
     const out = [];
-    if (!s.contacts) return out;
+    if (!s.contacts || !scenes.feet.length) return out;
     for (const [heel, toe, bit] of [[scenes.feet[0], scenes.feet[1], 1], [scenes.feet[2], scenes.feet[3], 3]]) {
       for (let f = 0; f < s.frames; f += 2) {
         if (s.contacts[f] >> bit & 1) out.push({ frame: f, heel: flat(joint(s, f, heel)), toe: flat(joint(s, f, toe)) });
@@ -68,11 +66,11 @@ import { createView } from "./view.js";
     drawScene(scene, time);
     if (playing) view.ask();
   });
-  const figure = createFigure(view, scenes.body);
+  const figure = createFigure(view, scenes.body, scenes.regions);
   const near = ([x, , z], focus) => Math.max(0, 1 - Math.hypot(x - focus[0], z - focus[2]) / 800);
   const drawPath = (s, focus, frame) => {
     for (let f = 3; f < s.frames; f += 3) {
-      const [a, b] = [f - 3, f].map((k) => [s.root[3 * k], 0, s.root[3 * k + 2]]);
+      const [a, b] = [f - 3, f].map((k) => [s.motion.roots[3 * k], 0, s.motion.roots[3 * k + 2]]);
       view.marks.strip(a, b, 1.6, view.paint.accent, (f <= frame ? .6 : .25) * near(b, focus));
     }
   };
@@ -85,10 +83,11 @@ import { createView } from "./view.js";
     const frame = Math.min(s.frames - 1, Math.floor(at)), next = Math.min(s.frames - 1, frame + 1), t = at - frame;
     const focus = [0, 1, 2].map((i) => s.focus[3 * frame + i] * (1 - t) + s.focus[3 * next + i] * t);
     view.aim([focus[0], focus[1] - 8, focus[2]]);
-    view.land.around(focus, () => 0);
+    view.land.around(focus);
     if (trails) { drawPath(s, focus, at); drawPrints(s, focus, at); }
-    figure.pose((j) => mix(joint(s, frame, j), joint(s, next, j), t), (links) => (
-      severityColour(view.paint, severity(s, frame, links))));
+    s.motion.show(figure, at);
+    figure.pose((links) => severityColour(view.paint, severity(s, frame, links)));
+    view.land.under(figure.balls(view.balls));
     tell(s, frame);
   };
 
@@ -96,13 +95,13 @@ import { createView } from "./view.js";
 
   const FEET = ["left heel", "left toe", "right heel", "right toe"];
   const tell = (s, frame) => {
-    const a = Math.max(0, frame - 7), b = Math.min(s.frames - 1, frame + 7);
-    const way = Math.hypot(s.root[3 * b] - s.root[3 * a], s.root[3 * b + 2] - s.root[3 * a + 2]);
+    const a = Math.max(0, frame - 7), b = Math.min(s.frames - 1, frame + 7), { roots } = s.motion;
+    const way = Math.hypot(roots[3 * b] - roots[3 * a], roots[3 * b + 2] - roots[3 * a + 2]);
     const moment = [`${(b > a ? way / 100 * fps / (b - a) : 0).toFixed(2)} m/s`];
     if (s.phase) moment.push(`phase ${(s.phase[frame] / 255).toFixed(2)}`);
     const lines = [moment.join(" · ")];
     if (s.contacts) lines.push(FEET.filter((_, i) => s.contacts[frame] >> i & 1).join(", ") || "no foot on the ground");
-    const hurt = scenes.links.map((name, l) => [name, severity(s, frame, [l])]).filter(([, much]) => much > 0);
+    const hurt = scenes.spoken.map((name, l) => [name, severity(s, frame, [l])]).filter(([, much]) => much > 0);
     hurt.slice(0, 4).forEach(([name, much]) => lines.push(`${name}: ${much.toFixed(1)} of 10`));
     const title = document.createElement("b");
     title.textContent = s.description || s.name;

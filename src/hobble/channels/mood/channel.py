@@ -1,0 +1,83 @@
+"""The channel: five moods from 0 to 1; a body in none of them is as it always is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+
+from pydantic import Field
+
+from hobble.channels.channel import Channel, Rig, Source
+from hobble.core.section import Section
+
+if TYPE_CHECKING:
+    from hobble.core.clip import Clip
+    from hobble.core.quat import Array
+
+Name = Literal["tired", "old", "happy", "sad", "angry"]
+Much = Annotated[float, Field(ge=0, le=1)]
+
+
+class Patterns(Section):
+    """Which clips are in which mood."""
+
+    patterns: dict[str, dict[Name, Much]] = Field(
+        description="of clips' names, with * for anything: what a clip of such a name is; the first that fits"
+    )
+
+
+class Mood(Channel):
+    """How the body feels, all through a clip: by a pattern of its name, or by its entry ({sad: .5})."""
+
+    name = "mood"
+    title = "Mood"
+    value = "amount"
+    highest = 1.0
+    rate = 1.0
+    Options = Patterns
+
+    def columns(self, rig: Rig) -> tuple[str, ...]:
+        """The moods."""
+        return get_args(Name)
+
+    def is_neutral(self, source: Source) -> bool:
+        """Whether no pattern that fits, and no entry, says more than 0."""
+        return not any(_moods(source).values())
+
+    def check(self, source: Source, rig: Rig) -> None:
+        """The entry of a clip names moods."""
+        from hobble.core.errors import InputError
+
+        given = source.value
+        moods = isinstance(given, Mapping) and set(given) <= set(self.columns(rig))
+        if given is not None and not (
+            moods and all(isinstance(v, int | float) and 0 <= v <= 1 for v in given.values())
+        ):
+            fix = f"Write some of {', '.join(self.columns(rig))} with a number from 0 to 1, as {{sad: .5}}."
+            raise InputError(f"{source.clip}.channels.{self.name}", f"cannot be {given!r:.80}", fix=fix)
+
+    def read(self, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
+        """The same moods in every frame; a warning where no pattern fits."""
+        import numpy as np
+
+        moods = _moods(source)
+        row = [float(moods.get(mood, 0.0)) for mood in self.columns(clip.skeleton)]
+        fits = source.value is not None or any(fnmatchcase(source.clip, p) for p in _patterns(source))
+        warnings = (
+            [] if fits else [f"no pattern of channels.{self.name} fits {source.clip}; it is in no mood."]
+        )
+        return np.tile(np.array(row, np.float32), (len(clip), 1)), warnings
+
+
+def _patterns(source: Source) -> Mapping[str, Mapping[str, float]]:
+    return source.options.get("patterns", {})
+
+
+def _moods(source: Source) -> Mapping[str, float]:
+    if source.value is not None:
+        return source.value
+    return next((m for pattern, m in _patterns(source).items() if fnmatchcase(source.clip, pattern)), {})
+
+
+CHANNEL = Mood()

@@ -1,0 +1,1 @@
+"""The rule by which a character goes on from one frame to the next."""

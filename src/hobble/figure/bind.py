@@ -1,0 +1,129 @@
+"""The pose in which a body is modelled: arms and legs a little away from it, so that nothing touches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+
+SIDES = ("left", "right")
+ARMS_DOWN = np.radians(60.0)  # below the horizontal
+LEGS_OUT = np.radians(5.0)
+SHORTEST = 0.5  # cm; a bone shorter than this has no direction
+
+
+@dataclass(frozen=True)
+class Bind:
+    """World positions (J, 3) in cm and rotations (J, 4) of all joints; `bones`: role -> the joint that moves
+    that part of the body, for every role, where the skeleton lacks one the next joint above; `at`: role ->
+    where it is (3,)."""
+
+    positions: Array
+    rotations: Array
+    bones: dict[str, int]
+    at: dict[str, Array]
+
+
+def bind(skeleton: Skeleton) -> Bind:
+    """The pose of a skeleton whose rest pose stands upright and faces +Z (see config/skeletons/README.md).
+
+    Raises KeyError where one of the roles is missing without which there is no body: hips, head, and of both
+    sides shoulder, hip, knee, heel, toe.
+    """
+    bones = _bones(skeleton)
+    aims = _aims(skeleton, bones)
+    count = len(skeleton.joints)
+    rotations, positions = np.tile(quat.IDENTITY, (count, 1)), np.zeros((count, 3))
+    upright = {bones[f"{side}_heel"] for side in SIDES}
+    for j, p in enumerate(skeleton.parents):
+        if p >= 0:
+            rotations[j] = rotations[p]
+            positions[j] = positions[p] + quat.rotate(rotations[p], skeleton.offsets[j])
+        if j in upright:
+            rotations[j] = quat.IDENTITY
+        elif j in aims:
+            child, wanted = aims[j]
+            bone = quat.rotate(rotations[j], _reach(skeleton, j, child))
+            if np.linalg.norm(bone) > SHORTEST:
+                rotations[j] = quat.mul(quat.between(bone, wanted), rotations[j])
+    at = {role: positions[skeleton.role(role)] for role in skeleton.roles if _known(skeleton, role)}
+    return Bind(positions, rotations, bones, _filled(at, positions, skeleton))
+
+
+def _known(skeleton: Skeleton, role: str) -> bool:
+    return skeleton.roles.get(role) in skeleton.joints
+
+
+def _bones(skeleton: Skeleton) -> dict[str, int]:
+    """The joint that moves the part below each role."""
+    found = {role: skeleton.role(role) for role in skeleton.roles if _known(skeleton, role)}
+    hips = found["hips"]
+    found.setdefault("neck", max(skeleton.parents[found["head"]], 0))
+    found.setdefault("chest", _common(skeleton, found["left_shoulder"], found["right_shoulder"]))
+    found.setdefault("spine", _first_below(skeleton, hips, found["chest"]))
+    for side in SIDES:
+        found.setdefault(f"{side}_elbow", found[f"{side}_shoulder"])
+        found.setdefault(f"{side}_wrist", found[f"{side}_elbow"])
+        for role in ("hip", "knee", "heel", "toe"):
+            skeleton.role(f"{side}_{role}")  # says which one is missing
+    return found
+
+
+def _chain(skeleton: Skeleton, joint: int) -> list[int]:
+    """The joint and all above it."""
+    out = [joint]
+    while skeleton.parents[out[-1]] >= 0:
+        out.append(skeleton.parents[out[-1]])
+    return out
+
+
+def _common(skeleton: Skeleton, a: int, b: int) -> int:
+    above = set(_chain(skeleton, b))
+    return next(j for j in _chain(skeleton, a) if j in above)
+
+
+def _first_below(skeleton: Skeleton, top: int, joint: int) -> int:
+    """The first joint on the way from `top` down to `joint`."""
+    way = _chain(skeleton, joint)
+    return way[way.index(top) - 1] if top in way[1:] else joint
+
+
+def _reach(skeleton: Skeleton, joint: int, below: int) -> Array:
+    """From a joint to one below it, (3,) at rest."""
+    way = _chain(skeleton, below)
+    steps = way[: way.index(joint)] if joint in way else []
+    return skeleton.offsets[steps].sum(axis=0) if steps else np.zeros(3)
+
+
+def _aims(skeleton: Skeleton, bones: dict[str, int]) -> dict[int, tuple[int, Array]]:
+    """Joint -> the joint below it, and the direction (3,) to which that is turned."""
+    out = {}
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        arm = np.array([sign * np.cos(ARMS_DOWN), -np.sin(ARMS_DOWN), 0.06])
+        leg = np.array([sign * np.sin(LEGS_OUT), -np.cos(LEGS_OUT), 0.0])
+        for a, b, wanted in (
+            ("shoulder", "elbow", arm), ("elbow", "wrist", arm), ("hip", "knee", leg), ("knee", "heel", leg),
+        ):  # fmt: skip
+            upper, lower = bones[f"{side}_{a}"], bones[f"{side}_{b}"]
+            if upper != lower:
+                out[upper] = (lower, wanted / np.linalg.norm(wanted))
+    return out
+
+
+def _filled(at: dict[str, Array], positions: Array, skeleton: Skeleton) -> dict[str, Array]:
+    """Places also for the roles that a skeleton lacks, from those around them."""
+    at = dict(at)
+    middle = (at["left_shoulder"] + at["right_shoulder"]) / 2
+    at.setdefault("neck", middle + 0.35 * (at["head"] - middle))
+    at.setdefault("chest", at["hips"] + 0.62 * (at["neck"] - at["hips"]))
+    at.setdefault("spine", at["hips"] + 0.45 * (at["chest"] - at["hips"]))
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        arm = np.array([sign * np.cos(ARMS_DOWN), -np.sin(ARMS_DOWN), 0.06])
+        length = 0.33 * np.linalg.norm(at["hips"] - at[f"{side}_heel"])
+        at.setdefault(f"{side}_elbow", at[f"{side}_shoulder"] + length * arm)
+        at.setdefault(f"{side}_wrist", at[f"{side}_elbow"] + 0.85 * length * arm)
+    return at

@@ -1,0 +1,177 @@
+"""The body of a skeleton as a mesh: corners, triangles, what moves them, and the same in any pose."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hobble.core import quat
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.figure.bind import SIDES, Bind, bind
+from hobble.figure.shape import person, scale
+from hobble.figure.skin import owners, spread
+from hobble.figure.solids import Rod, Solid
+from hobble.figure.surface import FAR, Fine, distances, slopes, surface
+
+STEP = 1.9  # cm between the corners of trunk and limbs
+FINE = {"hand": 0.64, "face": 0.85, "foot": 1.2}
+WIDE = {"": 3.6, "hand": 0.8, "head": 2.6, "foot": 1.8}  # cm over which the shares of two bones meet
+OPEN = (
+    (1.5, 0.30),
+    (4.0, 0.30),
+    (9.0, 0.25),
+)  # how far is looked for what shades a corner, and how much it counts
+NEEDED = ("hips", "head", *(f"{s}_{r}" for s in SIDES for r in ("shoulder", "hip", "knee", "heel", "toe")))
+STICK = (2.6, 1.9)  # half widths of a bone of a skeleton that is no person's
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A body in its bind pose, centimetres.
+
+    corners, normals: (V, 3); faces: (T, 3), counter-clockwise seen from outside; shade: (V,) how open to the
+    sky around a corner is, 0..1; bones: (B,) joints of the skeleton; bone: (V, 4) indices into these; share:
+    (V, 4), summing to 1; positions (B, 3) and rotations (B, 4): the bones in the bind pose.
+    """
+
+    corners: Array = field(repr=False)
+    normals: Array = field(repr=False)
+    faces: NDArray[np.int64] = field(repr=False)
+    shade: Array = field(repr=False)
+    bones: NDArray[np.int64] = field(repr=False)
+    bone: NDArray[np.int64] = field(repr=False)
+    share: Array = field(repr=False)
+    positions: Array = field(repr=False)
+    rotations: Array = field(repr=False)
+
+    def posed(self, positions: Array, rotations: Array) -> Array:
+        """Corners (V, 3) where the bones are at world positions (B, 3) with rotations (B, 4)."""
+        turn = quat.to_matrix(quat.mul(rotations, quat.inv(self.rotations)))
+        move = positions - np.einsum("bij,bj->bi", turn, self.positions)
+        out = np.zeros_like(self.corners)
+        for k in range(self.bone.shape[1]):
+            b = self.bone[:, k]
+            moved = np.einsum("vij,vj->vi", turn[b], self.corners) + move[b]
+            out += self.share[:, k, None] * moved
+        return out
+
+
+def body(skeleton: Skeleton) -> Mesh:
+    """The body of a skeleton: a person where its roles are known, else a rod for every bone.
+
+    It depends on joints, offsets and roles only, and is made once for each.
+    """
+    return _made(_text(skeleton))
+
+
+def key(skeleton: Skeleton) -> str:
+    """A name for the body of a skeleton, the same for skeletons that share it."""
+    return hashlib.sha256(_text(skeleton).encode()).hexdigest()[:12]
+
+
+def _text(skeleton: Skeleton) -> str:
+    data = skeleton.to_dict()
+    return json.dumps({key: data[key] for key in ("joints", "roles")})
+
+
+@functools.lru_cache(maxsize=8)
+def _made(text: str) -> Mesh:
+    skeleton = Skeleton.from_dict({"name": "body", **json.loads(text)})
+    known = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
+    if known:
+        stand = bind(skeleton)
+        solids, size, fine = list(person(stand)), scale(stand), _fine(stand)
+        bones = stand.bones
+    else:
+        stand, solids, bones = _sticks(skeleton)
+        size, fine = 1.0, []
+    corners, faces = surface(solids, STEP * size, fine)
+    slope, _ = slopes(solids, corners)
+    normals = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
+    owner = owners(solids, corners, bones)
+    bone, share = spread(corners, faces, owner, _reach(owner, stand, size) if known else 2.0)
+    used = np.unique(bone)
+    return Mesh(
+        corners,
+        normals,
+        faces,
+        _shade(solids, corners, normals, size),
+        used,
+        np.searchsorted(used, bone),
+        share,
+        stand.positions[used],
+        stand.rotations[used],
+    )
+
+
+def _fine(stand: Bind) -> list[Fine]:
+    """Where the surface is looked at more closely: hands, face, feet."""
+    size, at = scale(stand), stand.at
+    out: list[Fine] = []
+    head = at["head"]
+    low, high = np.array([-8.0, -6.0, -1.0]), np.array([8.0, 12.0, 13.0])
+    out.append((head + size * low, head + size * high, FINE["face"] * size))
+    for side in SIDES:
+        wrist = at[f"{side}_wrist"]
+        ahead = wrist - at[f"{side}_elbow"]
+        tip = wrist + 18 * size * ahead / max(float(np.linalg.norm(ahead)), 1e-9)
+        out.append(
+            (np.minimum(wrist, tip) - 4 * size, np.maximum(wrist, tip) + 4 * size, FINE["hand"] * size)
+        )
+        ankle, ball = at[f"{side}_heel"], at[f"{side}_toe"]
+        low, high = np.minimum(ankle, ball), np.maximum(ankle, ball)
+        low = low - size * np.array([5.0, 3.5, 6.0])
+        high = high + size * np.array([5.0, 0.0, 9.0])
+        out.append((low, high, FINE["foot"] * size))
+    return out
+
+
+def _reach(owner: NDArray[np.int64], stand: Bind, size: float) -> Array:
+    """Over how many cm the shares of two bones meet, at each corner, by its owner (V,)."""
+    wide = np.full(len(owner), WIDE[""])
+    for part, roles in (
+        ("hand", ("left_wrist", "right_wrist")),
+        ("head", ("head", "neck")),
+        ("foot", ("left_toe", "right_toe", "left_heel", "right_heel")),
+    ):
+        wide[np.isin(owner, [stand.bones[role] for role in roles])] = WIDE[part]
+    return wide * size
+
+
+def _shade(solids: Sequence[Solid], corners: Array, normals: Array, size: float) -> Array:
+    """How open the surroundings of each corner are, 0..1: what is found along its normal."""
+    shade = np.ones(len(corners))
+    for away, weight in OPEN:
+        reach = size * away
+        found = np.clip(distances(solids, corners + reach * normals), 0, min(reach, FAR))
+        shade -= weight * (1 - found / reach)
+    return np.clip(shade, 0, 1)
+
+
+def _sticks(skeleton: Skeleton) -> tuple[Bind, list[Solid], dict[str, int]]:
+    """A rod for every bone, at rest."""
+    count = len(skeleton.joints)
+    positions = np.zeros((count, 3))
+    for j, p in enumerate(skeleton.parents):
+        if p >= 0:
+            positions[j] = positions[p] + skeleton.offsets[j]
+    bones = {name: j for j, name in enumerate(skeleton.joints)}
+    stand = Bind(positions, np.tile(quat.IDENTITY, (count, 1)), bones, {})
+
+    def rods() -> Iterator[Solid]:
+        for j, p in enumerate(skeleton.parents):
+            if p >= 0:
+                yield Rod(1.0, ((-np.inf, skeleton.joints[p]),), positions[p], positions[j], *STICK)
+
+    return (
+        stand,
+        list(rods()) or [Rod(1.0, ((-np.inf, skeleton.joints[0]),), positions[0], positions[0], *STICK)],
+        bones,
+    )

@@ -1,0 +1,110 @@
+"""A body as it lies in the page: integers as base64, and which links lie in each of its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hobble.core import quat
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.figure.mesh import Mesh, body
+from hobble.models.packing import packed
+
+UNIT = 0.01  # cm of one step of corners and of places of bones
+TURN = 32767  # steps of a component of a rotation
+
+
+def packed_body(skeleton: Skeleton) -> dict[str, Any]:
+    """The mesh of `mesh.body` and all that is needed to move it; `keep`: the joints that are its bones."""
+    mesh = body(skeleton)
+    wide = np.uint16 if len(mesh.corners) < 1 << 16 else np.uint32
+    return {
+        "unit": UNIT,
+        "corners": packed(np.round(mesh.corners / UNIT).astype(np.int16)),
+        "normals": packed(np.round(mesh.normals * 127).astype(np.int8)),
+        "shade": packed(np.round(mesh.shade * 255).astype(np.uint8)),
+        "faces": packed(mesh.faces.astype(wide)),
+        "wide": wide is np.uint32,
+        "bone": packed(mesh.bone.astype(np.uint8)),
+        "share": packed(whole(mesh.share)),
+        "keep": mesh.bones.tolist(),
+        "places": np.round(mesh.positions, 4).tolist(),
+        "turns": np.round(mesh.rotations, 6).tolist(),
+        "balls": np.round(balls(mesh), 2).tolist(),
+    }
+
+
+def balls(mesh: Mesh) -> Array:
+    """A ball for the part that each bone moves: its middle (B, 3) seen from the bone, and its half width.
+
+    They stand for the body where only its outline counts, as in the shade that it gives the ground.
+    """
+    out = np.zeros((len(mesh.bones), 4))
+    main = np.take_along_axis(mesh.bone, mesh.share.argmax(axis=1)[:, None], axis=1)[:, 0]
+    for b in range(len(mesh.bones)):
+        if not (own := main == b).any():
+            continue
+        local = quat.rotate(quat.inv(mesh.rotations[b]), mesh.corners[own] - mesh.positions[b])
+        low, high = local.min(axis=0), local.max(axis=0)
+        out[b] = [*(low + high) / 2, float(np.prod((high - low) / 2) ** (1 / 3))]
+    return out
+
+
+def whole(share: Array) -> NDArray[np.uint8]:
+    """Shares (V, 4) as integers (V, 4) that sum to 255; what rounding leaves over goes to the largest."""
+    steps = np.floor(share * 255).astype(np.int64)
+    steps[np.arange(len(steps)), share.argmax(axis=1)] += 255 - steps.sum(axis=1)
+    return steps.astype(np.uint8)
+
+
+def regions(skeleton: Skeleton, links: Sequence[str]) -> list[list[int]]:
+    """For each bone of the body the links, by index, that lie in the part of the body that it moves.
+
+    A link lies where the joint at its upper end is; those that leave hips and chest belong to the limb, or
+    to the part of the back, to which they lead.
+    """
+    bones = body(skeleton).bones.tolist()
+    turning = {
+        skeleton.role(role) for role in ("hips", "chest") if skeleton.roles.get(role) in skeleton.joints
+    }
+    found: list[list[int]] = [[] for _ in bones]
+    for index, ends in enumerate(link_ends(skeleton.joints, links)):
+        if ends is None:
+            continue
+        upper, lower = ends
+        bone = upper
+        while bone not in bones and skeleton.parents[bone] >= 0:
+            bone = skeleton.parents[bone]
+        if bone in turning:
+            bone = next((j for j in _below(skeleton, lower) if j in bones), bone)
+        if bone in bones:
+            found[bones.index(bone)].append(index)
+    return found
+
+
+def _below(skeleton: Skeleton, joint: int) -> list[int]:
+    """The joint and all below it, nearest first."""
+    out = [joint]
+    for j in out:
+        out += skeleton.children(j)
+    return out
+
+
+def link_ends(joints: Sequence[str], links: Sequence[str]) -> list[tuple[int, int] | None]:
+    """Ends of each link as indices; joint names may hold hyphens themselves, so every place is tried."""
+    pairs: list[tuple[int, int] | None] = []
+    for link in links:
+        pieces = link.split("-")
+        splits = [("-".join(pieces[:i]), "-".join(pieces[i:])) for i in range(1, len(pieces))]
+        known = [(joints.index(a), joints.index(b)) for a, b in splits if a in joints and b in joints]
+        pairs.append(known[0] if known else None)
+    return pairs
+
+
+def packed_turns(rotations: Array) -> str:
+    """Rotations (F, B, 4) as 16-bit integers."""
+    return packed(np.round(np.clip(rotations, -1, 1) * TURN).astype(np.int16))

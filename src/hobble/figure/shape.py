@@ -1,0 +1,301 @@
+"""The shape of a person around the joints of a skeleton: all numbers of its proportions.
+
+Tables are in centimetres for a body whose hips are 81 cm above its ankles, and grow with the skeleton.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.figure.bind import SIDES, Bind
+from hobble.figure.solids import Ball, Floor, Owner, Rod, Solid, Sweep
+
+LEG_LENGTH = 81.0  # hip to ankle of the body that the tables describe
+TOE_HEIGHT = 2.5  # of the ball of the foot above the sole
+# Heights of hip joints, chest, neck and head in the table of the trunk, which are moved to the skeleton's.
+LEVELS = (-8.0, 23.0, 38.0, 48.0)
+
+# height, half width, half depth, to the front, squareness
+TRUNK = (
+    (-18.5, 3.5, 4.5, 0.2, 2.0),
+    (-16.5, 7.0, 7.0, 0.0, 2.0),
+    (-13.0, 12.6, 9.6, -0.3, 2.1),
+    (-8.0, 15.2, 10.8, -0.5, 2.2),
+    (-3.0, 15.5, 10.9, -0.5, 2.2),
+    (3.0, 14.4, 10.2, -0.2, 2.2),
+    (9.0, 12.8, 9.1, 0.2, 2.2),
+    (16.0, 12.6, 9.1, 0.5, 2.2),
+    (22.0, 14.0, 10.2, 0.6, 2.3),
+    (27.0, 15.2, 10.9, 0.5, 2.4),
+    (31.0, 15.4, 10.5, 0.1, 2.4),
+    (34.5, 14.0, 9.2, -0.5, 2.3),
+    (38.0, 9.6, 7.2, -1.0, 2.1),
+    (41.0, 6.6, 6.0, -1.0, 2.0),
+    (44.0, 5.4, 5.6, -0.7, 2.0),
+    (49.0, 5.1, 5.4, -0.1, 2.0),
+    (54.0, 4.2, 4.6, 0.4, 2.0),
+)
+# along thigh (0 to 1) and shank (1 to 2), half width, half depth, to the front
+LEG = (
+    (-0.2, 2.5, 3.5, -0.4),
+    (-0.12, 6.0, 7.6, -0.3),
+    (0.0, 8.4, 9.5, 0.0),
+    (0.2, 8.5, 9.3, 0.3),
+    (0.45, 7.5, 8.3, 0.6),
+    (0.72, 6.0, 6.7, 0.4),
+    (0.9, 5.2, 5.8, 0.3),
+    (1.0, 5.0, 5.6, 0.3),
+    (1.1, 4.8, 5.4, -0.4),
+    (1.28, 5.3, 6.0, -1.4),
+    (1.45, 4.8, 5.4, -1.2),
+    (1.66, 3.7, 4.2, -0.7),
+    (1.86, 3.1, 3.6, -0.3),
+    (1.97, 3.2, 3.7, -0.2),
+    (2.04, 3.0, 3.4, -0.2),
+)
+# along upper arm (0 to 1) and forearm (1 to 2), half width to the front, half depth
+ARM = (
+    (-0.16, 3.6, 3.2),
+    (-0.08, 5.1, 4.7),
+    (0.04, 5.8, 5.5),
+    (0.18, 5.5, 5.3),
+    (0.36, 4.9, 4.6),
+    (0.62, 4.4, 4.1),
+    (0.86, 3.7, 3.5),
+    (1.0, 3.6, 3.4),
+    (1.16, 4.1, 3.7),
+    (1.35, 3.9, 3.5),
+    (1.68, 3.1, 2.6),
+    (1.93, 2.7, 1.95),
+    (2.03, 2.7, 1.9),
+)
+# cm from the wrist, half width, half thickness, towards the thumb
+PALM = (
+    (-1.5, 2.4, 1.7, 0.0),
+    (0.5, 2.8, 1.75, 0.1),
+    (3.5, 3.8, 1.8, 0.3),
+    (7.0, 4.1, 1.55, 0.1),
+    (9.2, 3.9, 1.3, 0.0),
+    (10.2, 3.3, 1.0, 0.0),
+)
+# across the palm, where it begins, length, half width
+FINGERS = ((3.1, 8.7, 7.0, 0.84), (1.0, 9.2, 7.8, 0.86), (-1.1, 8.9, 7.2, 0.83), (-3.05, 8.1, 5.6, 0.74))
+CURL = (0.16, 0.30, 0.26)  # radians that each part of a finger is bent more than the one before
+# place along the foot (share of ankle to ball, and cm), half width, height, towards the other foot
+FOOT = (
+    (0.0, -6.0, 2.4, 4.6, 0.0),
+    (0.0, -5.0, 3.2, 6.8, 0.0),
+    (0.0, -3.0, 3.6, 8.6, 0.0),
+    (0.0, 0.5, 3.7, 9.6, 0.0),
+    (0.25, 0.0, 3.8, 8.7, 0.0),
+    (0.55, 0.0, 4.1, 6.9, 0.2),
+    (0.85, 0.0, 4.6, 5.3, 0.4),
+    (1.0, 1.0, 4.7, 4.5, 0.5),
+    (1.0, 4.0, 4.4, 3.7, 0.8),
+    (1.0, 6.5, 3.6, 3.1, 1.0),
+    (1.0, 8.0, 2.6, 2.6, 1.1),
+)
+
+
+def person(bind: Bind) -> Iterator[Solid]:
+    """The solids of a person, each melted into, or cut from, those before."""
+    at = bind.at
+    legs = [np.linalg.norm(at[f"{s}_heel"] - at[f"{s}_knee"]) for s in SIDES]
+    legs += [np.linalg.norm(at[f"{s}_knee"] - at[f"{s}_hip"]) for s in SIDES]
+    size = float(max(sum(legs) / 2 / LEG_LENGTH, 0.05))
+    yield from _trunk(at, size)
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        yield from _leg(at, side, size)
+        yield from _arm(at, side, sign, size)
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        yield from _foot(at, side, sign, size)
+        yield from _hand(at, side, sign, size)
+    yield from _head(at, size)
+
+
+def scale(bind: Bind) -> float:
+    """How large the body is beside that of the tables."""
+    legs = [np.linalg.norm(bind.at[f"{s}_{a}"] - bind.at[f"{s}_{b}"]) for s in SIDES for a, b in
+            (("heel", "knee"), ("knee", "hip"))]  # fmt: skip
+    return float(max(sum(legs) / 2 / LEG_LENGTH, 0.05))
+
+
+def _levels(at: dict[str, Array], size: float) -> Array:
+    """Heights of hip joints, chest, neck and head, each at least a little above the one before."""
+    hips = (at["left_hip"][1] + at["right_hip"][1]) / 2
+    heights = [hips, at["chest"][1], at["neck"][1], at["head"][1]]
+    for i in range(1, 4):
+        usual = size * (LEVELS[i] - LEVELS[i - 1])
+        heights[i] = max(heights[i], heights[i - 1] + 0.4 * usual)
+    return np.array(heights)
+
+
+def _trunk(at: dict[str, Array], size: float) -> Iterator[Solid]:
+    heights = _levels(at, size)
+
+    def level(y: float) -> float:
+        if y < LEVELS[0] or y > LEVELS[-1]:
+            end = 0 if y < LEVELS[0] else -1
+            return float(heights[end] + size * (y - LEVELS[end]))
+        return float(np.interp(y, LEVELS, heights))
+
+    hip = (at["left_hip"] + at["right_hip"]) / 2
+    start = np.array([hip[0], 0.0, hip[2]])
+    spine = [hip[2], at["spine"][2], at["chest"][2], at["neck"][2], at["head"][2]]
+    known = [heights[0], at["spine"][1], *heights[1:]]
+    rows = [
+        (level(y), size * w, size * d, 0.0, float(np.interp(level(y), known, spine)) - hip[2] + size * f, n)
+        for y, w, d, f, n in TRUNK
+    ]
+    up, left = np.array([0.0, 1.0, 0.0]), np.array([-1.0, 0.0, 0.0])
+    owners: tuple[Owner, ...] = (
+        (-np.inf, "hips"),
+        (0.5 * (at["hips"][1] + at["spine"][1]) + 2.0 * size, "spine"),
+        (0.5 * (at["spine"][1] + heights[1]) + 3.0 * size, "chest"),
+        (heights[2] + 2.0 * size, "neck"),
+        (heights[3] + 1.0 * size, "head"),
+    )
+    yield Sweep(0.0, owners, start, up, left, rows)
+
+    def place(x: float, y: float, z: float) -> Array:
+        middle = float(np.interp(level(y), known, spine))
+        return np.array([hip[0] + size * x, level(y), middle + size * z])
+
+    for sign in (1.0, -1.0):
+        for role, blend, centre, radii in (
+            ("chest", 4.0, (6.6, 28.5, 6.6), (7.2, 5.4, 3.9)),  # breast
+            ("chest", 4.0, (7.6, 29.0, -6.2), (6.4, 7.5, 3.6)),  # shoulder blade
+            ("hips", 6.0, (6.8, -9.0, -4.6), (7.0, 7.6, 6.6)),  # seat
+        ):
+            x, y, z = centre
+            yield Ball(blend * size, ((-np.inf, role),), place(sign * x, y, z), size * np.array(radii))
+        shoulder = at["left_shoulder" if sign > 0 else "right_shoulder"]
+        inner = place(sign * 3.6, 42.0, -1.8)
+        outer = shoulder + size * np.array([-sign * 2.5, 2.4, -0.4])
+        yield Rod(4.5 * size, ((-np.inf, "chest"),), inner, outer, 2.6 * size, 3.0 * size)
+
+
+def _unit(v: Array) -> Array:
+    return v / max(float(np.linalg.norm(v)), 1e-9)
+
+
+def _limb(
+    places: tuple[Array, Array, Array], forward: Array, table: tuple, size: float, roles: tuple[str, str]
+) -> Sweep:
+    """A sweep along two bones that lie in a line; table: share of the way, half widths, to the front."""
+    a, b, c = places
+    axis = _unit(c - a)
+    first, second = float((b - a) @ axis), float((c - b) @ axis)
+    across = _unit(np.cross(axis, forward))  # so that the third direction is the front
+    across = -across if np.cross(axis, across) @ forward < 0 else across
+    rows = []
+    for t, wide, deep, front in table:
+        s = t * first if t < 1 else first + (t - 1) * second
+        rows.append((s, size * wide, size * deep, 0.0, size * front, 2.0))
+    return Sweep(0.0, ((-np.inf, roles[0]), (first, roles[1])), a, axis, across, rows)
+
+
+def _leg(at: dict[str, Array], side: str, size: float) -> Iterator[Solid]:
+    hip, knee, heel = (at[f"{side}_{role}"] for role in ("hip", "knee", "heel"))
+    front = np.array([0.0, 0.0, 1.0])
+    leg = _limb((hip, knee, heel), front, LEG, size, (f"{side}_hip", f"{side}_knee"))
+    yield _with_blend(leg, 3.5 * size)
+    cap = knee + size * np.array([0.0, 0.4, 4.3])
+    yield Ball(3.0 * size, ((-np.inf, f"{side}_knee"),), cap, size * np.array([2.7, 3.4, 1.9]))
+
+
+def _with_blend(sweep: Sweep, blend: float) -> Sweep:
+    return Sweep(blend, sweep.owners, sweep.start, sweep.axis, sweep.across, sweep.sections)
+
+
+def _arm(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator[Solid]:
+    shoulder, elbow, wrist = (at[f"{side}_{role}"] for role in ("shoulder", "elbow", "wrist"))
+    # Its third direction is turned to the back of the hand, so that `wide` is measured to the front.
+    out = np.array([sign, 0.6, 0.0])
+    table = [(t, wide, deep, 0.0) for t, wide, deep in ARM]
+    arm = _limb((shoulder, elbow, wrist), out, tuple(table), size, (f"{side}_shoulder", f"{side}_elbow"))
+    yield _with_blend(arm, 3.5 * size)
+    deltoid = shoulder + size * np.array([sign * 1.2, -2.2, 0.3])
+    yield Ball(4.0 * size, ((-np.inf, f"{side}_shoulder"),), deltoid, size * np.array([4.5, 6.2, 5.2]))
+
+
+def _foot(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator[Solid]:
+    ankle, ball = at[f"{side}_heel"], at[f"{side}_toe"]
+    sole = ball[1] - TOE_HEIGHT * size
+    way = (ball - ankle) * [1.0, 0.0, 1.0]
+    length = float(np.linalg.norm(way))
+    ahead = way / length if length > 1.0 * size else np.array([0.0, 0.0, 1.0])
+    up = np.array([0.0, 1.0, 0.0])
+    inward = np.cross(up, ahead) * -sign
+    # The ankle's height above the sole decides how high the foot is there.
+    tall = max((ankle[1] - sole) / 7.0, 0.5 * size)
+    rows = []
+    for t, cm, wide, height, aside in FOOT:
+        high = height * (tall + (size - tall) * min(1.0, t + max(cm, 0.0) / 8))
+        s = t * length + size * cm
+        rows.append((s, size * wide, 0.64 * high, size * aside, 0.36 * high, 2.3))
+    start = np.array([ankle[0], sole, ankle[2]])
+    across = inward if np.cross(ahead, inward) @ up > 0 else -inward
+    if across is not inward:
+        rows = [(s, w, d, -cu, cv, n) for s, w, d, cu, cv, n in rows]
+    owners = ((-np.inf, f"{side}_heel"), (length - 0.5 * size, f"{side}_toe"))
+    yield Sweep(2.5 * size, owners, start, ahead, across, rows)
+    heel_only = ((-np.inf, f"{side}_heel"),)
+    middle = start + ahead * (0.6 * length)
+    yield Floor(1.0 * size, heel_only, middle, up, (length + 12.0) * size, cut=True)
+
+
+def _hand(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator[Solid]:
+    wrist, elbow = at[f"{side}_wrist"], at[f"{side}_elbow"]
+    ahead = _unit(wrist - elbow)
+    thumb = _unit(np.array([0.0, 0.0, 1.0]) - ahead * ahead[2])
+    palm = np.cross(ahead, thumb) * sign  # out of the palm
+    owner = ((-np.inf, f"{side}_wrist"),)
+
+    def place(out: float, aside: float, deep: float) -> Array:
+        return wrist + size * (out * ahead + aside * thumb + deep * palm)
+
+    rows = [(size * s, size * w, size * d, size * u, 0.0, 2.5) for s, w, d, u in PALM]
+    yield Sweep(1.6 * size, owner, wrist, ahead, thumb, rows)
+    for aside, begin, length, thick in FINGERS:
+        knuckle, bend = place(begin, aside, 0.0), 0.0
+        for part, (share, more) in enumerate(zip((0.42, 0.32, 0.26), CURL, strict=True)):
+            bend += more
+            fan = 0.045 * aside
+            way = _unit(np.cos(bend) * ahead + np.sin(bend) * palm + fan * thumb)
+            tip = knuckle + size * share * length * way
+            a, b = thick * (1 - 0.08 * part), thick * (1 - 0.08 * (part + 1))
+            yield Rod(0.5 * size, owner, knuckle, tip, a * size, b * size)
+            knuckle = tip
+    root, joint, tip = place(2.4, 2.4, 0.5), place(5.8, 4.7, 1.3), place(9.3, 5.9, 1.9)
+    yield Rod(1.4 * size, owner, root, joint, 1.5 * size, 1.12 * size)
+    yield Rod(0.5 * size, owner, joint, tip, 1.12 * size, 0.86 * size)
+
+
+def _head(at: dict[str, Array], size: float) -> Iterator[Solid]:
+    base, owner = at["head"], ((-np.inf, "head"),)
+
+    def ball(blend: float, centre: tuple, radii: tuple, cut: bool = False) -> Ball:
+        return Ball(size * blend, owner, base + size * np.array(centre), size * np.array(radii), cut=cut)
+
+    def rod(blend: float, a: tuple, b: tuple, thick: float, thin: float) -> Rod:
+        return Rod(
+            size * blend, owner, base + size * np.array(a), base + size * np.array(b),
+            size * thick, size * thin,
+        )  # fmt: skip
+
+    yield ball(2.0, (0, 9.4, 0.4), (7.1, 8.6, 8.9))  # skull
+    yield ball(4.0, (0, 3.2, 3.9), (4.9, 7.0, 5.5))  # face
+    yield ball(3.0, (0, -2.9, 6.9), (2.0, 1.7, 1.7))  # chin
+    for sign in (1.0, -1.0):
+        yield rod(3.5, (sign * 3.9, 1.2, 1.6), (sign * 1.3, -2.7, 6.0), 1.2, 1.2)  # jaw
+        yield ball(4.0, (sign * 3.3, 3.6, 5.9), (1.9, 2.4, 1.8))  # cheek
+        yield rod(3.0, (sign * 0.8, 8.9, 8.6), (sign * 4.2, 8.8, 7.2), 0.85, 0.7)  # brow
+    for sign in (1.0, -1.0):
+        yield ball(2.6, (sign * 2.9, 6.6, 10.9), (2.1, 1.1, 2.0), cut=True)  # eye socket
+        yield ball(1.0, (sign * 7.0, 6.2, -0.2), (0.8, 2.7, 1.6))  # ear
+    yield rod(1.8, (0, 8.0, 8.8), (0, 4.2, 10.9), 0.8, 1.1)  # nose
+    yield ball(3.0, (0, 0.7, 7.4), (2.6, 1.9, 1.5))  # mouth

@@ -1,0 +1,67 @@
+"""Which bones move each corner of a body, and by how much."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, diags_array
+from scipy.sparse.linalg import splu
+
+from hobble.core.quat import Array
+from hobble.figure.solids import Solid
+
+MOST = 4  # bones that move one corner
+
+
+def owners(solids: Sequence[Solid], points: Array, bones: Mapping[str, int]) -> NDArray[np.int64]:
+    """The joint (V,) whose part of the body is nearest to each corner."""
+    best, found = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
+    x, y, z = points.T
+    for solid in solids:
+        if solid.cut:
+            continue
+        low, high = (corner.reshape(3, 1) for corner in solid.bounds())
+        chosen = np.flatnonzero(((low - 4 < points.T) & (high + 4 > points.T)).all(axis=0))
+        away = np.full(len(points), np.inf)
+        away[chosen] = solid.distance(x[chosen], y[chosen], z[chosen])
+        nearer = away < best
+        joint = np.zeros(len(points), np.int64)
+        along = solid.along(points)
+        for begin, role in solid.owners:
+            joint[along >= begin] = bones[role]
+        found[nearer], best[nearer] = joint[nearer], away[nearer]
+    return found
+
+
+def spread(
+    corners: Array, faces: NDArray[np.int64], owner: NDArray[np.int64], reach: float | Array
+) -> tuple[NDArray[np.int64], Array]:
+    """Joints (V, 4) and their shares (V, 4), most first, that sum to 1.
+
+    Each corner begins as its owner's and the shares flow along the surface, as heat would, over about
+    `reach` cm (one, or one for each corner). So a hand that hangs beside a thigh takes nothing from it.
+    """
+    joints = np.unique(owner)
+    shares = (owner[:, None] == joints).astype(float)
+    edges = np.unique(
+        np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0
+    )
+    a, b = edges.T
+    length = np.maximum(np.linalg.norm(corners[a] - corners[b], axis=1), 0.05)
+    wide = np.broadcast_to(np.asarray(reach, float), (len(corners),))
+    flow = (np.minimum(wide[a], wide[b]) / length) ** 2 / 6
+    count = len(corners)
+    graph = coo_array((np.r_[flow, flow], (np.r_[a, b], np.r_[b, a])), (count, count)).tocsr()
+    system = (diags_array(1 + np.asarray(graph.sum(axis=1)).ravel()) - graph).tocsc()
+    solve = splu(system).solve
+    for _ in range(2):  # twice, so that what is left of the step at a joint is rounded off
+        shares = solve(shares)
+    order = np.argsort(-shares, axis=1)[:, :MOST]
+    kept = np.take_along_axis(shares, order, axis=1)
+    if kept.shape[1] < MOST:
+        pad = MOST - kept.shape[1]
+        kept, order = np.pad(kept, ((0, 0), (0, pad))), np.pad(order, ((0, 0), (0, pad)))
+    kept = np.maximum(kept - 0.01, 0)  # what falls away where a fifth bone would come in fades before it does
+    return joints[order], kept / kept.sum(axis=1, keepdims=True)

@@ -1,0 +1,163 @@
+"""Solids that a body is blended from, as distances to their surface: below 0 inside, in centimetres."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from hobble.core.quat import Array
+
+# A part of a solid that one bone moves: from which length along it on, and which role that is.
+Owner = tuple[float, str]
+
+
+@dataclass(frozen=True)
+class Solid:
+    """blend: cm within which it melts into what was there before; cut: it is taken away instead.
+    owners: which bone moves it, along its length. fine: it is modelled, and moved, in small steps."""
+
+    blend: float
+    owners: tuple[Owner, ...]
+    cut: bool = field(default=False, kw_only=True)
+
+    def distance(self, x: Any, y: Any, z: Any) -> Array:
+        """At world places, arrays that go together."""
+        raise NotImplementedError
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest corner (3,) of a box that holds it."""
+        raise NotImplementedError
+
+    def along(self, points: Array) -> Array:
+        """How far along it points (N, 3) are, as `owners` counts."""
+        return np.zeros(len(points))
+
+
+@dataclass(frozen=True)
+class Sweep(Solid):
+    """Sections across a straight line from `start` along the unit vector `axis`.
+
+    sections: rows of (place along the line, half width along `across`, half depth along the third direction,
+    centre along `across`, centre along the third, squareness: 2 is an ellipse). Cubic
+    splines run through them, so that no section is seen as an edge.
+    """
+
+    start: Array
+    axis: Array
+    across: Array
+    sections: Sequence[Sequence[float]]
+
+    def __post_init__(self) -> None:
+        rows = np.array(self.sections, float)
+        object.__setattr__(self, "_rows", rows)
+        object.__setattr__(self, "_at", CubicSpline(rows[:, 0], rows[:, 1:], axis=0))
+        object.__setattr__(self, "_third", np.cross(self.axis, self.across))
+
+    def distance(self, x: Any, y: Any, z: Any) -> Array:
+        """As in `Solid`."""
+        rows: Array = self._rows  # type: ignore[attr-defined]
+        local = [x - self.start[0], y - self.start[1], z - self.start[2]]
+        s, u, v = (
+            sum(part * direction[i] for i, part in enumerate(local))
+            for direction in (self.axis, self.across, self._third)  # type: ignore[attr-defined]
+        )
+        values = self._at(np.clip(s, rows[0, 0], rows[-1, 0]))  # type: ignore[attr-defined]
+        wide, deep, cu, cv, n = np.moveaxis(values, -1, 0)
+        wide, deep = np.maximum(wide, rows[:, 1].min() / 2), np.maximum(deep, rows[:, 2].min() / 2)
+        a, b = np.abs(u - cu), np.abs(v - cv)
+        size = np.sqrt(a * a + b * b) + 1e-9
+        q = ((a / wide) ** n + (b / deep) ** n) ** (1 / n) + 1e-9
+        aside = np.maximum(size * (1 - 1 / q), -np.minimum(wide, deep))
+        end = np.maximum(rows[0, 0] - s, s - rows[-1, 0])
+        return np.where(end > 0, np.hypot(np.maximum(aside, 0), np.maximum(end, 0)), np.maximum(aside, end))
+
+    def bounds(self) -> tuple[Array, Array]:
+        """As in `Solid`."""
+        rows: Array = self._rows  # type: ignore[attr-defined]
+        middle = (
+            self.start + rows[:, :1] * self.axis + rows[:, 3:4] * self.across + rows[:, 4:5] * self._third  # type: ignore[attr-defined]
+        )
+        reach = np.maximum(rows[:, 1], rows[:, 2])[:, None]
+        return (middle - reach).min(axis=0), (middle + reach).max(axis=0)
+
+    def along(self, points: Array) -> Array:
+        """As in `Solid`."""
+        return (points - self.start) @ self.axis
+
+
+@dataclass(frozen=True)
+class Ball(Solid):
+    """An ellipsoid: half axes `radii` along the rows of `axes` (3, 3)."""
+
+    centre: Array
+    radii: Array
+    axes: Array = field(default_factory=lambda: np.eye(3))
+
+    def distance(self, x: Any, y: Any, z: Any) -> Array:
+        """As in `Solid`."""
+        local = [x - self.centre[0], y - self.centre[1], z - self.centre[2]]
+        parts = [sum(p * row[i] for i, p in enumerate(local)) for row in self.axes]
+        k0 = np.sqrt(sum((p / r) ** 2 for p, r in zip(parts, self.radii, strict=True)))
+        k1 = np.sqrt(sum((p / r**2) ** 2 for p, r in zip(parts, self.radii, strict=True)))
+        return np.where(k1 > 1e-9, k0 * (k0 - 1) / np.maximum(k1, 1e-9), -self.radii.min())
+
+    def bounds(self) -> tuple[Array, Array]:
+        """As in `Solid`."""
+        reach = np.sqrt(((self.axes * self.radii[:, None]) ** 2).sum(axis=0))
+        return self.centre - reach, self.centre + reach
+
+
+@dataclass(frozen=True)
+class Rod(Solid):
+    """From one place to another, its half width going from `thick` to `thin` in cm, with round ends."""
+
+    start: Array
+    end: Array
+    thick: float
+    thin: float
+
+    def distance(self, x: Any, y: Any, z: Any) -> Array:
+        """As in `Solid`."""
+        way = self.end - self.start
+        local = [x - self.start[0], y - self.start[1], z - self.start[2]]
+        t = np.clip(sum(p * way[i] for i, p in enumerate(local)) / max(way @ way, 1e-9), 0, 1)
+        off = np.sqrt(sum((p - t * way[i]) ** 2 for i, p in enumerate(local)))
+        return off - (self.thick + (self.thin - self.thick) * t)
+
+    def bounds(self) -> tuple[Array, Array]:
+        """As in `Solid`."""
+        reach = max(self.thick, self.thin)
+        return np.minimum(self.start, self.end) - reach, np.maximum(self.start, self.end) + reach
+
+
+@dataclass(frozen=True)
+class Floor(Solid):
+    """Takes away what is below a plane through `place`, within `reach` cm of it."""
+
+    place: Array
+    up: Array
+    reach: float
+
+    def distance(self, x: Any, y: Any, z: Any) -> Array:
+        """As in `Solid`."""
+        local = [x - self.place[0], y - self.place[1], z - self.place[2]]
+        return sum(p * self.up[i] for i, p in enumerate(local)) + 0 * (x + y + z)
+
+    def bounds(self) -> tuple[Array, Array]:
+        """As in `Solid`."""
+        return self.place - self.reach, self.place + self.reach
+
+
+def united(a: Array, b: Array, blend: float) -> Array:
+    """The smaller distance, rounded off where both are within `blend` cm of each other."""
+    near = np.maximum(blend - np.abs(a - b), 0) / max(blend, 1e-9)
+    return np.minimum(a, b) - 0.25 * blend * near * near
+
+
+def taken_away(a: Array, b: Array, blend: float) -> Array:
+    """What of `a` lies outside `b`, rounded off."""
+    return -united(-a, b, blend)

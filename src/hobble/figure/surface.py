@@ -1,0 +1,183 @@
+"""The surface of blended solids: one closed mesh (surface nets: Gibson, 1998)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hobble.core.quat import Array
+from hobble.figure.solids import Solid, taken_away, united
+
+FAR = 12.0  # cm; nothing is said of how much further away the surface is
+NEAR = 7.0  # cm around a solid within which it counts; all blends are narrower
+# The corners of a cell, and its edges as pairs of them.
+CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if (CORNERS[a] != CORNERS[b]).sum() == 1]
+
+# Where steps are finer: lowest and highest corner of a box (3,), and the step in cm.
+Fine = tuple[Array, Array, float]
+
+
+def distances(solids: Sequence[Solid], points: Array) -> Array:
+    """Distance (N,) of points (N, 3) to the surface of the blended solids, below 0 inside, FAR at most."""
+    out = np.full(len(points), FAR)
+    x, y, z = (np.ascontiguousarray(part) for part in points.T)
+    for solid in solids:
+        low, high = solid.bounds()
+        low, high = low - NEAR, high + NEAR
+        near = (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]) & (z > low[2]) & (z < high[2])
+        chosen = np.flatnonzero(near)
+        if len(chosen):
+            found = solid.distance(x[chosen], y[chosen], z[chosen])
+            act = taken_away if solid.cut else united
+            out[chosen] = act(out[chosen], found, solid.blend)
+    return out
+
+
+def ticks(low: float, high: float, step: float, bands: Sequence[tuple[float, float, float]]) -> Array:
+    """Places from low to high, `step` apart and finer within bands (from, to, step), changing gently."""
+    places, at = [low], low
+    while at < high:
+        here = min([step, *(_gentle(at, band) for band in bands)])
+        at += here
+        places.append(at)
+    return np.array(places)
+
+
+def _gentle(at: float, band: tuple[float, float, float]) -> float:
+    """The step allowed at a place: the band's own, and more with distance from it."""
+    low, high, step = band
+    return step + 0.25 * max(low - at, at - high, 0.0)
+
+
+def field(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
+    """Distances on the grid of three axes."""
+    out = np.full([len(axis) for axis in axes], FAR, np.float64)
+    for solid in solids:
+        low, high = solid.bounds()
+        reach = max(solid.blend, 2.0) + 1.5
+        parts = tuple(
+            slice(
+                max(0, int(np.searchsorted(axis, low[i] - reach)) - 1),
+                int(np.searchsorted(axis, high[i] + reach)) + 1,
+            )
+            for i, axis in enumerate(axes)
+        )
+        grid = np.meshgrid(
+            *(axis[part] for axis, part in zip(axes, parts, strict=True)), indexing="ij", sparse=True
+        )
+        act = taken_away if solid.cut else united
+        out[parts] = act(out[parts], solid.distance(*grid), solid.blend)
+    return out
+
+
+def surface(
+    solids: Sequence[Solid], step: float, fine: Sequence[Fine] = ()
+) -> tuple[Array, NDArray[np.int64]]:
+    """Corners (V, 3) and triangles (T, 3), counter-clockwise seen from outside, of a closed surface.
+
+    step: cm between grid points, finer within the boxes `fine`.
+    """
+    kept = [solid for solid in solids if not solid.cut]
+    low = np.min([solid.bounds()[0] for solid in kept], axis=0) - 3 * step
+    high = np.max([solid.bounds()[1] for solid in kept], axis=0) + 3 * step
+    axes = [ticks(low[i], high[i], step, [(a[i], b[i], s) for a, b, s in fine]) for i in range(3)]
+    values = settled(field(solids, axes))
+    corners, faces = nets(values, axes)
+    for _ in range(2):
+        corners = corners - onto(solids, corners, 0.35 * step)
+    return corners, faces
+
+
+def onto(solids: Sequence[Solid], points: Array, most: float) -> Array:
+    """How far points (N, 3) lie from the surface along its slope, (N, 3), `most` cm at the most."""
+    slope, away = slopes(solids, points)
+    steep = (slope * slope).sum(axis=1)
+    move = (away / np.maximum(steep, 0.25))[:, None] * slope
+    size = np.linalg.norm(move, axis=1, keepdims=True)
+    return move * np.minimum(1.0, most / np.maximum(size, 1e-9))
+
+
+def slopes(solids: Sequence[Solid], points: Array, h: float = 0.06) -> tuple[Array, Array]:
+    """Slope (N, 3) of the distance at points (N, 3), and the distance (N,), from the corners of a small
+    tetrahedron around each."""
+    slope, away = np.zeros_like(points), np.zeros(len(points))
+    for corner in np.array([[1.0, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]]):
+        found = distances(solids, points + h * corner)
+        slope += found[:, None] * corner / (4 * h)
+        away += found / 4
+    return slope, away
+
+
+def settled(values: Array) -> Array:
+    """The same distances without squares of the grid whose inner corners lie across from each other.
+
+    At these two sheets of the surface would touch along an edge; the gap between them is closed.
+    """
+    values = values.copy()
+    while True:
+        inside, closed = values < 0, 0
+        for u, v in ((0, 1), (1, 2), (2, 0)):
+            views = []
+            for du in (0, 1):
+                for dv in (0, 1):
+                    cut = [slice(None)] * 3
+                    cut[u], cut[v] = slice(du, -1 if du == 0 else None), slice(dv, -1 if dv == 0 else None)
+                    views.append(tuple(cut))
+            a, b, c, d = (inside[view] for view in views)
+            for first, second, crossed in ((1, 2, a & d & ~b & ~c), (0, 3, b & c & ~a & ~d)):
+                where = np.argwhere(crossed)
+                closed += len(where)
+                both = [values[view][tuple(where.T)] for view in (views[first], views[second])]
+                for which, lower in ((first, both[0] <= both[1]), (second, both[0] > both[1])):
+                    values[views[which]][tuple(where[lower].T)] = -1e-3
+        if not closed:
+            return values
+
+
+def nets(values: Array, axes: Sequence[Array]) -> tuple[Array, NDArray[np.int64]]:
+    """A corner in every cell that the surface crosses, and a square around every edge of the grid that it
+    does."""
+    inside = values < 0
+    shape = np.array(values.shape) - 1
+    count = np.zeros(shape, np.int8)
+    for corner in CORNERS:
+        count += inside[tuple(slice(c, c + n) for c, n in zip(corner, shape, strict=True))]
+    cells = np.argwhere((count > 0) & (count < 8))
+    index = np.full(shape, -1, np.int64)
+    index[tuple(cells.T)] = np.arange(len(cells))
+    total, crossed = np.zeros((len(cells), 3)), np.zeros((len(cells), 1))
+    for a, b in EDGES:
+        first, second = cells + CORNERS[a], cells + CORNERS[b]
+        va, vb = values[tuple(first.T)], values[tuple(second.T)]
+        cross = (va < 0) != (vb < 0)
+        t = np.where(cross, va / np.where(cross, va - vb, 1.0), 0.0)[:, None]
+        pa, pb = (np.stack([axes[i][p[:, i]] for i in range(3)], axis=1) for p in (first, second))
+        total += np.where(cross[:, None], pa + t * (pb - pa), 0.0)
+        crossed += cross[:, None]
+    return total / crossed, _squares(inside, index)
+
+
+def _squares(inside: NDArray[np.bool_], index: NDArray[np.int64]) -> NDArray[np.int64]:
+    faces = []
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        a = inside[tuple(slice(0, -1) if i == axis else slice(1, -1) for i in range(3))]
+        b = inside[tuple(slice(1, None) if i == axis else slice(1, -1) for i in range(3))]
+        for which, flip in ((a & ~b, False), (~a & b, True)):
+            edge = np.argwhere(which)
+            edge[:, u] += 1
+            edge[:, v] += 1
+            around = []
+            for du, dv in ((-1, -1), (0, -1), (0, 0), (-1, 0)):
+                cell = edge.copy()
+                cell[:, u] += du
+                cell[:, v] += dv
+                around.append(index[tuple(cell.T)])
+            p, q, r, s = around
+            if flip:
+                q, s = s, q
+            faces += [np.stack([p, q, r], 1), np.stack([p, r, s], 1)]
+    return np.concatenate(faces)

@@ -1,0 +1,21 @@
+// The state that a link carries. What stands in a link was written by anybody: each part is taken if it is right.
+
+// {text: what follows "#play?", or null}
+export const read = (hash) => {
+  const [, text = null] = hash.match(/^#play\?(.*)$/s) || [];
+  return text === null ? null : new URLSearchParams(text);
+};
+// "yaw,pitch,distance" as numbers within bounds; null where it is no camera.
+export const camera = (text, { nearest = 140, furthest = 1500 } = {}) => {
+  const parts = (text || "").split(",");
+  if (parts.length !== 3 || !parts.every((part) => /^-?\d+(\.\d+)?$/.test(part.trim()))) return null;
+  const [yaw, pitch, distance] = parts.map(Number);
+  return {
+    yaw: yaw % (2 * Math.PI), pitch: Math.min(1.45, Math.max(.02, pitch)), distance: Math.min(furthest, Math.max(nearest, distance)),
+  };
+};
+// "link:severity,link:severity" as pairs; what is no number from 0 to 10 is left out.
+export const hurts = (text) => (text || "").split(",").flatMap((pair) => {
+  const cut = pair.lastIndexOf(":"), much = pair.slice(cut + 1);
+  return cut > 0 && /^\d+(\.\d+)?$/.test(much) && Number(much) <= 10 ? [[pair.slice(0, cut), Number(much)]] : [];
+});

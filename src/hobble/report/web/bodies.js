@@ -1,0 +1,13 @@
+// The bodies that lie in the page, each unpacked once.
+import { BufferAttribute, BufferGeometry, Matrix4, Quaternion, Sphere, Vector3 } from "three";
+import { material } from "./base.js";
+import { unpackBody } from "./skinned.js";
+
+const made = new Map();
+
+export const bodyOf = (name) => {
+  if (!made.has(name)) {
+    made.set(name, unpackBody({ BufferAttribute, BufferGeometry, Matrix4, Quaternion, Sphere, Vector3 }, material.bodies[name]));
+  }
+  return made.get(name);
+};

@@ -1,0 +1,31 @@
+// A camera that follows and comes round behind, smoothed by the clock, so that it is the same at any rate of pictures.
+import { wrap } from "./numbers.js";
+
+const FOLLOW = 8, COME_ROUND = .9; // share of the way that is gone in a second, as 1 - exp(-rate)
+const PATIENCE = 2500; // ms after somebody turned the camera until it comes round again
+
+export const createChase = (orbit, canvas) => {
+  let eye = null, last = null, touched = -Infinity;
+  for (const name of ["pointerdown", "pointermove"]) {
+    canvas.addEventListener(name, (event) => { if (event.buttons) touched = performance.now(); });
+  }
+  return {
+    reset() { eye = null; last = null; },
+    rest() { last = null; },
+    touch() { touched = performance.now(); },
+    // middle [x, y, z]: what is followed; going [x, z]: where it is asked to go, null where it stands or strafes.
+    // Returns where to look.
+    follow(now, middle, going) {
+      const passed = last === null ? 0 : Math.min(.25, (now - last) / 1000);
+      last = now;
+      if (!eye || Math.hypot(eye[0] - middle[0], eye[2] - middle[2]) > 250) eye = [...middle];
+      eye = eye.map((v, i) => v + (1 - Math.exp(-passed * (i === 1 ? .5 * FOLLOW : FOLLOW))) * (middle[i] - v));
+      if (going && now - touched > PATIENCE) {
+        const off = wrap(Math.atan2(going[0], going[1]) + Math.PI - orbit.yaw);
+        // Somebody who walks toward the camera wants to be seen from the front.
+        if (Math.abs(off) < 2.4) orbit.yaw += (1 - Math.exp(-passed * COME_ROUND)) * off;
+      }
+      return eye;
+    },
+  };
+};

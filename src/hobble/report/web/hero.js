@@ -1,0 +1,130 @@
+// The first thing on the page: the character, already walking, and beside it a healthy ghost with the same wish.
+import { createActor } from "./actor.js";
+import { find, material } from "./base.js";
+import { createDial } from "./dial.js";
+import { createView } from "./view.js";
+
+const BESIDE = -84; // cm from the hurt figure to its ghost, to its left
+const AHEAD = 120; // cm that the ghost may get away before it comes back
+const FADE = 24; // frames in which it goes, and comes
+const WARM = 100; // frames that are walked before anybody looks
+const SPEED = 2.5; // cm a frame
+
+const createHero = (spec, asked) => {
+  const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), still = find("hero-walk");
+  const link = (label) => spec.links[spec.parts[label]], labels = Object.keys(spec.parts), hurts = labels.length > 0;
+  const severity = new Map(), healthy = new Map(), flat = () => 0, hero = { frames: 0 };
+  let part = hurts ? (labels.includes(asked.part) ? asked.part : labels[0]) : null;
+  let last = null, owed = 0, told = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+  // Both are asked to go the same way, which bends gently.
+  const heading = () => .5 * Math.sin(hero.frames / 700);
+  const wish = () => ({ velocity: [SPEED * Math.sin(heading()), SPEED * Math.cos(heading())], ahead: null, gait: "walk" });
+  const view = createView(canvas, { yaw: .62, pitch: .1, distance: 460, nearest: 240, furthest: 800 }, (now) => {
+    if (walks) advance(now);
+    draw(now);
+    if (walks) view.ask();
+  });
+  view.onHidden = () => { last = null; };
+  const main = createActor(view, spec), ghost = hurts ? createActor(view, spec, { place: [BESIDE, 0], tint: "ghost", ghost: true }) : null;
+  const aside = () => [BESIDE * Math.cos(heading()), -BESIDE * Math.sin(heading())];
+
+  const step = () => {
+    hero.frames++;
+    main.frame(wish(), severity);
+    if (!ghost) return;
+    ghost.frame(wish(), healthy);
+    const [sin, cos] = [Math.sin(heading()), Math.cos(heading())], [a, b] = [main.character.root, ghost.character.root];
+    const [dx, dz] = [b[0] - a[0], b[2] - a[2]], along = dx * sin + dz * cos, beside = dx * cos - dz * sin;
+    if (!leaving && (Math.abs(along) > AHEAD || Math.abs(beside - BESIDE) > 70)) leaving = true;
+    fade = Math.min(1, Math.max(0, fade + (leaving ? -1 : 1) / FADE));
+    if (leaving && fade === 0) {
+      const [x, z] = aside();
+      ghost.character.follow(ghost.character, [a[0] + x - b[0], a[2] + z - b[2]]);
+      ghost.rig.take(ghost.character.pose, ghost.character.turns);
+      leaving = false;
+    }
+  };
+  const advance = (now) => {
+    owed = Math.min(3, owed + (last === null ? 1 : (now - last) * .06));
+    const passed = last === null ? 0 : now - last;
+    last = now;
+    for (; owed >= 1; owed--) step();
+    glide(1 - Math.exp(-passed / 350));
+  };
+  // The camera keeps to the path, and not to the hips, which rise and fall.
+  const glide = (share) => {
+    const { root } = main.character, [x, z] = ghost ? aside().map((v) => v / 2) : [0, 0], goal = [root[0] + x, root[2] + z, heading()];
+    camera = camera ? camera.map((v, i) => v + share * (goal[i] - v)) : goal;
+  };
+  const draw = (now) => {
+    const wide = view.W > 900;
+    view.framing = wide ? { size: 2.05, aside: .17, up: -.015 } : { size: 1.72, aside: 0, up: -.03 };
+    const [x, z, turn] = camera, { yaw } = view.orbit;
+    view.orbit.yaw = yaw + turn;
+    view.aim([x, 84, z]);
+    view.orbit.yaw = yaw;
+    view.land.around([x, 0, z]);
+    main.draw(false);
+    if (ghost) { ghost.draw(null); ghost.figure.show(fade > .01, fade); }
+    view.land.under(main.figure.balls(view.balls));
+    if (now - told > 250) { told = now; tell(); }
+  };
+  const pace = ({ character: c }) => {
+    const M = spec.window;
+    return Math.hypot(c.px[M] - c.px[M - 50], c.pz[M] - c.pz[M - 50]) * 60 / 50 / 100;
+  };
+  const tell = () => {
+    find("hero-pace").textContent = `${pace(main).toFixed(2)} m/s`;
+    if (ghost) find("hero-ghost").textContent = `${pace(ghost).toFixed(2)} m/s`;
+  };
+
+  if (hurts) {
+    const words = { part: document.createElement("b"), much: document.createElement("b") };
+    const say = () => {
+      words.part.textContent = part;
+      words.much.textContent = `${dial.value} of 10`;
+      if (dial.value) line.replaceChildren("One network, one wish: walk on. The solid figure is told that its ", words.part, " hurts, ", words.much, "; its ghost is told nothing.");
+      else line.replaceChildren("One network, one wish: walk on. Nothing hurts, and both figures walk alike.");
+      chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
+    };
+    const hurt = () => {
+      severity.clear();
+      severity.set(link(part), dial.value);
+      say();
+      view.ask();
+    };
+    const chips = labels.map((label) => {
+      const chip = document.createElement("button");
+      chip.type = "button";
+      chip.textContent = label;
+      chip.addEventListener("click", () => {
+        part = label;
+        if (!dial.value) dial.set(asked.severity);
+        hurt();
+      });
+      find("hero-parts").append(chip);
+      return chip;
+    });
+    const dial = createDial(find("hero-dial"), { value: asked.severity, changed: hurt });
+    Object.assign(hero, { dial, chips });
+    hurt();
+  }
+  const rest = () => {
+    still.textContent = walks ? "Pause" : "Walk";
+    still.setAttribute("aria-pressed", String(!walks));
+  };
+  still.addEventListener("click", () => { walks = !walks; last = null; rest(); view.ask(); });
+  rest();
+
+  for (const actor of [main, ghost]) actor?.start(flat);
+  const warm = severity.size ? new Map(severity) : severity;
+  for (let f = 0; f < WARM; f++) { hero.frames++; main.frame(wish(), f > 40 ? warm : healthy); ghost?.frame(wish(), healthy); }
+  glide(1);
+  tell();
+  section.classList.add("ready");
+  return Object.assign(hero, { main, ghost, view, step });
+};
+
+const canvas = find("hero-view"), spec = Object.values(material.playable)[0];
+export const hero = canvas && spec ? createHero(spec, material.hero) : null;

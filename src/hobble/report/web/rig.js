@@ -1,0 +1,45 @@
+// A body whose bones keep their lengths: rotations decide where joints are, and legs bend so that toes come to where
+// they were predicted. What Python's `hobble.runtime.export.jointed` does.
+import { dot, minus } from "./numbers.js";
+import { at3, at4, between, multiply } from "./turns.js";
+
+// spec: `parents`, `offsets`, `legs`. take(places, turns): of all joints, in the world, as predicted.
+export const createRig = ({ parents, offsets, legs }) => {
+  const J = parents.length, rig = { places: new Float64Array(3 * J), turns: new Float64Array(4 * J) };
+  const root = parents.findIndex((p) => p < 0);
+
+  const place = () => {
+    const { places: p, turns: q } = rig;
+    for (let j = 0; j < J; j++) {
+      if (j === root) continue;
+      const a = parents[j], [w, x, y, z] = [q[4 * a], q[4 * a + 1], q[4 * a + 2], q[4 * a + 3]], [u, v, s] = offsets[j];
+      const tx = 2 * (y * s - z * v), ty = 2 * (z * u - x * s), tz = 2 * (x * v - y * u);
+      p[3 * j] = p[3 * a] + u + w * tx + y * tz - z * ty;
+      p[3 * j + 1] = p[3 * a + 1] + v + w * ty + z * tx - x * tz;
+      p[3 * j + 2] = p[3 * a + 2] + s + w * tz + x * ty - y * tx;
+    }
+  };
+  const turn = (j, from, to) => rig.turns.set(multiply(between(from, to), at4(rig.turns, j)), 4 * j);
+  const reach = ([hip, knee, heel, toe], wanted) => {
+    const p = rig.places, [h, k, e] = [at3(p, hip), at3(p, knee), at3(p, heel)];
+    const goal = e.map((v, i) => v + wanted[3 * toe + i] - p[3 * toe + i]);
+    const thigh = minus(k, h), shank = minus(e, k), upper = Math.hypot(...thigh), lower = Math.hypot(...shank);
+    const leg = minus(goal, h), size = Math.max(Math.hypot(...leg), 1e-9), along = leg.map((v) => v / size);
+    const distance = Math.min(Math.max(size, Math.abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * .999);
+    const cosine = Math.min(1, Math.max(-1, (upper * upper + distance * distance - lower * lower) / (2 * upper * distance)));
+    const ahead = dot(thigh, along), out = thigh.map((v, i) => v - ahead * along[i]), wide = Math.max(Math.hypot(...out), 1e-9);
+    const sine = Math.sqrt(1 - cosine * cosine);
+    const bent = along.map((v, i) => upper * (v * cosine + out[i] / wide * sine)), end = along.map((v) => v * distance);
+    turn(hip, thigh, bent);
+    turn(knee, shank, minus(end, bent));
+  };
+  rig.take = (places, turns) => {
+    rig.turns.set(turns);
+    for (let i = 0; i < 3; i++) rig.places[3 * root + i] = places[3 * root + i];
+    place();
+    for (const leg of legs) reach(leg, places);
+    place();
+    return rig;
+  };
+  return rig;
+};

@@ -1,0 +1,27 @@
+// Rotations: quaternions, w first, four numbers at `i` of an array.
+import { cross, dot } from "./numbers.js";
+
+export const multiply = ([a, b, c, d], [e, f, g, h]) => [
+  a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g, a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e,
+];
+export const conjugate = ([w, x, y, z]) => [w, -x, -y, -z];
+export const rotate = (q, v) => {
+  const axis = [q[1], q[2], q[3]], t = cross(axis, v).map((x) => 2 * x), more = cross(axis, t);
+  return v.map((x, i) => x + q[0] * t[i] + more[i]);
+};
+// The least rotation that takes direction a to b; none where they are opposite.
+export const between = (a, b) => {
+  const w = Math.hypot(...a) * Math.hypot(...b) + dot(a, b), v = cross(a, b), n = Math.hypot(w, ...v);
+  return n < 1e-9 ? [1, 0, 0, 0] : [w / n, v[0] / n, v[1] / n, v[2] / n];
+};
+export const at4 = (array, j) => [array[4 * j], array[4 * j + 1], array[4 * j + 2], array[4 * j + 3]];
+export const at3 = (array, j) => [array[3 * j], array[3 * j + 1], array[3 * j + 2]];
+
+// Rotations on the way from those of `a` (at `i`) to those of `b` (at `k`), the shorter way, normalised.
+export const mixTurn = (a, i, b, k, t, out, o) => {
+  const near = a[i] * b[k] + a[i + 1] * b[k + 1] + a[i + 2] * b[k + 2] + a[i + 3] * b[k + 3] < 0 ? -t : t;
+  let n = 0;
+  for (let c = 0; c < 4; c++) { out[o + c] = (1 - t) * a[i + c] + near * b[k + c]; n += out[o + c] ** 2; }
+  n = Math.sqrt(n) || 1;
+  for (let c = 0; c < 4; c++) out[o + c] /= n;
+};

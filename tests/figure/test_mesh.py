@@ -1,0 +1,182 @@
+"""The body: closed, smooth, of a grown person's size, and moved by its bones and by nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from hobble.core import quat
+from hobble.core.skeleton import Skeleton, forward_kinematics
+from hobble.figure.fit import fitted_rotations
+from hobble.figure.mesh import Mesh, body, key
+from hobble.figure.pack import balls, regions, whole
+
+
+def rig(root: Path, name: str) -> Skeleton:
+    data = yaml.safe_load((root / f"config/skeletons/{name}.yaml").read_text())
+    return Skeleton.from_dict({"name": name, **{k: v for k, v in data.items() if k != "maps"}})
+
+
+def edges(mesh: Mesh) -> np.ndarray:
+    f = mesh.faces
+    return np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
+
+
+def closed(mesh: Mesh) -> bool:
+    """Every edge is walked once each way."""
+    walked = edges(mesh)
+    return len(np.unique(walked, axis=0)) == len(walked) and {tuple(e) for e in walked.tolist()} == {
+        tuple(e[::-1]) for e in walked.tolist()
+    }
+
+
+@pytest.fixture(scope="module")
+def mesh(holden31: Skeleton) -> Mesh:
+    return body(holden31)
+
+
+def test_the_surface_is_closed_in_one_piece_and_of_a_persons_volume(mesh: Mesh) -> None:
+    assert closed(mesh)
+    a, b = edges(mesh).T
+    count = len(mesh.corners)
+    pieces, _ = connected_components(coo_array((np.ones(len(a)), (a, b)), (count, count)))
+    assert pieces == 1
+    a, b, c = mesh.corners[mesh.faces].transpose(1, 0, 2)
+    assert 45 < (a * np.cross(b, c)).sum() / 6 / 1000 < 75  # litres; positive, so seen from outside
+    assert np.ptp(mesh.corners[:, 1]) == pytest.approx(162, abs=4)
+
+
+@pytest.mark.parametrize("name", ["mixamo55", "rig22"])
+def test_every_rig_gets_a_body(root: Path, name: str) -> None:
+    made = body(rig(root, name))
+    assert closed(made)
+    assert len(made.bones) == 19
+
+
+def test_the_surface_is_smooth(mesh: Mesh, holden31: Skeleton) -> None:
+    """The normals at the ends of an edge differ little, but for fingers, the edges of soles and the face."""
+    a, b = edges(mesh).T
+    turn = np.degrees(np.arccos(np.clip((mesh.normals[a] * mesh.normals[b]).sum(axis=1), -1, 1)))
+    fine = [
+        holden31.role(f"{side}_{role}") for side in ("left", "right") for role in ("wrist", "heel", "toe")
+    ]
+    trunk = ~np.isin(mesh.bones[mesh.bone[a, 0]], [*fine, holden31.role("head")])
+    assert np.median(turn) < 8
+    assert np.quantile(turn[trunk], 0.99) < 25
+
+
+def test_left_and_right_are_alike(mesh: Mesh) -> None:
+    mirrored = mesh.corners * [-1, 1, 1]
+    _, nearest = cKDTree(mesh.corners).query(mirrored)
+    away = np.abs(((mirrored - mesh.corners[nearest]) * mesh.normals[nearest]).sum(axis=1))
+    assert np.quantile(away, 0.99) < 0.3
+
+
+def test_at_most_four_bones_share_a_corner_and_give_all_of_it(mesh: Mesh) -> None:
+    assert mesh.bone.shape == mesh.share.shape == (len(mesh.corners), 4)
+    assert mesh.share.sum(axis=1) == pytest.approx(1)
+    assert mesh.share.min() >= 0
+    steps = whole(mesh.share)
+    assert steps.sum(axis=1).tolist() == [255] * len(steps)
+    assert np.abs(steps / 255 - mesh.share).max() < 0.02
+
+
+def test_standing_as_modelled_it_is_as_modelled(mesh: Mesh) -> None:
+    assert np.abs(mesh.posed(mesh.positions, mesh.rotations) - mesh.corners).max() < 1e-9
+
+
+def test_it_goes_where_its_bones_go_as_a_whole(mesh: Mesh) -> None:
+    turn = quat.from_axis_angle(np.array([0.6, 0.0, 0.8]), 1.1)
+    away = np.array([5.0, 6, 7])
+    moved = mesh.posed(quat.rotate(turn, mesh.positions) + away, quat.mul(turn, mesh.rotations))
+    assert np.abs(moved - (quat.rotate(turn, mesh.corners) + away)).max() < 1e-9
+
+
+def test_no_corner_goes_further_than_its_bones_carry_it(mesh: Mesh, holden31: Skeleton) -> None:
+    """Also where hands turn by half a turn: a corner is a mean of where its bones would take it."""
+    rng = np.random.default_rng(4)
+    wild = quat.normalize(rng.normal(size=(2, len(holden31.joints), 4)))
+    world, places = forward_kinematics(holden31, wild, np.zeros((2, 3)))
+    before, after = (mesh.posed(places[i, mesh.bones], world[i, mesh.bones]) for i in (0, 1))
+    most = np.zeros(len(mesh.corners))
+    for b in range(len(mesh.bones)):
+        local = quat.rotate(quat.inv(mesh.rotations[b]), mesh.corners - mesh.positions[b])
+        carried = [quat.rotate(world[i, mesh.bones[b]], local) + places[i, mesh.bones[b]] for i in (0, 1)]
+        step = np.linalg.norm(carried[1] - carried[0], axis=1)
+        mine = ((mesh.bone == b) & (mesh.share > 0)).any(axis=1)
+        most[mine] = np.maximum(most[mine], step[mine])
+    assert (np.linalg.norm(after - before, axis=1) <= most + 1e-6).all()
+
+
+def test_a_knee_bends_without_moving_the_other_leg(mesh: Mesh, holden31: Skeleton) -> None:
+    local = np.tile(quat.IDENTITY, (1, 31, 1))
+    local[0, holden31.role("left_knee")] = quat.from_axis_angle(np.array([1.0, 0, 0]), 1.2)
+    straight, bent = (
+        forward_kinematics(holden31, rotations, np.zeros((1, 3)))
+        for rotations in (np.tile(quat.IDENTITY, (1, 31, 1)), local)
+    )
+    apart = np.linalg.norm(
+        mesh.posed(bent[1][0, mesh.bones], bent[0][0, mesh.bones])
+        - mesh.posed(straight[1][0, mesh.bones], straight[0][0, mesh.bones]),
+        axis=1,
+    )
+    at = straight[1][0]
+    below = mesh.corners[:, 1] < at[holden31.role("left_knee"), 1] - 12
+    assert apart[below & (mesh.corners[:, 0] > 2)].min() > 2
+    assert apart[mesh.corners[:, 0] < -2].max() < 1e-6
+
+
+def test_a_link_lies_in_the_part_that_it_is(mesh: Mesh, holden31: Skeleton) -> None:
+    links = holden31.link_names
+    lies = {
+        links[i]: holden31.joints[bone]
+        for bone, part in zip(mesh.bones, regions(holden31, links), strict=True)
+        for i in part
+    }
+    assert set(lies) == set(links)
+    assert lies["LeftUpLeg-LeftLeg"] == "LeftUpLeg"
+    assert lies["RightArm-RightForeArm"] == "RightArm"
+    assert lies["Hips-LowerBack"] == "Spine"
+    assert lies["LeftHand-LThumb"] == "LeftHand"
+
+
+def test_links_of_joints_with_hyphens() -> None:
+    skeleton = Skeleton("x", ("a-b", "c"), (-1, 0), np.array([[0.0, 0, 0], [0, 10, 0]]))
+    assert regions(skeleton, ("a-b-c",)) == [[0]]
+
+
+def test_a_skeleton_of_unknown_roles_gets_a_rod_for_every_bone() -> None:
+    offsets = np.array([[0.0, 0, 0], [0, 20, 0], [15, 0, 0]])
+    made = body(Skeleton("x", ("a", "b", "c"), (-1, 0, 1), offsets))
+    assert closed(made)
+    assert made.corners.max(axis=0) == pytest.approx([16.9, 22.6, 2.6], abs=0.4)
+
+
+def test_balls_stand_for_the_parts(mesh: Mesh) -> None:
+    found = balls(mesh)
+    assert found.shape == (len(mesh.bones), 4)
+    assert (found[:, 3] > 1).all()
+    assert found[:, 3].max() < 25
+
+
+def test_bodies_are_shared_by_skeletons_that_move_alike(holden31: Skeleton) -> None:
+    assert key(holden31) == key(replace(holden31, links=()))
+    assert key(holden31) != key(replace(holden31, offsets=holden31.offsets * 1.1))
+
+
+def test_fitted_rotations_put_joints_where_they_are(holden31: Skeleton) -> None:
+    rng = np.random.default_rng(0)
+    local = quat.exp(rng.normal(0, 0.2, (6, 31, 3)))
+    _, places = forward_kinematics(holden31, local, rng.normal(size=(6, 3)))
+    turns = fitted_rotations(holden31, places)
+    for j, p in enumerate(holden31.parents):
+        if p >= 0:
+            there = places[:, p] + quat.rotate(turns[:, p], holden31.offsets[j])
+            assert np.abs(there - places[:, j]).max() < 1e-6, holden31.joints[j]

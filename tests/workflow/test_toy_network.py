@@ -1,0 +1,28 @@
+"""A kind of network is a folder: with a linear one, and no other file changed, the whole workflow runs."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from .conftest import Workflow
+
+TOY = Path(__file__).parent / "toy_network"
+
+
+@pytest.mark.workflow
+def test_a_linear_network_goes_from_training_to_the_page(copied: Workflow) -> None:
+    shutil.copytree(TOY, copied.own_source() / "models" / "toy")
+    (copied.checkout / "config" / "toy.yaml").write_text("extends: test\nnetwork:\n  kind: toy\n")
+    # No network, row or measurement that there was is made again because of it.
+    assert set(copied.planned("results/test/report.html")) <= {"page_bundle", "report"}
+    copied.run("-c2", "results/toy/report.html")
+    results = copied.folder / "results" / "toy"
+    accuracy = json.loads((results / "evaluation" / "accuracy.json").read_text())
+    assert 0 < accuracy["train"]["mean"] < 1
+    page = (results / "report.html").read_text(encoding="utf-8")
+    assert "A toy that is linear, with 372 inputs and 311 outputs, trained for 2 passes" in page
+    assert '"kind":"toy"' in page.replace(": ", ":")

@@ -1,0 +1,26 @@
+"""A linear network, as small as a kind of network can be: y = W x + b, whatever the phase."""
+
+from hobble.models.model import Model
+
+
+class _Toy(Model):
+    def options(self):
+        from hobble.models.toy.options import ToyOptions
+
+        return ToyOptions
+
+    def parameters(self, options, inputs, outputs):
+        return (inputs + 1) * outputs
+
+    def trainable(self, options, layout, seed):
+        from hobble.models.toy.trainable import fresh
+
+        return fresh(layout.x_size, layout.y_size, seed)
+
+    def read(self, path, arrays, common):
+        from hobble.models.toy.network import Toy
+
+        return Toy.read(path, arrays, common)
+
+
+MODEL = _Toy()

@@ -1,0 +1,70 @@
+"""The linear network at run time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.models import checks
+from hobble.models.network import Network, inverse, standardised
+from hobble.models.packing import packed_rows
+
+
+@dataclass(frozen=True)
+class Toy(Network):
+    kind: ClassVar[str] = "toy"
+    phase: ClassVar[bool] = False
+
+    weights: np.ndarray
+    biases: np.ndarray
+
+    @classmethod
+    def read(cls, path, arrays, common):
+        w, b = checks.numbers(path, arrays, "W0", 2), checks.numbers(path, arrays, "b0", 1)
+        if w.shape != (len(common["y_mean"]), len(common["x_mean"])) or b.shape != w.shape[:1]:
+            raise InputError(path, f"W0 {w.shape} and b0 {b.shape} do not fit")
+        return cls(weights=w, biases=b, **common)
+
+    @property
+    def sizes(self):
+        return self.weights.shape[::-1]
+
+    @property
+    def parameters(self):
+        return self.weights.size + self.biases.size
+
+    @property
+    def described(self):
+        return "toy that is linear"
+
+    def predict(self, x, phase):
+        return (standardised(self, x) @ self.weights.T + self.biases) * self.y_std + self.y_mean
+
+    def predictor(self, mode=None, storage="float32"):
+        self.mode(mode)
+        return Predictor(self)
+
+    def page(self, outputs):
+        return {"layers": [packed_rows(self.weights[None, :outputs], self.biases[None, :outputs])]}
+
+
+class Predictor:
+    def __init__(self, network):
+        self.network = network
+
+    def standardise(self, x, z):
+        z[:] = (x - self.network.x_mean) * inverse(self.network.x_std)
+
+    def evaluate(self, z, phase, out):
+        n = self.network
+        out[:] = (z @ n.weights.T + n.biases) * n.y_std + n.y_mean
+
+    def predict(self, x, phase, out=None):
+        z = np.empty_like(x)
+        self.standardise(x, z)
+        out = np.empty((len(x), len(self.network.y_mean)), np.float32) if out is None else out
+        self.evaluate(z, phase, out)
+        return out

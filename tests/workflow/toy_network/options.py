@@ -1,0 +1,11 @@
+"""The keys of `network` where its kind is toy."""
+
+from typing import Literal
+
+from hobble.models.options import Options
+
+
+class ToyOptions(Options):
+    """None but its kind."""
+
+    kind: Literal["toy"] = "toy"
