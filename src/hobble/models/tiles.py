@@ -132,7 +132,7 @@ _tile: Any = intrinsic(_typed_tile)
 
 def _has_32_registers() -> bool:
     """Whether compiled code has the 32 wide registers of AVX-512."""
-    return not config.CPU_NAME and bool(llvm.get_host_cpu_features().get("avx512f"))
+    return not getattr(config, "CPU_NAME", None) and bool(llvm.get_host_cpu_features().get("avx512f"))
 
 
 # Panels that go together with one row, with two or three, with four to six: about as many sums as there are
