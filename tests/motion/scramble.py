@@ -506,8 +506,8 @@ def main() -> None:
 def compare(first: Clip, second: Clip, names: dict[str, str]) -> Array:
     """(N,) mean distance in centimetres of each joint that both have.
 
-    A rig without toes does not tell how high its ankles are above the balls of its feet: how much higher or lower
-    all of the figure stands for that, 3 cm at most, is taken off.
+    A rig without toes does not tell how high its ankles are above the balls of its feet: how much higher or
+    lower all of the figure stands for that, 3 cm at most, is taken off.
     """
     frames = min(len(first), len(second))
     joints = [first.skeleton.index(name) for name in names]
