@@ -196,6 +196,19 @@ def test_what_a_clip_names_wrongly_is_told_before_anything_runs(
         check(Project(complete, {}), ["results/one/report.html"])
 
 
+def test_one_file_on_both_sides_of_the_split_is_refused_before_anything_runs(complete: Path) -> None:
+    for name, text in (("a", "one motion"), ("b", "one motion"), ("c", "one m0tion")):
+        (complete / f"data/mine/{name}.bvh").write_text(text)
+    message = r'data set mine: b and a are the same file: the first .* Add to held_out: \["a"\]'
+    with pytest.raises(HobbleError, match=message):
+        check(Project(complete, {}), ["results/one/report.html"])
+    check(Project(complete, {}), ["results/datasets/mine/look.html"])
+    data = complete / "config/datasets/mine.yaml"
+    data.write_text(DATASET.replace("[b]", "[a, b]").replace("mirror: true", ""))
+    (complete / "data/mine/a_mirror.bvh").unlink()
+    check(Project(complete, {}), ["results/hurt/report.html"])
+
+
 def test_a_skeleton_without_a_mirror_image_is_told_before_anything_runs(complete: Path) -> None:
     rig = complete / "config/skeletons/s.yaml"
     rig.write_text(rig.read_text().replace("RightFoot", "OtherFoot"))

@@ -10,6 +10,7 @@ from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
 from hobble.synthetic.links import check_link
 from hobble.workflow.comparison import COMPARE
+from hobble.workflow.copies import refuse_copies
 from hobble.workflow.project import Project
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def _configuration(project: Project, name: str) -> None:
         _goes_on(name, model, project.catalogue.configuration(model.training.continues))
     _dataset(project, model.dataset)
     project.datasets.selected(model.dataset, model.channels)
+    refuse_copies(project.clips, project.datasets, model.dataset, tuple(model.channels))
 
 
 def _goes_on(name: str, model: Configuration, start: Configuration) -> None:
