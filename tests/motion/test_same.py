@@ -16,7 +16,7 @@ from hobble.motion.same import likeness, same_pairs
 
 def test_a_turned_a_shortened_and_a_mirrored_copy_are_found(walker, holden31):
     clip = walker(holden31, 441, 60.0)
-    elsewhere = replace(turned(clip, 1.0), root=turned(clip, 1.0).root + [200.0, 0.0, 50.0])
+    elsewhere = replace(turned(clip, 1.0), root=turned(clip, 1.0).root + np.array([200.0, 0.0, 50.0]))
     short = replace(clip, rotations=clip.rotations[:440], root=clip.root[:440])
     other = walker(holden31, 470, 60.0)
     bent = replace(clip, root=clip.root * [1.0, 0.9, 1.0])

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.clip import Clip
-from hobble.core.clip_files import find_clips, the_file
+from hobble.core.clip_files import find_clips, orphan_notes, the_file
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.motion.check import worst
@@ -29,7 +29,6 @@ RATES = (24, 25, 30, 60, 120, 240)  # frames a second at which most files are, w
 STILL = 3.0  # cm a second at which the hips of somebody stand
 STANDING = 0.5  # seconds that it takes to tell a stand
 STRIDE = 0.25  # of the leg: how far ankles must part for a step
-SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt", "_injuries.txt", "_injuries")
 ENOUGH = {"mirrors of each other": "hold both out or neither"}
 
 
@@ -169,23 +168,6 @@ def standing_notes(clips: Sequence[Look]) -> list[str]:
         "Nobody stands in these clips: the character will not have learned to stand, to start or to stop. "
         "Add a clip of somebody who stands, starts and stops."
     ]
-
-
-def orphan_notes(folder: Path, clips: Sequence[str]) -> list[str]:
-    """Sentences on files beside clips that belong to none of them."""
-    out = []
-    for file in sorted(folder.rglob("*")):
-        suffix = next((s for s in sorted(SUFFIXES, key=len, reverse=True) if file.name.endswith(s)), None)
-        if suffix and file.is_file() and file.name.removesuffix(suffix) not in clips:
-            near = _nearest(file.name.removesuffix(suffix), clips)
-            out.append(f"{file.name} belongs to no clip{f': is it that of {near}?' if near else '.'}")
-    return out
-
-
-def _nearest(name: str, clips: Sequence[str]) -> str | None:
-    from difflib import get_close_matches
-
-    return next(iter(get_close_matches(name, clips, 1, 0.75)), None)
 
 
 def table(folder: Folder) -> str:

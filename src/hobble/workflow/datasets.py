@@ -68,7 +68,7 @@ class Datasets:
         return splits
 
     def compared(self, dataset: str, channels: Sequence[str]) -> list[str]:
-        """The clips of which it has to be known whether two are one motion: files, where some are held out."""
+        """The clips of which no two may be one motion: those that are files, where some are held out."""
         if self.catalogue.dataset(dataset).synthetic is not None:
             return []
         splits = self.selected(dataset, channels)
