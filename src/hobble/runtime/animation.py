@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
+from hobble.core import quat
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
@@ -146,6 +147,16 @@ class ProceduralAnimation:
     def seconds(self) -> Array:
         """(6,) seconds that the last frame spent in prepare, input, insert, predict, output, update."""
         return self._controller.seconds
+
+    @property
+    def predicted_rotations(self) -> Array:
+        """(C, J, 4) world rotations that the network predicted for the last frame, before any was held back.
+
+        In axes of our own: Y up, Z ahead.
+        """
+        made = self._controller
+        turns = made.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)
+        return quat.mul(quat.yaw(made.yaw)[:, None], quat.exp(turns.astype(float)))
 
     def next_pose(
         self,
