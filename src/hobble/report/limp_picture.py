@@ -31,8 +31,8 @@ QUALITIES = (80, 65, 50, 35, 20)
 def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> int:
     """Write an animated WebP that goes round for ever, of at most MOST_BYTES; returns its bytes.
 
-    Both halves are asked for the same speed. Raises HobbleError for a network that is not told what hurts, and
-    where no quality makes the picture small enough.
+    Both halves are asked for the same speed. Raises HobbleError for a network that is not told what hurts,
+    and where no quality makes the picture small enough.
     """
     if network.skeleton is None or not network.links:
         raise HobbleError("this network is not told what hurts; make the picture of a configuration that is")
