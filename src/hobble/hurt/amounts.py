@@ -86,7 +86,7 @@ RATIOS = (
 # The recordings take a slow ankle for a stance, which an early landing changes by half only; and
 # the network smooths what it learns from.
 TIMING = 2.0
-STEP = {"thigh": 0.44, "shank": 0.42, "foot": 0.48}  # of the hurt foot, where the mix would say less
+STEP = {"thigh": 0.44, "shank": 0.42, "foot": 0.42}  # of the hurt foot, where the mix would say less
 
 
 @functools.cache

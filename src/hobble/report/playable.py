@@ -145,4 +145,5 @@ def _constants() -> dict[str, float]:
         "fastestTurn": float(controller.FASTEST_TURN),
         "heightMix": feet.HEIGHT_MIX,
         "floating": feet.FLOATING,
+        "mostAdded": feet.MOST_ADDED,
     }
