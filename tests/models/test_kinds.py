@@ -23,7 +23,11 @@ from hobble.models.trainable import Trainable
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 
-OPTIONS: dict[str, dict[str, Any]] = {"plain": {"units": 18}, "pfnn": {"units": 18}}
+OPTIONS: dict[str, dict[str, Any]] = {
+    "mann": {"units": 18, "experts": 3},
+    "plain": {"units": 18},
+    "pfnn": {"units": 18},
+}
 KINDS = sorted(OPTIONS)
 Made = tuple[Trainable, dict[str, Any], Network]
 

@@ -64,7 +64,11 @@ def export(path: str | Path, network: Network, mode: str, body: Body) -> None:
     z = g("Mul", z, g.constant(inverse(network.x_std)))
     h = body(g, z)
     g("Add", g("Mul", h, g.constant(network.y_std)), g.constant(network.y_mean), output="y")
-    columns = (("x", [len(network.x_mean)]), ("phase", []), ("y", [len(network.y_mean)]))
+    columns: tuple[tuple[str, list[int]], ...] = (
+        ("x", [len(network.x_mean)]),
+        ("phase", []),
+        ("y", [len(network.y_mean)]),
+    )
     ends = [
         helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *sizes]) for name, sizes in columns
     ]

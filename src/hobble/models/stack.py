@@ -15,7 +15,9 @@ from numba import njit
 from hobble.core.quat import Array
 from hobble.models.network import STORAGES, Network, inverse
 
-BLOCK = 4  # characters that go through a layer's weights together
+BLOCK = 4  # characters of a crowd that go through a row of weights together
+FEW = 2  # up to so many, each goes by itself
+NEGLIGIBLE = 1e-7  # a share of which single precision keeps nothing beside another near 1
 
 
 class Stack:
@@ -33,13 +35,10 @@ class Stack:
         self._weights = tuple(w for w, _ in packed)
         self._scales = tuple(s for _, s in packed)
         self._biases = tuple(np.ascontiguousarray(b, np.float32) for b in biases)
-        widest = max(w.shape[1] for w in weights)
-        self._work = np.zeros((2, BLOCK, widest), np.float32)
-        self._block = np.zeros((BLOCK, weights[0].shape[2]), np.float32)
 
     def run(self, x: Array, shares: Array, out: Array) -> None:
         """Write the last layer's outputs (C, out) of x (C, in) and shares (C, K) into `out`, all float32."""
-        _run(self._weights, self._scales, self._biases, x, shares, self._block, self._work, out)
+        _run(self._weights, self._scales, self._biases, np.ascontiguousarray(x), shares, out)
 
 
 class StackPredictor:
@@ -102,80 +101,81 @@ def restore(y: Any, mean: Any, std: Any) -> None:
 # the compiler may round sums in another order when they come from disk.
 @njit(fastmath=True, forceinline=True)
 def _one(w: Any, s: Any, b: Any, share: Any, x: Any, y: Any) -> None:
-    """y (out,) of one character's x (in,); four sets of weights stream side by side."""
-    sets, rows, columns = w.shape
+    """y (out,) of one character's x (in,): four sets of weights stream side by side, those that weigh nothing
+    stay where they are."""
+    rows, columns = w.shape[1], w.shape[2]
+    used, count = np.empty(w.shape[0], np.int64), 0
+    for k in range(w.shape[0]):
+        if share[k] > NEGLIGIBLE:
+            used[count] = k
+            count += 1
     for r in range(rows):
         total = np.float32(0)
-        k = 0
-        while k + 4 <= sets:
-            w0, w1, w2, w3 = w[k, r], w[k + 1, r], w[k + 2, r], w[k + 3, r]
+        first = 0
+        while first + 4 <= count:
+            i, j, m, n = used[first], used[first + 1], used[first + 2], used[first + 3]
+            w0, w1, w2, w3 = w[i, r], w[j, r], w[m, r], w[n, r]
             a0, a1, a2, a3 = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
             for c in range(columns):
                 a0 += np.float32(w0[c]) * x[c]
                 a1 += np.float32(w1[c]) * x[c]
                 a2 += np.float32(w2[c]) * x[c]
                 a3 += np.float32(w3[c]) * x[c]
-            total += share[k] * (a0 * s[k, r] + b[k, r]) + share[k + 1] * (a1 * s[k + 1, r] + b[k + 1, r])
-            total += share[k + 2] * (a2 * s[k + 2, r] + b[k + 2, r])
-            total += share[k + 3] * (a3 * s[k + 3, r] + b[k + 3, r])
-            k += 4
-        while k < sets:
-            a = np.float32(0)
+            total += share[i] * (a0 * s[i, r] + b[i, r]) + share[j] * (a1 * s[j, r] + b[j, r])
+            total += share[m] * (a2 * s[m, r] + b[m, r]) + share[n] * (a3 * s[n, r] + b[n, r])
+            first += 4
+        for k in used[first:count]:
+            row, a = w[k, r], np.float32(0)
             for c in range(columns):
-                a += np.float32(w[k, r, c]) * x[c]
+                a += np.float32(row[c]) * x[c]
             total += share[k] * (a * s[k, r] + b[k, r])
-            k += 1
         y[r] = total
 
 
 @njit(fastmath=True, forceinline=True)
-def _four(w: Any, s: Any, b: Any, share: Any, x: Any, y: Any) -> None:
-    """y (4, out) of four characters' x (4, in): each row of weights is read once for all of them."""
+def _crowd(w: Any, s: Any, b: Any, shares: Any, x: Any, y: Any) -> None:
+    """y (C, out) of x (C, in): a row of each set of weights stays in the cache for all, four at a time."""
     sets, rows, columns = w.shape
-    x0, x1, x2, x3 = x[0], x[1], x[2], x[3]
+    zero, last = np.float32(0), x.shape[0] - 1
     for r in range(rows):
-        y[0, r], y[1, r], y[2, r], y[3, r] = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
-        for k in range(sets):
-            row = w[k, r]
-            a0, a1, a2, a3 = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
-            for c in range(columns):
-                value = np.float32(row[c])
-                a0 += value * x0[c]
-                a1 += value * x1[c]
-                a2 += value * x2[c]
-                a3 += value * x3[c]
-            y[0, r] += share[0, k] * (a0 * s[k, r] + b[k, r])
-            y[1, r] += share[1, k] * (a1 * s[k, r] + b[k, r])
-            y[2, r] += share[2, k] * (a2 * s[k, r] + b[k, r])
-            y[3, r] += share[3, k] * (a3 * s[k, r] + b[k, r])
+        for start in range(0, x.shape[0], BLOCK):
+            # Where the last block is not full, its last character is computed again.
+            i, j = start, min(start + 1, last)
+            m, n = min(start + 2, last), min(start + 3, last)
+            x0, x1, x2, x3 = x[i], x[j], x[m], x[n]
+            y0, y1, y2, y3 = zero, zero, zero, zero
+            for k in range(sets):
+                row, factor, bias = w[k, r], s[k, r], b[k, r]
+                a0, a1, a2, a3 = zero, zero, zero, zero
+                for c in range(columns):
+                    value = np.float32(row[c])
+                    a0 += value * x0[c]
+                    a1 += value * x1[c]
+                    a2 += value * x2[c]
+                    a3 += value * x3[c]
+                y0 += shares[i, k] * (a0 * factor + bias)
+                y1 += shares[j, k] * (a1 * factor + bias)
+                y2 += shares[m, k] * (a2 * factor + bias)
+                y3 += shares[n, k] * (a3 * factor + bias)
+            y[i, r], y[j, r], y[m, r], y[n, r] = y0, y1, y2, y3
 
 
 @njit(cache=True, fastmath=True)
-def _run(
-    weights: Any, scales: Any, biases: Any, x: Any, shares: Any, block: Any, work: Any, out: Any
-) -> None:
-    count, last = x.shape[0], len(weights) - 1
-    of_block = np.zeros((BLOCK, shares.shape[1]), np.float32)
-    for start in range(0, count, BLOCK):
-        members = min(BLOCK, count - start)
-        for m in range(members):
-            of_block[m] = shares[start + m]
-            block[m] = x[start + m]
-        h = block
-        for i in range(len(weights)):
-            rows = weights[i].shape[1]
-            y = work[i % 2, :, :rows]
-            if members > 2:
-                _four(weights[i], scales[i], biases[i], of_block, h, y)
-            else:
-                for m in range(members):
-                    _one(weights[i], scales[i], biases[i], of_block[m], h[m], y[m])
-            if i < last:
-                for m in range(members):
-                    for r in range(rows):
-                        if y[m, r] < 0:
-                            y[m, r] = np.exp(y[m, r]) - np.float32(1)
-            h = y
-        for m in range(members):
-            for r in range(out.shape[1]):
-                out[start + m, r] = h[m, r]
+def _run(weights: Any, scales: Any, biases: Any, x: Any, shares: Any, out: Any) -> None:
+    count, h = x.shape[0], x
+    for i in range(len(weights)):
+        y = np.empty((count, weights[i].shape[1]), np.float32)
+        if count > FEW:
+            _crowd(weights[i], scales[i], biases[i], shares, h, y)
+        else:
+            for m in range(count):
+                _one(weights[i], scales[i], biases[i], shares[m], h[m], y[m])
+        if i < len(weights) - 1:
+            for m in range(count):
+                for r in range(y.shape[1]):
+                    if y[m, r] < 0:
+                        y[m, r] = np.exp(y[m, r]) - np.float32(1)
+        h = y
+    for m in range(count):
+        for r in range(out.shape[1]):
+            out[m, r] = h[m, r]

@@ -57,7 +57,8 @@ class TrainablePlain(Trainable):
 
     def step(self, dropout: float, half: bool) -> Step:
         """Compiled loops on a CPU, PyTorch elsewhere."""
-        return (FusedPlainStep if self.flat.device.type == "cpu" else PlainStep)(self, dropout, half)
+        step: Any = FusedPlainStep if self.flat.device.type == "cpu" else PlainStep
+        return step(self, dropout, half)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """`W0` (out, in), `b0` (out,), ..."""
