@@ -122,7 +122,7 @@ def write(path: str | Path, network: Network, mode: str, body: Body) -> float:
 
 def _about(network: Network, mode: str) -> dict[str, Any]:
     """What a reader has to know of the columns."""
-    keys = ("configuration", "contacts", "units")
+    keys = ("configuration", "contacts", "limits", "units")
     return {
         "mode": mode,
         "layout": network.layout.to_dict(),

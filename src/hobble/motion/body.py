@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,11 +29,32 @@ class Body:
     head: int
     arms: Mapping[str, tuple[int | None, int, int, int]]
     legs: Mapping[str, tuple[int, int, int, int | None]]
+    fingers: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def chest(self) -> int:
         """What carries the arms."""
         return self.trunk[-1] if self.trunk else self.hips
+
+    @property
+    def joints(self) -> list[int]:
+        """All of them."""
+        out = [self.hips, *self.trunk, *self.neck, self.head]
+        for side in SIDES:
+            out += [j for j in (*self.arms[side], *self.legs[side]) if j is not None]
+        return out
+
+    def renumbered(self, new: Mapping[int, int]) -> Body:
+        """The same body of joints that have other indices; fingers that have none are left out."""
+
+        def one(joint: int | None) -> int | None:
+            return None if joint is None else new[joint]
+
+        arms = {s: (one(a), new[b], new[c], new[d]) for s, (a, b, c, d) in self.arms.items()}
+        legs = {s: (new[a], new[b], new[c], one(d)) for s, (a, b, c, d) in self.legs.items()}
+        fingers = {s: new[j] for s, j in self.fingers.items() if j in new}
+        trunk, neck = (tuple(new[j] for j in chain) for chain in (self.trunk, self.neck))
+        return Body(new[self.hips], trunk, neck, new[self.head], arms, legs, fingers)
 
     def roles(self, names: Sequence[str]) -> dict[str, str]:
         """Role -> joint, as a skeleton file says it."""
@@ -69,6 +90,35 @@ def body_of(parents: Sequence[int], roles: Mapping[str, int]) -> Body:
         hip, knee, heel = (roles[f"{side}_{part}"] for part in ("hip", "knee", "heel"))
         legs[side] = (hip, knee, heel, roles.get(f"{side}_toe"))
     return Body(hips, tuple(trunk), tuple(neck), roles["head"], arms, legs)
+
+
+def body_by_roles(skeleton: Skeleton) -> Body:
+    """The body of a skeleton that says what its joints are for."""
+    body = body_of(skeleton.parents, {role: skeleton.role(role) for role in skeleton.roles})
+    return with_fingers(body, skeleton)
+
+
+def with_fingers(body: Body, skeleton: Skeleton) -> Body:
+    """The body with a finger of each hand: the joint that is away from the wrist on the hand's longest
+    finger.
+
+    A thumb is none, nor what is longer than a forearm: that is a thing held in the hand. Fingers whose names
+    say that they are an index or a middle finger go first.
+    """
+    lengths = np.linalg.norm(skeleton.offsets, axis=-1)
+    fingers = {}
+    for side, (_, _, _, wrist) in body.arms.items():
+        fore, best = float(lengths[wrist]), 0.0
+        for end in range(len(skeleton.joints)):
+            chain = above(skeleton.parents, end)
+            chain = chain[: chain.index(wrist)][::-1] if wrist in chain[1:] else []
+            names = "".join(skeleton.joints[j] for j in chain).lower()
+            length = float(lengths[chain].sum()) + fore * ("index" in names or "middle" in names)
+            ways = np.linalg.norm(np.cumsum(skeleton.offsets[chain], axis=0), axis=-1)
+            far = [j for j, way in zip(chain, ways, strict=True) if 0.1 * fore < way < 0.7 * fore]
+            if far and "thumb" not in names and lengths[chain].sum() < fore and length > best:
+                best, fingers[side] = length, far[0]
+    return replace(body, fingers=fingers)
 
 
 def above(parents: Sequence[int], joint: int) -> list[int]:

@@ -21,6 +21,7 @@ SAMPLES = 150
 ALIKE = 0.15  # by how much of its length a bone may differ from the one across the body
 RIGID = 0.03  # by how much of its length a bone that is none in the file may change
 RATIOS = {"leg": (0.6, 1.6), "arm": (0.55, 1.6)}  # shank to thigh, forearm to upper arm
+APART = {"leg": 0.2, "arm": 0.5}  # of hips to knees, of shoulders to elbows
 FEWEST = 3  # joints of a limb
 LEAST = 0.15  # length of a limb to the size of the body
 AWAY = -0.2  # cosine between legs and trunk from which on they lead away from each other
@@ -223,7 +224,7 @@ class _Rig:
         best, where = 0.0, None
         for j in range(1, len(chain) - 1):
             for i in range(j):
-                if self._moves(pair, i, j):
+                if self._moves(pair, i, j) or not self._apart(pair, i, j, kind):
                     continue
                 for k in range(j + 1, len(chain)):
                     if not self._fits(chain, (i, j, k), kind):
@@ -245,6 +246,14 @@ class _Rig:
     def _moves(self, pair: _Pair, i: int, j: int) -> bool:
         """Whether the way from one place to another changes its length, so that it is no bone."""
         return any(self._chord(chain[i], chain[j])[1] > RIGID for chain in pair.chains)
+
+    def _apart(self, pair: _Pair, i: int, j: int, kind: str) -> bool:
+        """Whether the limbs begin apart, as shoulders and hips do, and collarbones do not."""
+        at = [
+            np.median(np.linalg.norm(self.at[:, a] - self.at[:, b], axis=-1))
+            for a, b in ((pair.chains[0][i], pair.chains[1][i]), (pair.chains[0][j], pair.chains[1][j]))
+        ]
+        return bool(at[0] >= APART[kind] * at[1])
 
     def _bends(self, pair: _Pair, i: int, j: int, k: int) -> bool:
         """Whether the limb bends there, by six degrees or more on either side."""

@@ -14,13 +14,16 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.motion.axes import turned
+from hobble.motion.body import body_by_roles
+from hobble.motion.check import check, compare
 from hobble.motion.loop import loop_clip
 from hobble.motion.read import MOST_POSES, Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.retarget import plan, retarget_clip
-from hobble.motion.rig import Match, load_skeleton
+from hobble.motion.rig import load_skeleton
 from hobble.motion.root import facing
 from hobble.motion.source import FOUND, Source, load_source
+from hobble.motion.stance import Spine, upright
 
 SAME = 1e-3  # cm: offsets this near to the skeleton's are the skeleton's
 
@@ -50,7 +53,9 @@ def make_clip(
     source = load_source(file, target, maps, options)
     _check_length(file, source.clip, target.skeleton, options)
     resampled = resample(source.clip, options["fps"])
-    fitted = fit_skeleton(resampled, source.match, target.skeleton, options["proportions"], source.moving)
+    fitted = fit_skeleton(resampled, source, target.skeleton, options["proportions"])
+    if fitted.figures is not None:
+        check(file.path, fitted.figures, source.match.rig)
     made, said, loops = fitted.clip, source.repairs + fitted.repairs, options["loops"]
     if loops > 1:
         made = loop_clip(made, loops, options["heading"])
@@ -59,7 +64,12 @@ def make_clip(
         made = turned(made, np.radians(options["facing"]) - first_facing(made))
     made = replace(made, name=clip)
     _check_finite(file, made)
-    extra = {"loops": loops, "cycle_frames": len(made) // loops, "scale": fitted.scale}
+    extra: dict[str, Any] = {
+        "loops": loops,
+        "cycle_frames": len(made) // loops,
+        "scale": fitted.scale,
+        "retarget": fitted.figures,
+    }
     return made, _report(file, source, made) | extra | {"repairs": said, "notes": source.notes}
 
 
@@ -115,30 +125,43 @@ def resample(clip: Clip, fps: float) -> Clip:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A clip on the joints of the target, how far its path was scaled for that, and what it cost."""
+    """A clip on the joints of the target, how far its path was scaled for that, and what it cost.
+
+    figures: how far it is from its source (`hobble.motion.check.compare`); None for one that was not
+    retargeted.
+    """
 
     clip: Clip
     scale: float
     repairs: list[str]
+    figures: dict[str, Any] | None = None
 
 
-def fit_skeleton(clip: Clip, match: Match, target: Skeleton, proportions: str, moving: bool) -> Fitted:
+def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str) -> Fitted:
     """The clip's motion on the target skeleton, or on its joints with the clip's own bone lengths.
 
-    moving: whether joints move in their parents, which is to be said.
+    clip: that of the source, at another frame rate.
     """
+    match = source.match
     if match.same:
         own = _reordered(clip, np.array([clip.skeleton.index(name) for name in target.joints]), target)
         same = np.abs(own.skeleton.offsets - target.offsets).max() <= SAME
         if same or proportions == "clip":
             own = replace(own, skeleton=target) if same else own
-            return Fitted(own, 1.0, [KEPT] if moving else [])
-    how = plan(clip.skeleton, target, match.sources)
-    repairs = [DROPPED] if moving else []
+            return Fitted(own, 1.0, [KEPT] if source.moving else [])
+    sources = match.sources
+    if not source.told:
+        wanted = {clip.skeleton.index(name) for name in sources.values()}
+        spine = Spine.of(target, body_by_roles(target))
+        clip = upright(clip, body_by_roles(clip.skeleton), spine, wanted).clip
+        sources = {mine: theirs for mine, theirs in sources.items() if theirs in clip.skeleton.joints}
+    how = plan(clip.skeleton, target, sources)
+    repairs = [DROPPED] if source.moving else []
     if proportions == "clip":
         rig = "another" if match.rig == FOUND else match.rig
         repairs.append(f"Its rig is {rig}, so that it was put on the bone lengths of {target.name}.")
-    return Fitted(retarget_clip(clip, how), round(how.scale, 6), repairs)
+    made = retarget_clip(clip, how)
+    return Fitted(made, round(how.scale, 6), repairs, compare(clip, made, how.scale))
 
 
 def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:

@@ -3,8 +3,10 @@ is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,12 +16,15 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
-from hobble.core.untrusted import read_yaml
+from hobble.core.untrusted import read_text, read_yaml
 
 # Centimetres per unit of the file; the CMU files count in inches / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
 LEG = 80.0  # thigh and shank of an adult of ordinary size, cm
 KNOWN = 0.75  # share of a clip's joints that a skeleton must know by name to be its rig
+NAME = re.compile(
+    r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE
+)  # of a joint in a skeleton file
 # Degrees by which bones of two rest poses may differ that are taken for one, by the role at the bone's end.
 LIKE = {"elbow": 20.0, "wrist": 25.0, "knee": 35.0, "heel": 35.0, "toe": 35.0}
 LEG_RANGE = (50.0, 125.0)
@@ -53,12 +58,35 @@ def load_skeleton(path: str | Path, name: str | None = None) -> Target:
     """Read a skeleton file (`config/skeletons/<name>.yaml`, validated when the workflow starts)."""
     if not Path(path).is_file():
         raise InputError(path, "no such skeleton file")
+    state = Path(path).stat()
+    return _loaded(Path(path), name or Path(path).stem, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=32)
+def _loaded(path: Path, name: str, changed: int, size: int) -> Target:
+    """A skeleton file in a certain state, read once."""
     data: Any = read_yaml(path)
     try:
         maps = data.pop("maps", None) or {}
-        return Target(Skeleton.from_dict({**data, "name": name or Path(path).stem}), maps)
+        return Target(Skeleton.from_dict({**data, "name": name}), maps)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(path, f"not a skeleton file: {error}") from None
+
+
+def nearest(names: Collection[str], target: Target, folder: str | Path) -> Target:
+    """The skeleton file of `folder` with most of the names, the target where none has more.
+
+    Only files whose text could hold more of them are read in full: to read YAML takes longer than most clips.
+    """
+    best, found = len(set(names) & set(target.skeleton.joints)), target
+    for file in sorted(Path(folder).glob("*.yaml")):
+        written = set(NAME.findall(read_text(file)))
+        if file.stem == target.skeleton.name or len(set(names) & written) <= best:
+            continue
+        other = load_skeleton(file)
+        if (shared := len(set(names) & set(other.skeleton.joints))) > best:
+            best, found = shared, other
+    return found
 
 
 def clean_names(names: Sequence[str]) -> tuple[str, ...]:
@@ -74,9 +102,7 @@ def find_hips(names: Sequence[str], target: Target, folder: str | Path) -> int:
     """
     if names[0] == target.skeleton.roles["hips"]:
         return 0
-    known = [target, *(load_skeleton(file) for file in sorted(Path(folder).glob("*.yaml")))]
-    shared = [len(set(names) & set(one.skeleton.joints)) for one in known]
-    hips = known[int(np.argmax(shared))].skeleton.roles["hips"]
+    hips = nearest(names, target, folder).skeleton.roles["hips"]
     return names.index(hips) if hips in names else 0
 
 
@@ -92,12 +118,8 @@ def match_rig(rig: Skeleton, target: Target, folder: str | Path) -> Match | None
         alike = rest_alike(replace(rig, roles=roles), target.skeleton)
         sources = {name: name for name in target.skeleton.joints} if alike else {}
         return Match(target.skeleton.name, roles, alike, sources)
-    best, known = _share(rig, target.skeleton), target
-    for file in sorted(Path(folder).glob("*.yaml")):
-        other = load_skeleton(file)
-        if _share(rig, other.skeleton) > best:
-            best, known = _share(rig, other.skeleton), other
-    if best < KNOWN or _unfit(rig, known.skeleton):
+    known = nearest(rig.joints, target, folder)
+    if _share(rig, known.skeleton) < KNOWN or _unfit(rig, known.skeleton):
         return None
     roles = _roles(rig, known.skeleton)
     sources = {a: b for a, b in joint_pairs(known, target).items() if b in rig.joints}

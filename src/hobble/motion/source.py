@@ -14,9 +14,9 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import Axes, straighten
-from hobble.motion.body import SIDES, Body, body_of, pairs
+from hobble.motion.body import SIDES, Body, body_by_roles, pairs, with_fingers
 from hobble.motion.decode import Decoded, decode, frame_rate
-from hobble.motion.defects import flips, repair
+from hobble.motion.defects import Repaired, flips, repair
 from hobble.motion.draft import refusal
 from hobble.motion.find_body import Doubt, Found, find_body
 from hobble.motion.floor import on_floor
@@ -32,7 +32,7 @@ from hobble.motion.rig import (
     missing_bone,
     unit_of,
 )
-from hobble.motion.stance import stands, upright
+from hobble.motion.stance import Spine, stands, upright
 
 STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
 FOUND = "found"  # what a report calls a rig that no skeleton file describes
@@ -56,6 +56,7 @@ class Source:
     notes: list[str]
     stance: str
     moving: bool
+    told: bool
 
 
 def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[str, Any]) -> Source:
@@ -67,7 +68,7 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[st
     """
     repairs = _frame_count(file, options["defects"])
     hips = find_hips(clean_names(file.names), target, maps)
-    known = match_rig(_rig(below_hips(file, hips)), target, maps)
+    known = match_rig(rig_of(below_hips(file, hips)), target, maps)
     if known is not None and known.sources:
         return _known(file, hips, known, repairs, options)
     return _unknown(file, target, known, repairs, options)
@@ -75,7 +76,7 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[st
 
 def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: Mapping[str, Any]) -> Source:
     """The source of a file on a rig that a skeleton file describes."""
-    rig = replace(_rig(below_hips(file, hips)), roles=match.roles)
+    rig = replace(rig_of(below_hips(file, hips)), roles=match.roles)
     unit, unit_name = _unit(file.path, leg_length(rig), options["unit"])
     decoded = decode_below(file, hips, STILL / unit)
     clip = _scaled(file, rig, decoded, unit, options)
@@ -94,6 +95,7 @@ def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: Mapp
         notes,
         "its zero pose",
         moving,
+        False,
         options,
     )
 
@@ -102,9 +104,8 @@ def _unknown(
     file: Bvh, target: Target, known: Match | None, repairs: list[str], options: Mapping[str, Any]
 ) -> Source:
     """The source of a file on any other rig: its parts are found, and a rest pose that stands."""
-    rig = _rig(file)
-    reach = float(np.linalg.norm(file.offsets[1:], axis=-1).max(initial=0.0))
-    decoded = decode(file, 1e-3 * reach)
+    rig = rig_of(file)
+    decoded = _decoded(file)
     raw = Clip(file.path.stem, rig, 1.0, decoded.rotations, decoded.root, decoded.translations)
     found = _found(file, rig, raw, known, options)
     body = found.body
@@ -117,8 +118,8 @@ def _unknown(
     standing = stands(body, rest_positions(rig)) is None
     clip, axes, unsure = straighten(clip, options["up"], options["handedness"], standing)
     axes = axes if standing else replace(axes, facing="+Z")
-    told = upright(clip, body)
-    theirs = body_of(target.skeleton.parents, {r: target.skeleton.role(r) for r in target.skeleton.roles})
+    theirs = body_by_roles(target.skeleton)
+    told = upright(clip, body, Spine.of(target.skeleton, theirs))
     match = Match(
         known.rig if known else FOUND,
         told.clip.skeleton.roles,
@@ -137,24 +138,24 @@ def _unknown(
         notes,
         told.rest,
         moving,
+        True,
         options,
     )
 
 
 def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: Mapping[str, Any]) -> Found:
     if known is not None:
-        return Found(
-            body_of(rig.parents, {role: rig.index(name) for role, name in known.roles.items()}), True
-        )
+        return Found(body_by_roles(replace(rig, roles=known.roles)), True)
     try:
         found = find_body(rig.joints, rig.parents, raw.positions)
     except Doubt as doubt:
         raise refusal(file, rig, doubt) from None
+    found = replace(found, body=with_fingers(found.body, rig))
     if not found.sided and options["handedness"] == "left":
         body = found.body
         arms = {a: body.arms[b] for a, b in (SIDES, SIDES[::-1])}
         legs = {a: body.legs[b] for a, b in (SIDES, SIDES[::-1])}
-        return Found(replace(body, arms=arms, legs=legs), False)
+        return Found(with_fingers(replace(body, arms=arms, legs=legs), rig), False)
     return found
 
 
@@ -179,20 +180,34 @@ def _mended(
     notes: list[str],
     stance: str,
     moving: bool,
+    told: bool,
     options: Mapping[str, Any],
 ) -> Source:
     """The source, without what is broken in it, its floor at height zero."""
-    repaired = repair(clip)
-    flat = options.get("ground", "flat") == "flat"
+    leave = options["defects"] == "leave"
+    repaired = Repaired(clip, 0, []) if leave else repair(clip)
+    flat = options.get("ground", "flat") == "flat" and not leave
     clip, moved, uneven = on_floor(repaired.clip) if flat else (repaired.clip, [], [])
     mended = repaired.sentences + moved
     if mended and options["defects"] == "refuse":
         raise InputError(file.path, mended[0], fix="Set motion.defects: repair to mend it so.")
     notes = notes + uneven + flips(clip, repaired.first)
-    return Source(clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving)
+    return Source(clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving, told)
 
 
-def _rig(file: Bvh) -> Skeleton:
+def raw_clip(file: Bvh) -> Clip:
+    """A file's motion as it stands: its own unit and axes, at one frame a second."""
+    decoded = _decoded(file)
+    return Clip(file.path.stem, rig_of(file), 1.0, decoded.rotations, decoded.root, decoded.translations)
+
+
+def _decoded(file: Bvh) -> Decoded:
+    reach = float(np.linalg.norm(file.offsets[1:], axis=-1).max(initial=0.0))
+    return decode(file, 1e-3 * reach)
+
+
+def rig_of(file: Bvh) -> Skeleton:
+    """The joints of a file as a skeleton, in its own unit, its names without prefixes."""
     names = clean_names(file.names)
     short = dict(zip(file.names, names, strict=True))
     ends = {short[name]: sites[0] for name, sites in file.end_sites.items()}

@@ -9,7 +9,7 @@ level.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -20,20 +20,22 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations, rest_positions
-from hobble.motion.body import SIDES, Body
+from hobble.motion.axes import rest_frame
+from hobble.motion.body import REACH, SIDES, Body, above
 
 UP, AHEAD, LEFT = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
 LEG, TRUNK, HEAD, FOOT = 40.0, 40.0, 50.0, 50.0  # degrees off the straight at which a person still stands
-NECK = np.array([0.0, 0.99, 0.11])  # a neck leans forward a little
 STEADY = 0.15  # share of frames, those in which a foot is lowest and slowest, that tell how it stands
 SAMPLES = 400
 FLEXED = 0.05  # mean sine of the bend of a knee or an elbow from which on it tells where the front is
 MOVES = 0.1  # cm
-BALL, BALL_DROP = (
-    0.165,
-    0.75,
-)  # of a foot without toes: length to that of the leg; ankle's height that it drops
-TIP = 0.19  # length of a foot to that of the leg from which on its end is the tip of the toes, not the ball
+BALL = np.array([0.0, -0.045, 0.14])  # from the ankle, to the length of the leg, of a foot without toes
+TRUSTED = (
+    30.0  # degrees between what zero pose and motion say of a joint, from which on the motion is believed
+)
+SHRUG = 12.0  # degrees from the chest, on average, up to which clavicles are at rest as in the zero pose
+LIMP = 60.0  # and hands from their forearms
+UPRIGHT = 0.6  # height of the hips above a foot that stands, to the length of the leg
 AGREE = np.radians(25.0)  # joints of a trunk that are turned no further from each other have one rest pose
 SHORT = 2.0  # cm: a bone shorter than this has no direction
 
@@ -50,6 +52,40 @@ class Upright:
     rest: str
 
 
+@dataclass(frozen=True)
+class Spine:
+    """Where the bones of a trunk and a neck point in a rest pose that stands, facing +Z.
+
+    shares: (N,) how far up from hips (0) to chest (1) the bones begin. axes: (N, 3). neck: (3,) to the head.
+    """
+
+    shares: Array
+    axes: Array
+    neck: Array
+
+    @classmethod
+    def of(cls, skeleton: Skeleton, body: Body) -> Spine:
+        """The spine of a skeleton, whose rest pose stands; what comes to it should point as it does."""
+        rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
+        chain = (body.hips, *body.trunk, *body.neck, body.head)
+        long = [j for k, j in enumerate(chain[1:]) if np.linalg.norm(rest[j] - rest[chain[k]]) > SHORT]
+        long = [body.hips, *long]
+        way = np.concatenate(
+            [[0.0], np.cumsum([np.linalg.norm(rest[b] - rest[a]) for a, b in pairwise(long)])]
+        )
+        axes = np.array([_unit(rest[b] - rest[a]) for a, b in pairwise(long)])
+        chest = max(
+            float(np.linalg.norm(np.diff(rest[list(chain[: len(body.trunk) + 1])], axis=0), axis=-1).sum()),
+            1e-9,
+        )
+        below = way[:-1] <= chest * 1.001
+        return cls(way[:-1][below] / chest, axes[below], axes[-1])
+
+    def at(self, share: float) -> Array:
+        """(3,) where the bone points that begins nearest below a share of the way, or little above it."""
+        return self.axes[max(0, int(np.searchsorted(self.shares, share + REACH, side="right")) - 1)]
+
+
 def stands(body: Body, rest: Array) -> str | None:
     """What keeps anybody from standing in a rest pose, in words; None where nothing does. rest: (J, 3)."""
     hips = 0.5 * (rest[body.legs["left"][0]] + rest[body.legs["right"][0]])
@@ -57,7 +93,7 @@ def stands(body: Body, rest: Array) -> str | None:
     up = _unit(shoulders - hips)
     left = rest[body.legs["left"][0]] - rest[body.legs["right"][0]]
     across = rest[body.arms["left"][1]] - rest[body.arms["right"][1]]
-    if _off(left, across) > 40 or abs(_off(left, up) - 90) > 25:
+    if _off(left, across) > 30 or abs(_off(left, up) - 90) > 25:
         return "hips and shoulders lie crosswise"
     if _off(rest[body.head] - shoulders, up) > HEAD:
         return "the head is not above the shoulders"
@@ -82,19 +118,95 @@ def stands(body: Body, rest: Array) -> str | None:
     return None
 
 
-def upright(clip: Clip, body: Body) -> Upright:
-    """The motion of a body on a rig that stands in its rest pose. clip: centimetres, right-handed, Y up."""
-    clip, body = _with_balls(clip, body)
+def upright(clip: Clip, body: Body, spine: Spine, others: Collection[int] = ()) -> Upright:
+    """The motion of a body on a rig that stands in its rest pose. clip: centimetres, right-handed, Y up.
+
+    spine: where the bones of a trunk point in that pose.
+
+    Where the bones point decides alone how trunk, limbs and feet are turned, so that the same motion comes
+    out of any rig alike; a zero pose that stands adds what no bone shows: how head, clavicles and hands are
+    turned. others: further joints that are to be kept, turned as the part of the body that they hang from.
+    """
     every = np.unique(np.linspace(0, len(clip) - 1, SAMPLES).round().astype(int))
-    seen = _Seen(body, clip.positions[every], clip.global_rotations[every])
+    ends = {
+        side: clip.skeleton.end_sites.get(clip.skeleton.joints[leg[2]]) for side, leg in body.legs.items()
+    }
+    seen = _Seen(body, clip.positions[every], clip.global_rotations[every], ends, spine)
     rest = rest_positions(clip.skeleton)
-    problem = stands(body, rest)
-    frames = seen.from_rest(rest) if problem is None else seen.from_motion()
+    frames, problem = seen.from_motion(), stands(body, rest)
+    if problem is None:
+        zero = seen.from_rest(rest)
+        if max(_apart(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED:
+            problem = "the trunk is twisted"
+        else:
+            _add_rest(frames, zero, seen)
     said = "its zero pose" if problem is None else f"its motion, since in its zero pose {problem}"
-    joints = [body.hips, *body.trunk, *body.neck, body.head]
+    kept = _kept(clip, seen, others, frames)
+    clip, body = _with_balls(clip, body, frames)
+    return Upright(*_told_anew(clip, body, [*body.joints, *kept], frames), said)
+
+
+def _add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: _Seen) -> None:
+    """Put into `frames` what the zero pose knows better."""
+    body = seen.body
+    if _apart(zero[body.head], frames[body.head]) < TRUSTED:
+        frames[body.head] = zero[body.head]
     for side in SIDES:
-        joints += [j for j in (*body.arms[side], *body.legs[side]) if j is not None]
-    return Upright(*_told_anew(clip, body, joints, frames), said)
+        clavicle, _, _, wrist = body.arms[side]
+        if clavicle is not None and _apart(frames[body.chest], frames[clavicle]) < SHRUG:
+            frames[clavicle] = frames[body.chest]
+        if _apart(zero[wrist], frames[wrist]) < LIMP:
+            frames[wrist] = zero[wrist]
+        heel, toe = body.legs[side][2:]
+        frames[heel] = _foot(frames[heel], zero[heel], seen, side)
+        if toe is not None:
+            frames[toe] = _foot(frames[toe], zero[toe], seen, side)
+
+
+def _foot(standing: Array, zero: Array, seen: _Seen, side: str) -> Array:
+    """How a foot is turned: rolled as it stands, pointing as in the zero pose, where the two agree at all.
+
+    Feet of a rig whose legs are splayed in the zero pose are rolled there; a patient's foot may never be
+    flat.
+    """
+    if not seen.stands(side):
+        return zero
+    heel, toe = seen.body.legs[side][2:]
+    if toe is None:
+        return zero if _apart(standing, zero) < TRUSTED else standing
+    bone = seen.bone(heel, toe)
+    if _apart(standing, zero) > TRUSTED + 60:
+        return standing
+    wanted, found = (quat.rotate(quat.inv(frame), bone) for frame in (zero, standing))
+    return quat.mul(standing, quat.between(wanted, found)) if _off(wanted, found) < TRUSTED else standing
+
+
+def _apart(a: Array, b: Array) -> float:
+    """Degrees between two rotations."""
+    return float(np.degrees(quat.angle(a, b)))
+
+
+def _kept(clip: Clip, seen: _Seen, others: Collection[int], frames: dict[int, Array]) -> list[int]:
+    """Those of the other joints that can be kept, with their frames put into `frames`.
+
+    Each is turned, on average, as the part of the body that it hangs from; the base of a finger points along
+    it.
+    """
+    body, parents = seen.body, clip.skeleton.parents
+    out = []
+    for joint in sorted(set(others) - set(body.joints)):
+        carrier = next((j for j in above(parents, joint)[1:] if j in body.joints), None)
+        if carrier is None:
+            continue
+        part = quat.mul(seen.turned[:, carrier], frames[carrier])
+        frames[joint] = _mean(quat.mul(quat.inv(seen.turned[:, joint]), part))
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            tips = [j for j in others if joint in above(parents, j)[1:]]
+            bones = [bone for j in tips if np.linalg.norm(bone := seen.bone(joint, j)) > SHORT]
+            if carrier == body.arms[side][3] and bones:
+                frames[joint] = _pointed(frames[joint], sign * LEFT, bones[0])
+        out.append(joint)
+    return out
 
 
 class _Seen:
@@ -104,8 +216,15 @@ class _Seen:
     joint's own: its world rotation times it is how far the part is turned from that stance.
     """
 
-    def __init__(self, body: Body, positions: Array, rotations: Array) -> None:
-        self.body, self.at, self.turned = body, positions, rotations
+    def __init__(
+        self,
+        body: Body,
+        positions: Array,
+        rotations: Array,
+        ends: Mapping[str, tuple[float, float, float] | None],
+        spine: Spine,
+    ) -> None:
+        self.body, self.at, self.turned, self.ends, self.spine = body, positions, rotations, ends, spine
         self.hips_left = self.line(body.legs["right"][0], body.legs["left"][0])
         self.chest_left = self.line(body.arms["right"][1], body.arms["left"][1])
 
@@ -144,7 +263,7 @@ class _Seen:
                 frames[clavicle] = whole
             for start, end in ((shoulder, elbow), (elbow, wrist)):
                 frames[start] = _pointed(whole, sign * LEFT, self.bone(start, end))
-            frames[wrist] = frames[elbow]
+            frames[wrist] = self._hand(side, frames[elbow], sign)
             hip, knee, heel, toe = body.legs[side]
             for start, end in ((hip, knee), (knee, heel)):
                 frames[start] = _pointed(whole, -UP, self.bone(start, end))
@@ -167,14 +286,22 @@ class _Seen:
         chain = (body.hips, *body.trunk)
         ends = (*body.neck, body.head)
         both = _unit(self.hips_left + self.chest_left)
+        steps = [
+            float(np.median(np.linalg.norm(self.at[:, b] - self.at[:, a], axis=-1)))
+            for a, b in pairwise(chain)
+        ]
+        way = np.concatenate([[0.0], np.cumsum(steps)])
         for i, joint in enumerate(chain):
             left = self.hips_left if i == 0 else self.chest_left if joint == body.chest else both
             following = (*chain[i + 1 :], *ends)
             bone = self._first_long(joint, following)
-            frames[joint] = _frame(bone, UP, self.local(joint, left), LEFT)
+            frames[joint] = _frame(
+                bone, self.spine.at(way[i] / max(way[-1], 1e-9)), self.local(joint, left), LEFT
+            )
         for i, joint in enumerate(body.neck):
             bone = self._first_long(joint, ends[i + 1 :])
-            frames[joint] = _frame(bone, NECK, self.local(joint, self.chest_left), LEFT)
+            axis = self.spine.neck if joint == body.neck[-1] else self.spine.at(1.0)
+            frames[joint] = _frame(bone, axis, self.local(joint, self.chest_left), LEFT)
         frames[body.head] = self._head(frames, (*chain, *body.neck))
 
     def _first_long(self, joint: int, following: Sequence[int]) -> Array:
@@ -199,19 +326,30 @@ class _Seen:
         for start, end in ((shoulder, elbow), (elbow, wrist)):
             frames[start] = _frame(self.bone(start, end), sign * LEFT, self.local(start, hinge), -sign * UP)
         forearm = quat.mul(self.turned[:, elbow], frames[elbow])
-        frames[wrist] = _mean(quat.mul(quat.inv(self.turned[:, wrist]), forearm))
+        frames[wrist] = self._hand(side, _mean(quat.mul(quat.inv(self.turned[:, wrist]), forearm)), sign)
+
+    def _hand(self, side: str, straight: Array, sign: float) -> Array:
+        """The frame of a hand: as its forearm's, but pointing where its fingers are."""
+        if side not in self.body.fingers:
+            return straight
+        return _pointed(straight, sign * LEFT, self.bone(self.body.arms[side][3], self.body.fingers[side]))
 
     def _leg(self, frames: dict[int, Array], side: str) -> None:
         hip, knee, heel, toe = self.body.legs[side]
         hinge = self._hinge(hip, knee, heel, self.hips_left)
         for start, end in ((hip, knee), (knee, heel)):
             frames[start] = _frame(self.bone(start, end), -UP, self.local(start, hinge), LEFT)
-        assert toe is not None
-        flat = self._flat(heel, toe)
-        ahead = _unit((self.at[flat, toe] - self.at[flat, heel]) * [1, 0, 1])
-        level = quat.between(np.broadcast_to(AHEAD, ahead.shape), ahead)
+        flat = self._flat(heel, heel if toe is None else toe)
+        if toe is not None:
+            ahead = self.at[flat, toe] - self.at[flat, heel]
+        elif (site := self.ends[side]) is not None and np.linalg.norm(site) > SHORT:
+            ahead = quat.rotate(self.turned[flat, heel], np.array(site))
+        else:
+            ahead = np.cross(self.hips_left[flat], UP)
+        level = quat.between(AHEAD, _unit(ahead * [1, 0, 1]))
         for joint in (heel, toe):
-            frames[joint] = _mean(quat.mul(quat.inv(self.turned[flat, joint]), level))
+            if joint is not None:
+                frames[joint] = _mean(quat.mul(quat.inv(self.turned[flat, joint]), level))
 
     def _hinge(self, start: int, middle: int, end: int, otherwise: Array) -> Array:
         """(S, 3) about what a limb bends, a knee to the body's left; `otherwise` where it hardly bends."""
@@ -220,6 +358,16 @@ class _Seen:
         if np.linalg.norm(own) < FLEXED:
             return otherwise
         return quat.rotate(self.turned[:, start], np.broadcast_to(_unit(own), axis.shape))
+
+    def stands(self, side: str) -> bool:
+        """Whether the body stands up while that foot is lowest and slowest."""
+        hip, knee, heel, toe = self.body.legs[side]
+        flat = self._flat(heel, heel if toe is None else toe)
+        leg = sum(
+            float(np.median(np.linalg.norm(self.at[:, b] - self.at[:, a], axis=-1)))
+            for a, b in ((hip, knee), (knee, heel))
+        )
+        return bool(np.median(self.at[flat, hip, 1] - self.at[flat, heel, 1]) > UPRIGHT * leg)
 
     def _flat(self, heel: int, toe: int) -> NDArray[np.integer]:
         """The frames in which the whole foot stands: it is lowest and slowest then."""
@@ -236,43 +384,42 @@ class _Seen:
 
 def _told_anew(clip: Clip, body: Body, joints: list[int], frames: dict[int, Array]) -> tuple[Clip, Body]:
     """The clip on those joints alone, each turned from its new rest pose; and the body by its new indices."""
+    skeleton = clip.skeleton
+    joints = [
+        body.hips,
+        *sorted((j for j in joints if j != body.hips), key=lambda j: _depth(skeleton, body, j)),
+    ]
     new = {old: i for i, old in enumerate(joints)}
-    parents = [-1]
-    for old in joints[1:]:
-        parents.append(new[_carrier(clip.skeleton.parents, body, old)])
+    parents = [-1, *(new[_carrier(skeleton.parents, body, old, new)] for old in joints[1:])]
     own = np.stack([frames[j] for j in joints])
     turned = quat.mul(clip.global_rotations[:, joints], own)
+    for side, finger in body.fingers.items():
+        wrist = body.arms[side][3]
+        out = quat.rotate(turned[:, new[wrist]], LEFT if side == "left" else -LEFT)
+        hand = clip.positions[:, finger] - clip.positions[:, wrist]
+        turned[:, new[wrist]] = quat.mul(quat.between(out, hand), turned[:, new[wrist]])
     places = clip.positions[:, joints]
     arms = quat.rotate(quat.inv(turned[:, parents]), places - places[:, parents])
     arms[:, 0] = 0.0
     offsets = np.median(arms, axis=0)
     moving = np.abs(arms - offsets).max() > MOVES
-    skeleton = Skeleton(
-        clip.skeleton.name, tuple(clip.skeleton.joints[j] for j in joints), tuple(parents), offsets
-    )
-    made = replace(
-        clip,
-        skeleton=skeleton,
-        rotations=quat.continuous(local_rotations(skeleton, turned)),
-        root=places[:, 0],
-        translations=arms if moving else None,
-    )
-    legs = {s: tuple(new[j] for j in body.legs[s]) for s in SIDES}  # type: ignore[index]
-    arms_of = {s: tuple(None if j is None else new[j] for j in body.arms[s]) for s in SIDES}
-    moved = Body(
-        new[body.hips],
-        tuple(new[j] for j in body.trunk),
-        tuple(new[j] for j in body.neck),
-        new[body.head],
-        arms_of,  # type: ignore[arg-type]
-        legs,  # type: ignore[arg-type]
-    )
-    skeleton = replace(skeleton, roles=moved.roles(skeleton.joints))
-    return replace(made, skeleton=skeleton), moved
+    moved = body.renumbered(new)
+    names = tuple(skeleton.joints[j] for j in joints)
+    made = Skeleton(skeleton.name, names, tuple(parents), offsets, roles=moved.roles(names))
+    rotations = quat.continuous(local_rotations(made, turned))
+    return Clip(clip.name, made, clip.fps, rotations, places[:, 0], arms if moving else None), moved
 
 
-def _carrier(parents: Sequence[int], body: Body, joint: int) -> int:
-    """The part of the body that a part hangs from."""
+def _depth(skeleton: Skeleton, body: Body, joint: int) -> int:
+    depth = 0
+    while joint != body.hips:
+        joint = _carrier(skeleton.parents, body, joint, body.joints)
+        depth += 1
+    return depth
+
+
+def _carrier(parents: Sequence[int], body: Body, joint: int, among: Collection[int]) -> int:
+    """What a part of the body hangs from; of any other joint, the nearest of `among` above it."""
     chain = (body.hips, *body.trunk, *body.neck, body.head)
     if joint in chain:
         return chain[chain.index(joint) - 1]
@@ -281,57 +428,39 @@ def _carrier(parents: Sequence[int], body: Body, joint: int) -> int:
             parts = (start, *(j for j in limb if j is not None))
             if joint in parts[1:]:
                 return parts[parts.index(joint) - 1]
-    raise KeyError(joint)
+    return next((j for j in above(parents, joint)[1:] if j in among), body.hips)
 
 
-def _with_balls(clip: Clip, body: Body) -> tuple[Clip, Body]:
-    """The clip with a ball on every foot: where a rig has none, it is put where the foot ends or stands."""
-    if all(leg[3] is not None for leg in body.legs.values()):
+def _with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, Body]:
+    """The clip with a ball on every foot, and their frames: where a rig has none, where a body has it."""
+    without = [side for side in SIDES if body.legs[side][3] is None]
+    if not without:
         return clip, body
     skeleton = clip.skeleton
     names, parents, offsets = list(skeleton.joints), list(skeleton.parents), list(skeleton.offsets)
     legs = dict(body.legs)
-    for side in SIDES:
-        hip, knee, heel, toe = body.legs[side]
-        if toe is not None:
-            continue
+    p = clip.positions
+    for side in without:
+        hip, knee, heel, _ = body.legs[side]
+        thigh, shank = (
+            float(np.median(np.linalg.norm(p[:, b] - p[:, a], axis=-1)))
+            for a, b in ((hip, knee), (knee, heel))
+        )
+        frames[len(names)] = frames[heel]
         legs[side] = (hip, knee, heel, len(names))
         names.append(f"{names[heel]}_ball")
         parents.append(heel)
-        offsets.append(_ball(clip, body, side))
-    extra = len(names) - len(skeleton.joints)
-    still = np.broadcast_to(quat.IDENTITY, (len(clip), extra, 4))
+        offsets.append(quat.rotate(frames[heel], BALL * (thigh + shank)))
+    still = np.broadcast_to(quat.IDENTITY, (len(clip), len(without), 4))
     moved = clip.translations
     if moved is not None:
-        tail = np.broadcast_to(np.array(offsets[-extra:]), (len(clip), extra, 3))
+        tail = np.broadcast_to(np.array(offsets[-len(without) :]), (len(clip), len(without), 3))
         moved = np.concatenate([moved, tail], axis=1)
     grown = replace(skeleton, joints=tuple(names), parents=tuple(parents), offsets=np.array(offsets))
     made = replace(
         clip, skeleton=grown, rotations=np.concatenate([clip.rotations, still], axis=1), translations=moved
     )
     return made, replace(body, legs=legs)
-
-
-def _ball(clip: Clip, body: Body, side: str) -> Array:
-    """Where the ball of a foot without toes is, as its ankle has it (3,), in centimetres."""
-    hip, knee, heel, _ = body.legs[side]
-    p = clip.positions
-    leg = float(
-        np.median(sum(np.linalg.norm(p[:, b] - p[:, a], axis=-1) for a, b in ((hip, knee), (knee, heel))))
-    )
-    end = clip.skeleton.end_sites.get(clip.skeleton.joints[heel])
-    if end is not None and np.linalg.norm(end) > 0.06 * leg:
-        length = float(np.linalg.norm(end))
-        return np.array(end) * (BALL * leg / length if length > TIP * leg else 1.0)
-    height = p[:, heel, 1]
-    low = height <= np.percentile(height, 20)
-    left = p[:, body.legs["left"][0]] - p[:, body.legs["right"][0]]
-    ahead = _unit(np.cross(_unit(left * [1, 0, 1]), UP))
-    drop = BALL_DROP * min(
-        0.09 * leg, max(0.03 * leg, float(np.median(height[low] - p[low].min(axis=(1, 2)))))
-    )
-    ball = ahead * BALL * leg - UP * drop
-    return _robust(quat.rotate(quat.inv(clip.global_rotations[low, heel]), ball[low]))
 
 
 def _unit(v: Array) -> Array:

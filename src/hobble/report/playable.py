@@ -76,6 +76,9 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "severityScale": runtime.scales.get("injury", 1.0),
         "footLocking": runtime.foot_locking,
         "steering": runtime.steering,
+        "limits": network.limits["injury"].to_dict()
+        if runtime.limits and "injury" in network.limits
+        else None,
         "parts": parts,
         "presets": [
             {"name": name, "severities": [[parts[label], value] for label, value in values.items()]}
@@ -145,4 +148,5 @@ def _constants() -> dict[str, float]:
         "fastestTurn": float(controller.FASTEST_TURN),
         "heightMix": feet.HEIGHT_MIX,
         "floating": feet.FLOATING,
+        "mostAdded": feet.MOST_ADDED,
     }

@@ -1,0 +1,135 @@
+"""Whether a retarget kept the motion: joint angles and limbs of the source against those of the result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+
+MOST = 15.0  # degrees of mean difference from which on a result is refused
+SIDES = ("left", "right")
+# What is measured at which joint: the angle between the bones from and to it.
+ANGLES = {
+    "knee": ("hip", "knee", "heel"),
+    "elbow": ("shoulder", "elbow", "wrist"),
+    "hip": ("head", "hip", "knee"),
+    "ankle": ("knee", "heel", "toe"),
+}
+BONES = {
+    "thigh": ("hip", "knee"),
+    "shank": ("knee", "heel"),
+    "upper arm": ("shoulder", "elbow"),
+    "forearm": ("elbow", "wrist"),
+}
+# Figures of other shapes have other angles there in the same pose, and a leg that is nearly straight bends by
+# 15 degrees for 1.5 cm: what is constant of the difference is taken off before it is judged.
+SHAPED = ("hip", "ankle", "knee")
+OFFSET = 25.0  # degrees of a knee that may be constant
+STANDS = 0.6  # cm a frame at 60 Hz: the ball of a foot that is slower stands
+BENT = 20.0  # degrees from which on a knee shows where it points
+
+
+def compare(source: Clip, made: Clip, scale: float) -> dict[str, Any]:
+    """How far a result is from its source, frame by frame on the same times, in degrees and centimetres.
+
+    scale: legs of the result to legs of the source. Returns, for both sides: `angles`, of each joint its
+    middle and range in the source and the result, and the difference; `directions`, of each limb the
+    mean difference; `feet`, how much higher the balls are, and how far they slide a second while they stand.
+    """
+    frames = min(len(source), len(made))
+    before, after = (_places(clip, frames) for clip in (source, made))
+    return {
+        "angles": {f"{s} {name}": _angle(before, after, s, name) for s in SIDES for name in ANGLES},
+        "directions": {f"{s} {name}": _direction(before, after, s, name) for s in SIDES for name in BONES},
+        "feet": {s: _foot(before, after, s, scale, made.fps) for s in SIDES},
+        "knees": {s: _forward(after, s) for s in SIDES},
+    }
+
+
+def check(path: Path, figures: dict[str, Any], rig: str) -> None:
+    """Refuse a result that does not move as its source. Raises InputError that names the joint."""
+    apart = {name: each["apart"] for name, each in figures["angles"].items()} | figures["directions"]
+    name = max(apart, key=lambda part: apart[part])
+    look = (
+        f"Look at it (`python -m hobble.motion look {path}`), and correct the roles of its rig: `python -m "
+    )
+    look += f"hobble.motion rig {path}` writes a draft for config/skeletons/."
+    if apart[name] > MOST:
+        raise InputError(
+            path, f"the {name} is {apart[name]:.0f} degrees off its source on average (rig: {rig})", fix=look
+        )
+    backward = [side for side, ahead in figures["knees"].items() if ahead is not None and ahead < -0.3]
+    if len(backward) == 2:
+        raise InputError(path, f"both knees bend backward (rig: {rig})", fix=look)
+
+
+def worst(figures: dict[str, Any]) -> tuple[str, float]:
+    """The joint or limb that is furthest off, and by how many degrees."""
+    apart = {name: each["apart"] for name, each in figures["angles"].items()} | figures["directions"]
+    name = max(apart, key=lambda part: apart[part])
+    return name, apart[name]
+
+
+def _places(clip: Clip, frames: int) -> dict[str, Array]:
+    return {role: clip.positions[:frames, clip.skeleton.role(role)] for role in clip.skeleton.roles}
+
+
+def _angle(before: dict[str, Array], after: dict[str, Array], side: str, name: str) -> dict[str, Any]:
+    one, other = (_bend(at, side, ANGLES[name]) for at in (before, after))
+    off = other - one
+    constant = float(np.median(off)) if name in SHAPED else 0.0
+    off = off - (constant if name != "knee" or abs(constant) < OFFSET else 0.0)
+    return {
+        "source": [round(float(x), 1) for x in np.percentile(one, [5, 50, 95])],
+        "result": [round(float(x), 1) for x in np.percentile(other, [5, 50, 95])],
+        "constant": round(constant, 2),
+        "apart": round(float(np.abs(off).mean()), 2),
+    }
+
+
+def _bend(at: dict[str, Array], side: str, parts: tuple[str, ...]) -> Array:
+    """(F,) degrees between the bone to the middle joint and the bone from it."""
+    a, b, c = (at[part] if part == "head" else at[f"{side}_{part}"] for part in parts)
+    return np.degrees(np.arccos(np.clip(np.sum(_unit(b - a) * _unit(c - b), axis=-1), -1.0, 1.0)))
+
+
+def _direction(before: dict[str, Array], after: dict[str, Array], side: str, name: str) -> float:
+    start, end = (f"{side}_{part}" for part in BONES[name])
+    one, other = (_unit(at[end] - at[start]) for at in (before, after))
+    return round(float(np.degrees(np.arccos(np.clip(np.sum(one * other, axis=-1), -1.0, 1.0))).mean()), 2)
+
+
+def _foot(
+    before: dict[str, Array], after: dict[str, Array], side: str, scale: float, fps: float
+) -> dict[str, float | None]:
+    one, other = before[f"{side}_toe"] * scale, after[f"{side}_toe"]
+    speeds = [np.linalg.norm(np.diff(at[:, [0, 2]], axis=0), axis=-1) for at in (one, other)]
+    stance = np.linalg.norm(np.diff(one, axis=0), axis=-1) * fps / 60.0 < STANDS
+    slides = [round(float(speed[stance].mean() * fps), 2) if stance.any() else None for speed in speeds]
+    return {
+        "higher": round(float(np.mean(other[:, 1] - one[:, 1])), 2),
+        "slide_source": slides[0],
+        "slide_result": slides[1],
+    }
+
+
+def _forward(at: dict[str, Array], side: str) -> float | None:
+    """Mean cosine between where a bent knee points and where the body faces; None where it never bends."""
+    left = at["left_hip"] - at["right_hip"]
+    ahead = _unit(np.cross(left, [0.0, 1.0, 0.0]))
+    hip, knee, heel = (at[f"{side}_{part}"] for part in ("hip", "knee", "heel"))
+    bent = _bend(at, side, ANGLES["knee"]) > BENT
+    if bent.mean() < 0.1:
+        return None
+    line = _unit(heel - hip)
+    out = knee - hip - line * np.sum((knee - hip) * line, axis=-1, keepdims=True)
+    return round(float(np.mean(np.sum(_unit(out[bent]) * ahead[bent], axis=-1))), 2)
+
+
+def _unit(v: Array) -> Array:
+    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
