@@ -52,7 +52,7 @@ class FusedStep(Step):
 
     def spread(self, number: int, d: Tensor, outputs: Tensor, c: Tensor, dc: Tensor) -> Tensor:
         """As in `Step`, in one sweep."""
-        da = self._buffer(f"da {number}", *outputs.shape, self.factors.dtype)
+        da = self._buffer(f"da {number}", len(c), outputs.shape[1], self.factors.dtype)
         team(outputs.numel())
         _spread(d.numpy(), bits(outputs), c.numpy(), bits(da), dc.numpy())
         return da
