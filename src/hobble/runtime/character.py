@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -42,6 +42,19 @@ class Character:
     foot_hold: Array
     foot_lift: Array
     foot_added: Array
+
+
+class Kept:
+    """What a character is now, to be put back where the frame that follows fails."""
+
+    def __init__(self, state: Character) -> None:
+        self._state = state
+        self._arrays = {field.name: getattr(state, field.name).copy() for field in fields(state)}
+
+    def restore(self) -> None:
+        """Write it back, into the arrays in which it was."""
+        for name, array in self._arrays.items():
+            getattr(self._state, name)[...] = array
 
 
 def standing(network: Network, characters: int, position: Array, yaw: Array) -> Character:

@@ -17,10 +17,10 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from hobble.character import rule
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import Predictor
 from hobble.rows.layout import BODY
@@ -30,6 +30,7 @@ from hobble.runtime.character import Character
 met = register_jitable(rule.met)
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
+HIGHEST = 1e7  # cm that ground may be above or below 0, 100 km: beyond it, heights lose digits
 # Radians a frame (1500 degrees a second). No joint of a person who walks or runs turns as fast, but a
 # prediction between rotations half a turn apart, such as hands have, may point anywhere, and a new wish
 # changes the next pose at once.
@@ -164,10 +165,12 @@ def _heights(ground: Ground, x: Array, z: Array) -> Array:
         raise ValueError(f"the terrain gave heights of shape {heights.shape} for {x.size} places")
     if not np.isfinite(heights).all():
         raise ValueError("the terrain has heights that are not finite")
+    if np.abs(heights).max() > HIGHEST:
+        raise ValueError(f"the terrain has a height of {np.abs(heights).max():.4g} cm; {HIGHEST:g} at most")
     return np.broadcast_to(heights, x.shape)
 
 
-@njit(cache=True)
+@njit
 def _fill_input(
     position: Any, direction: Any, gait: Any, ground: Any, height: Any, joints: Any, velocities: Any,
     told: Any, at: Any, told_at: Any, step: int, x: Any,
@@ -205,7 +208,7 @@ def _fill_input(
             x[c, told_at[k]] = told[c, k]
 
 
-@njit(cache=True)
+@njit
 def _take_output(
     y: Any, at: Any, position: Any, direction: Any, height: Any, joints: Any, velocities: Any, rotations: Any,
     root: Any, yaw: Any, pose_position: Any, pose_rotation: Any,

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba import njit
 
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import STORAGES, inverse
 from hobble.models.pfnn.forward import weights_at
@@ -104,7 +104,7 @@ def _pack(weights: Array, storage: str) -> tuple[Array, Array]:
     return np.round(weights / scale[..., None]).astype(np.int16), scale.astype(np.float32)
 
 
-@njit(cache=True, fastmath=True)
+@njit(fastmath=True)
 def _standardise(x: Any, mean: Any, inverse: Any, z: Any) -> None:
     for c in range(x.shape[0]):
         for i in range(x.shape[1]):
@@ -114,7 +114,7 @@ def _standardise(x: Any, mean: Any, inverse: Any, z: Any) -> None:
 # Only the functions called from outside are kept on disk, and what they call is forced into them: into
 # functions of their own the compiler may look the first time and not when they come from disk, and then
 # rounds sums in another order.
-@njit(forceinline=True)
+@njit(forceinline=True, cache=False)
 def _phase(phase: float, kind: int, points: int, index: Any, share: Any) -> None:
     """Fill the `kind` points that phase blends and their coefficients."""
     # A phase of exactly 1 is the end of the cycle, not its start: in constant mode the two have different
@@ -138,7 +138,7 @@ def _phase(phase: float, kind: int, points: int, index: Any, share: Any) -> None
         share[3] = 0.5 * (-t * t + t * t * t)
 
 
-@njit(fastmath=True, forceinline=True)
+@njit(fastmath=True, forceinline=True, cache=False)
 def _layer1(w: Any, s: Any, b: Any, x: Any, y: Any) -> None:
     for r in range(w.shape[0]):
         a = np.float32(0)
@@ -147,7 +147,7 @@ def _layer1(w: Any, s: Any, b: Any, x: Any, y: Any) -> None:
         y[r] = a * s[r] + b[r]
 
 
-@njit(fastmath=True, forceinline=True)
+@njit(fastmath=True, forceinline=True, cache=False)
 def _layer2(w: Any, s: Any, b: Any, k: Any, share: Any, x: Any, y: Any) -> None:
     i, j = k[0], k[1]
     for r in range(w.shape[1]):
@@ -158,7 +158,7 @@ def _layer2(w: Any, s: Any, b: Any, k: Any, share: Any, x: Any, y: Any) -> None:
         y[r] = share[0] * (a0 * s[i, r] + b[i, r]) + share[1] * (a1 * s[j, r] + b[j, r])
 
 
-@njit(fastmath=True, forceinline=True)
+@njit(fastmath=True, forceinline=True, cache=False)
 def _layer4(w: Any, s: Any, b: Any, k: Any, share: Any, x: Any, y: Any) -> None:
     i, j, m, n = k[0], k[1], k[2], k[3]
     for r in range(w.shape[1]):
@@ -176,7 +176,7 @@ def _layer4(w: Any, s: Any, b: Any, k: Any, share: Any, x: Any, y: Any) -> None:
         )
 
 
-@njit(cache=True, fastmath=True)
+@njit(fastmath=True)
 def _evaluate(
     weights: Any,
     scales: Any,
@@ -212,7 +212,7 @@ def _evaluate(
             out[c, r] = h[r] * std[r] + mean[r]
 
 
-@njit(fastmath=True, forceinline=True)
+@njit(fastmath=True, forceinline=True, cache=False)
 def _block(w: Any, s: Any, b: Any, x: Any, y: Any) -> None:
     """y (4, out) = W x + b for four characters at once; x: (4, in).
 
@@ -242,7 +242,7 @@ def _block(w: Any, s: Any, b: Any, x: Any, y: Any) -> None:
                 y[n, r + k] = sums[k, n] * s[r + k] + b[r + k]
 
 
-@njit(fastmath=True, forceinline=True)
+@njit(fastmath=True, forceinline=True, cache=False)
 def _layer_crowd(w: Any, s: Any, b: Any, index: Any, share: Any, x: Any, y: Any) -> None:
     """y (C, out) of x (C, in): point by point, the characters that blend it in blocks of four."""
     block_x, block_y = np.zeros((BLOCK, w.shape[2]), np.float32), np.zeros((BLOCK, w.shape[1]), np.float32)
@@ -272,7 +272,7 @@ def _layer_crowd(w: Any, s: Any, b: Any, index: Any, share: Any, x: Any, y: Any)
                 waiting = 0
 
 
-@njit(cache=True, fastmath=True)
+@njit(fastmath=True)
 def _evaluate_crowd(
     weights: Any, scales: Any, biases: Any, mean: Any, std: Any, kind: int, z: Any, phase: Any, out: Any
 ) -> None:
