@@ -17,7 +17,7 @@ from hobble.runtime.animation import ProceduralAnimation
 FPS = 60
 GAITS = ("walk", "jog", "crouch")
 FASTEST = 8.0  # cm a frame of a wish
-APART = 1e5  # centimetres between the places where characters start, each on ground of its own
+APART = 4e4  # centimetres between the places where characters start, each on ground of its own
 LIMITS = {"hips_lowest_cm": 60.0, "hips_highest_cm": 110.0, "added_turn_degrees": 30.0}
 
 

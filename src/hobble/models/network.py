@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.models.seen import Seen
 from hobble.rows.layout import GAITS, RowLayout
 
 TERRAIN_SIDE = 25.0  # centimetres from the path to the side heights, where a file does not tell
@@ -50,7 +51,8 @@ class Network(ABC):
     x_mean, x_std, y_mean, y_std: what standardises X and restores Y.
     layout: the columns; gaits: the order of the gait blocks; skeleton: None where the file carries none.
     channels: name -> labels of its columns, of each channel that it is told. terrain_side: centimetres from
-    the path to the heights at its sides. meta: what else the file says.
+    the path to the heights at its sides. meta: what else the file says. seen: what training
+    showed it, None where the file does not tell.
     """
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
@@ -67,6 +69,7 @@ class Network(ABC):
     channels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     terrain_side: float = TERRAIN_SIDE
     meta: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    seen: Seen | None = field(default=None, repr=False)
 
     def trained(self, channel: str) -> tuple[str, ...]:
         """Labels of a channel's columns that told something in training, as the means of their inputs say.

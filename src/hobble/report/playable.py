@@ -57,6 +57,8 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "joints": layout.joints,
         "names": list(skeleton.joints),
         "parents": list(skeleton.parents),
+        "bounds": _bounds(network),
+        "start": _start(network),
         "offsets": np.round(skeleton.offsets, 4).tolist(),
         "roles": dict(skeleton.roles),
         "window": layout.window,

@@ -16,7 +16,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.axes import Axes
-from hobble.runtime.character import Character, Kept, standing
+from hobble.runtime.character import Character, Kept, start
 from hobble.runtime.controller import Controller
 from hobble.runtime.ground import as_ground
 from hobble.runtime.told import Told, UnknownName
@@ -143,7 +143,7 @@ class ProceduralAnimation:
         else:
             ahead = self._level("facing", facing, self.axes.directions_in)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
-        self.state: Character = standing(self.network, count, np.array(places, float), yaws)
+        self.state: Character = start(self.network, count, np.array(places, float), yaws)
         self._controller = Controller(self._predictor, self.state, **self._of_controller)
         self._wish_gait = np.zeros((count, len(self._gaits)))
 
