@@ -322,6 +322,31 @@ def test_the_camera_comes_round_behind_at_any_rate_of_pictures(tab: Any) -> None
     assert 0 < slow[1] < 40
 
 
+def test_the_gait_lab_measures_steps_and_knees(tab: Any, examples: ModuleType, holden31: Skeleton) -> None:
+    made = examples.walker(holden31, 180, 2.2)
+    legs = [
+        [holden31.role(f"{side}_{part}") for part in ("hip", "knee", "heel", "toe")]
+        for side in ("left", "right")
+    ]
+    places = np.round(made["positions"], 4).reshape(180, -1).tolist()
+    down = (made["contacts"][:, ::2] > 0.5).tolist()
+    found = tab.run(f"""(() => {{
+      const lab = Hobble.lab({json.dumps(legs)}), down = {json.dumps(down)};
+      {json.dumps(places)}.forEach((at, f) => lab.add(at, down[f]));
+      return [lab.knees, lab.steps, lab.stance];
+    }})()""")
+    for f, (hip, knee, heel, _) in enumerate(legs):
+        a, b = (made["positions"][:, j] - made["positions"][:, i] for i, j in ((hip, knee), (knee, heel)))
+        cosine = (a * b).sum(-1) / np.linalg.norm(a, axis=-1) / np.linalg.norm(b, axis=-1)
+        assert found[0][f] == pytest.approx(np.degrees(np.arccos(np.clip(cosine, -1, 1))), abs=0.2)
+        lands = 1 + np.flatnonzero(np.diff(made["contacts"][:, 2 * f]) > 0.5)
+        other = np.flatnonzero(np.diff(made["contacts"][:, 2 - 2 * f], prepend=0) > 0.5)
+        at, before = lands[-1], other[other < lands[-1]][-1]
+        step = made["positions"][at, heel] - made["positions"][before, legs[1 - f][2]]
+        assert found[1][f] == pytest.approx(np.hypot(step[0], step[2]), abs=0.01)
+    assert found[2] == np.array(down).T.tolist()
+
+
 def test_the_saved_picture_has_a_sky(tab: Any) -> None:
     show(tab)
     least = """new Promise((done) => requestAnimationFrame(() => {

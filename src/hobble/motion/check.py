@@ -38,7 +38,7 @@ def compare(source: Clip, made: Clip, scale: float) -> dict[str, Any]:
     """How far a result is from its source, frame by frame on the same times, in degrees and centimetres.
 
     scale: legs of the result to legs of the source. Returns, for both sides: `angles`, of each joint its
-    middle and range in the source and the result, and the difference, constant and else; `directions`, of each limb the
+    middle and range in the source and the result, and the difference; `directions`, of each limb the
     mean difference; `feet`, how much higher the balls are, and how far they slide a second while they stand.
     """
     frames = min(len(source), len(made))

@@ -38,6 +38,7 @@ class Bounds:
         if seen is None:
             spread = DEVIATIONS * network.y_std
             x = np.full(layout.x_size, WILD, np.float32)
+            spread[layout.y_joint_rotation] = 2 * np.pi  # an angle cannot explode
             return cls(-x, x, network.y_mean - spread, network.y_mean + spread, WILD)
         x_more = BEYOND * (seen.x_high - seen.x_low)
         y_more = BEYOND * (seen.y_high - seen.y_low)
@@ -49,7 +50,7 @@ class Bounds:
         return cls(x_low, x_high, y_low, seen.y_high + y_more, FASTER * seen.fastest)
 
 
-@njit
+@njit(cache=False)
 def keep_within(rows: Any, low: Any, high: Any, wild: Any) -> bool:
     """Bring rows (C, N) in place within low and high (N,); `wild` (C,) says of which a number is not sound.
 
@@ -67,7 +68,7 @@ def keep_within(rows: Any, low: Any, high: Any, wild: Any) -> bool:
     return any_wild
 
 
-@njit
+@njit(cache=False)
 def unsound(
     position: Any, direction: Any, gait: Any, joints: Any, velocities: Any, rotations: Any, told: Any,
     target: Any, facing: Any, owed: Any, hold: Any, lift: Any, added: Any, phase: Any, wild: Any,
@@ -85,7 +86,7 @@ def unsound(
     return any_wild
 
 
-@njit
+@njit(cache=False)
 def _sound(array: Any) -> bool:
     total = 0.0
     for value in array.flat:
