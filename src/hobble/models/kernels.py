@@ -26,7 +26,7 @@ def bits(array: Tensor) -> np.ndarray:
     return array.view(torch.uint16).numpy() if array.dtype == torch.bfloat16 else array.numpy()
 
 
-@njit(inline="always", cache=False)
+@njit(inline="always")
 def rounded(value: Any) -> Any:
     """The bits of a float32 as bfloat16, rounded to even."""
     word = np.float32(value).view(np.uint32)
@@ -34,13 +34,13 @@ def rounded(value: Any) -> Any:
     return np.uint16(np.uint32(word + even + np.uint32(0x7FFF)) >> np.uint32(16))
 
 
-@njit(inline="always", cache=False)
+@njit(inline="always")
 def widened(half: Any) -> Any:
     """The float32 whose bfloat16 bits these are."""
     return np.uint32(np.uint32(half) << np.uint32(16)).view(np.float32)
 
 
-@njit(parallel=True, error_model="numpy", cache=False)
+@njit(parallel=True, error_model="numpy")
 def draw(mask: Any, counter: Any, keep: Any) -> Any:
     """Fill `mask` from a counter (splitmix64: Steele et al. 2014); returns the counter of the next one."""
     rows, width = mask.shape

@@ -12,10 +12,11 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils, config
 from numba.extending import intrinsic
 
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 
 WIDTH = 16  # outputs a panel: two registers with AVX2, one with AVX-512

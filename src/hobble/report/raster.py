@@ -147,7 +147,7 @@ def _normals(corners: Array, faces: NDArray[np.int64]) -> Array:
     return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
 
 
-@njit(cache=False)
+@njit
 def _shade(
     points: Array, colours: Array, faces: Any, picture: Array, depth: Array
 ) -> None:  # pragma: no cover
@@ -178,7 +178,7 @@ def _shade(
                         )
 
 
-@njit(cache=False)
+@njit
 def _fill(points: Array, faces: Any, cover: Array) -> None:  # pragma: no cover
     """Set to 1 what triangles of corners (V, 3) in pixels cover, from whichever side."""
     height, width = cover.shape

@@ -50,7 +50,7 @@ class Bounds:
         return cls(x_low, x_high, y_low, seen.y_high + y_more, FASTER * seen.fastest)
 
 
-@njit(cache=False)
+@njit
 def keep_within(rows: Any, low: Any, high: Any, wild: Any) -> bool:
     """Bring rows (C, N) in place within low and high (N,); `wild` (C,) says of which a number is not sound.
 
@@ -68,7 +68,7 @@ def keep_within(rows: Any, low: Any, high: Any, wild: Any) -> bool:
     return any_wild
 
 
-@njit(cache=False)
+@njit
 def unsound(
     position: Any, direction: Any, gait: Any, joints: Any, velocities: Any, rotations: Any, told: Any,
     target: Any, facing: Any, owed: Any, hold: Any, lift: Any, added: Any, phase: Any, wild: Any,
@@ -86,7 +86,7 @@ def unsound(
     return any_wild
 
 
-@njit(cache=False)
+@njit
 def _sound(array: Any) -> bool:
     total = 0.0
     for value in array.flat:

@@ -210,7 +210,7 @@ def _heights(ground: Ground, x: Array, z: Array) -> Array:
     return np.broadcast_to(heights, x.shape)
 
 
-@njit(cache=False)
+@njit
 def _fill_input(
     position: Any, direction: Any, gait: Any, ground: Any, height: Any, joints: Any, velocities: Any,
     told: Any, at: Any, told_at: Any, step: int, x: Any,
@@ -248,7 +248,7 @@ def _fill_input(
             x[c, told_at[k]] = told[c, k]
 
 
-@njit(cache=False)
+@njit
 def _take_output(
     y: Any, at: Any, position: Any, direction: Any, height: Any, joints: Any, velocities: Any, rotations: Any,
     fastest: float, root: Any, yaw: Any, pose_position: Any, pose_rotation: Any,

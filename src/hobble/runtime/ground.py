@@ -69,7 +69,7 @@ def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | Non
     return converted
 
 
-@njit(cache=False)
+@njit
 def _bilinear(heights: Any, cell: float, centre_x: float, centre_z: float, x: Any, z: Any) -> Any:
     rows, columns = heights.shape
     out = np.empty(x.size)

@@ -29,13 +29,13 @@ HELD = 0.5  # share of a movement that nobody asked for; all of it would drag th
 STILL = 0.1  # cm a frame: a slower wish is a wish to stand
 
 
-@njit(cache=False)
+@njit
 def wrap(angle: float) -> float:
     """The same angle within -pi..pi."""
     return angle - 2 * np.pi * np.floor((angle + np.pi) / (2 * np.pi))
 
 
-@njit(cache=False)
+@njit
 def follow_wish(
     wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
     velocity: Any, direction: Any, strafe: Any, gait: Any, position: Any, heading: Any, owed: Any,
@@ -65,7 +65,7 @@ def follow_wish(
             gait[c, middle, k] += GAIT_MIX * (wish_gait[c, k] - gait[c, middle, k])
 
 
-@njit(cache=False)
+@njit
 def _ask(steering: float, x: float, z: float, position: Any, owed: Any) -> tuple[float, float]:
     """The velocity to ask for so that (x, z) comes of it.
 
@@ -96,7 +96,7 @@ def _ask(steering: float, x: float, z: float, position: Any, owed: Any) -> tuple
     return x + more_x * min(1.0, limit), z + more_z * min(1.0, limit)
 
 
-@njit(cache=False)
+@njit
 def _ask_turn(gain: float, turn: float) -> float:
     """Radians to ask for beyond a `turn` that is still to be made: `gain` times it, and never as far round
     as to be nearer the other way."""
@@ -104,7 +104,7 @@ def _ask_turn(gain: float, turn: float) -> float:
     return min(max(gain * turn, -room), room)
 
 
-@njit(cache=False)
+@njit
 def blend_future(velocity: Any, target: Any, strafe: Any, position: Any, direction: Any, gait: Any) -> None:
     """Bend the predicted future toward the wished velocity and facing, more the further ahead.
 
@@ -133,7 +133,7 @@ def blend_future(velocity: Any, target: Any, strafe: Any, position: Any, directi
                 gait[c, i, k] = gait[c, middle, k]
 
 
-@njit(cache=False)
+@njit
 def sample_points(position: Any, direction: Any, step: int, side: float, points: Any) -> None:
     """Where the ground is looked up: points (C, samples, 3, 2) to the left, on the path and to the right."""
     for c in range(points.shape[0]):
@@ -145,7 +145,7 @@ def sample_points(position: Any, direction: Any, step: int, side: float, points:
             points[c, s, 2, 0], points[c, s, 2, 1] = x - side * dz, z + side * dx
 
 
-@njit(cache=False)
+@njit
 def prepare(
     wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
     velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
@@ -168,7 +168,7 @@ def prepare(
             told[c, k] += min(max(change, -told_step[k]), told_step[k])
 
 
-@njit(cache=False)
+@njit
 def advance(
     y: Any, at: Any, wish: Any, held: float, position: Any, direction: Any, gait: Any, phase: Any
 ) -> None:

@@ -43,7 +43,7 @@ def map_of(heights, starts, shapes, m):
     return heights[starts[m] : starts[m] + rows * columns], rows, columns
 
 
-@njit(cache=False)
+@njit
 def view_heights(heights, starts, shapes, which, affine, mean, points):
     """Heights (P, N) of P patches at the same N points (N, 2), in cells from the middle, inside the patch."""
     out = np.empty((len(which), len(points)), np.float32)
@@ -58,7 +58,7 @@ def view_heights(heights, starts, shapes, which, affine, mean, points):
     return out
 
 
-@njit(cache=False)
+@njit
 def view_extents(heights, starts, shapes, which, affine, size, highest):
     """Mean height of each of P views over its `size` x `size` cells, and whether no cell is further from it
     than `highest`.
@@ -103,7 +103,7 @@ def view_extents(heights, starts, shapes, which, affine, size, highest):
     return mean, passes
 
 
-@njit(fastmath=FAST, cache=False)
+@njit(fastmath=FAST)
 def distance_sum(x, z, place_x, place_z, weights):
     """(M,): at each point x, z (M,) the sum of its distances from N places, weighed by `weights` (N,)."""
     out = np.empty(len(x))
@@ -116,7 +116,7 @@ def distance_sum(x, z, place_x, place_z, weights):
     return out
 
 
-@njit(fastmath=FAST, cache=False)
+@njit(fastmath=FAST)
 def lowest_cone(x, z, place_x, place_z, heights, steepness):
     """(M,): at each point x, z (M,) the lowest of the cones that rise by `steepness` (N,) from N places."""
     out = np.empty(len(x))
@@ -208,7 +208,7 @@ def _terms(a):
     return (a[0, 0], a[0, 1], a[0, 2]), (a[1, 0], a[1, 1], a[1, 2])
 
 
-@njit(cache=False)
+@njit
 def view_errors(heights, starts, shapes, which, affine, tables, jumps):
     """The error (P,) of every view. tables: see `hobble.terrain.search`."""
     out = np.empty(len(which))
@@ -218,7 +218,7 @@ def view_errors(heights, starts, shapes, which, affine, tables, jumps):
     return out
 
 
-@njit(cache=False)
+@njit
 def search_views(heights, starts, shapes, which, affine, tables, jumps, count):
     """Indices and errors (count,) of the views of lowest error, the best first; of equal ones the first."""
     best = np.full(count, -1)

@@ -86,7 +86,7 @@ class Adam:
             w.addcdiv_(m * -rate, v.sqrt().mul_(root).add_(EPSILON))
 
 
-@njit(parallel=True, error_model="numpy", cache=False)
+@njit(parallel=True, error_model="numpy")
 def _fused(
     w: Any, m: Any, v: Any, g: Any, b1: Any, b2: Any, rate: Any, root: Any, slope: Any, epsilon: Any
 ) -> None:

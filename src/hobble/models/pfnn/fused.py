@@ -65,7 +65,7 @@ class FusedStep(Step):
         return self.buffers[key][:rows]
 
 
-@njit(cache=False)
+@njit
 def _coefficients(p: Any, c: Any) -> None:
     """As `hobble.models.pfnn.trainable.coefficients`."""
     points = c.shape[1]
@@ -80,7 +80,7 @@ def _coefficients(p: Any, c: Any) -> None:
         c[row, (knot + 2) % points] += (t - 1) * t * t / 2
 
 
-@njit(parallel=True, error_model="numpy", cache=False)
+@njit(parallel=True, error_model="numpy")
 def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
     """e (B, K (n + 1)) and slope (B, n) of x (B, n)."""
     rows, width = x.shape
@@ -101,7 +101,7 @@ def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
                 e[row, start + width] = share
 
 
-@njit(parallel=True, error_model="numpy", cache=False)
+@njit(parallel=True, error_model="numpy")
 def _contract(de: Any, c: Any, slope: Any, d: Any) -> None:
     """d (B, n): the sum of de (B, K (n + 1)) over the control points, times the slope."""
     rows, width = d.shape
