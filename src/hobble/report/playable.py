@@ -80,6 +80,9 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "severityScale": runtime.scales.get("injury", 1.0),
         "footLocking": runtime.foot_locking,
         "steering": runtime.steering,
+        "limits": network.limits["injury"].to_dict()
+        if runtime.limits and "injury" in network.limits
+        else None,
         "parts": parts,
         "presets": [
             {"name": name, "severities": [[parts[label], value] for label, value in values.items()]}

@@ -19,11 +19,11 @@ from hobble.runtime.axes import Axes
 from hobble.runtime.character import Character, Kept, start
 from hobble.runtime.controller import Controller
 from hobble.runtime.ground import as_ground
+from hobble.runtime.limits import JOG_FROM, Holder
 from hobble.runtime.told import Told, UnknownName
 from hobble.runtime.trajectory import STILL
 from hobble.runtime.waypoints import Follower, Waypoint
 
-JOG_FROM = 5.0  # cm a frame: between walking at 2.5 and jogging at 7.5
 # What a body can do, with room: sprinters reach 21 cm a frame, and the highest mountain is 9 km high.
 FASTEST_WISH = 30.0  # cm a frame, 18 m/s
 FARTHEST = 1e7  # cm from the origin, 100 km: beyond it, places lose digits that a step needs
@@ -69,6 +69,7 @@ class ProceduralAnimation:
         scales: Mapping[str, float] | None = None,
         foot_locking: bool = True,
         steering: float = 2.0,
+        limits: bool = True,
         axes: Axes | None = None,
         position: Any = None,
         facing: Any = None,
@@ -87,6 +88,7 @@ class ProceduralAnimation:
         self.network, self.skeleton = network, network.skeleton
         self.characters, self.axes = characters, axes or Axes()
         self._told = Told(network, scales or {})
+        self._limited = limits
         self._of_controller: dict[str, Any] = {
             "rates": {name: channel(name).rate for name in network.channels} | dict(rates or {}),
             "foot_locking": foot_locking,
@@ -112,7 +114,8 @@ class ProceduralAnimation:
         `next_pose` is given no velocity. rates: channel -> largest change of its values in a second, instead
         of the channel's own; scales: channel -> what its values are divided by. foot_locking: hold feet in
         contact where they landed. steering: how hard a velocity that is not reached is asked for, 0 as the
-        original. axes: the caller's convention. position, facing: as of `reset`. Raises InputError where the
+        original. limits: hold the wish to what a body that is hurt so
+        can do. axes: the caller's convention. position, facing: as of `reset`. Raises InputError where the
         file is not a network that fits, ValueError for an option out of range, UnknownName for a gait that
         the network does not have.
         """
@@ -146,6 +149,7 @@ class ProceduralAnimation:
         self.state: Character = start(self.network, count, np.array(places, float), yaws)
         self._controller = Controller(self._predictor, self.state, **self._of_controller)
         self._wish_gait = np.zeros((count, len(self._gaits)))
+        self._holder = Holder(self.network, self._told.columns, count)
 
     @property
     def seconds(self) -> Array:
@@ -190,6 +194,8 @@ class ProceduralAnimation:
         try:
             for columns, values in targets:
                 self.state.told_target[:, columns] = values
+            if self._limited:
+                self._holder.hold(self.state.told, velocity, shares)
             self._controller.frame(velocity, direction, strafe, shares, self._terrain[1])
         except BaseException:
             if before is not None:  # without a ground of the caller's own nothing in a frame can fail

@@ -79,6 +79,39 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     return out;
   };
 
+  // A hurt body is asked for what it can do, as `hobble.runtime.limits` holds it to: at most so much a frame, and who
+  // cannot run any more walks.
+
+  const allowed = (g) => {
+    let most = Infinity;
+    const { levels, speeds } = spec.limits;
+    for (let l = 0; l < L; l++) {
+      const v = c.severity[l];
+      if (!(v > 0)) continue;
+      let i = 0;
+      while (i < levels.length - 2 && levels[i + 1] <= v) i++;
+      const [low, high] = [speeds[g][l][i], speeds[g][l][i + 1]];
+      most = min(most, low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low));
+    }
+    return most;
+  };
+  const hold = (velocity, gait) => {
+    if (!spec.limits || !c.severity.some((v) => v > 0)) return velocity;
+    const each = gaits.map((_, g) => allowed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");
+    if (each[jog] < k.jogFrom) {
+      gait[walk] += gait[jog];
+      gait[jog] = 0;
+    }
+    let whole = 0, most = 0;
+    gaits.forEach((name, g) => {
+      if (name === "stand" || !(gait[g] > 0)) return;
+      whole += gait[g];
+      most += gait[g] * each[g];
+    });
+    const held = whole > 0 ? min(1, most / whole / max(hypot(...velocity), 1e-9)) : 1;
+    return velocity.map((v) => v * held);
+  };
+
   // The steps of a frame
 
   const ask = ([x, z], speed, [goingX, goingZ]) => {
@@ -313,8 +346,9 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     c.root = [c.root[0] + by[0], c.root[1], c.root[2] + by[1]];
   };
   c.frame = (velocity, ahead, gait, ground) => {
-    const [strafe, direction] = facing(velocity, ahead);
-    prepare(velocity, direction, strafe, shares(velocity, direction, gait), ground);
+    const [strafe, direction] = facing(velocity, ahead), share = shares(velocity, direction, gait);
+    velocity = hold(velocity, share);
+    prepare(velocity, direction, strafe, share, ground);
     input();
     within(x, xLow, xHigh);
     const y = predict(x, c.phase);
