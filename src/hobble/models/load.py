@@ -72,7 +72,7 @@ def network_from_arrays(
         raise InputError(
             path, f"{layout.joints} joints, but skeleton {skeleton.name} has {len(skeleton.joints)}"
         )
-    common = {
+    common: dict[str, Any] = {
         **statistics,
         "layout": layout,
         "skeleton": skeleton,

@@ -72,8 +72,11 @@ class Seen:
             if start is None or far[k] < best:
                 best, start = float(far[k]), (x[k], y[k], float(block.p[k]))
         assert start is not None, "a database has rows"
-        f32 = [np.asarray(a, np.float32) for a in (low[0], high[0], low[1], high[1], *start[:2])]
-        return cls(*f32, start_phase=start[2], fastest=fastest)
+        found = (low[0], high[0], low[1], high[1], *start[:2])
+        of_rows: dict[str, Any] = {
+            key: np.asarray(a, np.float32) for key, a in zip(ARRAYS.values(), found, strict=True)
+        }
+        return cls(**of_rows, start_phase=start[2], fastest=fastest)
 
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], x_size: int, y_size: int) -> Seen | None:

@@ -16,7 +16,8 @@ from hobble.core.quat import Array
 from hobble.models.network import Network
 
 BEYOND = 0.25  # of the range that a column had in training, to either side
-DEVIATIONS = 15.0  # from the mean, for an answer of a network whose file does not tell what it saw
+DEVIATIONS = 15.0  # from the mean, for an answer of a network whose file does not tell what it saw,
+ROOM = 50.0  # and so many cm more
 FASTER = 1.5  # times the fastest joint in training
 WILD = 1e8  # nothing in a row is as large; a state that is, is as good as not finite
 
@@ -36,7 +37,7 @@ class Bounds:
         """Those of a network; what channels tell is not bounded here but by the channels."""
         layout, seen = network.layout, network.seen
         if seen is None:
-            spread = DEVIATIONS * network.y_std
+            spread = DEVIATIONS * network.y_std + ROOM
             x = np.full(layout.x_size, WILD, np.float32)
             spread[layout.y_joint_rotation] = 2 * np.pi  # an angle cannot explode
             return cls(-x, x, network.y_mean - spread, network.y_mean + spread, WILD)
