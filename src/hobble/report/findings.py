@@ -66,8 +66,8 @@ def hints(material: Material) -> list[Hint]:
     """What to do next, most pressing first."""
     found = [
         *measured.hints(material),
+        *placed(10, _coverage(material)),  # what the data lack no training makes good
         *placed(20, _curve(material)),
-        *placed(40, _coverage(material)),
         *placed(80, _repairs(material)),
         *placed(90, _costs(material)),
     ]
@@ -113,6 +113,13 @@ def _coverage(material: Material) -> Iterator[Hint]:
         for gait, seconds in (report.get("seconds") or {}).items():
             totals[gait] = totals.get(gait, 0.0) + seconds
     everything = sum(totals.values())
+    if everything and not totals.get("stand"):
+        yield Hint(
+            "warn",
+            "Nobody stands in these clips, so nobody starts or stops either.",
+            "More training will not teach it: where the character is to stand, it steps on the spot. Add "
+            "clips in which somebody stands, sets off and stops.",
+        )
     thin = [g for g, s in totals.items() if 0 < s < 0.03 * everything and g not in ("jump", "bump")]
     if thin:
         yield Hint(
