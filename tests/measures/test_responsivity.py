@@ -100,6 +100,23 @@ def test_each_mode_runs_its_own_laps(network) -> None:
     assert without_times(some["laps"]) == without_times(modes["linear"]["laps"])
 
 
+def test_modes_beside_the_own_run_fewer_laps(network) -> None:
+    result = responsivity(
+        network,
+        configuration="x",
+        runtime=RUNTIME,
+        laps=3,
+        laps_beside=1,
+        lap_seconds=2.0,
+        modes=("linear",),
+        track=AHEAD,
+    )
+    assert result["laps_beside"] == 1
+    assert {m["mode"]: len(m["laps"]) for m in result["modes"]} == {"linear": 1, "cubic": 3}
+    assert {m["mode"]: m["waypoints"] for m in result["modes"]} == {"linear": 2, "cubic": 6}
+    assert len(result["laps"]) == 3
+
+
 def test_times_of_steps_that_are_known() -> None:
     """Two frames, of steps 1 .. 6 ms and of twice that; the whole call takes 1 ms more."""
     steps = np.arange(1.0, 7.0)

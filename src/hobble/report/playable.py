@@ -139,7 +139,7 @@ def _constants() -> dict[str, float]:
         "mostOwed": trajectory.MOST_OWED,
         "held": trajectory.HELD,
         "furthestTurn": float(trajectory.FURTHEST_TURN),
-        "strafeFrom": float(animation.STRAFE_FROM),
+        "strafeFrom": float(trajectory.STRAFE_FROM),
         "turnInPlace": float(animation.TURN_IN_PLACE),
         "jogFrom": animation.JOG_FROM,
         "lockAt": feet.LOCK_AT,

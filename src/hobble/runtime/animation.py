@@ -21,7 +21,7 @@ from hobble.runtime.controller import Controller
 from hobble.runtime.ground import as_ground
 from hobble.runtime.limits import JOG_FROM, Holder
 from hobble.runtime.told import Told, UnknownName
-from hobble.runtime.trajectory import STILL
+from hobble.runtime.trajectory import STILL, wished
 from hobble.runtime.waypoints import Follower, Waypoint
 
 TURN_IN_PLACE = np.radians(20)  # a standing figure steps around to face what is further aside than this
@@ -94,6 +94,7 @@ class ProceduralAnimation:
         }
         self._predictor = network.predictor(mode, storage)
         self._waypoints = list(waypoints) if waypoints is not None else None
+        self._contacts = network.layout.y_contacts
         self._gaits = {name: i for i, name in enumerate(network.gaits)}
         for waypoint in self._waypoints or ():
             self._known_gait(waypoint.gait)
@@ -144,6 +145,8 @@ class ProceduralAnimation:
         self.state: Character = standing(self.network, count, np.array(places, float), yaws)
         self._controller = Controller(self._predictor, self.state, **self._of_controller)
         self._wish_gait = np.zeros((count, len(self._gaits)))
+        self._wish_strafe, self._wish_look = np.zeros(count), np.zeros((count, 2))
+        self._nowhere = np.zeros((count, 2))
         self._holder = Holder(self.network, self._told.columns, count)
 
     @property
@@ -175,7 +178,9 @@ class ProceduralAnimation:
         for what is not finite or of another shape.
         """
         velocity, ahead, gait = self._wish(target_velocity, facing, gait)
-        strafe, direction = self._facing(velocity, ahead)
+        strafe, direction = self._wish_strafe, self._wish_look
+        ahead = self._nowhere if ahead is None else ahead
+        wished(velocity, ahead, self.state.target_direction, strafe, direction)
         shares = self._gait(velocity, direction, gait)
         if terrain is not self._terrain[0]:
             self._terrain = (terrain, as_ground(terrain, self.axes))
@@ -197,10 +202,12 @@ class ProceduralAnimation:
             return np.zeros((self.characters, 2)), ahead, gait
         middle = self.network.layout.window
         wish, heading = self.follower.lead(self.state.position[:, middle])
-        ahead = wish.copy()
-        for c, waypoint in enumerate(heading):
-            if waypoint.facing is not None:
-                ahead[c] = waypoint.facing
+        ahead = wish
+        if any(waypoint.facing is not None for waypoint in heading):
+            ahead = wish.copy()
+            for c, waypoint in enumerate(heading):
+                if waypoint.facing is not None:
+                    ahead[c] = waypoint.facing
         return wish, ahead, [w.gait for w in heading] if gait is None else gait
 
     def _level(self, what: str, vector: Any, convert: Any) -> Array:
@@ -224,20 +231,6 @@ class ProceduralAnimation:
         if not self.axes.native:
             v = convert(v)
         return np.array(np.broadcast_to(v[..., ::2], (self.characters, 2)), order="C")
-
-    def _facing(self, velocity: Array, ahead: Array | None) -> tuple[Array, Array]:
-        """How much each figure strafes (C,) and where it wants to look (C, 2)."""
-        going = np.hypot(velocity[:, 0], velocity[:, 1]) >= STILL
-        if ahead is None:
-            return np.zeros(self.characters), np.where(going[:, None], velocity, self.state.target_direction)
-        angle = np.arctan2(velocity[:, 0], velocity[:, 1]) - np.arctan2(ahead[:, 0], ahead[:, 1])
-        aside = np.abs(np.mod(angle + np.pi, 2 * np.pi) - np.pi)
-        strafe = np.where(going, np.minimum(1.0, aside / STRAFE_FROM), 1.0)
-        nowhere = (ahead == 0).all(axis=1)
-        if nowhere.any():
-            _, where = self._facing(velocity, None)
-            strafe, ahead = np.where(nowhere, 0.0, strafe), np.where(nowhere[:, None], where, ahead)
-        return strafe, ahead
 
     def _gait(self, velocity: Array, direction: Array, gait: Any) -> Array:
         """Shares (C, 6) of each gait that the wish amounts to."""
@@ -285,7 +278,7 @@ class ProceduralAnimation:
         if not self.axes.native:
             positions[:], root[:] = self.axes.points_out(positions), self.axes.points_out(root)
             rotations = self.axes.rotations_out(rotations)
-        contacts = np.clip(c.y[:, c.layout.y_contacts], 0, 1)
+        contacts = np.minimum(np.maximum(c.y[:, self._contacts], 0), 1)
         told = {name: state.told[:, columns].copy() for name, columns in self._told.columns.items()}
         if self.characters > 1:
             return Pose(positions, rotations, contacts, state.phase.copy(), root, c.yaw.copy(), told)
@@ -298,6 +291,3 @@ class ProceduralAnimation:
             float(c.yaw[0]),
             {name: values[0] for name, values in told.items()},
         )
-
-
-STRAFE_FROM = np.radians(45)  # from this angle between facing and going, strafing is full

@@ -119,11 +119,11 @@ class Controller:
             self.layout.step, self.side, self._points,
         )  # fmt: skip
         if ground is None:
-            c.ground[:] = 0.0
+            c.ground.fill(0.0)
         else:
             level = self._points.reshape(-1, 2)
             c.ground[:] = _heights(ground, level[:, 0], level[:, 1]).reshape(c.ground.shape)
-        c.root_height[:] = c.ground[:, :, 1].mean(axis=1)
+        trajectory.stand_on(c.ground, c.root_height)
 
     def _input(self) -> None:
         c = self.character

@@ -26,6 +26,7 @@ OWED_WITHIN = 0.8  # share of the wish; who lacks more is still on the way to it
 MOST_OWED = 1.0  # share of the wish
 FURTHEST_TURN = np.radians(137)
 HELD = 0.5  # share of a movement that nobody asked for; all of it would drag the feet along
+STRAFE_FROM = np.radians(45)  # from this angle between facing and going, strafing is full
 STILL = 0.1  # cm a frame: a slower wish is a wish to stand
 
 
@@ -33,6 +34,26 @@ STILL = 0.1  # cm a frame: a slower wish is a wish to stand
 def wrap(angle: float) -> float:
     """The same angle within -pi..pi."""
     return angle - 2 * np.pi * np.floor((angle + np.pi) / (2 * np.pi))
+
+
+@njit(cache=True)
+def wished(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: Any) -> None:
+    """How much each figure strafes, into `strafe` (C,), and where it wants to look, into `look` (C, 2).
+
+    velocity (C, 2): where it is to go; ahead (C, 2): where it is to look, or zero to look where it goes, and
+    where it stands as before, in `direction` (C, 2).
+    """
+    for c in range(velocity.shape[0]):
+        x, z = velocity[c, 0], velocity[c, 1]
+        going = np.sqrt(x * x + z * z) >= STILL
+        if ahead[c, 0] == 0.0 and ahead[c, 1] == 0.0:
+            strafe[c] = 0.0
+            look[c, 0] = x if going else direction[c, 0]
+            look[c, 1] = z if going else direction[c, 1]
+        else:
+            aside = abs(wrap(np.arctan2(x, z) - np.arctan2(ahead[c, 0], ahead[c, 1])))
+            strafe[c] = min(1.0, aside / STRAFE_FROM) if going else 1.0
+            look[c, 0], look[c, 1] = ahead[c, 0], ahead[c, 1]
 
 
 @njit(cache=True)
@@ -143,6 +164,16 @@ def sample_points(position: Any, direction: Any, step: int, side: float, points:
             points[c, s, 0, 0], points[c, s, 0, 1] = x + side * dz, z - side * dx
             points[c, s, 1, 0], points[c, s, 1, 1] = x, z
             points[c, s, 2, 0], points[c, s, 2, 1] = x - side * dz, z + side * dx
+
+
+@njit(cache=True)
+def stand_on(ground: Any, height: Any) -> None:
+    """height (C,): the mean of the heights (C, samples, 3) on the path."""
+    for c in range(ground.shape[0]):
+        total = 0.0
+        for s in range(ground.shape[1]):
+            total += ground[c, s, 1]
+        height[c] = total / ground.shape[1]
 
 
 @njit(cache=True)

@@ -95,13 +95,19 @@ def lap_chart(found: Json, material: Material) -> Chart | None:
     if theirs:
         shape, note = mark(theirs["milliseconds"], f"{theirs['label']}: mean as published", vertical=False)
         shapes, notes = [shape], [note]
-    laps = max(len(trace["x"]) for traces in options.values() for trace in traces)
+    counts = [max(len(trace["x"]) for trace in traces) for traces in options.values()]
+    laps = max(counts)
+    fewer = (
+        f" Other modes than the runtime's own ran {min(counts)}: from the second on, laps repeat each other."
+        if min(counts) < laps
+        else ""
+    )
     return Chart(
         "laps",
         "Milliseconds a frame, lap by lap",
         "Each bar is one lap of the six-waypoint track; its parts are the steps of a frame, means over the "
         "lap. Diamonds are medians of the whole frame. A few frames that another program held up raise a "
-        "bar and leave the diamond where it is. A frame at 60 Hz has 16.7 ms.",
+        "bar and leave the diamond where it is. A frame at 60 Hz has 16.7 ms." + fewer,
         layout={
             "barmode": "stack",
             "xaxis": axis("lap", dtick=1 if laps < 25 else None),
