@@ -160,3 +160,15 @@ def test_figures_of_almost_nothing(material: Material) -> None:
     )
     assert [f.label for f in key_figures(bare)] == ["Network"]
     assert [hint.head for hint in hints(bare)] == ["Nothing was held out."]
+
+
+def test_what_the_data_lack_comes_before_longer_training(material: Material) -> None:
+    """Nobody stands, and the error still falls: the clips are named first."""
+    labels = [{"clip": "a", "seconds": {"walk": 30.0}, "strip": {}}]
+    falling = history([0.5 * 0.9**k for k in range(20)])
+    found = list(heads(material, labels=labels, history=falling))
+    missing = next(k for k, head in enumerate(found) if head.startswith("Nobody stands in these clips"))
+    longer = next(k for k, head in enumerate(found) if "still falling" in head)
+    assert missing < longer
+    standing = [{"clip": "a", "seconds": {"walk": 30.0, "stand": 5.0}, "strip": {}}]
+    assert not any("Nobody stands" in head for head in heads(material, labels=standing, history=falling))

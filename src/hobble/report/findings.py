@@ -68,8 +68,8 @@ def hints(material: Material) -> list[Hint]:
     """What to do next in the order in which to do it, then what is well, then what asks for nothing."""
     found = [
         *measured.hints(material),
+        *placed(10, _coverage(material)),  # what the data lack no training makes good
         *placed(11, _repairs(material)),
-        *placed(13, _coverage(material)),
         *placed(20, _curve(material)),
         *placed(90, _costs(material)),
     ]
@@ -114,6 +114,13 @@ def _coverage(material: Material) -> Iterator[Hint]:
         for gait, seconds in (report.get("seconds") or {}).items():
             totals[gait] = totals.get(gait, 0.0) + seconds
     everything = sum(totals.values())
+    if everything and not totals.get("stand"):
+        yield Hint(
+            "warn",
+            "Nobody stands in these clips, so nobody starts or stops either.",
+            "More training will not teach it: where the character is to stand, it steps on the spot. Add "
+            "clips in which somebody stands, sets off and stops.",
+        )
     thin = [g for g, s in totals.items() if 0 < s < 0.03 * everything and g not in ("jump", "bump")]
     if thin:
         yield Hint(
