@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
+from hobble.core import quat
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.axes import Axes
-from hobble.runtime.character import Character, standing
+from hobble.runtime.character import Character, Kept, start
 from hobble.runtime.controller import Controller
 from hobble.runtime.ground import as_ground
 from hobble.runtime.limits import JOG_FROM, Holder
@@ -24,6 +25,9 @@ from hobble.runtime.told import Told, UnknownName
 from hobble.runtime.trajectory import STILL, wished
 from hobble.runtime.waypoints import Follower, Waypoint
 
+# What a body can do, with room: sprinters reach 21 cm a frame, and the highest mountain is 9 km high.
+FASTEST_WISH = 30.0  # cm a frame, 18 m/s
+FARTHEST = 1e7  # cm from the origin, 100 km: beyond it, places lose digits that a step needs
 TURN_IN_PLACE = np.radians(20)  # a standing figure steps around to face what is further aside than this
 
 
@@ -137,12 +141,14 @@ class ProceduralAnimation:
             if position is None
             else self._level("position", position, self.axes.points_in)
         )
+        if np.abs(places).max() > FARTHEST:
+            raise ValueError(f"position is further than {FARTHEST / 1e5:g} km from the origin: {position}")
         if facing is None:
             yaws = np.full(count, yaw)
         else:
             ahead = self._level("facing", facing, self.axes.directions_in)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
-        self.state: Character = standing(self.network, count, np.array(places, float), yaws)
+        self.state: Character = start(self.network, count, np.array(places, float), yaws)
         self._controller = Controller(self._predictor, self.state, **self._of_controller)
         self._wish_gait = np.zeros((count, len(self._gaits)))
         self._wish_strafe, self._wish_look = np.zeros(count), np.zeros((count, 2))
@@ -153,6 +159,16 @@ class ProceduralAnimation:
     def seconds(self) -> Array:
         """(6,) seconds that the last frame spent in prepare, input, insert, predict, output, update."""
         return self._controller.seconds
+
+    @property
+    def predicted_rotations(self) -> Array:
+        """(C, J, 4) world rotations that the network predicted for the last frame, before any was held back.
+
+        In axes of our own: Y up, Z ahead.
+        """
+        made = self._controller
+        turns = made.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)
+        return quat.mul(quat.yaw(made.yaw)[:, None], quat.exp(turns.astype(float)))
 
     def next_pose(
         self,
@@ -174,8 +190,9 @@ class ProceduralAnimation:
         None for flat at zero, a function of two ground coordinates (arrays) to heights, a `ground.Heightmap`
         or a 2D array around the origin, all in your axes and unit; give the same object every frame. Raises
         UnknownName (a KeyError) for a label or gait that the network does not have, TypeError for a keyword
-        that is no channel, ValueError for a channel that the network is not told, for values out of range and
-        for what is not finite or of another shape.
+        that is no channel, ValueError for a channel that the network is not told, for values out of range (a
+        velocity above 18 m/s, a share of a gait above 1, ground above 100 km) and for what is not finite or
+        of another shape. Whatever is raised, in the terrain function too, the state is as it was.
         """
         velocity, ahead, gait = self._wish(target_velocity, facing, gait)
         strafe, direction = self._wish_strafe, self._wish_look
@@ -184,19 +201,34 @@ class ProceduralAnimation:
         shares = self._gait(velocity, direction, gait)
         if terrain is not self._terrain[0]:
             self._terrain = (terrain, as_ground(terrain, self.axes))
-        for name, given in told.items():
-            if given is not None:
-                columns, values = self._told.values(name, given, self.characters)
+        targets = [
+            self._told.values(name, given, self.characters)
+            for name, given in told.items()
+            if given is not None
+        ]
+        before = None if self._terrain[1] is None else Kept(self.state)
+        try:
+            for columns, values in targets:
                 self.state.told_target[:, columns] = values
-        if self._limited:
-            self._holder.hold(self.state.told, velocity, shares)
-        self._controller.frame(velocity, direction, strafe, shares, self._terrain[1])
+            if self._limited:
+                self._holder.hold(self.state.told, velocity, shares)
+            self._controller.frame(velocity, direction, strafe, shares, self._terrain[1])
+        except BaseException:
+            if before is not None:  # without a ground of the caller's own nothing in a frame can fail
+                before.restore()
+            raise
         return self._pose()
 
     def _wish(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array | None, Any]:
         if velocity is not None:
             ahead = None if facing is None else self._level("facing", facing, self.axes.directions_in)
-            return self._level("target_velocity", velocity, self.axes.points_in), ahead, gait
+            wish = self._level("target_velocity", velocity, self.axes.points_in)
+            if (fastest := np.hypot(wish[:, 0], wish[:, 1]).max()) > FASTEST_WISH:
+                raise ValueError(
+                    f"target_velocity is {fastest:.4g} cm a frame, faster than a body can move: "
+                    f"{FASTEST_WISH:g} cm a frame at most ({FASTEST_WISH * 0.6:g} m/s at 60 frames a second)"
+                )
+            return wish, ahead, gait
         if self.follower is None:
             ahead = None if facing is None else self._level("facing", facing, self.axes.directions_in)
             return np.zeros((self.characters, 2)), ahead, gait
@@ -238,10 +270,10 @@ class ProceduralAnimation:
         speed = np.hypot(velocity[:, 0], velocity[:, 1])
         given = np.asarray(gait)
         if given.dtype.kind in "biuf":
-            known = (given >= 0) & (given < np.inf)
+            known = (given >= 0) & (given <= 1)
             if given.shape not in (shares.shape, shares.shape[1:]) or not known.all():
                 raise ValueError(
-                    f"shares of gaits are {shares.shape[1:]} or {shares.shape} numbers of 0 or more, not "
+                    f"shares of gaits are {shares.shape[1:]} or {shares.shape} numbers from 0 to 1, not "
                     f"{given.tolist()}; their order: {', '.join(self._gaits)}"
                 )
             shares[:] = given

@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from hobble.character import rule
+from hobble.core.compiled import njit
 from hobble.rows.layout import RowLayout
 
 phase_change, moving_share = register_jitable(rule.phase_change), register_jitable(rule.moving)
@@ -30,13 +30,13 @@ STRAFE_FROM = np.radians(45)  # from this angle between facing and going, strafi
 STILL = 0.1  # cm a frame: a slower wish is a wish to stand
 
 
-@njit(cache=True)
+@njit
 def wrap(angle: float) -> float:
     """The same angle within -pi..pi."""
     return angle - 2 * np.pi * np.floor((angle + np.pi) / (2 * np.pi))
 
 
-@njit(cache=True)
+@njit
 def wished(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: Any) -> None:
     """How much each figure strafes, into `strafe` (C,), and where it wants to look, into `look` (C, 2).
 
@@ -56,7 +56,7 @@ def wished(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: Any) ->
             look[c, 0], look[c, 1] = ahead[c, 0], ahead[c, 1]
 
 
-@njit(cache=True)
+@njit
 def follow_wish(
     wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
     velocity: Any, direction: Any, strafe: Any, gait: Any, position: Any, heading: Any, owed: Any,
@@ -86,7 +86,7 @@ def follow_wish(
             gait[c, middle, k] += GAIT_MIX * (wish_gait[c, k] - gait[c, middle, k])
 
 
-@njit(cache=True)
+@njit
 def _ask(steering: float, x: float, z: float, position: Any, owed: Any) -> tuple[float, float]:
     """The velocity to ask for so that (x, z) comes of it.
 
@@ -117,7 +117,7 @@ def _ask(steering: float, x: float, z: float, position: Any, owed: Any) -> tuple
     return x + more_x * min(1.0, limit), z + more_z * min(1.0, limit)
 
 
-@njit(cache=True)
+@njit
 def _ask_turn(gain: float, turn: float) -> float:
     """Radians to ask for beyond a `turn` that is still to be made: `gain` times it, and never as far round
     as to be nearer the other way."""
@@ -125,7 +125,7 @@ def _ask_turn(gain: float, turn: float) -> float:
     return min(max(gain * turn, -room), room)
 
 
-@njit(cache=True)
+@njit
 def blend_future(velocity: Any, target: Any, strafe: Any, position: Any, direction: Any, gait: Any) -> None:
     """Bend the predicted future toward the wished velocity and facing, more the further ahead.
 
@@ -154,7 +154,7 @@ def blend_future(velocity: Any, target: Any, strafe: Any, position: Any, directi
                 gait[c, i, k] = gait[c, middle, k]
 
 
-@njit(cache=True)
+@njit
 def sample_points(position: Any, direction: Any, step: int, side: float, points: Any) -> None:
     """Where the ground is looked up: points (C, samples, 3, 2) to the left, on the path and to the right."""
     for c in range(points.shape[0]):
@@ -166,7 +166,7 @@ def sample_points(position: Any, direction: Any, step: int, side: float, points:
             points[c, s, 2, 0], points[c, s, 2, 1] = x - side * dz, z + side * dx
 
 
-@njit(cache=True)
+@njit
 def stand_on(ground: Any, height: Any) -> None:
     """height (C,): the mean of the heights (C, samples, 3) on the path."""
     for c in range(ground.shape[0]):
@@ -176,7 +176,7 @@ def stand_on(ground: Any, height: Any) -> None:
         height[c] = total / ground.shape[1]
 
 
-@njit(cache=True)
+@njit
 def prepare(
     wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
     velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
@@ -199,7 +199,7 @@ def prepare(
             told[c, k] += min(max(change, -told_step[k]), told_step[k])
 
 
-@njit(cache=True)
+@njit
 def advance(
     y: Any, at: Any, wish: Any, held: float, position: Any, direction: Any, gait: Any, phase: Any
 ) -> None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 
 
@@ -70,7 +70,7 @@ class Follower:
         return velocity, [self.track[n % len(self.track)] for n in self.reached.tolist()]
 
 
-@njit(cache=True)
+@njit
 def _distance_to_line(p: Any, a: Any, b: Any) -> float:
     """Distance in cm of point p from the stretch from a to b, each (2,)."""
     ax, az, bx, bz = p[0] - a[0], p[1] - a[1], b[0] - a[0], b[1] - a[1]
@@ -78,7 +78,7 @@ def _distance_to_line(p: Any, a: Any, b: Any) -> float:
     return np.sqrt((ax - t * bx) ** 2 + (az - t * bz) ** 2)
 
 
-@njit(cache=True)
+@njit
 def _lead(
     places: Any, speeds: Any, arrived: float, position: Any, reached: Any, off_path: Any, velocity: Any
 ) -> None:
