@@ -224,8 +224,8 @@ class Clips:
         if mirrors:
             said.insert(
                 0,
-                f"{len(mirrors)} files in {folder} are mirrors of clips beside them ({mirrors[0]}.bvh, ...) and "
-                "were left out: `mirror: true` makes them anew, labels too, on the side of the split that "
+                f"{len(mirrors)} files in {folder} are mirrors of clips beside them ({mirrors[0]}.bvh, ...) "
+                "and were left out: `mirror: true` makes them anew, labels too, on the side of the split that "
                 "their originals are on.",
             )
         more = len(said) - MOST_NOTES
