@@ -225,8 +225,8 @@ class Clips:
             said.insert(
                 0,
                 f"{len(mirrors)} files in {folder} are mirrors of clips beside them ({mirrors[0]}.bvh, ...) "
-                "and were left out: `mirror: true` makes them anew, labels too, on the side of the split that "
-                "their originals are on.",
+                "and were left out: `mirror: true` makes them anew, labels too, on the side of the split "
+                "that their originals are on.",
             )
         more = len(said) - MOST_NOTES
         return [*said[:MOST_NOTES], *([f"{more} more files belong to no clip."] if more > 0 else [])]
