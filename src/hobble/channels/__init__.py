@@ -11,7 +11,7 @@ from hobble.channels.channel import Channel, Source
 __all__ = ["NAMES", "Channel", "Source", "channel", "every", "formerly", "modules_of"]
 
 # Every channel that there is: the folder NAME beside this file, whose package has the channel as CHANNEL.
-NAMES = ("injury", "mood")
+NAMES = ("injury", "mood", "diagnosis")
 
 
 @functools.cache
