@@ -1,4 +1,4 @@
-"""The data: which clips, how much of each gait and of each injury, what was repaired, where it came from."""
+"""The data: which clips, how much of each gait, what they are told, what was repaired, where it came from."""
 
 from __future__ import annotations
 
@@ -139,7 +139,9 @@ def strips(material: Material) -> list[dict[str, Any]]:
     """The label strip of each clip that has one, with what it was told; mirrors would say it twice."""
     told: dict[str, dict[str, Any]] = {}
     for report in material.told:
-        told.setdefault(report["clip"], {}).update(report["told"])
+        highest = {"highest": report.get("highest", 10.0)}
+        found = {label: (value, highest) for label, value in report["told"].items()}
+        told.setdefault(report["clip"], {}).update(found)
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
     known = {report["clip"] for report in material.labels}
     out = []
@@ -150,8 +152,8 @@ def strips(material: Material) -> list[dict[str, Any]]:
             continue
         length = lengths.get(clip) or strip["seconds"][-1]
         status = [
-            {"name": label, "spans": value.get("spells") or [[0, length, value["highest"]]]}
-            for label, value in told.get(clip, {}).items()
+            {"name": label, "spans": value.get("spells") or [[0, length, value["highest"]]], **highest}
+            for label, (value, highest) in told.get(clip, {}).items()
         ]
         out.append({**strip, "clip": clip, "length": length, "status": status})
     return out

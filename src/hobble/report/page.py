@@ -22,7 +22,7 @@ from hobble.report import (
 from hobble.report.formats import embedded, plain
 from hobble.report.gather import Material
 from hobble.report.ground_pictures import ground_pictures
-from hobble.report.hero import opening
+from hobble.report.hero import opening, placed
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
@@ -74,7 +74,7 @@ def render(
         embedded=embedded(data),
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable={material.name: playable} if playable else {},
-        hurts=bool((playable or {}).get("parts")),
+        hurts=placed(playable or {}) is not None,
         compared=[clip["name"] for clip in (compared or {}).get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],
@@ -106,7 +106,7 @@ def _sections(material: Material) -> dict[str, dict[str, Any]]:
             "speeds": data.speed_chart(material),
             "turns": coverage.turn_chart(found),
             "both": coverage.both_chart(found),
-            "hurt": coverage.severity_chart(found),
+            "told": coverage.told_charts(found),
             "clips": data.clip_table(material),
             "remarks": data.remarks_table(material),
         },

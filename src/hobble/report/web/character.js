@@ -6,16 +6,18 @@ import { at4, between, multiply } from "./turns.js";
 
 export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const { joints: J, step, x: X, y: Y, gaits, constants: k } = spec, T = 2 * spec.window, M = spec.window;
-  const S = T / step, F = M / step, G = gaits.length, L = spec.links.length, predict = networks[spec.network.kind](spec);
+  const S = T / step, F = M / step, G = gaits.length, predict = networks[spec.network.kind](spec);
   const { atan2, sin, cos, hypot, floor, min, max, abs, sqrt, PI } = Math;
   const wrap = (angle) => angle - 2 * PI * floor((angle + PI) / (2 * PI));
   const mean = new Float32Array(bytes(spec.yMean)), x = new Float32Array(X.size);
+  // What the body is told, channel after channel: where each column lies in X, and how far it may go in a frame.
+  const columns = spec.channels.flatMap((one) => one.columns.map((_, l) => ({ at: X[one.name] + l, rate: one.rate }))), L = columns.length;
   const filled = (n, value) => new Float64Array(n).fill(value);
 
   const c = {
     px: filled(T, place[0]), pz: filled(T, place[1]), dx: filled(T, sin(heading)), dz: filled(T, cos(heading)),
     gait: filled(T * G, 0), ground: filled(S * 3, 0), height: 0, phase: 0, joints: filled(3 * J, 0),
-    velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), severity: filled(L, 0), wished: filled(L, 0),
+    velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), told: filled(L, 0), wished: filled(L, 0),
     velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, owed: [0, 0], lock: [0, 0],
     hold: [[0, 0], [0, 0]], lift: [0, 0], contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
   };
@@ -126,9 +128,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       c.ground[3 * s + 2] = ground(c.px[i] - a, c.pz[i] + b);
       c.height += c.ground[3 * s + 1] / S;
     }
-    for (let l = 0; l < L; l++) {
-      c.severity[l] += min(max(c.wished[l] - c.severity[l], -spec.severityStep), spec.severityStep);
-    }
+    columns.forEach(({ rate }, l) => { c.told[l] += min(max(c.wished[l] - c.told[l], -rate), rate); });
   };
   const input = () => {
     let [px, pz, co, si] = [c.px[M], c.pz[M], c.dz[M], c.dx[M]];
@@ -151,7 +151,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       x[v + 1] = c.velocities[j + 1];
       x[v + 2] = c.velocities[j] * si + c.velocities[j + 2] * co;
     }
-    for (let l = 0; l < L; l++) x[X.injury + l] = c.severity[l];
+    columns.forEach(({ at }, l) => { x[at] = c.told[l]; });
   };
   const output = (y, ground) => {
     const si = c.dx[M], co = c.dz[M];
