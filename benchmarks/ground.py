@@ -97,7 +97,7 @@ def made(project: Project, job: Job, folder: Path) -> Iterator[tuple[Clip, dict]
         skeleton_name=dataset.skeleton,
         options=project.datasets.motion_options(job.dataset, job.clip),
     )
-    options = project.datasets.options(job.dataset, "labels")
+    options = dataset.labels
     labels, told = label_clip(clip, files, report, entry.gait, entry.ground, options)
     yield clip, vars(labels)
     if dataset.mirror:

@@ -16,7 +16,7 @@ import yaml
 
 from hobble.config.sections import Labels, Motion, Synthetic
 from hobble.core.clip import Clip, load_clip
-from hobble.labels.contacts import foot_contacts
+from hobble.labels.contacts import contacts, stance
 from hobble.labels.footfall import find_swings, landings
 from hobble.labels.gait import automatic_gait
 from hobble.labels.label import label_clip
@@ -58,17 +58,16 @@ def main() -> None:
     )
     folder = parser.parse_args().folder
     clips = [load_clip(p) for p in sorted(folder.glob("*.npz"))] if folder else [synthetic_minute()]
-    options = Labels().model_dump(mode="json")
-    speeds = options["heel_speed"], options["toe_speed"], options["valley_factor"]
+    options = Labels()
     frames = sum(map(len, clips))
     kinematics = best_of(1, lambda: [clip.positions for clip in clips])
     parts = {
         "world positions, once": kinematics,
-        "contacts": best_of(3, lambda: [foot_contacts(c, options["contact_threshold"]) for c in clips]),
+        "contacts": best_of(3, lambda: [contacts(c, options) for c in clips]),
         "swings and landings": best_of(
-            3, lambda: [landings(find_swings(c, *speeds), len(c), options["shortest_step"]) for c in clips]
+            3, lambda: [landings(find_swings(c, options), len(c), options.shortest_step) for c in clips]
         ),
-        "gait": best_of(3, lambda: [automatic_gait(c, find_swings(c, *speeds), None) for c in clips]),
+        "gait": best_of(3, lambda: [automatic_gait(c, stance(c, options), None) for c in clips]),
     }
     motion = {"source_frames": 0, "source_fps": 60.0}
     whole = best_of(3, lambda: [label_clip(c, [], motion, None, "flat", options) for c in clips])

@@ -45,7 +45,7 @@ CAPTURED = {
 
 
 def labelled(clip: Clip, gait: str, flat: bool) -> Healthy:
-    options = LabelOptions().model_dump(mode="json")
+    options = LabelOptions()
     report = {"source_frames": len(clip), "source_fps": clip.fps}
     labels, _ = label_clip(clip, [], report, gait, "flat" if flat else "rocky", options)
     return clip, labels, flat

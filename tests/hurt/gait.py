@@ -9,6 +9,7 @@ from hobble.core.clip import Clip
 from hobble.hurt.clip import HurtClip
 from hobble.labels.footfall import feet_up, find_swings
 from hobble.labels.model import CONTACT_ROLES, Labels
+from hobble.labels.options import Labels as Options
 
 SIDES = ("left", "right")
 
@@ -33,7 +34,7 @@ def measures(clip: Clip, labels: Labels) -> dict[str, float]:
     ahead = np.cross(left, [0.0, 1.0, 0.0])
     trunk = role["neck"] - hips
     # By the motion alone: contacts are those that the generator knows.
-    up = feet_up(find_swings(clip, 0.375, 0.0875, 2.875), len(clip))
+    up = feet_up(find_swings(clip, Options()), len(clip))
     out["forward"] = _degrees(np.sum(trunk * ahead, axis=1), trunk[:, 1])[inside].mean()
     out["left"] = _degrees(np.sum(trunk * left, axis=1), trunk[:, 1])[inside].mean()
     for i, side in enumerate(SIDES):

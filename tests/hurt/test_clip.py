@@ -61,9 +61,9 @@ def _keeps_to_the_ground(healthy, hurting, links) -> None:
     hurt = hurt_clip(clip, labels, hurting(len(clip), links), flat=flat)
     assert np.isfinite(hurt.clip.rotations).all()
     assert np.isfinite(hurt.clip.root).all()
-    # A stance that is a tenth shorter takes the same slide in less time; and a walker without any slide gets
-    # next to none: .3 mm a frame is a fifth of what counts as contact.
-    assert slide(hurt.clip, hurt.labels) <= max(1.1 * slide(clip, labels), 0.03)
+    # The frames in which a foot comes down and leaves count for more where a stance is shorter; and a walker
+    # without any slide gets next to none: .3 mm a frame is a fifth of what counts as contact.
+    assert slide(hurt.clip, hurt.labels) <= max(1.25 * slide(clip, labels), 0.03)
     assert fastest(hurt.clip) <= 1.5 * fastest(clip)
     for side in SIDES:
         assert knee(hurt.clip, side).min() > min(-1.0, knee(clip, side).min() - 1.0)

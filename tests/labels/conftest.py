@@ -11,22 +11,13 @@ import pytest
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton
-
-OPTIONS = {
-    "files": True,
-    "contact_threshold": 0.02,
-    "phase_zero": "right",
-    "heel_speed": 0.375,
-    "toe_speed": 0.0875,
-    "valley_factor": 2.875,
-    "margins": "drop",
-    "shortest_step": 5,
-}
+from hobble.labels.options import Labels
 
 
 @pytest.fixture
-def options() -> dict:
-    return dict(OPTIONS)
+def options() -> Labels:
+    """The original's margins and contacts; all else by default."""
+    return Labels(margins="drop", contacts="original")
 
 
 def feet_only(skeleton: Skeleton, right: np.ndarray, left: np.ndarray, hips: np.ndarray, name: str) -> Clip:

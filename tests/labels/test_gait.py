@@ -8,12 +8,18 @@ import numpy as np
 import pytest
 
 from hobble.labels import gait as g
-from hobble.labels.footfall import find_swings
+from hobble.labels.contacts import stance
 from hobble.labels.model import GAITS
+from hobble.labels.options import Labels
 
 
 def automatic(clip, dominant=None):
-    return g.automatic_gait(clip, find_swings(clip, 0.375, 0.0875, 2.875), dominant)
+    return g.automatic_gait(clip, stance(clip, Labels()), dominant)
+
+
+def clearly(gait):
+    """Log odds that leave no doubt of walking."""
+    return np.full(len(gait), -9.0)
 
 
 def test_shares_add_up_to_one(walker):
@@ -41,9 +47,9 @@ def test_bouncing_hips_and_feet_in_the_air_are_a_jog(walker):
 
 
 def test_what_the_clip_is_said_to_show_tips_the_balance(walker):
-    clip = walker(half=20, swing=26, stride=160.0)
+    clip = walker(half=20, swing=22, stride=160.0)
     root = clip.root.copy()
-    root[:, 1] += 1.5 * np.cos(2 * np.pi * np.arange(len(clip)) / 20)
+    root[:, 1] += 1.0 * np.cos(2 * np.pi * np.arange(len(clip)) / 20)
     between = replace(clip, root=root)
     assert (automatic(between, "walk")[60:-60].argmax(axis=1) == g.WALK).all()
     assert (automatic(between, "jog")[60:-60].argmax(axis=1) == g.JOG).all()
@@ -81,10 +87,20 @@ def test_the_likeliest_path_changes_only_for_what_it_costs():
 
 def test_a_short_walk_into_a_jog_is_part_of_setting_off():
     gait = np.array([g.STAND] * 20 + [g.WALK] * 40 + [g.JOG] * 20 + [g.WALK] * 30 + [g.CROUCH] * 5)
-    out = g._without_passing(gait)
+    out = g._without_passages(gait, clearly(gait))
     assert out.tolist() == [g.STAND] * 40 + [g.JOG] * 40 + [g.WALK] * 30 + [g.CROUCH] * 5
-    longer = np.array([g.STAND] * 5 + [g.WALK] * (g.PASSING + 1) + [g.JOG] * 5)
-    assert (g._without_passing(longer) == longer).all()
+    longer = np.array([g.STAND] * 5 + [g.WALK] * (g.LONGEST_PASSAGE + 1) + [g.JOG] * 5)
+    assert (g._without_passages(longer, clearly(longer)) == longer).all()
+
+
+def test_a_doubtful_start_belongs_to_the_jog():
+    gait = np.array([g.STAND] * 20 + [g.WALK] * 100 + [g.JOG] * 20 + [g.WALK] * 100 + [g.STAND] * 5)
+    doubtful = np.full(len(gait), -1.0)
+    assert (
+        g._without_passages(gait, doubtful).tolist() == [g.STAND] * 20 + [g.JOG] * 120 + gait[140:].tolist()
+    )
+    much_longer = np.array([g.STAND] * 5 + [g.WALK] * (g.LONGEST_START + 1) + [g.JOG] * 5)
+    assert (g._without_passages(much_longer, np.full(len(much_longer), -1.0)) == much_longer).all()
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,9 @@ def test_files_go_before_motion(walker, options, write):
     assert labels.phase[100] == 0.5
     assert not labels.phase_known[190:250].any()
 
-    labels, report = label_clip(clip, files, MOTION, "walk", "rocky", {**options, "files": False})
+    labels, report = label_clip(
+        clip, files, MOTION, "walk", "rocky", options.model_copy(update={"files": False})
+    )
     assert (report.phase_source, report.gait_source) == ("automatic", "automatic")
     assert (labels.gait.argmax(axis=1)[60:] == 1).all()
 
@@ -53,7 +55,9 @@ def test_files_beside_a_cycle_that_is_repeated_are_left_out_and_said(walker, opt
         "w_footsteps.txt, w_gait.txt left out: the frames counted there are those of one cycle, and the clip "
         "repeats it",
     )
-    unread = label_clip(clip, files, {**MOTION, "loops": 2}, "walk", "rocky", {**options, "files": False})
+    unread = label_clip(
+        clip, files, {**MOTION, "loops": 2}, "walk", "rocky", options.model_copy(update={"files": False})
+    )
     assert unread[1].warnings == ()
     np.testing.assert_array_equal(unread[0].phase, labels.phase)
 
@@ -82,7 +86,9 @@ def test_left_zero_shifts_phase_and_starts_cycles_with_the_left_foot(walker, opt
     clip = walker()
     files = [write("w_footsteps.txt", FOOTSTEPS)]
     right, _ = label_clip(clip, files, MOTION, None, "rocky", options)
-    left, report = label_clip(clip, files, MOTION, None, "rocky", {**options, "phase_zero": "left"})
+    left, report = label_clip(
+        clip, files, MOTION, None, "rocky", options.model_copy(update={"phase_zero": "left"})
+    )
     assert report.phase_zero == "left"
     assert apart(left.phase, right.phase + 0.5).max() < 1e-12
     assert left.cycles.tolist() == [[100, 160], [280, 340]]
@@ -106,7 +112,9 @@ def test_a_mirror_is_labelled_as_if_its_own_files_said_so(walker, options, write
 @pytest.mark.parametrize("zero", ["right", "left"])
 def test_mirroring_twice_gives_the_labels_back(walker, options, zero):
     clip = walker(limp=0.4)
-    labels, report = label_clip(clip, [], MOTION, "walk", "flat", {**options, "phase_zero": zero})
+    labels, report = label_clip(
+        clip, [], MOTION, "walk", "flat", options.model_copy(update={"phase_zero": zero})
+    )
     mirrored, other = mirror_labels(labels, report, clip)
     assert mirrored.cycles.tolist() != labels.cycles.tolist()
     back, again = mirror_labels(mirrored, other, clip)

@@ -1,8 +1,8 @@
 """Clips rewritten as other programs would have written them: the oracle of everything that reads a rig.
 
-A real clip of the 31 joints is told anew under other names, from another zero pose, with other bone lengths, joints
-added and left out, in other axes and units and at another rate. Where its joints are in the world stays known, so
-that what comes of it has to be what comes of the clip itself.
+A real clip of the 31 joints is told anew under other names, from another zero pose, with other bone lengths,
+joints added and left out, in other axes and units and at another rate. Where its joints are in the world
+stays known, so that what comes of it has to be what comes of the clip itself.
 
     python -m tests.motion.scramble ../shared/mocap/cmu --count 240
 """
@@ -45,9 +45,9 @@ def _prefixed(text: str):
 
 
 STYLES = {
-    "own": {name: name for name in _names(TRUNK, LIMB, LEG, lambda n, s: s[0] + n if n in ("HipJoint", "Thumb") else s + n).values()},
+    "own": {name: name for name in _names(TRUNK, LIMB, LEG, lambda n, s: s[0] + n if n in ("HipJoint", "Thumb") else s + n).values()},  # noqa: E501
     "mixamo": _names(
-        ("mixamorig:Hips", "mixamorig:Spine", "mixamorig:Spine1", "mixamorig:Spine2", None, "mixamorig:Neck", "mixamorig:Head"),
+        ("mixamorig:Hips", "mixamorig:Spine", "mixamorig:Spine1", "mixamorig:Spine2", None, "mixamorig:Neck", "mixamorig:Head"),  # noqa: E501
         ("Shoulder", "Arm", "ForeArm", "Hand", None, "HandIndex1", "HandThumb1"),
         (None, "UpLeg", "Leg", "Foot", "ToeBase"), _prefixed("mixamorig:{side}{name}")),
     "blender": _names(
@@ -55,7 +55,7 @@ STYLES = {
         ("shoulder", "upper_arm", "forearm", "hand", None, "f_index.01", "thumb.01"),
         (None, "thigh", "shin", "foot", "toe"), _prefixed("{name}.{S}")),
     "rigify": _names(
-        ("DEF-spine", "DEF-spine.001", "DEF-spine.002", "DEF-spine.003", None, "DEF-spine.004", "DEF-spine.006"),
+        ("DEF-spine", "DEF-spine.001", "DEF-spine.002", "DEF-spine.003", None, "DEF-spine.004", "DEF-spine.006"),  # noqa: E501
         ("DEF-shoulder", "DEF-upper_arm", "DEF-forearm", "DEF-hand", None, None, None),
         (None, "DEF-thigh", "DEF-shin", "DEF-foot", "DEF-toe"), _prefixed("{name}.{S}")),
     "biped": _names(
@@ -170,7 +170,7 @@ class Rig:
 
 
 def stretched(clip: Clip, how: Scramble) -> Clip:
-    """The clip with other bone lengths, alike on both sides, and a neck that does not bend where it will go."""
+    """The clip with other bone lengths, alike on both sides, and a neck that does not bend where it will go."""  # noqa: E501
     rng = np.random.default_rng(how.seed + 1)
     skeleton = clip.skeleton
     offsets, rotations = skeleton.offsets.copy(), clip.rotations.copy()
@@ -354,7 +354,7 @@ def _sorted(rig: Rig) -> list[int]:
 def _zero(
     places: Array, turns: Array, parents: Sequence[int], names: Sequence[str], how: Scramble, rng
 ) -> Array:
-    """(J, 4) by how much more each joint is turned than in the clip, so that another pose is the zero pose."""
+    """(J, 4) by how much more each joint is turned than in the clip, so that another pose is the zero pose."""  # noqa: E501
     n = len(parents)
     none = np.broadcast_to(quat.IDENTITY, (n, 4)).copy()
     x, z = np.eye(3)[0], np.eye(3)[2]
@@ -506,8 +506,8 @@ def main() -> None:
 def compare(first: Clip, second: Clip, names: dict[str, str]) -> Array:
     """(N,) mean distance in centimetres of each joint that both have.
 
-    A rig without toes does not tell how high its ankles are above the balls of its feet: how much higher or lower
-    all of the figure stands for that, 3 cm at most, is taken off.
+    A rig without toes does not tell how high its ankles are above the balls of its feet: how much higher or
+    lower all of the figure stands for that, 3 cm at most, is taken off.
     """
     frames = min(len(first), len(second))
     joints = [first.skeleton.index(name) for name in names]

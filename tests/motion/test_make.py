@@ -172,7 +172,7 @@ def test_a_floor_that_is_not_at_zero_is_put_there_and_said(walker, bvh, make, ro
         make(path, defects="refuse")
 
 
-@pytest.mark.parametrize("height", [-12.0, 12.0])
+@pytest.mark.parametrize("height", [-1.5, 1.5])
 def test_a_floor_near_zero_stays_where_it_is(walk, bvh, make, height):
     clip, report = make(bvh(raised(walk, height)), defects="refuse")
     assert report["repairs"] == report["notes"] == []
@@ -465,3 +465,10 @@ def test_every_shared_clip_becomes_a_clip(shared, make):
         assert (report["up"], report["handedness"], report["rest_facing"]) == ("+Y", "right", "+Z"), file.name
         height = clip.positions[..., 1].max(axis=1) - clip.positions[..., 1].min(axis=1)
         assert 80 < np.median(height) < 200, file.name
+
+
+def test_what_is_broken_can_be_left_as_it_is(walk, bvh, make):
+    broken = raised(walk, np.where(np.arange(len(walk)) >= 200, 80.0, 7.0))
+    clip, report = make(bvh(broken), defects="leave")
+    assert report["repairs"] == []
+    np.testing.assert_allclose(clip.root, broken.root[::2], atol=1e-6)

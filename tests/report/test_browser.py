@@ -125,6 +125,19 @@ def test_captured_and_predicted_are_drawn_and_stepped_through(tab: Any) -> None:
     assert tab.until("document.getElementById('compare-reading').textContent.startsWith('a training clip')")
 
 
+def test_a_point_about_a_clip_opens_it_where_it_is_worst(tab: Any) -> None:
+    charts = "[...document.querySelectorAll('[data-chart]')]"
+    tab.run("Hobble.drawAll()")
+    clicked = f"""{charts}.some((chart) => chart.data?.some((trace) => (trace.y || []).includes("jog")
+      && (chart.emit("plotly_click", {{ points: [{{ y: "jog", x: 3 }}] }}), true)))"""
+    assert tab.run(clicked)
+    assert tab.run("document.getElementById('compare-choice').value") == "jog"
+    worst = """(({ error }) => error.indexOf(Math.max(...error)))(
+      Hobble.material.compare.clips.find(({ name }) => name === "jog"))"""
+    assert tab.until(f"Number(document.getElementById('compare-time').value) === {worst}")
+    assert tab.run("Hobble.openClip('none of these')") is False
+
+
 def test_choosers_change_their_pictures(tab: Any, material: Material) -> None:
     choose(tab, "sweeps-choice", 2)
     drawn = "document.querySelector('[data-chart=\"sweep-speed\"]').data[0].y[0]"

@@ -15,7 +15,7 @@ from hobble.report.bundle import WEB, bundle, install
 def test_the_lock_file_holds_every_package_by_its_hash_and_no_host() -> None:
     package, lock = (json.loads((WEB / f"package{name}.json").read_text()) for name in ("", "-lock"))
     wanted = package["dependencies"] | package["devDependencies"]
-    assert all(re.fullmatch(r"\d+\.\d+\.\d+", version) for version in wanted.values())
+    assert all(re.fullmatch(r"\d+\.\d+\.\d+(-[\w.]+)?", version) for version in wanted.values())
     packages = {path: entry for path, entry in lock["packages"].items() if path}
     for name, version in wanted.items():
         assert packages[f"node_modules/{name}"]["version"] == version

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -98,7 +99,7 @@ def test_links_that_were_never_hurt_say_nothing_but_how_the_walk_drifts(material
     caught = {"responses": [swept("never", False, 0.1, 0.1), swept("hurt", True, 11.0, 6.5)]}
     found = heads(material, injury=caught)
     assert "After healing, the walk does not quite come back for hurt." in found
-    assert any(head.startswith("Every link that was hurt in training") for head in found)
+    assert any(re.match(r"The \d+ links? hurt in training, of \d+, shifts?", head) for head in found)
 
 
 def test_one_slow_frame_does_not_decide_the_time_of_a_frame(material: Material) -> None:
@@ -110,7 +111,7 @@ def test_one_slow_frame_does_not_decide_the_time_of_a_frame(material: Material) 
     assert (figure.value, figure.unit) == ("0.025", "ms")
     assert "667 characters" in figure.beside
     assert "mean 0.17 ms, published mean 0.376 ms" in figure.beside
-    assert heads(slow)["A frame uses 0.1 % of its time at 60 Hz."] == "good"
+    assert next(kind for head, kind in heads(slow).items() if head.startswith("A frame uses 0.1 %")) == "good"
 
 
 def test_most_pressing_first(material: Material) -> None:

@@ -29,7 +29,7 @@ OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0}
 # A data set as the original made it: what differs from the defaults, as a configuration would say it.
 ORIGINAL = {
     "motion": {"proportions": "clip", "defects": "refuse"},
-    "labels": {"margins": "drop"},
+    "labels": {"margins": "drop", "contacts": "original"},
     "terrain": {
         "flat_level": "feet",
         "heel_height": 5.0,
@@ -75,7 +75,8 @@ def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrai
         folder / f"{NAME}.bvh", skeletons / "holden31.yaml", skeletons, NAME, "holden31", options("motion")
     )
     files = [folder / f"{NAME}{end}" for end in (".phase", ".gait", "_footsteps.txt", "_gait.txt")]
-    labels = vars(label_clip(clip, files, report, "walk", "flat", options("labels", margins=margins))[0])
+    labelling = sections.Labels.model_validate(options("labels", margins=margins))
+    labels = vars(label_clip(clip, files, report, "walk", "flat", labelling)[0])
     ground, database = options("terrain", **terrain), options("database")
     any_map = Heightmap("any", np.zeros((200, 200)), ground["cell"])
     drawn = {name: ground[name] for name in ("cell", "size", "highest", "seed")}

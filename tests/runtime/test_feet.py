@@ -11,7 +11,18 @@ from hobble.core import quat
 from hobble.core.ik import two_bone_knee
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.feet import FLOATING, LOCK_AT, RELEASE, TOO_FAR, carried, leg_joints, place_feet, reach
+from hobble.runtime.feet import (
+    FLOATING,
+    LOCK_AT,
+    MOST_ADDED,
+    RELEASE,
+    TOO_FAR,
+    bend,
+    carried,
+    leg_joints,
+    place_feet,
+    reach,
+)
 
 coordinate = st.floats(-25, 25)
 
@@ -33,7 +44,10 @@ def test_reach_is_two_bone_ik(holden31: Skeleton, x: float, y: float, z: float) 
     hip, knee, heel, _ = leg_joints(holden31)[0]
     before, turned = position.copy(), rotation.copy()
     shift = np.array([x, y, z])
-    reach(position, rotation, hip, knee, heel, *shift)
+    added = np.tile([1.0, 0, 0, 0], (2, 1))
+    for _ in range(12):  # it takes so many frames to get there at most
+        position, rotation = before.copy(), turned.copy()
+        bend(position, rotation, hip, knee, heel, shift, added)
     upper, lower = (
         np.linalg.norm(before[knee] - before[hip]),
         np.linalg.norm(before[heel] - before[knee]),
@@ -57,8 +71,8 @@ def test_the_knee_stays_on_its_side(holden31: Skeleton) -> None:
     hip, knee, heel, _ = leg_joints(holden31)[0]
     knees = []
     for z in np.linspace(-70, 90, 321):
-        position, rotation = crouched(holden31)
-        reach(position, rotation, hip, knee, heel, 0.0, 0.0, z)
+        position, _ = crouched(holden31)
+        reach(position, hip, knee, heel, 0.0, 0.0, z)
         knees.append(position[knee] - position[hip])
     assert np.linalg.norm(np.diff(knees, axis=0), axis=1).max() < 2
 
@@ -70,6 +84,7 @@ class Feet:
         self.legs = leg_joints(skeleton)
         self.below = carried(skeleton, self.legs)
         self.lock, self.hold, self.lift = np.zeros((1, 2)), np.zeros((1, 2, 2)), np.zeros((1, 2))
+        self.added = np.tile([1.0, 0, 0, 0], (1, 2, 2, 1))
         self.base = crouched(skeleton)
 
     def __call__(self, moved: np.ndarray, contact: float, ground: float | None = None, locking: bool = True):
@@ -79,8 +94,9 @@ class Feet:
         place_feet(
             np.array([[contact, contact, 0, 0]], np.float32), 0, np.full((1, 4), ground), locking, self.legs,
             self.below,
-            np.array([5.0, 4.0]), self.lock, self.hold, self.lift, position, rotation,
+            np.array([5.0, 4.0]), self.lock, self.hold, self.lift, self.added, position, rotation,
         )  # fmt: skip
+        self.rotation = rotation[0]
         return position[0]
 
 
@@ -162,3 +178,27 @@ def test_the_character_stands_on_the_ground_it_is_given(steady, slope: float) ->
     ]
     # A figure that climbs a slope of .3 at 1.5 cm a frame rises .45 cm a frame.
     np.testing.assert_allclose(np.diff(heights[120:]).mean(), slope * 1.5, atol=0.01)
+
+
+def test_no_leg_turns_too_fast_wherever_the_foot_is_to_be(holden31: Skeleton) -> None:
+    """Under hips that leap about thigh and shank keep their lengths and turn by MOST_ADDED at most."""
+    rng = np.random.default_rng(3)
+    feet = Feet(holden31)
+    hip, knee, heel, _ = leg_joints(holden31)[0]
+    lengths = np.linalg.norm(np.diff(feet.base[0][[hip, knee, heel]], axis=0), axis=1)
+    last, furthest, plain = feet.base[1], 0.0, 0.0
+    for _ in range(400):
+        moved = rng.uniform(-30, 30, 3)
+        position = feet(moved, rng.random(), ground=rng.uniform(-10, 30))
+        between = quat.mul(feet.rotation, quat.inv(last))
+        furthest = max(furthest, float(2 * np.arccos(np.minimum(1, np.abs(between[:, 0]))).max()))
+        np.testing.assert_allclose(
+            np.linalg.norm(np.diff(position[[hip, knee, heel]], axis=0), axis=1), lengths, rtol=1e-6
+        )
+        straight = feet.base[0] + moved
+        reach(straight, hip, knee, heel, *rng.uniform(-30, 30, 3))
+        leg, base = straight[knee] - straight[hip], feet.base[0][knee] - feet.base[0][hip]
+        plain = max(plain, float(np.arccos(leg @ base / lengths[0] ** 2)))
+        last = feet.rotation
+    assert furthest <= MOST_ADDED + 1e-6
+    assert plain > 1.5 * MOST_ADDED, "the feet asked for should need more"

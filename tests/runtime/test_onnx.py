@@ -75,7 +75,7 @@ def test_the_file_says_what_it_is(hurtable, tmp_path: Path) -> None:
     (meta,) = (json.loads(p.value) for p in model.metadata_props if p.key == "hobble")
     assert meta["mode"] == "linear"
     assert RowLayout.from_dict(meta["layout"]) == hurtable.layout
-    assert meta["links"] == list(hurtable.links)
+    assert meta["channels"]["injury"] == list(hurtable.channels["injury"])
     assert Skeleton.from_dict(meta["skeleton"]).joints == hurtable.skeleton.joints
     export_onnx(tmp_path / "again.onnx", hurtable, "linear")
     assert (tmp_path / "again.onnx").read_bytes() == (tmp_path / "network.onnx").read_bytes()

@@ -315,7 +315,7 @@ def test_real_clips_are_honest_too(shared: Path, root: Path, made: SimpleNamespa
             options=Motion().model_dump(mode="json"),
         )
         beside = [p for s in (".phase", "_footsteps.txt") if (p := bvh.with_name(bvh.stem + s)).is_file()]
-        labels, _ = label_clip(clip, beside, report, "walk", kind, Labels().model_dump(mode="json"))
+        labels, _ = label_clip(clip, beside, report, "walk", kind, Labels())
         arrays = {"contacts": labels.contacts, "cycles": labels.cycles}
         fits = clip_fits(clip, arrays, patches, kind, terrain, made.database())
         assert len(fits.frame) > 60, file

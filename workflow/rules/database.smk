@@ -54,6 +54,7 @@ rule database_merge:
     params:
         splits=lambda w: datasets.selected(w.dataset, told_by(w.told)),
         channels=lambda w: told_by(w.told),
+        sources=lambda w: datasets.sources(w.dataset, told_by(w.told)),
         options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=lambda w: package.code("database_merge", *modules_of(told_by(w.told))),
     script:

@@ -124,7 +124,7 @@ rule report:
         splits=lambda w: configurations.splits(w.configuration),
         title=lambda w: catalogue.configuration(w.configuration).report.title,
         code=lambda w: package.code(
-            "report", configurations.kind(w.configuration), *modules("page")
+            "report", configurations.kind(w.configuration), *modules("page"), *shown_modules()
         ),
     script:
         "../scripts/report.py"
@@ -172,3 +172,26 @@ rule stimuli:
         code=lambda w: package.code("stimuli", configurations.kind(w.configuration), *shown_modules()),
     script:
         "../scripts/stimuli.py"
+
+
+rule export_web:
+    """The character for other web pages: an ES module, its network, TypeScript types and an example."""
+    input:
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        packages=rules.page_packages.output,
+        scripts=rules.page_bundle.input.scripts,
+        files=kept([*package.web(".ts"), *package.web(".html")]),
+    output:
+        folder=directory("results/{configuration}/export/web"),
+    log:
+        "results/{configuration}/logs/report/export_web.log",
+    benchmark:
+        "results/{configuration}/benchmarks/report/export_web.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=10,
+    params:
+        runtime=lambda w: configurations.section(w.configuration, "runtime"),
+        code=lambda w: package.code("export_web", configurations.kind(w.configuration)),
+    script:
+        "../scripts/export_web.py"

@@ -63,3 +63,24 @@ rule export_release:
         ),
     script:
         "../scripts/export_release.py"
+
+
+rule export_glb:
+    """The character for a game engine: body, skeleton and the scripted walks, limps included, as glTF 2.0."""
+    input:
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        scenarios=rules.generate.output.scenarios,
+    output:
+        glb="results/{configuration}/export/character.glb",
+    log:
+        "results/{configuration}/logs/runtime/export_glb.log",
+    benchmark:
+        "results/{configuration}/benchmarks/runtime/export_glb.tsv"
+    threads: 1
+    resources:
+        mem_mb=1500,
+        runtime=10,
+    params:
+        code=lambda w: package.code("export_glb", configurations.kind(w.configuration)),
+    script:
+        "../scripts/export_glb.py"

@@ -12,6 +12,7 @@ with job(snakemake) as log:
         {Path(file).stem: file for file in snakemake.input.clips},
         snakemake.params.splits,
         channels=snakemake.params.channels,
+        sources=snakemake.params.sources,
         joint_weight=options["joint_weight"],
         dtype=options["dtype"],
         seed=options["seed"],

@@ -4,6 +4,7 @@ from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.labels.label import label_clip, write_report
 from hobble.labels.model import save_labels
+from hobble.labels.options import Labels
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
@@ -14,7 +15,7 @@ with job(snakemake) as log:
         read_json(snakemake.input.report),
         snakemake.params.gait,
         snakemake.params.ground,
-        snakemake.params.options,
+        Labels.model_validate(snakemake.params.options),
     )
     for warning in report.warnings:
         log.info("%s: %s", report.clip, warning)

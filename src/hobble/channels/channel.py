@@ -48,7 +48,8 @@ class Channel(ABC):
     second at run time, unless the configuration says otherwise. suffix: of a file beside a clip that holds
     values, or None. former: keys that older files have for this channel. Options: the data set's section
     `channels.<name>`; a channel that has one is known of a data set that gives it, any other of every data
-    set.
+    set. slows: whether what is told makes the body slower; then how fast it goes is learnt with the rows, and
+    the character is asked for no more (see `hobble.channels.limits`).
     """
 
     name: str
@@ -59,6 +60,7 @@ class Channel(ABC):
     suffix: str | None = None
     former: Sequence[str] = ()
     Options: type[Section] | None = None
+    slows: bool = False
 
     @abstractmethod
     def columns(self, rig: Rig) -> tuple[str, ...]:

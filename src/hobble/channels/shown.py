@@ -1,6 +1,8 @@
 """How channels are shown of one figure.
 
-What differs from the usual lies in channels/<name>/shown.py, found by name: its WORDS, `shown`, `sweeps` and `loops`, each as below. Nothing that trains or measures depends on it."""
+What differs from the usual lies in channels/<name>/shown.py, found by name: its WORDS, `shown`, `sweeps` and
+`loops`, each as below. Nothing that trains or measures depends on it.
+"""
 
 from __future__ import annotations
 

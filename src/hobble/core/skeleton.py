@@ -98,6 +98,17 @@ class Skeleton:
         return self.index(self.roles[role])
 
     @property
+    def leg_length(self) -> float:
+        """Thigh and shank of the left leg, cm: the unit in which bodies of any size are compared."""
+        bones = np.linalg.norm(self.offsets, axis=1)
+        knee, heel = self.role("left_knee"), self.role("left_heel")
+        length, joint = 0.0, heel
+        while joint != self.parents[knee] and joint >= 0:
+            length += bones[joint]
+            joint = self.parents[joint]
+        return float(length)
+
+    @property
     def link_names(self) -> tuple[str, ...]:
         """Links as status files write them: "LeftUpLeg-LeftLeg"."""
         return tuple(f"{a}-{b}" for a, b in self.links)

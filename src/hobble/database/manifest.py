@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ class Manifest:
 
     layout: of the rows composed. visits: how often a pass uses each row. clips: one entry a clip with
     `clip`, `split`, `rows`, `pairs`. chunks: per split. original_bytes: what the same pairs take in the
-    original's layout.
+    original's layout. limits: channel -> how fast what it tells lets a body go (`hobble.channels.limits`).
     """
 
     folder: str
@@ -38,6 +38,7 @@ class Manifest:
     chunks: Mapping[str, list[Chunk]]
     original_bytes: int
     bytes: int
+    limits: Mapping[str, Any] = field(default_factory=dict)
 
     def rows(self, split: str) -> int:
         """Rows of a split."""

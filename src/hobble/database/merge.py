@@ -18,12 +18,14 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels.limits import Pace
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import explained, save_npz, sync_folder
 from hobble.core.quat import Array
 from hobble.database.buckets import INDEX, Buckets
 from hobble.database.chunks import Chunk, write_chunk
 from hobble.database.manifest import FILE, SPLITS, STATISTICS, Manifest
+from hobble.database.pace import gather, paces_of
 from hobble.database.precision import STORED, narrow
 from hobble.database.split import split_rows
 from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
@@ -60,6 +62,7 @@ def write_database(
     splits: Mapping[str, str],
     *,
     channels: Sequence[str],
+    sources: Mapping[str, str] | None = None,
     joint_weight: float,
     dtype: str = "float32",
     seed: int = 1,
@@ -68,7 +71,8 @@ def write_database(
     """Build the database folder `path` from rows by clip name, or from the files that hold them.
 
     splits: clip name -> "train" or "held_out". channels: those that the network is told, in the order of
-    their columns. dtype: float32, float16 or bfloat16. The statistics are those of the clips in training. The
+    their columns. sources: hurt version -> the healthy clip that it was made from.
+    dtype: float32, float16 or bfloat16. The statistics are those of the clips in training. The
     same rows and options give the same bytes. Raises HobbleError where no clip has rows to train on,
     InputError where a clip does not fit the others.
     """
@@ -79,7 +83,8 @@ def write_database(
     try:
         work.mkdir()
         plan = _plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes)
-        buckets, moments = _scatter(work, clips, plan, seed)
+        paces = paces_of(plan.layout, plan.skeleton)
+        buckets, moments = _scatter(work, clips, plan, seed, paces, sources or {})
         unseen = unseen_joints(plan.skeleton)
         statistics = finish(plan.layout, *moments, joint_weight, unseen)
         chunks = {
@@ -97,6 +102,7 @@ def write_database(
             chunks=chunks,
             original_bytes=_original_bytes(plan),
             bytes=sum(chunk.bytes for split in SPLITS for chunk in chunks[split]),
+            limits={name: found.to_dict() for name, pace in paces.items() if (found := pace.learn())},
         )
         _publish(path, work, manifest)
         return manifest
@@ -153,9 +159,14 @@ def _load(source: Source) -> ClipRows:
 
 
 def _scatter(
-    work: Path, clips: Mapping[str, Source], plan: Plan, seed: int
+    work: Path,
+    clips: Mapping[str, Source],
+    plan: Plan,
+    seed: int,
+    paces: Mapping[str, Pace],
+    sources: Mapping[str, str],
 ) -> tuple[dict[str, Buckets], tuple[Moments, Moments]]:
-    """Pass 1: every clip into its split's buckets, and the moments of the clips in training."""
+    """Pass 1: every clip into its split's buckets, and the moments and the pace of the clips in training."""
     layout = plan.layout
     columns, of_fits = x_columns(layout) + layout.y_size, fit_columns(layout)
     buckets, places, done = {}, {}, dict.fromkeys(SPLITS, 0)
@@ -169,6 +180,7 @@ def _scatter(
         if split == "train":
             x_clip, y_clip = clip_moments(clip, layout)
             x, y = (x_clip, y_clip) if x is None or y is None else (x + x_clip, y + y_clip)
+            gather(paces, clip, sources.get(entry["clip"]))
         index = np.zeros(len(clip), INDEX)
         index["place"] = places[split][done[split] : done[split] + len(clip)]
         index["count"], index["clip"] = clip.fits, number

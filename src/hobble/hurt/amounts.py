@@ -38,7 +38,7 @@ OWN: dict[str, dict[str, float]] = {
     "thigh": {
         "speed": 0.62,
         "stride": 1.04,
-        "push": 0.3,
+        "push": 0.2,
         "lift": 0.1,
         "out": 0.07,
         "strike": 0.4,
@@ -85,8 +85,8 @@ RATIOS = (
 )
 # The recordings take a slow ankle for a stance, which an early landing changes by half only; and
 # the network smooths what it learns from.
-TIMING = 2.0
-STEP = {"thigh": 0.44, "shank": 0.42, "foot": 0.48}  # of the hurt foot, where the mix would say less
+TIMING = 1.85
+STEP = {"thigh": 0.44, "shank": 0.42, "foot": 0.42}  # of the hurt foot, where the mix would say less
 
 
 @functools.cache

@@ -19,9 +19,9 @@ PELVIS = 0.35  # share of the trunk's lean that the pelvis tilts
 MEAN = 0.5  # seconds, of the Gaussian that leaves of a joint's turns its mean posture
 LOOK = {"neck": 0.5, "head": 0.85}  # share of the trunk's lean that neck and head take back
 MOST_GUARD = 0.93  # of an arm's own movement that holding it takes away
-# Upper arm and forearm of a guarded left arm, forward, left and up in the heading's frame. `fore` is the mean of the
-# hurt arm of Ferre et al.'s jog with a hurt forearm (Injured_Jog_LLA), across the belly; an upper arm that hurts is
-# held nearer to the body and its forearm ahead, a hand is carried.
+# Upper arm and forearm of a guarded left arm, forward, left and up in the heading's frame. `fore` is the mean
+# of the hurt arm of Ferre et al.'s jog with a hurt forearm (Injured_Jog_LLA), across the belly; an upper arm
+# that hurts is held nearer to the body and its forearm ahead, a hand is carried.
 GUARDS = {
     "upper": ((0.10, 0.16, -0.98), (0.80, -0.58, 0.10)),
     "fore": ((0.28, 0.17, -0.85), (0.26, -0.86, -0.41)),

@@ -27,7 +27,7 @@ SHORT = 12.0  # cm: a swing that goes less far is shared out by its time, not by
 CLEARANCE = 1.3  # cm of a swinging toe joint over its height in stance, or as little as in the source
 EVEN = 4.0  # cm of height between two stances that leaves the swing as high as it was
 JOGGING = 0.65  # share of what steps differ that a jog does not take on
-ENDS = 0.3  # share of the swing over which its lower height sets in and goes
+ENDS = 0.22  # share of the swing over which its lower height sets in and goes
 
 
 @dataclass(frozen=True)

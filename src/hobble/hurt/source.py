@@ -70,7 +70,7 @@ def read_source(clip: Clip, labels: Labels) -> Source:
     """Everything about a healthy clip that its change needs; labels as `hobble.labels` makes them."""
     frames, skeleton = len(clip), clip.skeleton
     options = LabelOptions()
-    found = find_swings(clip, options.heel_speed, options.toe_speed, options.valley_factor)
+    found = find_swings(clip, options)
     stances, up, swing = [], np.zeros((frames, 2), bool), np.zeros((frames, 2))
     for side in (LEFT, RIGHT):
         own = [

@@ -16,7 +16,8 @@ from hobble.hurt.source import Source
 
 SQUEEZE = 0.6  # of the time between two events of a leg that is left to it at least
 JOG_STRIDE = 0.15  # share of a longer stride's time that a jog takes on: its flight cannot last longer
-MOST_SHIFT = 0.17  # cycles
+JOG_SHIFT = 0.6  # share of what its landings and leavings shift, whose stances are short
+MOST_SHIFT = 0.22  # cycles
 
 
 @dataclass(frozen=True)
@@ -49,9 +50,10 @@ def retime(source: Source, effects: Effects) -> Timing:
     new = np.arange(int(begins[-1] + 1e-6) + 1, dtype=float)
     legs = []
     landings: list[tuple[float, float]] = []
+    shares = 1 - (1 - JOG_SHIFT) * source.jog
     for side in (LEFT, RIGHT):
-        land = _limited(effects.sided["land"][:, side]) * unit
-        off = _limited(effects.sided["off"][:, side]) * unit
+        land = _limited(effects.sided["land"][:, side]) * shares * unit
+        off = _limited(effects.sided["off"][:, side]) * shares * unit
         events = []
         for stance in source.stances[side]:
             events += [(stance.land, land), (stance.off, off)]

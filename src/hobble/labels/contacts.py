@@ -1,26 +1,113 @@
-"""Which heels and toes stand on the ground: those that do not move."""
+"""Which heels and toes stand on the ground, from the motion of the feet alone."""
 
 from __future__ import annotations
+
+import itertools
 
 import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
+from hobble.labels.footfall import foot_positions, relative_speeds, swing_peaks
 from hobble.labels.model import CONTACT_ROLES
+from hobble.labels.options import Labels
+
+FEET = ((0, 1), (2, 3))  # heel and toe of the left and of the right foot, in the order of CONTACT_ROLES
+
+# A joint comes into contact below the first limit and stays in contact up to the second. Heights are above
+# the joint's own stance, in leg lengths. Speeds are in leg lengths a frame, or a share of the fastest moment
+# of the swing beside it, whichever is more: the share keeps the stance of a leg that is dragged. Set on the
+# walks and runs of `cmu`: a foot is then down for 55 to 65 % of a walking cycle and for less than half of a
+# jogging one.
+HEEL_HEIGHTS, TOE_HEIGHTS = (0.015, 0.02), (0.02, 0.035)
+SPEEDS, SHARES = (0.010, 0.020), (0.18, 0.30)
+ON_TIPTOE = 0.03  # a heel so much higher above its toe than in the clip's flat stances is in the air
+DRAWN_UP, STRETCHED = 0.55, 0.8  # heights of hips over heels, in leg lengths
 
 
-def foot_positions(clip: Clip) -> Array:
-    """(F, 4, 3) positions of the joints in the order of CONTACT_ROLES, cm."""
-    return clip.positions[:, [clip.skeleton.role(role) for role in CONTACT_ROLES]]
+def contacts(clip: Clip, options: Labels) -> np.ndarray:
+    """(F, 4) bool in the order of CONTACT_ROLES, by the rule that the section `labels` names."""
+    if options.contacts == "original":
+        return still_joints(clip, options.contact_threshold)
+    return stance(clip, options)
 
 
-def foot_contacts(clip: Clip, threshold: float) -> np.ndarray:
+def still_joints(clip: Clip, threshold: float) -> np.ndarray:
     """(F, 4) bool: whether a joint moves less than the root of `threshold` (cm2) to the next frame.
 
-    There is no test of height (`pfnn-facts`, Labels). The last frame repeats the one before it.
+    This is the rule of the original (`pfnn-facts`, Labels): it does not look at height, and it depends on the
+    size of the body and on the noise of the capture. The last frame repeats the one before it.
     """
     feet = foot_positions(clip)
     still = np.sum(np.diff(feet, axis=0) ** 2, axis=-1) < threshold
     if not len(still):
         return np.ones((len(feet), len(CONTACT_ROLES)), bool)
     return np.concatenate([still, still[-1:]])
+
+
+def stance(clip: Clip, options: Labels) -> np.ndarray:
+    """(F, 4) bool: whether a joint is near the height of its stance and slow.
+
+    Between two swings a foot has one stance, and its height is the lowest of the joint's slow frames there.
+    So the rule needs no floor and holds on slopes and stairs. Two pairs of limits (hysteresis) keep a stance
+    in one piece from landing to toe-off. All limits are relative to the length of the leg.
+    """
+    leg = clip.skeleton.leg_length
+    height, speed = foot_positions(clip)[..., 1] / leg, _centred_speeds(clip) / leg
+    out = np.zeros(speed.shape, bool)
+    for (heel, toe), relative in zip(FEET, relative_speeds(clip, options).T, strict=True):
+        edges = np.unique([0, *swing_peaks(relative), len(clip)])
+        heel_level = _find_stances(height[:, heel], speed[:, heel], edges, HEEL_HEIGHTS, out[:, heel])
+        toe_level = _find_stances(height[:, toe], speed[:, toe], edges, TOE_HEIGHTS, out[:, toe])
+        lift = heel_level - toe_level
+        whole = lift[1:-1] if len(lift) > 3 else lift  # the first and the last stance may be cut off
+        flat = np.percentile(whole, 10)
+        for number in np.flatnonzero(lift > flat + ON_TIPTOE):
+            out[edges[number] : edges[number + 1], heel] = False
+    return out & ~_lifted(clip)
+
+
+def _lifted(clip: Clip) -> np.ndarray:
+    """(F, 4) bool: joints of a foot that is held up: its leg is drawn up, the other one is stretched."""
+    sides = ("left", "right")
+    hips, heels = (
+        clip.positions[:, [clip.skeleton.role(f"{s}_{r}") for s in sides], 1] for r in ("hip", "heel")
+    )
+    reach = (hips - heels) / clip.skeleton.leg_length
+    return np.repeat((reach < DRAWN_UP) & (reach[:, ::-1] > STRETCHED), 2, axis=1)
+
+
+def _find_stances(
+    height: Array, speed: Array, edges: np.ndarray, heights: tuple[float, float], down: np.ndarray
+) -> Array:
+    """Fill `down` (F,) from a joint's height and speed (F,) in leg lengths; returns each stance's height.
+
+    edges: (S + 1,) the clip's ends and the fastest frames of the swings between them; one stance lies between
+    two of them. heights: the limits above a stance, for landing and for leaving.
+    """
+    lands, stays = np.zeros(len(speed), bool), np.zeros(len(speed), bool)
+    levels = []
+    for a, b in itertools.pairwise(edges):
+        swing = min((speed[p] for p in (a, b) if 0 < p < len(speed)), default=0.0)
+        slow, leaves = (max(limit, share * swing) for limit, share in zip(SPEEDS, SHARES, strict=True))
+        h, v = height[a:b], speed[a:b]
+        levels.append(h[v <= max(slow, 1.2 * v.min())].min())
+        lands[a:b] = (h < levels[-1] + heights[0]) & (v < slow)
+        stays[a:b] = (h < levels[-1] + heights[1]) & (v < leaves)
+    down[:] = _stretches_with(stays | lands, lands)
+    return np.array(levels)
+
+
+def _stretches_with(stays: np.ndarray, lands: np.ndarray) -> np.ndarray:
+    """The stretches of `stays` (F,) in which `lands` (F,) is true at least once."""
+    number = np.cumsum(np.diff(stays, prepend=False) & stays)
+    return stays & np.isin(number, number[lands & stays])
+
+
+def _centred_speeds(clip: Clip) -> Array:
+    """(F, 4) speeds about each frame, cm a frame: a landing and a toe-off then look alike from both sides."""
+    feet = foot_positions(clip)
+    if len(feet) < 2:
+        return np.zeros(feet.shape[:2])
+    steps = np.linalg.norm(np.diff(feet, axis=0), axis=-1)
+    return 0.5 * (np.concatenate([steps[:1], steps]) + np.concatenate([steps, steps[-1:]]))

@@ -15,7 +15,8 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import median_of_three
-from hobble.labels.contacts import foot_positions
+from hobble.labels.model import CONTACT_ROLES
+from hobble.labels.options import Labels
 
 RIGHT, LEFT = 0, 1
 END_OF_BOUT = (np.nan, -1)
@@ -47,6 +48,11 @@ class Swing:
     peak: float
 
 
+def foot_positions(clip: Clip) -> Array:
+    """(F, 4, 3) positions of the joints in the order of CONTACT_ROLES, cm."""
+    return clip.positions[:, [clip.skeleton.role(role) for role in CONTACT_ROLES]]
+
+
 def foot_speeds(clip: Clip) -> Array:
     """(F, 4) speeds in cm a frame to the next frame, in the order of CONTACT_ROLES."""
     feet = foot_positions(clip)
@@ -56,21 +62,28 @@ def foot_speeds(clip: Clip) -> Array:
     return np.concatenate([speed, speed[-1:]])
 
 
-def find_swings(clip: Clip, heel_speed: float, toe_speed: float, valley_factor: float) -> list[Swing]:
+def find_swings(clip: Clip, options: Labels) -> list[Swing]:
     """The swings of both feet, in the order in which they end.
 
-    heel_speed, toe_speed: the unit speeds, cm a frame at 120 Hz. valley_factor: a foot that never rests
-    between two swings is down while it is no faster than so many times its slowest.
+    options: `heel_speed` and `toe_speed` are the unit speeds; a foot that never rests between two swings is
+    down while it is no faster than `valley_factor` times its slowest.
     """
-    speed = foot_speeds(clip)
+    speed, relative = foot_speeds(clip), relative_speeds(clip, options)
     swings = []
-    for foot, heel, toe in ((RIGHT, 2, 3), (LEFT, 0, 1)):
-        relative = np.minimum(speed[:, heel] / (2 * heel_speed), speed[:, toe] / (2 * toe_speed))
-        for start, end in _times_up(relative, valley_factor):
+    for foot, side, toe in ((RIGHT, 1, 3), (LEFT, 0, 1)):
+        for start, end in _times_up(relative[:, side], options.valley_factor):
             path, peak = speed[start:end, toe].sum(), speed[start:end, toe].max()
             swings.append(Swing(foot, start, end, float(path), float(peak)))
     real = sorted((s for s in swings if s.path >= LEAST_PATH), key=lambda s: (s.end, s.foot))
     return _one_swing_a_step(real)
+
+
+def relative_speeds(clip: Clip, options: Labels) -> Array:
+    """(F, 2) the slower of heel and toe of the left and of the right foot, in their unit speeds."""
+    speed = foot_speeds(clip)
+    units = 2 * np.array([options.heel_speed, options.toe_speed] * 2)
+    relative = (speed / units).reshape(-1, 2, 2).min(axis=2)
+    return np.stack([median_of_three(side) for side in relative.T], axis=1)
 
 
 def feet_up(swings: list[Swing], frames: int) -> np.ndarray:
@@ -105,15 +118,14 @@ def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tup
 
 def _times_up(relative: Array, valley_factor: float) -> np.ndarray:
     """(n, 2) first frame up, first frame down again, of a foot with the `relative` speed (F,)."""
-    relative = median_of_three(relative)
-    peaks = _swing_peaks(relative)
+    peaks = swing_peaks(relative)
     up = relative >= _rest_limit(relative, peaks, valley_factor)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], up, [False]]))).reshape(-1, 2)
     holds_peak = np.searchsorted(peaks, edges[:, 0]) < np.searchsorted(peaks, edges[:, 1])
     return edges[holds_peak]
 
 
-def _swing_peaks(relative: Array) -> np.ndarray:
+def swing_peaks(relative: Array) -> np.ndarray:
     """Frames of the fastest moment of each swing: peaks that are parted by a real dip."""
     kept: list[int] = []
     for peak in _local_highs(relative, 2 * SLOWEST_REST):

@@ -9,23 +9,33 @@ import numpy as np
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian, lowest, mean
-from hobble.labels.footfall import Swing, feet_up
 from hobble.labels.model import GAITS
 
 STAND, WALK, JOG, CROUCH = range(4)
-GRAVITY = 981.0 / 3600.0
+GRAVITY = 981.0 / 3600.0  # cm a frame, each frame
 
-# Each is where the evidence for a gait outweighs that for walking; set once on the labelled clips.
-STANDING_SPEED = 0.15
-JOG_BOUNCE = 0.24
-JOG_FLIGHT = 0.35
-JOG_SPEED = 3.2
+# Where a figure stands, in leg lengths a frame, and where it crouches, in the lengths of the bones below.
+STANDING_SPEED = 0.0019
 CROUCHED_HEAD = 0.8
 CROUCHED_HIPS = 0.85
-SAID = 0.3
-SWITCH = 14.0
-FADE = 31
-PASSING = 75
+
+# Log odds of jog against walk, a fit to the hand-made labels of the original release and of Ferre et al. and
+# to the descriptions of `cmu`. All measures are free of units, so that they hold for any size of body.
+JOG_SPRING = 3.7  # hips that are lowest over the standing foot (a spring), not between two steps (a pendulum)
+JOG_FLIGHT = 9.0  # share of the time in which no foot is down
+JOG_DOUBLE_SUPPORT = -9.0  # share of the time in which both are
+JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g, up to MOST_BOUNCE: a happy walk bounces too
+MOST_BOUNCE = 0.5
+JOG_FROUDE = 6.0  # above FASTEST_WALK, in Froude numbers: people walk no faster than that for long
+FASTEST_WALK = 0.5
+JOG_CONSTANT = -3.2
+CERTAIN_ODDS = 2.0  # log odds that count as full evidence
+DATA_SET_ODDS = 1.0  # what the data set says of the clip's main gait counts for so much
+SWITCH_COST = 18.0  # frames of full evidence that a change of gait takes
+FADE_FRAMES = 31
+LONGEST_START = 180  # a doubtful walk between a stand and a jog belongs to the jog, if no longer than this
+CLEARLY_WALKING = -4.0  # log odds in the second half of such a walk
+LONGEST_PASSAGE = 75  # any other walk between the two is halved, if no longer than this
 
 
 def overwrite_crouch(gait: Array, clip: Clip) -> Array:
@@ -39,51 +49,80 @@ def overwrite_crouch(gait: Array, clip: Clip) -> Array:
     return out
 
 
-def automatic_gait(clip: Clip, swings: list[Swing], dominant: str | None) -> Array:
-    """Gait shares (F, 6), which add up to 1, of a clip whose feet swing as `swings` say.
+def automatic_gait(clip: Clip, down: np.ndarray, dominant: str | None) -> Array:
+    """Gait shares (F, 6), which add up to 1, of a clip whose feet stand as `down` says.
 
-    dominant: the gait it mostly shows, which tips the balance where walk and jog are alike. A jump or a bump
-    is not recognised; where `dominant` is one of them, every frame but those that stand is that.
+    down: (F, 4) contacts by `contacts.stance`. dominant: the gait that the clip mostly shows; it tips the
+    balance where walk and jog are alike. A jump or a bump is not recognised: where `dominant` is one of them,
+    every frame but those that stand is that.
     """
-    gait = _likeliest_path(_evidence(clip, swings, dominant), SWITCH)
-    shares = _fade(_without_passing(gait), len(GAITS))
+    odds = jog_odds(clip, down) + {"jog": DATA_SET_ODDS, "walk": -DATA_SET_ODDS}.get(dominant or "", 0.0)
+    gait = _likeliest_path(_evidence(clip, odds), SWITCH_COST)
+    shares = _fade(_without_passages(gait, odds), len(GAITS))
     if dominant in ("jump", "bump"):
         shares[:, GAITS.index(dominant)] = 1 - shares[:, STAND]
         shares[:, [WALK, JOG, CROUCH]] = 0.0
     return shares
 
 
-def _evidence(clip: Clip, swings: list[Swing], dominant: str | None) -> Array:
+def jog_odds(clip: Clip, down: np.ndarray) -> Array:
+    """(F,) log odds that a moving figure jogs and does not walk; down: (F, 4) contacts."""
+    left, right = down[:, :2].any(axis=1), down[:, 2:].any(axis=1)
+    flight = gaussian((~left & ~right).astype(float), 20.0)
+    double_support = gaussian((left & right).astype(float), 20.0)
+    # Froude number: the square of the speed over gravity times the length of the leg.
+    froude = _speed(clip) ** 2 / (GRAVITY * clip.skeleton.leg_length)
+    return (
+        JOG_SPRING * _spring(clip)
+        + JOG_FLIGHT * flight
+        + JOG_DOUBLE_SUPPORT * double_support
+        + JOG_BOUNCE * np.minimum(_bounce(clip), MOST_BOUNCE)
+        + JOG_FROUDE * np.clip(froude - FASTEST_WALK, 0.0, 1.0)
+        + JOG_CONSTANT
+    )
+
+
+def _evidence(clip: Clip, odds: Array) -> Array:
     """(F, 4) how much more each of the first four gaits fits a frame than walking does, -1 to 1."""
-    frames = len(clip)
-    speed, bounce = _speed_and_bounce(clip)
-    flight = gaussian(feet_up(swings, frames).all(axis=1).astype(float), 15.0)
-    fast = 0.5 * np.clip(speed - JOG_SPEED, -1.0, 2.0)
-    jog = bounce / JOG_BOUNCE + flight / JOG_FLIGHT + fast - 2.0
-    jog += {"jog": SAID, "walk": -SAID}.get(dominant or "", 0.0)
-    stand = np.clip((STANDING_SPEED - speed) / 0.15, -1.0, 1.0)
+    speed = _speed(clip) / clip.skeleton.leg_length
+    stand = np.clip((STANDING_SPEED - speed) / STANDING_SPEED, -1.0, 1.0)
     head, hips = _relative_heights(clip)
     low = np.clip(np.minimum(CROUCHED_HEAD - head, CROUCHED_HIPS - hips) / 0.08, -1.0, 1.0)
     stand = np.where(low > 0, -1.0, stand)
-    return np.stack([stand, np.zeros(frames), np.clip(jog, -1.0, 1.0), low], axis=1)
+    jog = np.clip(odds / CERTAIN_ODDS, -1.0, 1.0)
+    return np.stack([stand, np.zeros(len(clip)), jog, low], axis=1)
 
 
-def _speed_and_bounce(clip: Clip) -> tuple[Array, Array]:
-    """(F,) speed of the hips along the ground, cm a frame, and root mean square of their vertical
-    acceleration, g.
-
-    Jogging bounces the hips by a third of a gravity and more, on the spot too; walking by a quarter and less,
-    but for turns and brisk walks, which speed tells from a jog.
-    """
+def _speed(clip: Clip) -> Array:
+    """(F,) speed of the hips along the ground, cm a frame."""
     if len(clip) < 3:
-        return np.zeros(len(clip)), np.zeros(len(clip))
-    hips = clip.positions[:, clip.skeleton.role("hips")]
-    ground = gaussian(hips[:, [0, 2]], 3.0)
-    speed = np.linalg.norm(np.gradient(ground, axis=0), axis=1)
-    height = gaussian(hips[:, 1], 2.0)
+        return np.zeros(len(clip))
+    ground = gaussian(clip.positions[:, clip.skeleton.role("hips")][:, [0, 2]], 3.0)
+    return gaussian(np.linalg.norm(np.gradient(ground, axis=0), axis=1), 10.0)
+
+
+def _bounce(clip: Clip) -> Array:
+    """(F,) root mean square of the vertical acceleration of the hips over half a second, g."""
+    if len(clip) < 3:
+        return np.zeros(len(clip))
+    height = gaussian(clip.positions[:, clip.skeleton.role("hips"), 1], 2.0)
     vertical = np.clip(np.gradient(np.gradient(height)) / GRAVITY, -2.0, 2.0)
-    bounce = np.sqrt(gaussian(vertical**2, 15.0))
-    return gaussian(speed, 10.0), bounce
+    return np.sqrt(gaussian(vertical**2, 15.0))
+
+
+def _spring(clip: Clip) -> Array:
+    """(F,) correlation of the height of the hips with the distance between the ankles over about a cycle.
+
+    A walking leg is a pendulum turned upside down: the hips are highest over the standing foot, while the
+    other foot passes it. A jogging leg is a spring: there the hips are lowest (Cavagna et al. 1977).
+    """
+    skeleton, positions = clip.skeleton, clip.positions
+    height = gaussian(positions[:, skeleton.role("hips"), 1], 1.5)
+    apart = positions[:, skeleton.role("left_heel")] - positions[:, skeleton.role("right_heel")]
+    apart = np.linalg.norm(apart[:, [0, 2]], axis=1)
+    height, apart = height - gaussian(height, 15.0), apart - gaussian(apart, 15.0)
+    spread = gaussian(height**2, 25.0) * gaussian(apart**2, 25.0)
+    return gaussian(height * apart, 25.0) / np.sqrt(spread + 1e-3)
 
 
 def _relative_heights(clip: Clip) -> tuple[Array, Array]:
@@ -92,7 +131,7 @@ def _relative_heights(clip: Clip) -> tuple[Array, Array]:
     toes = y[:, [skeleton.role("left_toe"), skeleton.role("right_toe")]]
     floor = lowest(toes, 61).mean(axis=1)
     lengths = np.linalg.norm(skeleton.offsets, axis=1)
-    leg = lengths[skeleton.role("left_knee")] + lengths[skeleton.role("left_heel")]
+    leg = skeleton.leg_length
     trunk, joint = 0.0, skeleton.role("head")
     while joint != skeleton.role("hips") and skeleton.parents[joint] >= 0:
         trunk += lengths[joint]
@@ -120,18 +159,25 @@ def _likeliest_path(evidence: Array, switch: float) -> Array:
     return path
 
 
-def _without_passing(gait: Array) -> Array:
-    """Gaits (F,) in which a short walk from standing into a jog, or back, is halved between the two."""
+def _without_passages(gait: Array, odds: Array) -> Array:
+    """Gaits (F,) without the short walks by which a figure gets from standing into a jog and back.
+
+    odds: (F,) of `jog_odds`. Setting off into a jog is part of the jog, unless it is clearly a walk.
+    """
     out = gait.copy()
     edges = np.concatenate([[0], np.flatnonzero(np.diff(gait)) + 1, [len(gait)]])
     for a, b in itertools.pairwise(edges[1:-1]):
         before, after = gait[a - 1], gait[b]
-        if gait[a] == WALK and {before, after} == {STAND, JOG} and b - a <= PASSING:
+        if gait[a] != WALK or {before, after} != {STAND, JOG}:
+            continue
+        if after == JOG and b - a <= LONGEST_START and np.median(odds[(a + b) // 2 : b]) > CLEARLY_WALKING:
+            out[a:b] = JOG
+        elif b - a <= LONGEST_PASSAGE:
             middle = (a + b) // 2
             out[a:middle], out[middle:b] = before, after
     return out
 
 
 def _fade(gait: Array, count: int) -> Array:
-    """Shares (F, count) of gaits (F,) with a linear fade of FADE frames at every change."""
-    return np.clip(mean(np.eye(count)[gait], FADE), 0.0, 1.0)
+    """Shares (F, count) of gaits (F,) with a linear fade of FADE_FRAMES at every change."""
+    return np.clip(mean(np.eye(count)[gait], FADE_FRAMES), 0.0, 1.0)

@@ -13,11 +13,12 @@ from hobble.core.clip import Clip
 from hobble.core.files import write_json
 from hobble.core.quat import Array
 from hobble.labels import files as label_files
-from hobble.labels.contacts import foot_contacts
+from hobble.labels.contacts import contacts, stance
 from hobble.labels.files import SourceTime
 from hobble.labels.footfall import Swing, find_swings, landings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
 from hobble.labels.model import GAITS, LabelReport, Labels
+from hobble.labels.options import Labels as Options
 from hobble.labels.phase import (
     MARGINS,
     dropped_frames,
@@ -36,7 +37,7 @@ def label_clip(
     motion: Mapping[str, Any],
     gait: str | None,
     ground: str,
-    options: Mapping[str, Any],
+    options: Options,
 ) -> tuple[Labels, LabelReport]:
     """Label a clip.
 
@@ -45,24 +46,24 @@ def label_clip(
     it mostly shows, if that is known. ground: "flat", ... options: the section `labels` of the data set.
     Raises InputError for a file that cannot be used.
     """
-    given = _by_kind(files) if options["files"] else {}
+    given = _by_kind(files) if options.files else {}
     warnings: list[str] = []
     if given and motion.get("loops", 1) > 1:
         warnings.append(_left_out(given))
         given = {}
     time = SourceTime(motion["source_frames"], motion["source_fps"], motion.get("source_start", 0))
-    swings = find_swings(clip, options["heel_speed"], options["toe_speed"], options["valley_factor"])
-    phase, known, footsteps = _phase(clip, given, time, swings, options["shortest_step"])
-    shares = _gait(clip, given, time, swings, gait)
+    swings = find_swings(clip, options)
+    phase, known, footsteps = _phase(clip, given, time, swings, options.shortest_step)
+    shares = _gait(clip, given, time, options, gait)
     if ground == "flat":
         shares = overwrite_crouch(shares, clip)
     known &= ~dropped_frames(footsteps, len(clip))
-    zero = options["phase_zero"]
-    cycles, dropped = find_cycles(footsteps, len(clip), zero, options["margins"])
+    zero = options.phase_zero
+    cycles, dropped = find_cycles(footsteps, len(clip), zero, options.margins)
     if not len(cycles):
-        warnings.append(_no_cycle(options["margins"]))
+        warnings.append(_no_cycle(options.margins))
     labels = Labels(
-        contacts=foot_contacts(clip, options["contact_threshold"]),
+        contacts=contacts(clip, options),
         phase=phase if zero == "right" else (phase + 0.5) % 1.0,
         phase_known=known,
         gait=shares,
@@ -74,7 +75,7 @@ def label_clip(
         phase_source="file" if {"phase", "footsteps"} & given.keys() else "automatic",
         gait_source="file" if {"gait", "gait_keys"} & given.keys() else "automatic",
         phase_zero=zero,
-        margins=options["margins"],
+        margins=options.margins,
         cycles_dropped=dropped,
         warnings=tuple(warnings),
     )
@@ -155,10 +156,10 @@ def _phase(
 
 
 def _gait(
-    clip: Clip, given: Mapping[str, Path], time: SourceTime, swings: list[Swing], dominant: str | None
+    clip: Clip, given: Mapping[str, Path], time: SourceTime, options: Options, dominant: str | None
 ) -> Array:
     if "gait" in given:
         return label_files.read_gait(given["gait"], time, len(clip))
     if "gait_keys" in given:
         return label_files.read_gait_keys(given["gait_keys"], time, len(clip))
-    return automatic_gait(clip, swings, dominant)
+    return automatic_gait(clip, stance(clip, options), dominant)

@@ -13,7 +13,14 @@ class Labels(Section):
     """Contacts, phase and gait. Speeds are those of the facts page: centimetres a frame at 120 Hz."""
 
     files: bool = Field(True, description="use hand-made label files where they lie beside the clip")
-    contact_threshold: PositiveFloat = Field(0.02, description="squared displacement, cm2 per 60 Hz frame")
+    contacts: Literal["stance", "original"] = Field(
+        "stance",
+        description="a heel or a toe is down near the height of its stance while it is slow; or, as in the "
+        "original, wherever it moves less than the root of `contact_threshold` in a frame",
+    )
+    contact_threshold: PositiveFloat = Field(
+        0.02, description="for `contacts: original`: squared displacement, cm2 per 60 Hz frame"
+    )
     phase_zero: Literal["right", "left"] = Field("right", description="the foot that lands at phase 0")
     heel_speed: PositiveFloat = 0.375
     toe_speed: PositiveFloat = 0.0875

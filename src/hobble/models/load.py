@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import NAMES, channel, every
+from hobble.channels.limits import Limits
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz
 from hobble.core.skeleton import Skeleton
@@ -79,6 +80,7 @@ def network_from_arrays(
         "terrain_side": checks.length(path, "terrain_side", meta.get("terrain_side", TERRAIN_SIDE), WIDEST),
         "meta": meta,
     }
+    common["limits"] = _limits(path, meta, common["channels"], len(common["gaits"]))
     network = model(kind).read(path, arrays, common)
     _try(path, network)
     return network
@@ -160,6 +162,22 @@ def _labels(
     if len(labels) != columns:
         raise InputError(path, f"{columns} inputs of channel {name}, but {len(labels)} are named")
     return labels
+
+
+def _limits(
+    path: str | Path, meta: Mapping[str, Any], channels: Mapping[str, tuple[str, ...]], gaits: int
+) -> dict[str, Limits]:
+    """How fast each channel that slows the body lets it go, where the file says so."""
+    out = {}
+    for name, given in checks.mapping(path, "limits", meta.get("limits", {})).items():
+        if name not in channels:
+            raise InputError(path, f"has limits of {name!a:.40}, which it is not told")
+        table = checks.mapping(path, f"limits of {name}", given)
+        try:
+            out[name] = Limits.from_dict(table, gaits, len(channels[name]), channel(name).highest)
+        except ValueError as error:
+            raise InputError(path, f"limits of {name}: {error}") from None
+    return out
 
 
 def _try(path: str | Path, network: Network) -> None:

@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hobble.channels.limits import Limits
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
@@ -50,7 +51,8 @@ class Network(ABC):
     x_mean, x_std, y_mean, y_std: what standardises X and restores Y.
     layout: the columns; gaits: the order of the gait blocks; skeleton: None where the file carries none.
     channels: name -> labels of its columns, of each channel that it is told. terrain_side: centimetres from
-    the path to the heights at its sides. meta: what else the file says.
+    the path to the heights at its sides. limits: channel -> how fast it lets the body go.
+    meta: what else the file says.
     """
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
@@ -66,6 +68,7 @@ class Network(ABC):
     gaits: tuple[str, ...] = GAITS
     channels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     terrain_side: float = TERRAIN_SIDE
+    limits: Mapping[str, Limits] = field(default_factory=dict, repr=False)
     meta: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def trained(self, channel: str) -> tuple[str, ...]:

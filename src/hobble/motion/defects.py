@@ -24,7 +24,7 @@ TELEPORT = 30.0  # cm: a jump of the root that is no seam of a loop
 HEAD, TAIL = 0.5, 1.0  # seconds: pieces up to this long before the first and after the last jump are cut off
 BRIDGE = 0.25  # seconds: pieces up to this long between two jumps are bridged
 BLEND = 0.1  # seconds to each side over which a jump in the pose is smoothed
-FLIP = np.radians(100.0)  # a joint turning by more from one frame to the next has flipped
+FLIP = np.radians(60.0)  # a joint turning by more from one frame to the next has flipped
 BLOCK = 4096  # frames at a time
 NO_POSE = 0.75  # share of joints without any rotation in a frame that holds no pose
 

@@ -67,8 +67,10 @@ class Motion(Section):
     proportions: Literal["skeleton", "clip"] = Field(
         "skeleton", description="retarget onto the skeleton's bone lengths, or keep each clip's own"
     )
-    defects: Literal["repair", "refuse"] = Field(
-        "repair", description="what to do with frames that are plainly broken; repairs are reported"
+    defects: Literal["repair", "refuse", "leave"] = Field(
+        "repair",
+        description="what to do with frames that are plainly broken, and a floor off height 0: repairs are "
+        "reported; leave takes a clip as it is, as the original did",
     )
     loops: Positive = Field(1, description="how often a clip that is one short cycle is repeated")
     heading: Finite | None = Field(

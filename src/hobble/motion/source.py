@@ -16,7 +16,7 @@ from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import Axes, straighten
 from hobble.motion.body import SIDES, Body, body_by_roles, pairs, with_fingers
 from hobble.motion.decode import Decoded, decode, frame_rate
-from hobble.motion.defects import flips, repair
+from hobble.motion.defects import Repaired, flips, repair
 from hobble.motion.draft import refusal
 from hobble.motion.find_body import Doubt, Found, find_body
 from hobble.motion.floor import on_floor
@@ -68,7 +68,7 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[st
     """
     repairs = _frame_count(file, options["defects"])
     hips = find_hips(clean_names(file.names), target, maps)
-    known = match_rig(_rig(below_hips(file, hips)), target, maps)
+    known = match_rig(rig_of(below_hips(file, hips)), target, maps)
     if known is not None and known.sources:
         return _known(file, hips, known, repairs, options)
     return _unknown(file, target, known, repairs, options)
@@ -76,7 +76,7 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[st
 
 def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: Mapping[str, Any]) -> Source:
     """The source of a file on a rig that a skeleton file describes."""
-    rig = replace(_rig(below_hips(file, hips)), roles=match.roles)
+    rig = replace(rig_of(below_hips(file, hips)), roles=match.roles)
     unit, unit_name = _unit(file.path, leg_length(rig), options["unit"])
     decoded = decode_below(file, hips, STILL / unit)
     clip = _scaled(file, rig, decoded, unit, options)
@@ -104,9 +104,8 @@ def _unknown(
     file: Bvh, target: Target, known: Match | None, repairs: list[str], options: Mapping[str, Any]
 ) -> Source:
     """The source of a file on any other rig: its parts are found, and a rest pose that stands."""
-    rig = _rig(file)
-    reach = float(np.linalg.norm(file.offsets[1:], axis=-1).max(initial=0.0))
-    decoded = decode(file, 1e-3 * reach)
+    rig = rig_of(file)
+    decoded = _decoded(file)
     raw = Clip(file.path.stem, rig, 1.0, decoded.rotations, decoded.root, decoded.translations)
     found = _found(file, rig, raw, known, options)
     body = found.body
@@ -185,8 +184,9 @@ def _mended(
     options: Mapping[str, Any],
 ) -> Source:
     """The source, without what is broken in it, its floor at height zero."""
-    repaired = repair(clip)
-    flat = options.get("ground", "flat") == "flat"
+    leave = options["defects"] == "leave"
+    repaired = Repaired(clip, 0, []) if leave else repair(clip)
+    flat = options.get("ground", "flat") == "flat" and not leave
     clip, moved, uneven = on_floor(repaired.clip) if flat else (repaired.clip, [], [])
     mended = repaired.sentences + moved
     if mended and options["defects"] == "refuse":
@@ -195,7 +195,19 @@ def _mended(
     return Source(clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving, told)
 
 
-def _rig(file: Bvh) -> Skeleton:
+def raw_clip(file: Bvh) -> Clip:
+    """A file's motion as it stands: its own unit and axes, at one frame a second."""
+    decoded = _decoded(file)
+    return Clip(file.path.stem, rig_of(file), 1.0, decoded.rotations, decoded.root, decoded.translations)
+
+
+def _decoded(file: Bvh) -> Decoded:
+    reach = float(np.linalg.norm(file.offsets[1:], axis=-1).max(initial=0.0))
+    return decode(file, 1e-3 * reach)
+
+
+def rig_of(file: Bvh) -> Skeleton:
+    """The joints of a file as a skeleton, in its own unit, its names without prefixes."""
     names = clean_names(file.names)
     short = dict(zip(file.names, names, strict=True))
     ends = {short[name]: sites[0] for name, sites in file.end_sites.items()}

@@ -50,7 +50,15 @@ def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -
     with tempfile.TemporaryDirectory() as folder:
         networks = Path(folder, "networks.js")
         networks.write_text(networks_module(), encoding="utf-8")
-        _bundle(Path(modules).resolve(), target, Path(sources), networks)
+        _bundle(Path(modules).resolve(), target, Path(sources, "index.js"), networks, "iife")
+
+
+def bundle_module(modules: str | Path, target: str | Path) -> None:
+    """Bundle the character alone as an ES module that imports nothing; as `bundle`."""
+    with tempfile.TemporaryDirectory() as folder:
+        networks = Path(folder, "networks.js")
+        networks.write_text(networks_module(), encoding="utf-8")
+        _bundle(Path(modules).resolve(), target, WEB / "module.js", networks, "esm")
 
 
 def networks_module() -> str:
@@ -62,14 +70,14 @@ def networks_module() -> str:
     return "\n".join([*imports, f"export const networks = {{ {', '.join(MODELS)} }};\n"])
 
 
-def _bundle(modules: Path, target: str | Path, sources: Path, networks: Path) -> None:
+def _bundle(modules: Path, target: str | Path, entry: Path, networks: Path, form: str) -> None:
     done = node(
         [
             str(modules / "esbuild" / "bin" / "esbuild"),
-            str(Path(sources, "index.js").resolve()),
+            str(entry.resolve()),
             f"--alias:networks={networks}",
             "--bundle",
-            "--format=iife",
+            f"--format={form}",
             "--minify",
             "--target=es2022",
             "--charset=utf8",

@@ -74,6 +74,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
     assert skeleton is not None
     for name, columns in network.channels.items():
         one, said, at = channel(name), words(name), list(columns).index
+        limits = network.limits.get(name)
         face = shown(name, skeleton, columns, network.trained(name))
         presets = [
             {"name": preset, "values": [[at(column), value] for column, value in values.items()]}
@@ -97,6 +98,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
                 "never": said.never,
                 "rate": runtime.rates.get(name, one.rate) / 60,
                 "scale": runtime.scales.get(name, 1.0),
+                "limits": limits.to_dict() if runtime.limits and limits is not None else None,
             }
         )
         first += len(columns)
@@ -147,4 +149,5 @@ def _constants() -> dict[str, float]:
         "fastestTurn": float(controller.FASTEST_TURN),
         "heightMix": feet.HEIGHT_MIX,
         "floating": feet.FLOATING,
+        "mostAdded": feet.MOST_ADDED,
     }

@@ -19,11 +19,11 @@ from hobble.runtime.axes import Axes
 from hobble.runtime.character import Character, standing
 from hobble.runtime.controller import Controller
 from hobble.runtime.ground import as_ground
+from hobble.runtime.limits import JOG_FROM, Holder
 from hobble.runtime.told import Told, UnknownName
 from hobble.runtime.trajectory import STILL
 from hobble.runtime.waypoints import Follower, Waypoint
 
-JOG_FROM = 5.0  # cm a frame: between walking at 2.5 and jogging at 7.5
 TURN_IN_PLACE = np.radians(20)  # a standing figure steps around to face what is further aside than this
 
 
@@ -66,6 +66,7 @@ class ProceduralAnimation:
         scales: Mapping[str, float] | None = None,
         foot_locking: bool = True,
         steering: float = 2.0,
+        limits: bool = True,
         axes: Axes | None = None,
         position: Any = None,
         facing: Any = None,
@@ -84,6 +85,7 @@ class ProceduralAnimation:
         self.network, self.skeleton = network, network.skeleton
         self.characters, self.axes = characters, axes or Axes()
         self._told = Told(network, scales or {})
+        self._limited = limits
         self._of_controller: dict[str, Any] = {
             "rates": {name: channel(name).rate for name in network.channels} | dict(rates or {}),
             "foot_locking": foot_locking,
@@ -109,7 +111,8 @@ class ProceduralAnimation:
         `next_pose` is given no velocity. rates: channel -> largest change of its values in a second, instead
         of the channel's own; scales: channel -> what its values are divided by. foot_locking: hold feet in
         contact where they landed. steering: how hard a velocity that is not reached is asked for, 0 as the
-        original. axes: the caller's convention. position, facing: as of `reset`. Raises InputError where the
+        original. limits: hold the wish to what a body that is hurt so
+        can do. axes: the caller's convention. position, facing: as of `reset`. Raises InputError where the
         file is not a network that fits, ValueError for an option out of range, UnknownName for a gait that
         the network does not have.
         """
@@ -141,6 +144,7 @@ class ProceduralAnimation:
         self.state: Character = standing(self.network, count, np.array(places, float), yaws)
         self._controller = Controller(self._predictor, self.state, **self._of_controller)
         self._wish_gait = np.zeros((count, len(self._gaits)))
+        self._holder = Holder(self.network, self._told.columns, count)
 
     @property
     def seconds(self) -> Array:
@@ -179,6 +183,8 @@ class ProceduralAnimation:
             if given is not None:
                 columns, values = self._told.values(name, given, self.characters)
                 self.state.told_target[:, columns] = values
+        if self._limited:
+            self._holder.hold(self.state.told, velocity, shares)
         self._controller.frame(velocity, direction, strafe, shares, self._terrain[1])
         return self._pose()
 

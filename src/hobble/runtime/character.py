@@ -20,7 +20,7 @@ class Character:
     joint_rotation: (C, J, 4) world: the network's own copy. phase: (C,). told, told_target: (C, K) every
     channel's columns side by side.
     target_velocity, target_direction: (C, 2); strafe: (C,); owed: (C, 2) of `trajectory.follow_wish`.
-    foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2): of `feet`.
+    foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2), foot_added (C, 2, 2, 4): of `feet`.
     """
 
     position: Array
@@ -41,6 +41,7 @@ class Character:
     foot_lock: Array
     foot_hold: Array
     foot_lift: Array
+    foot_added: Array
 
 
 def standing(network: Network, characters: int, position: Array, yaw: Array) -> Character:
@@ -82,4 +83,5 @@ def standing(network: Network, characters: int, position: Array, yaw: Array) -> 
         foot_lock=np.zeros((count, 2)),
         foot_hold=np.zeros((count, 2, 2)),
         foot_lift=np.zeros((count, 2)),
+        foot_added=np.tile([1.0, 0.0, 0.0, 0.0], (count, 2, 2, 1)),
     )

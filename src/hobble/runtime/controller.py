@@ -146,8 +146,8 @@ class Controller:
             self._foot_ground[:] = 0.0
         feet.place_feet(
             self.y, self.layout.y_contacts.start, self._foot_ground, self.foot_locking, self._legs,
-            self._carried, self._sole, c.foot_lock, c.foot_hold, c.foot_lift, self.pose_position,
-            self.pose_rotation,
+            self._carried, self._sole, c.foot_lock, c.foot_hold, c.foot_lift, c.foot_added,
+            self.pose_position, self.pose_rotation,
         )  # fmt: skip
 
     def _update(self, velocity: Array) -> None:

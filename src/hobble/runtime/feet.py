@@ -15,6 +15,9 @@ LOCK_AT = 0.5
 RELEASE = 0.075  # share of the hold given up each frame afterwards
 TOO_FAR = 20.0  # centimetres the network may want a held foot elsewhere before it is let go
 HEIGHT_MIX = 0.5
+# Radians a frame that placing a foot may turn thigh and shank further than the network does. One frame in
+# 2,000 needs more, where a leg snapped by up to 148 degrees; now the foot arrives some frames later.
+MOST_ADDED = float(np.radians(28))
 FLOATING = 3.0  # centimetres above SOLE that a standing foot may be, as rigs differ
 SOLE = (5.0, 4.0)  # centimetres of heel and toe joint above the ground under a standing foot
 
@@ -40,14 +43,45 @@ def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True)
-def _turn(rotation: Any, ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> None:
-    """Turn the world rotation (4,) in place by the least rotation that takes direction a to b."""
+def between(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
+    """The least rotation (w, x, y, z) that takes direction a to b; none where they are opposite."""
     w = np.sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)) + ax * bx + ay * by + az * bz
     x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     norm = np.sqrt(w * w + x * x + y * y + z * z)
     if norm < 1e-9:
-        return
-    w, x, y, z = w / norm, x / norm, y / norm, z / norm
+        return 1.0, 0.0, 0.0, 0.0
+    return w / norm, x / norm, y / norm, z / norm
+
+
+@njit(cache=True)
+def approach(held: Any, w: float, x: float, y: float, z: float) -> bool:
+    """Turn `held` (4,) in place to the rotation (w, x, y, z), by MOST_ADDED at most; whether it is late."""
+    dot = held[0] * w + held[1] * x + held[2] * y + held[3] * z
+    if dot < 0.0:
+        dot, w, x, y, z = -dot, -w, -x, -y, -z
+    whole = np.arccos(min(dot, 1.0))
+    if whole <= 0.5 * MOST_ADDED:
+        held[0], held[1], held[2], held[3] = w, x, y, z
+        return False
+    keep = np.sin(whole - 0.5 * MOST_ADDED) / np.sin(whole)
+    take = np.sin(0.5 * MOST_ADDED) / np.sin(whole)
+    held[0], held[1] = keep * held[0] + take * w, keep * held[1] + take * x
+    held[2], held[3] = keep * held[2] + take * y, keep * held[3] + take * z
+    return True
+
+
+@njit(cache=True)
+def turned(by: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """The vector turned by the rotation `by` (4,)."""
+    w, a, b, c = by[0], by[1], by[2], by[3]
+    p, q, r = 2 * (b * z - c * y), 2 * (c * x - a * z), 2 * (a * y - b * x)
+    return x + w * p + b * r - c * q, y + w * q + c * p - a * r, z + w * r + a * q - b * p
+
+
+@njit(cache=True)
+def turn(by: Any, rotation: Any) -> None:
+    """Turn the rotation (4,) in place by the rotation `by` (4,)."""
+    w, x, y, z = by[0], by[1], by[2], by[3]
     a, b, c, d = rotation[0], rotation[1], rotation[2], rotation[3]
     rotation[0] = w * a - x * b - y * c - z * d
     rotation[1] = w * b + x * a + y * d - z * c
@@ -56,14 +90,11 @@ def _turn(rotation: Any, ax: float, ay: float, az: float, bx: float, by: float, 
 
 
 @njit(cache=True)
-def reach(
-    position: Any, rotation: Any, hip: int, knee: int, heel: int, sx: float, sy: float, sz: float
-) -> None:
-    """Move the heel of a pose, positions (J, 3), world rotations (J, 4), by (sx, sy, sz), bending the knee.
+def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, sz: float) -> None:
+    """Move the heel of a pose, positions (J, 3), by (sx, sy, sz), bending the knee.
 
     Bone lengths stay; the knee keeps to the side it bends to; a target out of reach is approached to .1% of
-    full stretch (the law of cosines, as `hobble.core.ik.two_bone_knee`). Thigh and shank turn by the least
-    amount.
+    full stretch (the law of cosines, as `hobble.core.ik.two_bone_knee`).
     """
     hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]
     tx, ty, tz = position[knee, 0] - hx, position[knee, 1] - hy, position[knee, 2] - hz
@@ -88,29 +119,55 @@ def reach(
     if size < 1e-6:
         return
     sine = np.sqrt(1 - cosine * cosine) / size
-    kx = upper * (wx * cosine + ox * sine)
-    ky = upper * (wy * cosine + oy * sine)
-    kz = upper * (wz * cosine + oz * sine)
-    position[knee, 0], position[knee, 1], position[knee, 2] = hx + kx, hy + ky, hz + kz
+    position[knee, 0] = hx + upper * (wx * cosine + ox * sine)
+    position[knee, 1] = hy + upper * (wy * cosine + oy * sine)
+    position[knee, 2] = hz + upper * (wz * cosine + oz * sine)
     position[heel, 0] = hx + wx * distance
     position[heel, 1] = hy + wy * distance
     position[heel, 2] = hz + wz * distance
-    _turn(rotation[hip], tx, ty, tz, kx, ky, kz)
-    _turn(rotation[knee], lx, ly, lz, wx * distance - kx, wy * distance - ky, wz * distance - kz)
+
+
+@njit(cache=True)
+def bend(position: Any, rotation: Any, hip: int, knee: int, heel: int, shift: Any, added: Any) -> None:
+    """`reach` by `shift` (3,); thigh and shank turn no further than MOST_ADDED beyond the network's own turn.
+
+    added: (2, 4) by how much thigh and shank of the last frame were turned from where the network had them;
+    it is changed to this frame's. Where a joint was to turn further, the heel is not there yet.
+    """
+    hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]
+    kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
+    tx, ty, tz = kx - hx, ky - hy, kz - hz
+    lx, ly, lz = position[heel, 0] - kx, position[heel, 1] - ky, position[heel, 2] - kz
+    if abs(shift[0]) + abs(shift[1]) + abs(shift[2]) > 1e-9:
+        reach(position, hip, knee, heel, shift[0], shift[1], shift[2])
+        kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
+    w, x, y, z = between(tx, ty, tz, kx - hx, ky - hy, kz - hz)
+    late = approach(added[0], w, x, y, z)
+    w, x, y, z = between(lx, ly, lz, position[heel, 0] - kx, position[heel, 1] - ky, position[heel, 2] - kz)
+    late |= approach(added[1], w, x, y, z)
+    if late:
+        x, y, z = turned(added[0], tx, ty, tz)
+        kx, ky, kz = hx + x, hy + y, hz + z
+        position[knee, 0], position[knee, 1], position[knee, 2] = kx, ky, kz
+        x, y, z = turned(added[1], lx, ly, lz)
+        position[heel, 0], position[heel, 1], position[heel, 2] = kx + x, ky + y, kz + z
+    turn(added[0], rotation[hip])
+    turn(added[1], rotation[knee])
 
 
 @njit(cache=True)
 def place_feet(
     y: Any, first: int, ground: Any, locking: bool, legs: Any, below: Any, sole: Any,
-    lock: Any, hold: Any, lift: Any, position: Any, rotation: Any,
+    lock: Any, hold: Any, lift: Any, added: Any, position: Any, rotation: Any,
 ) -> None:  # fmt: skip
     """Hold feet in contact and keep feet out of the ground; changes the pose and the state of the feet.
 
     y: (C, outputs), whose columns from `first` on are the contacts of left heel, left toe, right heel, right
     toe. ground: (C, 4) heights under them. legs: (2, 4) of `leg_joints`; below: (2, J) bool of `carried`;
     sole: (2,) of `sole_heights`. lock (C, 2) share of the hold; hold (C, 2, 2) x, z where the toe landed;
-    lift (C, 2) smoothed rise of the heel.
+    lift (C, 2) smoothed rise of the heel; added (C, 2, 2, 4) of `bend`.
     """
+    shift = np.zeros(3)
     for c in range(position.shape[0]):
         for f in range(2):
             hip, knee, heel, toe = legs[f, 0], legs[f, 1], legs[f, 2], legs[f, 3]
@@ -133,11 +190,9 @@ def place_feet(
             rise = max(heel_sunk, toe_sunk)
             rise = max(rise, 0.0) + lock[c, f] * min(rise + FLOATING, 0.0)
             lift[c, f] += HEIGHT_MIX * (rise - lift[c, f])
-            away_x, away_z = lock[c, f] * away_x, lock[c, f] * away_z
-            if abs(away_x) + abs(away_z) + abs(lift[c, f]) < 1e-4:
-                continue
+            shift[0], shift[1], shift[2] = lock[c, f] * away_x, lift[c, f], lock[c, f] * away_z
             x, up, z = position[c, heel, 0], position[c, heel, 1], position[c, heel, 2]
-            reach(position[c], rotation[c], hip, knee, heel, away_x, lift[c, f], away_z)
+            bend(position[c], rotation[c], hip, knee, heel, shift, added[c, f])
             x, up, z = position[c, heel, 0] - x, position[c, heel, 1] - up, position[c, heel, 2] - z
             for j in range(position.shape[1]):
                 if below[f, j]:

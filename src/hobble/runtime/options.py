@@ -18,6 +18,7 @@ class Runtime(Section):
     )
     scales: dict[str, PositiveFloat] = Field({}, description="channel: what its values are divided by")
     foot_locking: bool = True
+    limits: bool = Field(True, description="whether a hurt body is asked for no more than it can do")
     steering: Annotated[float, Field(ge=0)] = Field(
         2.0, description="how hard a velocity that is not reached is asked for; 0 is the original runtime"
     )

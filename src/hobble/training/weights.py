@@ -45,6 +45,7 @@ def meta(network: Trainable, database: Database, configuration: str, facts: Mapp
             "gaits": list(GAITS),
             "contacts": list(CONTACTS),
             "channels": {one.name: one.columns(rig) for one in channels},
+            "limits": database.manifest.limits,
             "units": "; ".join([UNITS, *(f"{one.value} 0 to {one.highest:g}" for one in channels)]),
             **network.about,
             **facts,

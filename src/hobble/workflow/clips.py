@@ -53,7 +53,8 @@ class Clips:
         if odd := [name for name in listed if name.endswith(MIRROR)]:
             raise HobbleError(
                 f"data set {dataset}: {', '.join(odd)}: only a mirror is called so, which `mirror: true` "
-                "makes from its original. Take it out, or rename its file."
+                "makes from its original. Set `mirror: true`, which accepts such files beside originals, "
+                "or take it out, or rename its file."
             )
         if odd := [name for name in listed if HURT.search(name)]:
             raise HobbleError(

@@ -66,3 +66,9 @@ class Datasets:
             only = f" that is told nothing of {' or '.join(others)}" if others else ""
             raise HobbleError(f"data set {dataset}: no clip{only} is left to train on")
         return splits
+
+    def sources(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
+        """Hurt version -> the healthy clip that it is made from, of the clips that are selected."""
+        chosen = self.selected(dataset, channels)
+        mirrors = {clip: MIRROR if clip.endswith(MIRROR) else "" for clip in chosen}
+        return {clip: original(clip) + mirrors[clip] for clip in chosen if self.clips.is_version(clip)}

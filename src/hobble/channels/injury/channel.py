@@ -31,6 +31,7 @@ class Injury(Channel):
     rate = 10.0
     suffix = "_injuries.txt"
     former = ("links", "injury", "status", "severity")
+    slows = True
 
     def columns(self, rig: Rig) -> tuple[str, ...]:
         """The links: "LeftUpLeg-LeftLeg"."""

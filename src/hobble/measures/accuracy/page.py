@@ -207,7 +207,7 @@ def figures(found: Json, material: Material) -> Iterator[Figure]:
             beside = f"{number(error)} cm a joint on average" if error is not None else ""
             theirs = material.beside("accuracy") if split == "held_out" else None
             if theirs:
-                beside += f"; {theirs['label']} was published at {100 * theirs['mean']:.2f} %"
+                beside += f"; {theirs['label']} was published at {100 * theirs['mean']:.2f} %, on other clips"
             yield Figure(label, f"{100 * part['mean']:.2f}", "%", beside, at)
 
 

@@ -121,7 +121,7 @@ def check_onnx(path: str | Path, network: Pfnn, mode: str = "cubic") -> float:
 
 def _about(network: Pfnn, mode: str) -> dict[str, Any]:
     """What a reader has to know of the columns."""
-    keys = ("configuration", "contacts", "units")
+    keys = ("configuration", "contacts", "limits", "units")
     return {
         "mode": mode,
         "layout": network.layout.to_dict(),

@@ -1,9 +1,10 @@
 """Evaluating the network at a phase: three modes, float32 or int16 storage, one character or a crowd.
 
-The outputs are blended and not the weights: sum_k c_k (W_k x + b_k) is the same number (the layer is linear
+The outputs are blended and not the weights: sum_k c_k (W_k x + b_k) is the same number (a layer is linear
 before its activation), and no blended matrix is ever written to memory. One character is limited by how fast
-weights stream from memory, so its kernel reads each once; a crowd shares the weights and goes through matrix
-products.
+weights stream from memory; a crowd reads each weight once for all who need it. A character's prediction has
+the same bits alone and in any crowd: its sums go through its points and their inputs in one order, whoever
+is beside it (`hobble.models.tiles`).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numba import njit
 from hobble.core.quat import Array
 from hobble.models.network import STORAGES, inverse
 from hobble.models.pfnn.forward import weights_at
+from hobble.models.tiles import WIDTH, aligned, in_panels, multiply, panels_of
 
 if TYPE_CHECKING:
     from hobble.models.pfnn.network import Pfnn
@@ -36,15 +38,11 @@ class PfnnPredictor:
         self.network, self.mode, self.storage = network, mode, storage
         tables = phase_tables(network, mode)
         self.points = len(tables[0][0])
-        packed = [_pack(w, storage) for w, _ in tables]
-        self._weights = tuple(q for q, _ in packed)
-        self._scales = tuple(s for _, s in packed)
-        self._biases = tuple(np.ascontiguousarray(b, np.float32) for _, b in tables)
-        self._statistics = tuple(
+        self._x_mean, self._x_inverse, y_mean, y_std = (
             np.ascontiguousarray(a, np.float32)
             for a in (network.x_mean, inverse(network.x_std), network.y_mean, network.y_std)
         )
-        self._work = np.zeros((2, max(network.sizes)), np.float32)
+        self._weights, self._numbers, self._plan = _flat(tables, storage, y_mean, y_std)
         self._kind = 4 if mode == "cubic" else 2 if mode == "linear" else 1
 
     def predict(self, x: Array, phase: Array, out: Array | None = None) -> Array:
@@ -58,25 +56,11 @@ class PfnnPredictor:
 
     def standardise(self, x: Array, z: Array) -> None:
         """z = (x - mean) / std, both (C, inputs) float32."""
-        _standardise(x, self._statistics[0], self._statistics[1], z)
+        _standardise(x, self._x_mean, self._x_inverse, z)
 
     def evaluate(self, z: Array, phase: Array, out: Array) -> None:
         """Write Y of standardised inputs z at phases (C,) into `out`."""
-        if len(z) <= CROWD:
-            _evaluate(
-                self._weights, self._scales, self._biases, self._statistics[2], self._statistics[3],
-                self._kind, z, phase, self._work, out,
-            )  # fmt: skip
-        else:
-            _evaluate_crowd(
-                self._weights, self._scales, self._biases, self._statistics[2], self._statistics[3],
-                self._kind, z, phase, out,
-            )  # fmt: skip
-
-
-# For more characters than this, sharing the weights that were read pays for gathering those who need them.
-CROWD = 2
-BLOCK = 4  # characters that go through a layer's weights together
+        _evaluate(self._weights, self._numbers, self._plan, self._kind, self.points, z, phase, out)
 
 
 def phase_tables(network: Pfnn, mode: str) -> list[tuple[Array, Array]]:
@@ -96,10 +80,38 @@ def phase_tables(network: Pfnn, mode: str) -> list[tuple[Array, Array]]:
     ]
 
 
+# What a row of the plan says of a layer: how many it takes and gives, and where its weights, its scales and
+# its biases begin. Few flat arrays: handing one over to compiled code takes some 0.3 microseconds.
+INPUTS, OUTPUTS, WEIGHTS, SCALES, BIASES = range(5)
+
+
+def _flat(
+    tables: list[tuple[Array, Array]], storage: str, y_mean: Array, y_std: Array
+) -> tuple[Array, Array, Array]:
+    """All layers as compiled code takes them: weights (n,) in panels, point by point; numbers (n,) float32:
+    y_mean, y_std, and of each layer the factors of its rows and its biases at each point; and the plan."""
+    numbers, plan, at, size = [y_mean, y_std], [], 0, 2 * len(y_mean)
+    weights = aligned(sum(_room(w) for w, _ in tables), storage)
+    for table, biases in tables:
+        points, outputs, inputs = table.shape
+        stored, scales = _pack(table, storage)
+        panels = in_panels(stored).ravel()
+        weights[at : at + panels.size] = panels
+        plan.append([inputs, outputs, at, size, size + points * outputs])
+        numbers += [scales.ravel(), np.asarray(biases, np.float32).ravel()]
+        at, size = at + panels.size, size + 2 * points * outputs
+    return weights, np.concatenate(numbers), np.array(plan, np.int64)
+
+
+def _room(table: Array) -> int:
+    points, outputs, inputs = table.shape
+    return int(points * panels_of(outputs) * WIDTH * inputs)
+
+
 def _pack(weights: Array, storage: str) -> tuple[Array, Array]:
     """Weights (K, out, in) as stored, and the factor of each row (K, out)."""
     if storage == "float32":
-        return np.ascontiguousarray(weights, np.float32), np.ones(weights.shape[:2], np.float32)
+        return np.asarray(weights, np.float32), np.ones(weights.shape[:2], np.float32)
     scale = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30)
     return np.round(weights / scale[..., None]).astype(np.int16), scale.astype(np.float32)
 
@@ -138,158 +150,104 @@ def _phase(phase: float, kind: int, points: int, index: Any, share: Any) -> None
         share[3] = 0.5 * (-t * t + t * t * t)
 
 
-@njit(fastmath=True, forceinline=True)
-def _layer1(w: Any, s: Any, b: Any, x: Any, y: Any) -> None:
-    for r in range(w.shape[0]):
-        a = np.float32(0)
-        for c in range(w.shape[1]):
-            a += np.float32(w[r, c]) * x[c]
-        y[r] = a * s[r] + b[r]
+@njit(forceinline=True)
+def _exp(x: Any) -> Any:
+    """e^x for x <= 0 in float32, within 2e-7 of 1; written out so that a row of them goes side by side."""
+    one = np.float32(1)
+    x = max(x, np.float32(-87))
+    n = np.floor(x * np.float32(1.44269504) + np.float32(0.5))
+    r = (x - n * np.float32(0.693359375)) + n * np.float32(2.12194440e-4)  # n ln 2 in two parts
+    p = one + r * np.float32(1 / 6)
+    p = one + r * np.float32(1 / 5) * p
+    p = one + r * np.float32(1 / 4) * p
+    p = one + r * np.float32(1 / 3) * p
+    p = one + r * np.float32(1 / 2) * p
+    p = one + r * p
+    return p * np.uint32(np.uint32(np.int32(n) + np.int32(127)) << np.uint32(23)).view(np.float32)
 
 
-@njit(fastmath=True, forceinline=True)
-def _layer2(w: Any, s: Any, b: Any, k: Any, share: Any, x: Any, y: Any) -> None:
-    i, j = k[0], k[1]
-    for r in range(w.shape[1]):
-        a0, a1 = np.float32(0), np.float32(0)
-        for c in range(w.shape[2]):
-            a0 += np.float32(w[i, r, c]) * x[c]
-            a1 += np.float32(w[j, r, c]) * x[c]
-        y[r] = share[0] * (a0 * s[i, r] + b[i, r]) + share[1] * (a1 * s[j, r] + b[j, r])
-
-
-@njit(fastmath=True, forceinline=True)
-def _layer4(w: Any, s: Any, b: Any, k: Any, share: Any, x: Any, y: Any) -> None:
-    i, j, m, n = k[0], k[1], k[2], k[3]
-    for r in range(w.shape[1]):
-        a0, a1, a2, a3 = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
-        for c in range(w.shape[2]):
-            a0 += np.float32(w[i, r, c]) * x[c]
-            a1 += np.float32(w[j, r, c]) * x[c]
-            a2 += np.float32(w[m, r, c]) * x[c]
-            a3 += np.float32(w[n, r, c]) * x[c]
-        y[r] = (
-            share[0] * (a0 * s[i, r] + b[i, r])
-            + share[1] * (a1 * s[j, r] + b[j, r])
-            + share[2] * (a2 * s[m, r] + b[m, r])
-            + share[3] * (a3 * s[n, r] + b[n, r])
-        )
-
-
-@njit(cache=True, fastmath=True)
+@njit(cache=True, error_model="numpy")
 def _evaluate(
-    weights: Any,
-    scales: Any,
-    biases: Any,
-    mean: Any,
-    std: Any,
-    kind: int,
-    z: Any,
-    phase: Any,
-    work: Any,
-    out: Any,
+    weights: Any, numbers: Any, plan: Any, kind: int, points: int, z: Any, phase: Any, out: Any
 ) -> None:
-    index, share = np.empty(kind, np.int64), np.empty(kind, np.float32)
-    last = len(weights) - 1
-    for c in range(z.shape[0]):
-        _phase(phase[c], kind, weights[0].shape[0], index, share)
-        h = z[c]
-        for i in range(len(weights)):
-            y = work[i % 2, : weights[i].shape[1]]
-            if kind == 1:
-                k = index[0]
-                _layer1(weights[i][k], scales[i][k], biases[i][k], h, y)
-            elif kind == 2:
-                _layer2(weights[i], scales[i], biases[i], index, share, h, y)
-            else:
-                _layer4(weights[i], scales[i], biases[i], index, share, h, y)
-            if i < last:
-                for r in range(y.size):
-                    if y[r] < 0:
-                        y[r] = np.exp(y[r]) - np.float32(1)
-            h = y
-        for r in range(h.size):
-            out[c, r] = h[r] * std[r] + mean[r]
-
-
-@njit(fastmath=True, forceinline=True)
-def _block(w: Any, s: Any, b: Any, x: Any, y: Any) -> None:
-    """y (4, out) = W x + b for four characters at once; x: (4, in).
-
-    Two rows by four characters: eight sums that the processor can keep going side by side.
-    """
-    rows, columns = w.shape
-    x0, x1, x2, x3 = x[0], x[1], x[2], x[3]
-    zero = np.float32(0)
-    sums = np.empty((2, BLOCK), np.float32)
-    for r in range(0, rows, 2):
-        w0, w1 = w[r], w[min(r + 1, rows - 1)]
-        a0, a1, a2, a3, b0, b1, b2, b3 = zero, zero, zero, zero, zero, zero, zero, zero
-        for c in range(columns):
-            p, q = np.float32(w0[c]), np.float32(w1[c])
-            a0 += p * x0[c]
-            a1 += p * x1[c]
-            a2 += p * x2[c]
-            a3 += p * x3[c]
-            b0 += q * x0[c]
-            b1 += q * x1[c]
-            b2 += q * x2[c]
-            b3 += q * x3[c]
-        sums[0, 0], sums[0, 1], sums[0, 2], sums[0, 3] = a0, a1, a2, a3
-        sums[1, 0], sums[1, 1], sums[1, 2], sums[1, 3] = b0, b1, b2, b3
-        for k in range(min(2, rows - r)):
-            for n in range(BLOCK):
-                y[n, r + k] = sums[k, n] * s[r + k] + b[r + k]
-
-
-@njit(fastmath=True, forceinline=True)
-def _layer_crowd(w: Any, s: Any, b: Any, index: Any, share: Any, x: Any, y: Any) -> None:
-    """y (C, out) of x (C, in): point by point, the characters that blend it in blocks of four."""
-    block_x, block_y = np.zeros((BLOCK, w.shape[2]), np.float32), np.zeros((BLOCK, w.shape[1]), np.float32)
-    members, shares = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.float32)
-    for c in range(y.shape[0]):
-        for r in range(y.shape[1]):
-            y[c, r] = np.float32(0)
-    for point in range(w.shape[0]):
-        waiting = 0
-        for n in range(index.size + 1):
-            if n < index.size:
-                if index.flat[n] != point:
-                    continue
-                members[waiting], shares[waiting] = n // index.shape[1], share.flat[n]
-                for r in range(w.shape[2]):
-                    block_x[waiting, r] = x[members[waiting], r]
-                waiting += 1
-            if waiting == BLOCK or (n == index.size and waiting > 0):
-                if waiting > 2:
-                    _block(w[point], s[point], b[point], block_x, block_y)
-                else:
-                    for m in range(waiting):
-                        _layer1(w[point], s[point], b[point], block_x[m], block_y[m])
-                for m in range(waiting):
-                    for r in range(w.shape[1]):
-                        y[members[m], r] += shares[m] * block_y[m, r]
-                waiting = 0
-
-
-@njit(cache=True, fastmath=True)
-def _evaluate_crowd(
-    weights: Any, scales: Any, biases: Any, mean: Any, std: Any, kind: int, z: Any, phase: Any, out: Any
-) -> None:
-    count = z.shape[0]
+    count, layers = z.shape[0], plan.shape[0]
     index, share = np.empty((count, kind), np.int64), np.empty((count, kind), np.float32)
     for c in range(count):
-        _phase(phase[c], kind, weights[0].shape[0], index[c], share[c])
-    h = z
-    for i in range(len(weights)):
-        y = np.empty((count, weights[i].shape[1]), np.float32)
-        _layer_crowd(weights[i], scales[i], biases[i], index, share, h, y)
-        if i < len(weights) - 1:
-            for c in range(count):
-                for r in range(y.shape[1]):
-                    if y[c, r] < 0:
-                        y[c, r] = np.exp(y[c, r]) - np.float32(1)
-        h = y
+        _phase(phase[c], kind, points, index[c], share[c])
+    widest = 0
+    for layer in range(layers):
+        widest = max(widest, plan[layer, INPUTS], -(-plan[layer, OUTPUTS] // WIDTH) * WIDTH)
+    room = np.empty((4, count * widest), np.float32)
+    h, y, some, sums = room[0], room[1], room[2], room[3]
+    members, slots = np.empty(count, np.int64), np.empty(count, np.int64)
+    shares = np.empty(count, np.float32)
     for c in range(count):
-        for r in range(h.shape[1]):
-            out[c, r] = h[c, r] * std[r] + mean[r]
+        _copy(z[c], z.shape[1], h[c * z.shape[1] :])
+    for layer in range(layers):
+        inputs, outputs = plan[layer, INPUTS], plan[layer, OUTPUTS]
+        padded = -(-outputs // WIDTH) * WIDTH
+        y[: count * outputs] = np.float32(0)
+        for point in range(points):
+            rows = _who(point, index, share, members, shares)
+            if rows == 0:
+                continue
+            for m in range(rows):
+                slots[m] = m * padded
+                if rows < count:
+                    _copy(h[members[m] * inputs :], inputs, some[m * inputs :])
+            sums[: rows * padded] = np.float32(0)
+            start = plan[layer, WEIGHTS] + point * padded * inputs
+            multiply(weights, start, padded // WIDTH, inputs, h if rows == count else some, rows, sums, slots)
+            scales = numbers[plan[layer, SCALES] + point * outputs :]
+            biases = numbers[plan[layer, BIASES] + point * outputs :]
+            for m in range(rows):
+                _add(sums[m * padded :], scales, biases, shares[m], outputs, y[members[m] * outputs :])
+        if layer < layers - 1:
+            _elu(y, count * outputs)
+        h, y = y, h
+    outputs = out.shape[1]
+    for c in range(count):
+        _restore(h[c * outputs :], numbers, outputs, out[c])
+
+
+@njit(forceinline=True)
+def _who(point: int, index: Any, share: Any, members: Any, shares: Any) -> int:
+    """Write down which characters blend `point`, and their shares of it; returns how many."""
+    rows = 0
+    for c in range(index.shape[0]):
+        for k in range(index.shape[1]):
+            if index[c, k] == point:
+                members[rows], shares[rows] = c, share[c, k]
+                rows += 1
+    return rows
+
+
+# The loops below run from 0 through what they are given: with an offset in the index the compiler looks for
+# negative ones at every step and takes numbers one by one.
+
+
+@njit(forceinline=True)
+def _copy(x: Any, count: int, to: Any) -> None:
+    for i in range(count):
+        to[i] = x[i]
+
+
+@njit(forceinline=True)
+def _add(sums: Any, scales: Any, biases: Any, share: Any, count: int, y: Any) -> None:
+    for r in range(count):
+        y[r] += share * (sums[r] * scales[r] + biases[r])
+
+
+@njit(forceinline=True)
+def _elu(y: Any, count: int) -> None:
+    for r in range(count):
+        below = _exp(min(y[r], np.float32(0))) - np.float32(1)
+        y[r] = y[r] if y[r] > 0 else below
+
+
+@njit(forceinline=True)
+def _restore(h: Any, statistics: Any, count: int, out: Any) -> None:
+    """out = h std + mean; statistics: the means, then the standard deviations."""
+    std = statistics[count:]
+    for r in range(count):
+        out[r] = h[r] * std[r] + statistics[r]

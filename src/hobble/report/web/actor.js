@@ -1,6 +1,7 @@
 // One character that is played: the controller, its body and figure, what it leaves on the ground, and its last seconds.
 import { createCharacter } from "./character.js";
 import { createFigure } from "./figure.js";
+import { createLab } from "./lab.js";
 import { toldColour } from "./paint.js";
 import { createRig } from "./rig.js";
 import { keyed, placed } from "./told.js";
@@ -9,13 +10,14 @@ const KEPT = 1200; // frames that can be saved as motion
 
 export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = false } = {}) => {
   const figure = createFigure(view, spec.body, placed(spec)?.regions || [], { ghost }), rig = createRig(spec), stood = [false, false];
-  const actor = { spec, figure, rig, place, falls: 0, milliseconds: 0, frames: [] };
+  const lab = createLab(spec.legs), actor = { spec, figure, rig, lab, place, falls: 0, milliseconds: 0, frames: [] };
   let trail = [], floor = () => 0;
 
   actor.start = (height) => {
     floor = height;
     actor.character = createCharacter(spec, place);
     actor.frames = [];
+    lab.clear();
     trail = [];
   };
   const sole = (j) => { const [x, z] = [rig.places[3 * j], rig.places[3 * j + 2]]; return [x, floor(x, z), z]; };
@@ -36,6 +38,7 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
       if (down && !stood[f]) trail.push({ from: sole(heel), to: sole(toe), age: 0, side: f });
       stood[f] = down;
     });
+    lab.add(rig.places, [0, 1].map((f) => c.contacts[2 * f] > .5 || c.contacts[2 * f + 1] > .5));
     if (!c.pose.every(Number.isFinite)) { actor.falls++; actor.start(floor); } // a network that has learnt nothing runs away
   };
   const drawGround = (way) => {

@@ -4,6 +4,9 @@ import { createFigure } from "./figure.js";
 import { createMotion } from "./motion.js";
 import { createView } from "./view.js";
 
+// Opens a clip by its name at the frame where the two are furthest apart; false where it does not lie in the page.
+export let openClip = () => false;
+
 (() => {
   const shown = material.compare, canvas = document.getElementById("compare-view");
   if (!canvas || !shown || !shown.clips) return;
@@ -58,6 +61,15 @@ import { createView } from "./view.js";
     curve.setAttribute("d", `M${clip.error.map((e, f) => `${f} ${(39 - 37 * e / most).toFixed(1)}`).join("L")}`);
     find("compare-most").textContent = `${most.toFixed(1)} cm`;
     view.ask();
+  };
+  openClip = (name) => {
+    const index = shown.clips.findIndex((c) => c.name === name);
+    if (index < 0) return false;
+    choice.selectedIndex = index;
+    choose();
+    seek(clip.error.indexOf(Math.max(...clip.error)));
+    find("compare").scrollIntoView({ block: "center" });
+    return true;
   };
   const seek = (to) => { play(false); time = Math.min(clip.frames - 1, Math.max(0, to)); view.ask(); };
   slider.addEventListener("input", () => seek(Number(slider.value)));

@@ -2,7 +2,7 @@
 // that one set of vectors tests both. Centimetres, 60 Hz, yaw 0 faces +Z and grows toward +X.
 import { networks } from "networks"; // by kind; the bundle gathers them from the folders of hobble.models
 import { bytes, dot, minus } from "./numbers.js";
-import { at4, between, multiply } from "./turns.js";
+import { at4, between, multiply, rotate } from "./turns.js";
 
 export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const { joints: J, step, x: X, y: Y, gaits, constants: k } = spec, T = 2 * spec.window, M = spec.window;
@@ -19,7 +19,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     gait: filled(T * G, 0), ground: filled(S * 3, 0), height: 0, phase: 0, joints: filled(3 * J, 0),
     velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), told: filled(L, 0), wished: filled(L, 0),
     velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, owed: [0, 0], lock: [0, 0],
-    hold: [[0, 0], [0, 0]], lift: [0, 0], contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
+    hold: [[0, 0], [0, 0]], lift: [0, 0], added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
   };
   // The rotation at `i` of the outputs, an axis times half the angle, turned about Y with the root; into q.
   const q = [1, 0, 0, 0];
@@ -68,6 +68,42 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     }
     out[gaits.indexOf(name)] = 1;
     return out;
+  };
+
+  // A hurt body is asked for what it can do, as `hobble.runtime.limits` holds it to: at most so much a frame, and who
+  // cannot run any more walks.
+
+  const limited = spec.channels.filter((one) => one.limits);
+  const allowed = (g) => {
+    let most = Infinity;
+    for (const { first, limits } of limited) {
+      const { levels, speeds } = limits;
+      for (let l = 0; l < speeds[g].length; l++) {
+        const v = c.told[first + l];
+        if (!(v > 0)) continue;
+        let i = 0;
+        while (i < levels.length - 2 && levels[i + 1] <= v) i++;
+        const [low, high] = [speeds[g][l][i], speeds[g][l][i + 1]];
+        most = min(most, low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low));
+      }
+    }
+    return most;
+  };
+  const hold = (velocity, gait) => {
+    if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.told[first + l] > 0))) return velocity;
+    const each = gaits.map((_, g) => allowed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");
+    if (each[jog] < k.jogFrom) {
+      gait[walk] += gait[jog];
+      gait[jog] = 0;
+    }
+    let whole = 0, most = 0;
+    gaits.forEach((name, g) => {
+      if (name === "stand" || !(gait[g] > 0)) return;
+      whole += gait[g];
+      most += gait[g] * each[g];
+    });
+    const held = whole > 0 ? min(1, most / whole / max(hypot(...velocity), 1e-9)) : 1;
+    return velocity.map((v) => v * held);
   };
 
   // The steps of a frame
@@ -238,13 +274,35 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     const up = max(...sunk), rise = max(up, 0) + c.lock[f] * min(up + k.floating, 0);
     c.lift[f] += k.heightMix * (rise - c.lift[f]);
     away = away.map((v) => v * c.lock[f]);
-    if (abs(away[0]) + abs(away[1]) + abs(c.lift[f]) < 1e-4) return;
     const before = Array.from(at(heel));
-    reach(at(hip), at(knee), at(heel), [away[0], c.lift[f], away[1]], hip, knee);
+    bend(at(hip), at(knee), at(heel), [away[0], c.lift[f], away[1]], hip, knee, c.added[f]);
     const moved = at(heel).map((v, i) => v - before[i]);
     for (const j of spec.carried[f]) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
   };
-  const reach = (hip, knee, heel, shift, h, n) => {
+  // `held` turned to `aim`, by mostAdded at most; whether that was too little.
+  const approach = (held, aim) => {
+    const near = held[0] * aim[0] + held[1] * aim[1] + held[2] * aim[2] + held[3] * aim[3], to = near < 0 ? aim.map((v) => -v) : aim;
+    const whole = Math.acos(min(abs(near), 1)), most = .5 * k.mostAdded, late = whole > most;
+    const [keep, take] = late ? [sin(whole - most) / sin(whole), sin(most) / sin(whole)] : [0, 1];
+    for (let i = 0; i < 4; i++) held[i] = keep * held[i] + take * to[i];
+    return late;
+  };
+  // `reach`, thigh and shank turning no further than mostAdded beyond the network's own turn.
+  const bend = (hip, knee, heel, shift, h, n, added) => {
+    const thigh = minus(knee, hip), shank = minus(heel, knee);
+    if (abs(shift[0]) + abs(shift[1]) + abs(shift[2]) > 1e-9) reach(hip, knee, heel, shift);
+    const late = [[thigh, minus(knee, hip)], [shank, minus(heel, knee)]].map(([a, b], i) => approach(added[i], between(a, b)));
+    if (late[0] || late[1]) {
+      const [t, s] = [rotate(added[0], thigh), rotate(added[1], shank)];
+      for (let i = 0; i < 3; i++) {
+        knee[i] = hip[i] + t[i];
+        heel[i] = knee[i] + s[i];
+      }
+    }
+    c.turns.set(multiply(added[0], at4(c.turns, h)), 4 * h);
+    c.turns.set(multiply(added[1], at4(c.turns, n)), 4 * n);
+  };
+  const reach = (hip, knee, heel, shift) => {
     const thigh = minus(knee, hip), shank = minus(heel, knee);
     const upper = hypot(...thigh), lower = hypot(...shank);
     const leg = thigh.map((v, i) => v + shank[i]), before = hypot(...leg);
@@ -263,8 +321,6 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       knee[i] = hip[i] + upper * (way[i] * cosine + out[i] * sine);
       heel[i] = hip[i] + way[i] * length;
     }
-    c.turns.set(multiply(between(thigh, minus(knee, hip)), at4(c.turns, h)), 4 * h);
-    c.turns.set(multiply(between(shank, minus(heel, knee)), at4(c.turns, n)), 4 * n);
   };
 
   // Become as another is, `by` [x, z] cm aside.
@@ -279,8 +335,9 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     c.root = [c.root[0] + by[0], c.root[1], c.root[2] + by[1]];
   };
   c.frame = (velocity, ahead, gait, ground) => {
-    const [strafe, direction] = facing(velocity, ahead);
-    prepare(velocity, direction, strafe, shares(velocity, direction, gait), ground);
+    const [strafe, direction] = facing(velocity, ahead), share = shares(velocity, direction, gait);
+    velocity = hold(velocity, share);
+    prepare(velocity, direction, strafe, share, ground);
     input();
     const y = predict(x, c.phase);
     output(y, ground);

@@ -1,6 +1,7 @@
 // Charts: drawn when they come near the window, in the colours of the page's tokens, again when the theme changes.
 import Plotly from "plotly.js-cartesian-dist-min";
 import { colour, material, onTheme } from "./base.js";
+import { openClip } from "./captured.js";
 
 // Draws every chart, also those that were never scrolled to: for printing.
 export let drawAll;
@@ -50,8 +51,11 @@ export let drawAll;
     };
     const traces = resolve(chosen ? chosen.traces : spec.traces);
     const shape = layout(chosen && chosen.layout ? merge(spec, { layout: chosen.layout }) : spec, narrow);
-    if (!drawn.has(element)) drawn.set(element, 0);
+    const first = !drawn.has(element);
+    if (first) drawn.set(element, 0);
     Plotly.react(element, traces, shape, config);
+    // A point about a clip opens it in the viewer.
+    if (first) element.on("plotly_click", ({ points }) => [points[0].y, points[0].x, points[0].text].some(openClip));
   };
   drawAll = () => document.querySelectorAll("[data-chart]").forEach(draw);
 

@@ -9,9 +9,10 @@ import { drawAll } from "./charts.js";
 import { csv } from "./tables.js";
 import "./walking.js";
 import { player } from "./play.js";
-import "./captured.js";
+import { createLab } from "./lab.js";
+import { openClip } from "./captured.js";
 import "./fits.js";
 import "./strips.js";
 import "./page.js";
 
-globalThis.Hobble = { bvh, character: createCharacter, chase: createChase, colour, csv, drawAll, hero, material, player, rig: createRig };
+globalThis.Hobble = { bvh, character: createCharacter, chase: createChase, colour, csv, drawAll, hero, lab: createLab, material, openClip, player, rig: createRig };

@@ -1,4 +1,7 @@
 // What is read off a character while it is played: phase, contacts, gait, speed, milliseconds.
+import { drawLab } from "./lab.js";
+import { palette } from "./paint.js";
+
 const FEET = ["left heel", "left toe", "right heel", "right toe"];
 const COLOURS = { stand: "g0", walk: "g1", jog: "g2", crouch: "g3", jump: "g4", bump: "g5" };
 const NS = "http://www.w3.org/2000/svg";
@@ -19,7 +22,10 @@ export const createPanel = (host, actor, title = "") => {
     make(part, "dt", "", label);
     return make(part, "dd");
   };
-  const speed = row("Speed"), phase = row("Phase"), down = row("On the ground"), gait = row("Gait"), cost = row("A frame");
+  const speed = row("Speed"), phase = row("Phase"), down = row("On the ground"), gait = row("Gait"), lab = row("Stance and knees, 4 s"), steps = row("Steps"), cost = row("A frame");
+  const chart = make(lab, "canvas", "lab"), bends = make(lab, "span", "words"), lengths = make(steps, "span", "words");
+  chart.setAttribute("role", "img");
+  chart.setAttribute("aria-label", "When each foot stood, left above right, and how its knee was bent");
   const number = make(speed, "span", "value");
   const dial = document.createElementNS(NS, "svg"), hand = document.createElementNS(NS, "circle");
   dial.setAttribute("viewBox", "0 0 24 24");
@@ -49,6 +55,10 @@ export const createPanel = (host, actor, title = "") => {
       standing.textContent = FEET.filter((_, i) => c.contacts[i] > .5).join(", ") || "no foot";
       spec.gaits.forEach((name, g) => { shares[g].style.flexGrow = Math.max(0, c.gait[M * G + g]); });
       words.textContent = spec.gaits.filter((_, g) => c.gait[M * G + g] > .3).join(", ");
+      const { knees, steps: made } = actor.lab, cm = (v) => (v === null ? "–" : `${v.toFixed(0)} cm`);
+      drawLab(chart, actor.lab, palette());
+      bends.textContent = `knees ${knees.map((k) => `${(k.at(-1) ?? 0).toFixed(0)}°`).join(" and ")}, left and right`;
+      lengths.textContent = `left ${cm(made[0])}, right ${cm(made[1])}`;
       cost.textContent = `${actor.milliseconds.toFixed(1)} ms${drawing ? `, drawing ${drawing.toFixed(1)} ms` : ""}`;
       note.textContent = actor.falls ? `fell over ${actor.falls === 1 ? "once" : `${actor.falls} times`} and stood up again` : "";
     },

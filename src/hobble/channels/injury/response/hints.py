@@ -55,7 +55,8 @@ def injury_hints(found: Json) -> Iterator[Hint]:
     if not deaf and not rough:
         yield Hint(
             "good",
-            "Every link that was hurt in training shifts the walk with its severity, and steadily.",
+            f"The {_plural(len(walks), 'link')} hurt in training, of {len(responses)}, "
+            f"shift{'s' if len(walks) == 1 else ''} the walk with severity, and steadily.",
             "",
         )
 

@@ -1,0 +1,45 @@
+"""The command `hobble`; `hobble --help` lists what it does."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+
+from hobble.cli import injury, labels, motion, play
+from hobble.core.errors import HobbleError
+
+COMMANDS = {"motion": motion, "labels": labels, "injury": injury, "play": play}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status: 0, 1 where something failed, 2 for wrong arguments."""
+    parser = argparse.ArgumentParser(
+        prog="hobble",
+        description="Motion capture clips, their labels, what hurts in them, and the trained character. "
+        "The whole way from clips to a character is a Snakemake workflow: see README.md.",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, module in COMMANDS.items():
+        text = str(module.__doc__)
+        command = commands.add_parser(
+            name,
+            help=text.splitlines()[0],
+            description=text,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(command)
+        command.set_defaults(run=module.run)
+    options = parser.parse_args(arguments)
+    run: Callable[[argparse.Namespace], int] = options.run
+    try:
+        return run(options)
+    except HobbleError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,31 @@
+"""Status files: write them from a table of clips, links and severities.
+
+hobble injury TABLE.csv FOLDER
+
+TABLE.csv has the columns clip, link, severity, from, to. The status files NAME_injuries.txt go beside the
+clips in FOLDER, where the workflow reads them.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from hobble.channels.injury.table import write_statuses
+from hobble.cli import batch
+from hobble.core.untrusted import read_yaml
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What `hobble injury` takes."""
+    parser.add_argument("table", type=Path, help="CSV with the columns clip, link, severity, from, to")
+    parser.add_argument("folder", type=Path, help="where the clips' BVH files lie")
+    parser.add_argument("--skeleton", default="holden31", help="names the links (holden31)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the files and print their names; returns the exit status."""
+    links = [f"{a}-{b}" for a, b in read_yaml(batch.skeleton_file(options.skeleton)).get("links") or ()]
+    for path in write_statuses(options.table, options.folder, links):
+        print(path)
+    return 0

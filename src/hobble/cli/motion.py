@@ -1,0 +1,75 @@
+"""Turn a folder of BVH files into a folder of checked BVH files.
+
+hobble motion FOLDER OUT --fps 60
+hobble motion FOLDER OUT --skeleton holden31 --mirror
+
+Every file is read whatever its rotation order, unit, axes and frame rate. It is checked, repaired where
+that is safe, and written in centimetres, Y up. Rotations are interpolated as rotations, not as angles.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+from hobble.cli import batch
+from hobble.core.bvh import write_bvh
+from hobble.core.clip import Clip
+from hobble.motion.loop import loop_clip
+from hobble.motion.make import make_clip, resample
+from hobble.motion.mirror import mirror_clip
+from hobble.motion.options import Motion
+from hobble.motion.read import read_bvh
+from hobble.motion.source import load_source
+
+ROLES_FROM = "holden31"  # names the joints of a rig where no skeleton is asked for
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What `hobble motion` takes."""
+    batch.add_folders(parser, "the folder to write; the clips keep their names")
+    parser.add_argument("--fps", type=float, default=60.0, help="frames a second to write (60)")
+    parser.add_argument("--source-fps", type=float, help="the files' rate, where their Frame Time is wrong")
+    parser.add_argument(
+        "--skeleton", help="put the motion on this skeleton: a name of config/skeletons or a file"
+    )
+    parser.add_argument(
+        "--mirror", action="store_true", help="write each clip's mirror as NAME_mirror.bvh too"
+    )
+    parser.add_argument("--loops", type=int, default=1, help="repeat a clip that is one cycle so often")
+    parser.add_argument(
+        "--refuse", action="store_true", help="refuse broken frames instead of repairing them"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Convert every clip; returns the exit status."""
+
+    def convert(name: str, file: Path) -> list[str]:
+        clip, notes = converted(name, file, options)
+        write_bvh(options.out / f"{name}.bvh", clip)
+        if options.mirror:
+            write_bvh(options.out / f"{name}_mirror.bvh", mirror_clip(clip, f"{name}_mirror"))
+        return notes
+
+    options.out.mkdir(parents=True, exist_ok=True)
+    return batch.for_each(batch.clips_in(options.folder), convert)
+
+
+def converted(name: str, file: Path, options: argparse.Namespace) -> tuple[Clip, list[str]]:
+    """The clip of a file as asked for, and what was repaired or noted. Raises InputError for a bad file."""
+    defects: Literal["repair", "refuse"] = "refuse" if options.refuse else "repair"
+    keys = Motion(source_fps=options.source_fps, defects=defects, loops=options.loops)
+    folder = batch.skeleton_folder()
+    if options.skeleton:
+        target = batch.skeleton_file(options.skeleton)
+        values = keys.model_dump(mode="json")
+        clip, report = make_clip(file, target, folder, clip=name, skeleton_name=target.stem, options=values)
+        return resample(clip, options.fps), report["repairs"] + report["notes"]
+    source = load_source(read_bvh(file), batch.skeleton(ROLES_FROM), folder, keys.model_dump(mode="json"))
+    clip = resample(source.clip, options.fps)
+    if options.loops > 1:
+        clip = loop_clip(clip, options.loops, None)
+    return replace(clip, name=name), source.repairs + source.notes

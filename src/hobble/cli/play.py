@@ -1,0 +1,43 @@
+"""Open the page on which a trained character walks under your keys.
+
+hobble play                    the newest report under results/
+hobble play results/injured    that configuration's
+"""
+
+from __future__ import annotations
+
+import argparse
+import webbrowser
+from pathlib import Path
+
+from hobble.core.errors import InputError
+
+REPORT = "report.html"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What `hobble play` takes."""
+    parser.add_argument("results", nargs="?", type=Path, help="results/<configuration>, or a report's file")
+    parser.add_argument("--print", action="store_true", help="print the address instead of opening it")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Open the page; returns the exit status."""
+    address = report_of(options.results).resolve().as_uri() + "#play"
+    print(address)
+    if not options.print and not webbrowser.open(address):
+        print("No browser could be started here: open the address above in one.")
+    return 0
+
+
+def report_of(results: Path | None) -> Path:
+    """The report's file. Raises InputError, with the command that makes it, where there is none."""
+    if results is None:
+        found = sorted(Path("results").glob(f"*/{REPORT}"), key=lambda path: path.stat().st_mtime)
+        if not found:
+            raise InputError("results", "holds no report", fix="Make one: make report.")
+        return found[-1]
+    path = results / REPORT if results.is_dir() or results.suffix != ".html" else results
+    if not path.is_file():
+        raise InputError(path, "no such report", fix=f"Make it: snakemake -c2 {path}.")
+    return path

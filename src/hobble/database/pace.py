@@ -1,0 +1,44 @@
+"""How fast bodies go that are told something, gathered while the rows of clips are merged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hobble.channels import channel
+from hobble.channels.limits import Pace
+from hobble.core.skeleton import Skeleton
+from hobble.rows.clip_rows import ClipRows
+from hobble.rows.compose import body_layout
+from hobble.rows.layout import GAITS, RowLayout
+
+
+def paces_of(layout: RowLayout, skeleton: Mapping[str, Any]) -> dict[str, Pace]:
+    """For each channel of the layout that slows a body, what will learn by how much."""
+    slowing = [(one, columns) for name, columns in layout.channels if (one := channel(name)).slows]
+    if not slowing:
+        return {}
+    rig = Skeleton.from_dict(skeleton)
+    return {
+        one.name: Pace(one.highest, one.mirror(np.arange(columns)[None], rig)[0], len(GAITS))
+        for one, columns in slowing
+    }
+
+
+def gather(paces: Mapping[str, Pace], rows: ClipRows, source: str | None) -> None:
+    """Add the rows of a clip, a version of the clip `source` where it is one."""
+    if not paces or not len(rows):
+        return
+    layout = rows.layout
+    shares = rows.x[:, body_layout(layout).x_gait].reshape(len(rows), len(GAITS), layout.samples)
+    for name, pace in paces.items():
+        pace.add(
+            rows.clip,
+            gait=shares[:, :, layout.samples // 2],
+            velocity=rows.y[:, layout.y_root_velocity],
+            values=rows.channels[name],
+            cycle=rows.cycle,
+            source=source,
+        )

@@ -1,0 +1,154 @@
+"""Does any of many characters fall apart? Random wishes, injuries and grounds for any number of frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hobble.channels import channel
+from hobble.core.quat import Array
+from hobble.evaluation.motion_measures import SHORTEST_STANCE, STANCE
+from hobble.models.network import Network
+from hobble.runtime.animation import ProceduralAnimation
+
+FPS = 60
+GAITS = ("walk", "jog", "crouch", None)
+FASTEST = 8.0  # cm a frame of a wish
+APART = 1e5  # centimetres between the places where characters start, each on ground of its own
+LIMITS = {"hips_lowest_cm": 60.0, "hips_highest_cm": 110.0, "added_turn_degrees": 30.0}
+
+
+@dataclass
+class Wishes:
+    """What C characters are asked for in a frame; each is asked for something new every 1 to 8 seconds."""
+
+    velocity: Array
+    facing: Array
+    gait: list[str | None]
+    told: dict[str, Array]
+    left: np.ndarray
+
+    @classmethod
+    def none(cls, characters: int, channels: Mapping[str, int]) -> Wishes:
+        """Nothing yet: everyone is asked at the first `renew`."""
+        return cls(
+            np.zeros((characters, 2)),
+            np.zeros((characters, 2)),
+            [None] * characters,
+            {name: np.zeros((characters, columns)) for name, columns in channels.items()},
+            np.zeros(characters, int),
+        )
+
+    def renew(self, rng: np.random.Generator) -> None:
+        """Draw anew for those whose time is over: a third stand, half look elsewhere than they go."""
+        self.left -= 1
+        for c in np.flatnonzero(self.left <= 0):
+            going, looking = rng.uniform(-np.pi, np.pi, 2)
+            speed = 0.0 if rng.random() < 1 / 3 else rng.uniform(0.2, FASTEST)
+            self.velocity[c] = speed * np.array([np.sin(going), np.cos(going)])
+            self.facing[c] = rng.integers(2) * np.array([np.sin(looking), np.cos(looking)])
+            self.gait[c] = GAITS[rng.integers(len(GAITS))]
+            for name, values in self.told.items():
+                some = rng.random(values.shape[1]) < 2 / values.shape[1]
+                values[c] = some * rng.uniform(0, channel(name).highest, values.shape[1])
+            self.left[c] = rng.integers(FPS, 8 * FPS)
+
+
+def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array], Array]:
+    """Ground of C kinds side by side, `APART`: some flat, most hills of 2 to 8 m that rise by up to .35."""
+    length = rng.uniform(200, 800, characters)
+    height = rng.uniform(0.05, 0.35, characters) * length / np.pi * (rng.random(characters) > 0.25)
+    pitch = 2 * np.pi / length
+
+    def heights(x: Array, z: Array) -> Array:
+        k = np.clip(np.rint(x / APART), 0, characters - 1).astype(int)
+        return np.asarray(0.5 * height[k] * (np.sin(pitch[k] * x) + np.sin(pitch[k] * z)))
+
+    return heights
+
+
+@dataclass
+class Slides:
+    """How far toes slide in each stance of C characters, as `motion_measures.foot_slide`."""
+
+    far: Array
+    frames: np.ndarray
+    done: list[Array] = field(default_factory=list)
+
+    def add(self, toes: Array, before: Array, standing: np.ndarray) -> None:
+        """One frame on: toes and before (C, 2, 3), standing (C, 2)."""
+        over = ~standing & (self.frames >= SHORTEST_STANCE)
+        self.done.append(self.far[over])
+        stays = standing & (self.frames > 0)
+        self.far = np.where(stays, self.far + np.hypot(*(toes - before)[..., ::2].transpose(2, 0, 1)), 0.0)
+        self.frames = np.where(standing, self.frames + 1, 0)
+
+
+def turns(now: Array, before: Array) -> Array:
+    """Degrees between rotations (..., 4)."""
+    dot = np.abs(np.sum(now * before, axis=-1))
+    return np.asarray(np.degrees(2 * np.arccos(np.minimum(1.0, dot))))
+
+
+def soak(
+    network: Network, characters: int = 200, frames: int = 5000, seed: int = 1, **options: Any
+) -> dict[str, Any]:
+    """The worst of characters x frames; options: of ProceduralAnimation.
+
+    `finite`; `hips_lowest_cm` and `hips_highest_cm` above the path's mean ground; `network_turn_degrees`, the
+    most that the network turned a joint in a frame, `turn_degrees` that of the pose, `added_turn_degrees`
+    the most by which the pose turned further than the network in the same joint and frame; `slide_cm` a
+    stance, mean; `toes_cm` and `knees_cm`, the most that these moved in a frame.
+    """
+    rng = np.random.default_rng(seed)
+    skeleton = network.skeleton
+    assert skeleton is not None
+    starts = np.zeros((characters, 3))
+    starts[:, 0] = APART * np.arange(characters)
+    animation = ProceduralAnimation(network, characters=characters, position=starts, **options)
+    ground, wishes = grounds(characters, rng), Wishes.none(characters, dict(network.layout.channels))
+    hips = skeleton.role("hips")
+    toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
+    low, high, worst = np.inf, -np.inf, dict.fromkeys(("network", "pose", "added", "speed"), 0.0)
+    slides = Slides(np.zeros((characters, 2)), np.zeros((characters, 2), int))
+    old: tuple[Array, ...] | None = None
+    finite, wild = True, 0
+    for _ in range(frames):
+        wishes.renew(rng)
+        pose = animation.next_pose(wishes.velocity, wishes.facing, wishes.gait, terrain=ground, **wishes.told)
+        finite = finite and bool(np.isfinite(pose.positions).all() and np.isfinite(pose.rotations).all())
+        height = pose.positions[:, hips, 1] - pose.root[:, 1]
+        low, high = min(low, float(height.min())), max(high, float(height.max()))
+        now = pose.positions, pose.rotations, animation.state.joint_rotation.copy()
+        if old is not None:
+            asked, made = turns(now[2], old[2]), turns(now[1], old[1])
+            moved = np.linalg.norm(now[0] - old[0], axis=-1)
+            for key, value in zip(worst, (asked, made, made - asked, moved), strict=True):
+                worst[key] = max(worst[key], float(value.max()))
+            wild += int(((made - asked).max(axis=1) > LIMITS["added_turn_degrees"]).sum())
+            slides.add(now[0][:, toes], old[0][:, toes], pose.contacts[:, 1::2] >= STANCE)
+        old = now
+    slide = np.concatenate(slides.done)
+    out = {
+        "frames": characters * frames,
+        "finite": finite,
+        "hips_lowest_cm": round(low, 1),
+        "hips_highest_cm": round(high, 1),
+        "network_turn_degrees": round(worst["network"], 1),
+        "turn_degrees": round(worst["pose"], 1),
+        "added_turn_degrees": round(worst["added"], 1),
+        "frames_beyond": wild,
+        "fastest_joint_cm": round(worst["speed"], 1),
+        "slide_cm": round(float(slide.mean()), 3) if len(slide) else None,
+        "stances": len(slide),
+    }
+    out["holds"] = (
+        finite
+        and low >= LIMITS["hips_lowest_cm"]
+        and high <= LIMITS["hips_highest_cm"]
+        and worst["added"] <= LIMITS["added_turn_degrees"]
+    )
+    return out

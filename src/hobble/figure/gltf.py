@@ -1,0 +1,207 @@
+"""A body, its skeleton and its motion as one glTF 2.0 file (.glb) in metres, for game engines."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hobble.core import quat
+from hobble.core.files import atomic_path
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton, local_rotations
+from hobble.figure.bind import bind
+from hobble.figure.mesh import NEEDED, Mesh, body
+from hobble.figure.pack import whole
+
+METRES = 0.01  # of a centimetre
+MOVES = 1e-5  # a component of a rotation that varies less than this stands still
+COLOUR = (0.72, 0.72, 0.69, 1.0)
+# Component types and targets of the format.
+FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
+ARRAY, ELEMENTS = 34962, 34963
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Something that the body does: place of the root (F, 3) in cm, local rotations (F, J, 4), frames a
+    second."""
+
+    name: str
+    root: Array = field(repr=False)
+    local: Array = field(repr=False)
+    fps: float
+
+
+class _Buffer:
+    """The file's one buffer, with what says where each array lies in it."""
+
+    def __init__(self) -> None:
+        self.bytes = bytearray()
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+
+    def add(
+        self,
+        array: NDArray[Any],
+        kind: str,
+        component: int,
+        *,
+        target: int | None = None,
+        normalized: bool = False,
+        bounds: bool = False,
+    ) -> int:
+        """Append an array; returns the number of its accessor."""
+        data = np.ascontiguousarray(array)
+        self.bytes += b"\0" * (-len(self.bytes) % 4)
+        view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": data.nbytes}
+        if target:
+            view["target"] = target
+        self.bytes += data.astype(data.dtype.newbyteorder("<")).tobytes()
+        self.views.append(view)
+        entry: dict[str, Any] = {
+            "bufferView": len(self.views) - 1,
+            "componentType": component,
+            "count": data.size if kind == "SCALAR" else len(data),
+            "type": kind,
+        }
+        if normalized:
+            entry["normalized"] = True
+        if bounds:
+            flat = data.reshape(entry["count"], -1)
+            entry["min"], entry["max"] = (getattr(flat, edge)(axis=0).tolist() for edge in ("min", "max"))
+        self.accessors.append(entry)
+        return len(self.accessors) - 1
+
+
+def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[Motion] = ()) -> None:
+    """Write the body of a skeleton, standing with its soles at height 0, and its motions as animations."""
+    mesh, buffer = body(skeleton), _Buffer()
+    nodes = _nodes(skeleton, mesh)
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": "Hobble"},
+        "scene": 0,
+        "scenes": [{"name": skeleton.name or "character", "nodes": [0, len(nodes)]}],
+        "nodes": [*nodes, {"name": "body", "mesh": 0, "skin": 0}],
+        "meshes": [{"name": "body", "primitives": [_primitive(mesh, buffer)]}],
+        "materials": [
+            {
+                "name": "body",
+                "pbrMetallicRoughness": {
+                    "baseColorFactor": list(COLOUR),
+                    "metallicFactor": 0.0,
+                    "roughnessFactor": 0.8,
+                },
+            }
+        ],
+        "skins": [
+            {
+                "name": "body",
+                "skeleton": 0,
+                "joints": mesh.bones.tolist(),
+                "inverseBindMatrices": buffer.add(_undoing(mesh), "MAT4", FLOAT),
+            }
+        ],
+    }
+    if animations := [_animation(motion, buffer) for motion in motions]:
+        document["animations"] = animations
+    document |= {
+        "accessors": buffer.accessors,
+        "bufferViews": buffer.views,
+        "buffers": [{"byteLength": len(buffer.bytes)}],
+    }
+    _write(path, document, bytes(buffer.bytes))
+
+
+def _nodes(skeleton: Skeleton, mesh: Mesh) -> list[dict[str, Any]]:
+    """The joints in the pose in which the body was modelled, standing on the ground."""
+    known = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
+    world = bind(skeleton).rotations if known else np.tile(quat.IDENTITY, (len(skeleton.joints), 1))
+    local = local_rotations(skeleton, world)
+    offsets = np.array(skeleton.offsets, float)
+    offsets[0] = [0.0, -mesh.corners[:, 1].min(), 0.0]
+    nodes = []
+    for j, name in enumerate(skeleton.joints):
+        node: dict[str, Any] = {
+            "name": name,
+            "translation": (METRES * offsets[j]).tolist(),
+            "rotation": _xyzw(local[j]).tolist(),
+        }
+        if children := skeleton.children(j):
+            node["children"] = children
+        nodes.append(node)
+    return nodes
+
+
+def _primitive(mesh: Mesh, buffer: _Buffer) -> dict[str, Any]:
+    share = whole(mesh.share)
+    bone = np.where(share > 0, mesh.bone, 0).astype(np.uint8)
+    normals = mesh.normals.astype(np.float32)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    wide = len(mesh.corners) > 65535
+    faces = mesh.faces.ravel().astype(np.uint32 if wide else np.uint16)
+    corners = (METRES * mesh.corners).astype(np.float32)
+    return {
+        "attributes": {
+            "POSITION": buffer.add(corners, "VEC3", FLOAT, target=ARRAY, bounds=True),
+            "NORMAL": buffer.add(normals, "VEC3", FLOAT, target=ARRAY),
+            "JOINTS_0": buffer.add(bone, "VEC4", BYTE, target=ARRAY),
+            "WEIGHTS_0": buffer.add(share, "VEC4", BYTE, target=ARRAY, normalized=True),
+        },
+        "indices": buffer.add(faces, "SCALAR", INT if wide else SHORT, target=ELEMENTS),
+        "material": 0,
+    }
+
+
+def _undoing(mesh: Mesh) -> NDArray[np.float32]:
+    """The matrices (B, 16), columns first, that take a corner to where it lies seen from each bone."""
+    turn = quat.to_matrix(quat.inv(mesh.rotations))
+    out = np.tile(np.eye(4), (len(mesh.bones), 1, 1))
+    out[:, :3, :3] = turn
+    out[:, :3, 3] = -METRES * np.einsum("bij,bj->bi", turn, mesh.positions)
+    return out.swapaxes(1, 2).reshape(-1, 16).astype(np.float32)
+
+
+def _animation(motion: Motion, buffer: _Buffer) -> dict[str, Any]:
+    times = (np.arange(len(motion.root)) / motion.fps).astype(np.float32)
+    at = buffer.add(times, "SCALAR", FLOAT, bounds=True)
+    ends = buffer.add(times[[0, -1]], "SCALAR", FLOAT, bounds=True) if len(times) > 2 else at
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
+
+    def follow(node: int, path: str, times: int, values: Array, kind: str) -> None:
+        output = buffer.add(values.astype(np.float32), kind, FLOAT)
+        samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
+        channels.append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
+
+    follow(0, "translation", at, METRES * motion.root, "VEC3")
+    for j, turns in enumerate(np.moveaxis(_xyzw(quat.normalize(quat.continuous(motion.local))), 1, 0)):
+        if len(times) > 2 and np.ptp(turns, axis=0).max() < MOVES:
+            follow(j, "rotation", ends, turns[[0, -1]], "VEC4")
+        else:
+            follow(j, "rotation", at, turns, "VEC4")
+    return {"name": motion.name, "samplers": samplers, "channels": channels}
+
+
+def _xyzw(rotation: Array) -> Array:
+    return rotation[..., [1, 2, 3, 0]]
+
+
+def _write(path: str | Path, document: dict[str, Any], data: bytes) -> None:
+    """The container: a header, the JSON padded with spaces, the buffer padded with zeros."""
+    text = json.dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    data += b"\0" * (-len(data) % 4)
+    length = 12 + 8 + len(text) + 8 + len(data)
+    header = struct.pack("<4sII", b"glTF", 2, length)
+    chunks = [
+        struct.pack("<I4s", len(part), kind) + part for part, kind in ((text, b"JSON"), (data, b"BIN\0"))
+    ]
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(b"".join([header, *chunks]))

@@ -1,0 +1,211 @@
+"""Products of a few rows with many weights, whose sums do not depend on how many rows there are.
+
+Weights lie in panels of WIDTH outputs: (panels, inputs, WIDTH), so that one input meets WIDTH weights that
+lie side by side. Every output is one running sum over the inputs in their order, each term fused into it. A
+tile keeps the sums of some rows by some panels in registers; its shape decides the speed and never the bits.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import llvmlite.binding as llvm
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.core import cgutils, config
+from numba.extending import intrinsic
+
+from hobble.core.quat import Array
+
+WIDTH = 16  # outputs a panel: two registers with AVX2, one with AVX-512
+DEPTH = 256  # inputs at a time, or a little fewer: a panel of them stays in the first cache
+ALIGNMENT = 64  # bytes of a cache line
+
+
+def panels_of(outputs: int) -> int:
+    """How many panels hold so many outputs."""
+    return -(-outputs // WIDTH)
+
+
+def aligned(size: int, dtype: Any) -> Array:
+    """(size,) zeros that begin at a cache line."""
+    dtype = np.dtype(dtype)
+    room = np.zeros(size * dtype.itemsize + ALIGNMENT, np.uint8)
+    start = -room.ctypes.data % ALIGNMENT
+    return room[start : start + size * dtype.itemsize].view(dtype)
+
+
+def in_panels(weights: Array) -> Array:
+    """Weights (..., out, in) as (..., panels, in, WIDTH), zeros behind the last output."""
+    *lead, outputs, inputs = weights.shape
+    panels = panels_of(outputs)
+    padded = np.zeros((*lead, panels * WIDTH, inputs), weights.dtype)
+    padded[..., :outputs, :] = weights
+    return np.ascontiguousarray(np.swapaxes(padded.reshape(*lead, panels, WIDTH, inputs), -1, -2))
+
+
+def _write_tile(  # type: ignore[no-untyped-def]
+    builder, rows, panels, weights, x, y, y_at, first, step, depth, x_at, x_step
+):
+    """Write the loop of `_tile` in the compiler's own language, whose vectors are WIDTH numbers whatever the
+    processor: the sums stay in registers, which no compiler finds out from plain loops."""
+    index, vector = ir.IntType(64), ir.VectorType(ir.FloatType(), WIDTH)
+    fused = cgutils.get_or_insert_function(
+        builder.module, ir.FunctionType(vector, [vector] * 3), f"llvm.fmuladd.v{WIDTH}f32"
+    )
+    begin = builder.block
+    places = []
+    for r in range(rows):
+        row = builder.load(builder.gep(y_at, [index(r)]))
+        places += [_vector_at(builder, y, builder.add(row, index(q * WIDTH))) for q in range(panels)]
+    before = [builder.load(place, align=4) for place in places]
+    of_row = [builder.add(x_at, builder.mul(x_step, index(r))) for r in range(rows)]
+    of_panel = [builder.add(first, builder.mul(step, index(q))) for q in range(panels)]
+
+    loop, done = builder.append_basic_block("inputs"), builder.append_basic_block("done")
+    builder.branch(loop)
+    builder.position_at_end(loop)
+    k = builder.phi(index)
+    sums = [builder.phi(vector) for _ in places]
+    at = builder.mul(k, index(WIDTH))
+    w = [_weights_at(builder, weights, builder.add(start, at), vector) for start in of_panel]
+    after = []
+    for r in range(rows):
+        one = _spread(builder, builder.load(builder.gep(x, [builder.add(of_row[r], k)])), vector)
+        after += [builder.call(fused, [one, w[q], sums[r * panels + q]]) for q in range(panels)]
+    following = builder.add(k, index(1))
+    for phi, old, new in zip([k, *sums], [index(0), *before], [following, *after], strict=True):
+        phi.add_incoming(old, begin)
+        phi.add_incoming(new, loop)
+    builder.cbranch(builder.icmp_signed("<", following, depth), loop, done)
+    builder.position_at_end(done)
+    for place, total in zip(places, after, strict=True):
+        builder.store(total, place, align=4)
+
+
+def _vector_at(builder, array, place):  # type: ignore[no-untyped-def]
+    kind = ir.VectorType(array.type.pointee, WIDTH)
+    return builder.bitcast(builder.gep(array, [place]), kind.as_pointer())
+
+
+def _weights_at(builder, weights, place, vector):  # type: ignore[no-untyped-def]
+    stored = builder.load(_vector_at(builder, weights, place), align=2)
+    if isinstance(weights.type.pointee, ir.FloatType):
+        return stored
+    return builder.sitofp(builder.sext(stored, ir.VectorType(ir.IntType(32), WIDTH)), vector)
+
+
+def _spread(builder, one, vector):  # type: ignore[no-untyped-def]
+    """A vector of the same number throughout."""
+    nothing, lane = ir.Constant(vector, ir.Undefined), ir.IntType(32)
+    first = builder.insert_element(nothing, one, lane(0))
+    return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(lane, WIDTH), [0] * WIDTH))
+
+
+def _typed_tile(typing, rows, panels, weights, first, step, depth, x, x_at, x_step, y, y_at):  # type: ignore[no-untyped-def]
+    """Add to `rows` rows of y what `depth` inputs give for `panels` panels of weights.
+
+    weights, x, y: (n,) arrays. first: where the first panel's weights of these inputs are, step: from there
+    to the next panel's. x_at, x_step: where the first row's inputs are, and from there to the next row's.
+    y_at: (rows,) where each row's sums for the first panel are. rows, panels: known when compiled.
+    """
+    if not (isinstance(rows, types.IntegerLiteral) and isinstance(panels, types.IntegerLiteral)):
+        return None
+    m, p = rows.literal_value, panels.literal_value
+    signature = types.void(
+        rows, panels, weights, types.intp, types.intp, types.intp, x, types.intp, types.intp, y, y_at
+    )
+
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        arrays = [
+            context.make_array(signature.args[i])(context, builder, args[i]).data for i in (2, 6, 9, 10)
+        ]
+        _write_tile(builder, m, p, *arrays, *(args[i] for i in (3, 4, 5, 7, 8)))
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+_tile: Any = intrinsic(_typed_tile)
+
+
+def _has_32_registers() -> bool:
+    """Whether compiled code has the 32 wide registers of AVX-512."""
+    return not getattr(config, "CPU_NAME", None) and bool(llvm.get_host_cpu_features().get("avx512f"))
+
+
+# Panels that go together with one row, with two or three, with four to six: about as many sums as there are
+# registers for, and enough to hide how long one addition takes.
+FEW, SOME, MANY = (6, 4, 4) if _has_32_registers() else (4, 2, 1)
+ROWS = 6
+
+
+@njit(forceinline=True)
+def multiply(
+    weights: Any, start: int, panels: int, inputs: int, x: Any, rows: int, y: Any, y_at: Any
+) -> None:
+    """Add W x to rows of y.
+
+    weights: (n,), of which those from `start` on are (panels, inputs, WIDTH). x: (n,) that begins with (rows,
+    inputs). y: (n,) with room for panels * WIDTH sums at each of y_at (rows,).
+    """
+    at = np.empty(ROWS, np.int64)
+    tiles = -(-rows // ROWS)
+    wide = FEW if rows == 1 else SOME if rows <= 3 else MANY
+    stretches = -(-inputs // DEPTH)
+    for stretch in range(stretches):
+        k = inputs * stretch // stretches
+        depth = inputs * (stretch + 1) // stretches - k
+        panel = 0
+        while panel < panels:
+            together = wide if panel + wide <= panels else 1
+            first = start + (panel * inputs + k) * WIDTH
+            # These weights stay in the first cache for all rows. Tiles of about the same height: a low one
+            # takes as long as a high one.
+            for n in range(tiles):
+                row = rows * n // tiles
+                count = rows * (n + 1) // tiles - row
+                for r in range(count):
+                    at[r] = y_at[row + r] + panel * WIDTH
+                _chosen_tile(
+                    count, together, weights, first, inputs * WIDTH, depth, x, row * inputs + k, inputs, y, at
+                )
+            panel += together
+
+
+@njit(forceinline=True)
+def _chosen_tile(
+    rows: int, panels: int, weights: Any, first: int, step: int, depth: int, x: Any, x_at: int, x_step: int,
+    y: Any, at: Any,
+) -> None:  # fmt: skip
+    """`_tile` for as many rows and panels as are known only now."""
+    if rows == 1:
+        if panels == FEW:
+            _tile(1, FEW, weights, first, step, depth, x, x_at, x_step, y, at)
+        else:
+            _tile(1, 1, weights, first, step, depth, x, x_at, x_step, y, at)
+    elif rows == 2:
+        if panels == SOME:
+            _tile(2, SOME, weights, first, step, depth, x, x_at, x_step, y, at)
+        else:
+            _tile(2, 1, weights, first, step, depth, x, x_at, x_step, y, at)
+    elif rows == 3:
+        if panels == SOME:
+            _tile(3, SOME, weights, first, step, depth, x, x_at, x_step, y, at)
+        else:
+            _tile(3, 1, weights, first, step, depth, x, x_at, x_step, y, at)
+    elif rows == 4:
+        if panels == MANY:
+            _tile(4, MANY, weights, first, step, depth, x, x_at, x_step, y, at)
+        else:
+            _tile(4, 1, weights, first, step, depth, x, x_at, x_step, y, at)
+    elif rows == 5:
+        if panels == MANY:
+            _tile(5, MANY, weights, first, step, depth, x, x_at, x_step, y, at)
+        else:
+            _tile(5, 1, weights, first, step, depth, x, x_at, x_step, y, at)
+    elif panels == MANY:
+        _tile(6, MANY, weights, first, step, depth, x, x_at, x_step, y, at)
+    else:
+        _tile(6, 1, weights, first, step, depth, x, x_at, x_step, y, at)

@@ -1,0 +1,60 @@
+"""What can be asked of files before anything is configured: `python -m hobble.motion rig` and `look`."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from hobble.core.errors import HobbleError
+from hobble.core.files import write_text
+from hobble.motion.draft import draft, guessed
+from hobble.motion.find_body import Doubt, find_body
+from hobble.motion.look import look, table
+from hobble.motion.read import read_bvh
+from hobble.motion.source import raw_clip, rig_of
+
+SKELETONS = Path("config/skeletons")
+
+
+def rig(file: Path) -> str:
+    """A draft of a rig file for a BVH file: the roles that were found, and `?` for those that were not."""
+    bvh = read_bvh(file)
+    skeleton = rig_of(bvh)
+    try:
+        roles = find_body(skeleton.joints, skeleton.parents, raw_clip(bvh).positions).body.roles(
+            skeleton.joints
+        )
+    except Doubt as doubt:
+        print(f"{file}: {doubt}; its roles are guessed by names", file=sys.stderr)
+        roles = guessed(skeleton)
+    return draft(skeleton, roles)
+
+
+def main() -> int:
+    """Read the command line; the exit status is 1 where a file is refused."""
+    parser = argparse.ArgumentParser(prog="python -m hobble.motion", description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    one = commands.add_parser("rig", help="write a draft of a rig file for a BVH file")
+    one.add_argument("file", type=Path)
+    one.add_argument("--to", type=Path, help="the file to write; else it is printed")
+    many = commands.add_parser("look", help="one line about each clip of a folder, or about one file")
+    many.add_argument("folder", type=Path)
+    many.add_argument("--skeleton", default="holden31")
+    many.add_argument("--maps", type=Path, default=SKELETONS, help="the folder of the skeleton files")
+    given = parser.parse_args()
+    try:
+        if given.command == "rig":
+            text = rig(given.file)
+            write_text(given.to, text) if given.to else print(text, end="")
+            return 0
+        seen = look(given.folder, given.maps / f"{given.skeleton}.yaml", given.maps)
+        print(table(seen))
+        return int(any(one.refused for one in seen.clips))
+    except HobbleError as error:
+        print(error, file=sys.stderr)
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,232 @@
+"""What a folder of clips says about itself: one line a clip, and what is odd about all of them.
+
+Cadence and speed are those of the feet: how often a minute the ankles pass each other, and how far the hips
+go. Steps of a length come at a rate that hardly differs between people; where a file's frame rate makes
+another of it, the rate that would explain it is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.core.clip_files import find_clips, the_file
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.quat import Array
+from hobble.motion.check import worst
+from hobble.motion.make import make_clip
+from hobble.motion.options import Motion
+from hobble.motion.rig import leg_length
+
+SLOWEST, FASTEST = 40.0, 260.0  # steps a minute of somebody who walks or runs
+RATES = (24, 25, 30, 60, 120, 240)  # frames a second at which most files are, whatever they say
+STILL = 3.0  # cm a second at which the hips of somebody stand
+STANDING = 0.5  # seconds that it takes to tell a stand
+STRIDE = 0.25  # of the leg: how far ankles must part for a step
+NEAR = 1.0  # cm of mean difference up to which two clips are one motion
+SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt", "_injuries.txt", "_injuries")
+GRAVITY = 981.0  # cm a second squared
+
+
+@dataclass(frozen=True)
+class Look:
+    """One clip as it looks. `stands`: seconds in which nobody moves. `steps`: ankles passing each other.
+
+    print: a digest of the file. poses: (K, J, 3) some of its frames, seen from its own root, for likeness.
+    """
+
+    name: str
+    refused: str = ""
+    rig: str = ""
+    fps: float = 0.0
+    seconds: float = 0.0
+    hips: float = 0.0
+    speed: float = 0.0
+    steps: int = 0
+    cadence: float = 0.0
+    stands: float = 0.0
+    off: tuple[str, float] | None = None
+    warnings: tuple[str, ...] = ()
+    print: str = ""
+    poses: Array = field(default_factory=lambda: np.zeros((0, 0, 3)), repr=False)
+
+
+@dataclass(frozen=True)
+class Folder:
+    """All clips of a folder, and sentences on what they have in common or lack."""
+
+    clips: tuple[Look, ...]
+    notes: tuple[str, ...]
+
+
+def look(folder: Path, skeleton: Path, maps: Path) -> Folder:
+    """Look at each clip of a folder, or at one file. Raises HobbleError where there are none."""
+    files = [folder] if folder.is_file() else [the_file(n, f) for n, f in sorted(find_clips(folder).items())]
+    if not files:
+        raise InputError(folder, "no .bvh files here")
+    clips = tuple(_one(file, skeleton, maps) for file in files)
+    orphans = () if folder.is_file() else tuple(orphan_notes(folder, [file.stem for file in files]))
+    return Folder(clips, (*same_notes(clips), *standing_notes(clips), *orphans))
+
+
+def _one(file: Path, skeleton: Path, maps: Path) -> Look:
+    try:
+        clip, report = make_clip(file, skeleton, maps, file.stem, skeleton.stem, Motion().model_dump())
+    except HobbleError as error:
+        return Look(file.stem, refused=str(error).split("\n")[0])
+    return seen(clip, report)
+
+
+def seen(clip: Clip, report: Mapping[str, Any]) -> Look:
+    """How a clip looks that was made. report: its `motion/<clip>.json`."""
+    hips = clip.positions[:, clip.skeleton.role("hips")]
+    path = np.linalg.norm(np.diff(hips[:, [0, 2]], axis=0), axis=-1)
+    seconds = len(clip) / clip.fps
+    steps = step_count(clip)
+    speed, cadence = float(path.sum() / seconds), 60.0 * steps / seconds
+    stands = stand_seconds(path * clip.fps, clip.fps)
+    moving = max(seconds - stands, 1e-9)
+    return Look(
+        clip.name,
+        rig=report["rig"],
+        fps=report["source_fps"],
+        seconds=seconds,
+        hips=float(np.median(hips[:, 1])),
+        speed=speed,
+        steps=steps,
+        cadence=cadence,
+        stands=stands,
+        off=worst(report["retarget"]) if report.get("retarget") else None,
+        warnings=(*rate_warnings(steps, moving, float(path.sum()), clip, report), *_first(report)),
+        print=report["sha256"],
+        poses=_poses(clip),
+    )
+
+
+def _first(report: Mapping[str, Any]) -> list[str]:
+    """The repairs, as the shortest of warnings."""
+    return [f"{len(report['repairs'])} repaired"] if report["repairs"] else []
+
+
+def step_count(clip: Clip) -> int:
+    """How often the ankles pass each other, along where the figure faces, parting far enough between."""
+    p, role = clip.positions, clip.skeleton.role
+    left = p[:, role("left_hip")] - p[:, role("right_hip")]
+    ahead = np.cross(left, [0.0, 1.0, 0.0])
+    ahead /= np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-9)
+    apart = np.sum((p[:, role("left_heel")] - p[:, role("right_heel")]) * ahead, axis=-1)
+    far = 0.5 * STRIDE * leg_length(clip.skeleton)
+    sides = np.sign(apart[np.abs(apart) > far])
+    return int(np.count_nonzero(sides[1:] != sides[:-1]))
+
+
+def stand_seconds(speed: Array, fps: float) -> float:
+    """Seconds in which the hips hardly move for a while. speed: (F-1,) cm a second."""
+    still = np.concatenate([[False], speed < STILL, [False]])
+    edges = np.flatnonzero(still[1:] != still[:-1])
+    runs = [b - a for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return float(sum(run for run in runs if run >= STANDING * fps) / fps)
+
+
+def rate_warnings(steps: int, moving: float, way: float, clip: Clip, report: Mapping[str, Any]) -> list[str]:
+    """A sentence where no person has this cadence, with the frame rate that would explain it.
+
+    moving: seconds in which the figure goes. way: how far, cm.
+    """
+    if steps < 2:
+        return []
+    cadence = 60.0 * steps / moving
+    stride = way / steps
+    leg = leg_length(clip.skeleton)
+    # Grieve and Gear 1966: step and cadence grow together; a step of .8 legs comes 110 times a minute.
+    usual = 110.0 * np.clip(stride / (0.8 * leg), 0.5, 2.2) ** 0.6
+    if SLOWEST <= cadence <= FASTEST and 0.45 < cadence / usual < 2.2:
+        return []
+    rates = [rate for rate in RATES if rate != report["source_fps"]]
+    wanted = report["source_fps"] * usual / cadence
+    rate = min(rates, key=lambda r: abs(np.log(r / wanted)))
+    would = cadence * rate / report["source_fps"]
+    return [
+        f"{cadence:.0f} steps a minute of {stride:.0f} cm are no person's; at {rate} fps they would be "
+        f"{would:.0f} (source_fps: {rate})"
+    ]
+
+
+def _poses(clip: Clip) -> Array:
+    """(12, J, 3) frames evenly over the clip, above the ground below the hips."""
+    at = np.linspace(0, len(clip) - 1, 12).round().astype(int)
+    return clip.positions[at] - clip.positions[at][:, :1] * [1.0, 0.0, 1.0]
+
+
+def same_pairs(clips: Sequence[Look]) -> list[tuple[str, str, str]]:
+    """Pairs of clips that are one motion: name, name, and "the same file" or "the same motion"."""
+    out = []
+    whole = [clip for clip in clips if not clip.refused]
+    for i, a in enumerate(whole):
+        for b in whole[i + 1 :]:
+            if a.print == b.print:
+                out.append((a.name, b.name, "the same file"))
+            elif _alike(a, b):
+                out.append((a.name, b.name, "the same motion"))
+    return out
+
+
+def _alike(a: Look, b: Look) -> bool:
+    long = abs(a.seconds - b.seconds) < 0.02 * a.seconds and a.poses.shape == b.poses.shape
+    return long and bool(np.linalg.norm(a.poses - b.poses, axis=-1).mean() < NEAR)
+
+
+def same_notes(clips: Sequence[Look]) -> list[str]:
+    """Sentences on clips that are there twice."""
+    return [f"{a} and {b} are {what}: one of them is enough." for a, b, what in same_pairs(clips)]
+
+
+def standing_notes(clips: Sequence[Look]) -> list[str]:
+    """A sentence where nobody stands in any clip, and what follows from it."""
+    if not clips or any(clip.stands > 0 or clip.refused for clip in clips):
+        return []
+    return [
+        "Nobody stands in these clips: the character will not have learned to stand, to start or to stop. "
+        "Add a clip of somebody who stands, starts and stops."
+    ]
+
+
+def orphan_notes(folder: Path, clips: Sequence[str]) -> list[str]:
+    """Sentences on files beside clips that belong to none of them."""
+    out = []
+    for file in sorted(folder.rglob("*")):
+        suffix = next((s for s in sorted(SUFFIXES, key=len, reverse=True) if file.name.endswith(s)), None)
+        if suffix and file.is_file() and file.name.removesuffix(suffix) not in clips:
+            near = _nearest(file.name.removesuffix(suffix), clips)
+            out.append(f"{file.name} belongs to no clip{f': is it that of {near}?' if near else '.'}")
+    return out
+
+
+def _nearest(name: str, clips: Sequence[str]) -> str | None:
+    from difflib import get_close_matches
+
+    return next(iter(get_close_matches(name, clips, 1, 0.75)), None)
+
+
+def table(folder: Folder) -> str:
+    """The folder as text: a line a clip, and the sentences below."""
+    wide = max(4, *(len(clip.name) for clip in folder.clips))
+    names = f"{'rig':10} {'fps':>5} {'s':>6} {'hips':>5} {'cm/s':>5} {'steps':>5} {'/min':>4} {'stands':>6}"
+    head = f"{'clip':{wide}} {names}  furthest off"
+    lines = [head]
+    for clip in folder.clips:
+        if clip.refused:
+            lines.append(f"{clip.name:{wide}} REFUSED {clip.refused}")
+            continue
+        off = f"{clip.off[0]} {clip.off[1]:.0f} deg" if clip.off else "as it is"
+        said = "; ".join([off, *clip.warnings])
+        lines.append(
+            f"{clip.name:{wide}} {clip.rig:10.10} {clip.fps:5.4g} {clip.seconds:6.1f} {clip.hips:5.0f} "
+            f"{clip.speed:5.0f} {clip.steps:5d} {clip.cadence:4.0f} {clip.stands:6.1f}  {said}"
+        )
+    return "\n".join([*lines, *folder.notes])

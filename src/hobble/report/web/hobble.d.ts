@@ -1,0 +1,41 @@
+/** Centimetres, 60 Hz, Y up; yaw 0 faces +Z; +X is the character's left. Quaternions w first. */
+import type * as Three from "three";
+
+/** What lies in character.json: the network, the skeleton, the body. */
+export interface CharacterData { spec: object; body: object }
+
+export interface Wish {
+  /** How far to go in this frame, [x, z] in cm: 2.5 walks, 7 jogs. */
+  velocity?: [number, number];
+  /** Where to look, [x, z], of any length; null looks where it goes. */
+  facing?: [number, number] | null;
+  /** One of `gaits`; null chooses by speed. */
+  gait?: string | null;
+  /** Height of the ground in cm at x, z. */
+  ground?: (x: number, z: number) => number;
+}
+
+export interface Character {
+  readonly joints: string[];
+  readonly gaits: string[];
+  /** What it can be told: columns by channel, and the highest value of each; 0 tells nothing. */
+  readonly channels: Record<string, { columns: string[]; highest: number }>;
+  /** What a reader calls a column ("left thigh") to where it is told. */
+  readonly parts: Record<string, { channel: string; column: string }>;
+  /** Where all joints are, three numbers each, and their rotations in the world, four each; the next step writes over them. */
+  readonly places: Float64Array;
+  readonly turns: Float64Array;
+  /** Left heel, left toe, right heel, right toe: 0 to 1. */
+  readonly contacts: number[];
+  readonly phase: number;
+  readonly root: [number, number, number];
+  /** Values by column of a channel; columns that are not named go back to 0. Throws RangeError for what is wrong. */
+  tell(channel: string, values?: Record<string, number>): void;
+  /** One frame of a sixtieth of a second. */
+  step(wish?: Wish): Character;
+}
+
+export interface Figure { mesh: Three.SkinnedMesh; pose(character: Character): void }
+
+export function createCharacter(data: CharacterData, stand?: { place?: [number, number]; heading?: number }): Character;
+export function createFigure(THREE: typeof Three, data: CharacterData, material?: Three.Material): Figure;

@@ -1,0 +1,61 @@
+// The gait of the character that is played, as it goes: stance of both feet, length of steps, bend of the knees.
+import { dot, minus } from "./numbers.js";
+import { at3 } from "./turns.js";
+
+export const SHOWN = 240; // frames: four seconds
+const SIDES = ["left", "right"];
+
+// Bend of a knee in degrees: 0 where the leg is straight.
+export const bend = (hip, knee, heel) => {
+  const a = minus(knee, hip), b = minus(heel, knee), size = Math.hypot(...a) * Math.hypot(...b);
+  return size ? Math.acos(Math.min(1, Math.max(-1, dot(a, b) / size))) * 180 / Math.PI : 0;
+};
+
+// legs: [hip, knee, heel, toe] of the left and of the right.
+export const createLab = (legs) => {
+  const lab = { stance: [[], []], knees: [[], []], steps: [null, null], stood: [false, false] };
+  let landed = [null, null];
+  const kept = (list, value) => { list.push(value); if (list.length > SHOWN) list.shift(); };
+  // places: of all joints; down: whether the left and the right foot stand.
+  lab.add = (places, down) => {
+    legs.forEach(([hip, knee, heel], f) => {
+      kept(lab.stance[f], down[f]);
+      kept(lab.knees[f], bend(at3(places, hip), at3(places, knee), at3(places, heel)));
+      if (down[f] && !lab.stood[f]) {
+        const other = landed[1 - f], here = at3(places, heel);
+        // A step goes from where the other foot stands to where this one lands.
+        if (other) lab.steps[f] = Math.hypot(here[0] - other[0], here[2] - other[2]);
+        landed[f] = here;
+      }
+      lab.stood[f] = down[f];
+    });
+  };
+  lab.clear = () => { Object.assign(lab, createLab(legs), { add: lab.add, clear: lab.clear }); landed = [null, null]; };
+  return lab;
+};
+
+// Draws a lab onto a canvas: a bar where a foot stands, over it the bend of that knee.
+export const drawLab = (canvas, lab, { ink, line, accent, second }) => {
+  const scale = Math.min(2, devicePixelRatio || 1), [w, h] = [canvas.clientWidth, canvas.clientHeight];
+  if (!w) return;
+  if (canvas.width !== Math.round(w * scale)) [canvas.width, canvas.height] = [Math.round(w * scale), Math.round(h * scale)];
+  const context = canvas.getContext("2d"), rgb = (c) => `rgb(${c.join(",")})`, half = h / 2;
+  context.setTransform(scale, 0, 0, scale, 0, 0);
+  context.clearRect(0, 0, w, h);
+  SIDES.forEach((_, f) => {
+    const top = f * half, foot = top + half - 9, n = lab.stance[f].length, x = (i) => w * (SHOWN - n + i) / SHOWN;
+    context.fillStyle = rgb(line);
+    context.globalAlpha = .25;
+    context.fillRect(0, foot, w, 5);
+    context.globalAlpha = 1;
+    context.fillStyle = rgb(f ? second : accent);
+    lab.stance[f].forEach((down, i) => { if (down) context.fillRect(x(i), foot, w / SHOWN + .6, 5); });
+    context.strokeStyle = rgb(ink);
+    context.globalAlpha = .75;
+    context.lineWidth = 1.3;
+    context.beginPath();
+    lab.knees[f].forEach((degrees, i) => context.lineTo(x(i), foot - 4 - (half - 18) * Math.min(1, degrees / 90)));
+    context.stroke();
+    context.globalAlpha = 1;
+  });
+};

@@ -1,0 +1,35 @@
+"""The character for other web pages: an ES module, its network, and an example to begin with."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from hobble.core.errors import HobbleError
+from hobble.core.files import atomic_path, write_json
+from hobble.figure.pack import packed_body
+from hobble.models.network import Network
+from hobble.report.bundle import WEB, bundle_module
+from hobble.report.playable import playable
+from hobble.runtime.options import Runtime
+
+THREE = ("three.module.js", "three.core.js")  # of three.js, for the example
+
+
+def export_web(folder: str | Path, network: Network, runtime: Runtime, modules: str | Path) -> None:
+    """Write into a folder hobble.js, hobble.d.ts, character.json and index.html, with three.js for the last.
+
+    modules: the node_modules folder of `bundle.install`. Raises HobbleError for a network without a skeleton.
+    """
+    if network.skeleton is None:
+        raise HobbleError("this network carries no skeleton, so it has no body to show")
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    spec = playable(network, runtime)
+    write_json(folder / "character.json", {"spec": spec, "body": packed_body(network.skeleton)})
+    bundle_module(modules, folder / "hobble.js")
+    copies = {WEB / "hobble.d.ts": "hobble.d.ts", WEB / "example.html": "index.html"}
+    copies |= {Path(modules, "three", "build", name): name for name in THREE}
+    for source, name in copies.items():
+        with atomic_path(folder / name) as temporary:
+            shutil.copyfile(source, temporary)

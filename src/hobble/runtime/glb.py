@@ -1,0 +1,50 @@
+"""The character for a game engine: body, skeleton and what it was scripted to do, as one glTF file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from hobble.core.errors import HobbleError
+from hobble.core.files import load_npz
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton, local_rotations
+from hobble.figure.fit import fitted_rotations
+from hobble.figure.gltf import Motion, write_glb
+from hobble.models.network import Network
+from hobble.runtime.export import fitted_skeleton, jointed
+
+FPS = 30.0  # poses a second that are kept; viewers go evenly from one to the next
+
+
+def export_glb(path: str | Path, network: Network, scenarios: str | Path) -> None:
+    """Write the body of a network's skeleton with every scenario of `scenarios` (runtime/scenarios.npz) as an
+    animation of its name. Raises HobbleError for a network without a skeleton."""
+    if network.skeleton is None:
+        raise HobbleError("this network carries no skeleton, so it has no body to write")
+    data = load_npz(scenarios)
+    skeleton = network.skeleton
+    if "skeleton" not in network.meta:
+        first = str(data["names"][0])
+        skeleton = fitted_skeleton(skeleton, *_motion(data, first, skeleton))
+    write_glb(path, skeleton, _motions(data, skeleton))
+
+
+def _motion(data: Mapping[str, Array], name: str, skeleton: Skeleton) -> tuple[Array, Array]:
+    """World positions (F, J, 3) and rotations (F, J, 4), thinned to FPS."""
+    stride = max(1, round(float(data["fps"]) / FPS))
+    positions = np.asarray(data[f"{name}/positions"], float)[::stride]
+    rotations = data.get(f"{name}/rotations")
+    if rotations is None:
+        return positions, fitted_rotations(skeleton, positions)
+    return positions, np.asarray(rotations, float)[::stride]
+
+
+def _motions(data: Mapping[str, Array], skeleton: Skeleton) -> Iterator[Motion]:
+    stride = max(1, round(float(data["fps"]) / FPS))
+    for name in map(str, data["names"]):
+        world, places = jointed(skeleton, *_motion(data, name, skeleton))
+        local = local_rotations(skeleton, world)
+        yield Motion(name, places[:, 0], local, float(data["fps"]) / stride)

@@ -1,0 +1,113 @@
+"""How fast a body goes that is told something: interpolated, the worst counts, learnt from made-up cycles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hobble.channels.limits import UNLIMITED, Limits, Pace
+
+WALK, JOG, GAITS = 1, 2, 6
+LIMITS = Limits(np.array([0.0, 5.0, 10.0]), np.array([[[4.0, 3.0, 1.0], [4.0, 4.0, 2.0]]]))
+
+
+def rows(speeds, values, gait: int = WALK, each: int = 40) -> dict[str, np.ndarray]:
+    """Rows of cycles of `each` frames, straight ahead at `speeds` (N,), told `values` (N, L)."""
+    speed = np.repeat(np.asarray(speeds, float), each)
+    return {
+        "gait": np.eye(GAITS)[np.full(len(speed), gait)],
+        "velocity": np.stack([np.zeros_like(speed), speed], axis=1),
+        "values": np.repeat(np.asarray(values, float), each, axis=0),
+        "cycle": np.repeat(np.arange(len(speeds)), each),
+    }
+
+
+def pace(labels: int = 2, across=None) -> Pace:
+    return Pace(10.0, np.arange(labels) if across is None else np.array(across), GAITS)
+
+
+@pytest.mark.parametrize(
+    ("values", "speed"),
+    [((0, 0), np.inf), ((5, 0), 3.0), ((10, 0), 1.0), ((7.5, 0), 2.0), ((2.5, 0), 3.5), ((0, 7.5), 3.0)],
+)
+def test_between_levels_the_speed_is_interpolated(values, speed: float) -> None:
+    np.testing.assert_array_equal(LIMITS.allowed(np.array([values], float)), [[speed]])
+
+
+def test_two_are_as_slow_as_the_worse_one() -> None:
+    values = np.random.default_rng(1).uniform(0, 10, (50, 2))
+    both = LIMITS.allowed(values)
+    alone = [LIMITS.allowed(values * keep) for keep in ([1, 0], [0, 1])]
+    np.testing.assert_array_equal(both, np.minimum(*alone))
+
+
+def test_a_version_is_set_beside_its_own_source() -> None:
+    """The slow source is hurt: beside all that is healthy, it would look slower than it is."""
+    found = pace()
+    speeds = np.linspace(1.0, 3.0, 41)
+    found.add("healthy", **rows(speeds, np.zeros((41, 2))))
+    found.add("slow", **rows(np.full(400, 1.0), np.zeros((400, 2))))
+    severity = np.tile([0.0, 2.5, 5.0, 7.5, 10.0], 80)
+    hurt = rows(1.0 - 0.05 * severity, np.stack([severity, np.zeros(400)], axis=1))
+    found.add("slow_hurt1", **hurt, source="slow")
+    limits = found.learn()
+    assert limits is not None
+    top = limits.speeds[WALK, 1, 0]
+    np.testing.assert_allclose(limits.speeds[WALK, 0] / top, 1 - 0.05 * limits.levels, atol=0.01)
+    np.testing.assert_array_equal(limits.speeds[WALK, 1], top)  # never hurt: as fast as the healthy
+    # A gait in which nothing healthy goes is not limited; one that was never hurt keeps the same share.
+    assert (limits.speeds[JOG] == UNLIMITED).all()
+
+
+def test_a_captured_injury_is_set_beside_what_is_usual_in_its_gait() -> None:
+    found = pace()
+    found.add("healthy", **rows(np.full(30, 2.0), np.zeros((30, 2))))
+    found.add("jogs", **rows(np.full(30, 6.0), np.zeros((30, 2)), JOG))
+    found.add("limps", **rows(np.full(60, 1.0), np.tile([8.0, 0.0], (60, 1))))
+    limits = found.learn()
+    assert limits is not None
+    walk, jog = (limits.allowed(np.array([[8.0, 0.0]]))[0, g] for g in (WALK, JOG))
+    assert walk == pytest.approx(1.0, rel=0.1)
+    assert jog == pytest.approx(3.0, rel=0.1)  # by what the link does in other gaits
+
+
+def test_what_is_learnt_never_rises_and_is_the_same_on_both_sides() -> None:
+    rng = np.random.default_rng(4)
+    found = pace(3, across=[1, 0, 2])
+    found.add("healthy", **rows(rng.uniform(1.5, 2.5, 200), np.zeros((200, 3))))
+    values = np.zeros((300, 3))
+    values[np.arange(300), rng.integers(0, 3, 300)] = rng.uniform(0.1, 10, 300)
+    found.add("hurt", **rows(rng.uniform(0.2, 4.0, 300), values))
+    limits = found.learn()
+    assert limits is not None
+    assert (np.diff(limits.speeds, axis=2) <= 0).all()
+    assert (limits.speeds[WALK] <= limits.speeds[WALK, 0, 0]).all()
+    np.testing.assert_array_equal(limits.speeds[:, 0], limits.speeds[:, 1])
+    again = Limits.from_dict(limits.to_dict(), GAITS, 3, 10.0)
+    np.testing.assert_allclose(again.speeds, limits.speeds, atol=1e-4)
+
+
+def test_where_nothing_is_told_nothing_is_limited() -> None:
+    found = pace()
+    found.add("healthy", **rows(np.full(30, 2.0), np.zeros((30, 2))))
+    assert found.learn() is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"levels": np.array([0.0, 5.0, 9.0])}, "rise from 0 to 10"),
+        ({"levels": np.array([0.0, 5.0])}, "for 1 gaits, 2 labels"),
+        ({"speeds": -LIMITS.speeds}, "above 0"),
+        ({"speeds": LIMITS.speeds * np.nan}, "above 0"),
+        ({"speeds": LIMITS.speeds[..., ::-1]}, "faster"),
+    ],
+)
+def test_a_strangers_table_is_refused(changes, says: str) -> None:
+    data = {key: value.tolist() for key, value in vars(replace(LIMITS, **changes)).items()}
+    with pytest.raises(ValueError, match=says):
+        Limits.from_dict(data, 1, 2, 10.0)
+    with pytest.raises(ValueError, match="no table"):
+        Limits.from_dict({"levels": "all"}, 1, 2, 10.0)

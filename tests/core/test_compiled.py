@@ -1,0 +1,82 @@
+"""Compiled functions run where nothing can be cached: read-only places, damaged files, a full disk."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+MODULE = """
+import warnings, sys
+from hobble.core.compiled import njit
+
+@njit
+def twice(x):
+    return 2 * x
+
+@njit(fastmath=True)
+def thrice(x):
+    return 3 * x
+
+print(twice(4), thrice(4.0))
+"""
+
+
+def run(folder: Path, **environment: str) -> subprocess.CompletedProcess:
+    """Run the module in a process of its own, as an installed package would be."""
+    (folder / "job.py").write_text(MODULE)
+    source = Path(__file__).resolve().parents[2] / "src"
+    keep = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA")}
+    variables = {**keep, "PYTHONPATH": str(source), "PYTHONDONTWRITEBYTECODE": "1", **environment}
+    return subprocess.run(
+        [sys.executable, "job.py"], cwd=folder, env=variables, capture_output=True, text=True, timeout=120
+    )
+
+
+def cached(folder: Path) -> list[Path]:
+    return sorted(folder.rglob("*.nb[ic]"))
+
+
+def test_what_is_compiled_is_kept(tmp_path):
+    first = run(tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    assert (first.stdout, first.stderr) == ("8 12.0\n", "")
+    files = {path: path.stat().st_mtime_ns for path in cached(tmp_path)}
+    assert len(files) == 4
+    assert run(tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache")).stdout == "8 12.0\n"
+    assert {path: path.stat().st_mtime_ns for path in cached(tmp_path)} == files
+
+
+def test_nowhere_to_write_costs_one_warning(tmp_path):
+    """A folder below a file cannot be made, not even by root."""
+    (tmp_path / "file").write_text("")
+    (tmp_path / "__pycache__").write_text("")
+    below = str(tmp_path / "file" / "cache")
+    result = run(tmp_path, NUMBA_CACHE_DIR=below, HOME=below, XDG_CACHE_HOME=below)
+    assert result.stdout == "8 12.0\n", result.stderr
+    assert result.stderr.count("RuntimeWarning: compiled functions are not kept") == 1
+    assert "NUMBA_CACHE_DIR" in result.stderr
+
+
+@pytest.mark.parametrize("content", [b"", b"rubbish", b"\x80\x04."])
+def test_a_damaged_cache_is_a_miss(tmp_path, content):
+    cache = str(tmp_path / "cache")
+    run(tmp_path, NUMBA_CACHE_DIR=cache)
+    for path in cached(tmp_path):
+        path.write_bytes(content)
+    result = run(tmp_path, NUMBA_CACHE_DIR=cache)
+    assert result.stdout == "8 12.0\n", result.stderr
+    assert result.stderr.count("RuntimeWarning") == 1
+
+
+def test_a_cache_that_is_a_folder_of_folders_is_a_miss(tmp_path):
+    cache = str(tmp_path / "cache")
+    run(tmp_path, NUMBA_CACHE_DIR=cache)
+    for path in cached(tmp_path):
+        path.unlink()
+        path.mkdir()
+    assert run(tmp_path, NUMBA_CACHE_DIR=cache).stdout == "8 12.0\n"
+    shutil.rmtree(cache)

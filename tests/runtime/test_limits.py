@@ -1,0 +1,106 @@
+"""A hurt body is asked for what it can do: the wish stops at the limit, and who cannot run walks."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hobble.channels.limits import UNLIMITED, Limits
+from hobble.core.errors import InputError
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.runtime.animation import ProceduralAnimation
+
+KNEE, ARM = "LeftUpLeg-LeftLeg", "LeftArm-LeftForeArm"
+WALK, JOG = 1, 2
+
+
+@pytest.fixture
+def limited(make_network) -> Network:
+    """A gliding network whose knee halves the walk at 10 and ends the jog at 5; an arm takes a tenth."""
+    network = make_network(links=30, scale=0.0)
+    speeds = np.full((6, 30, 2), UNLIMITED)
+    speeds[WALK], speeds[JOG] = 2.0, 7.0
+    knee, arm = (network.links.index(link) for link in (KNEE, ARM))
+    speeds[WALK, knee, 1], speeds[JOG, knee, 1] = 1.0, 3.0
+    speeds[WALK, arm, 1], speeds[JOG, arm, 1] = 1.8, 6.3
+    return replace(network, limits={"injury": Limits(np.array([0.0, 10.0]), speeds)})
+
+
+def asked(
+    network: Network, velocity, hurt, gait=None, frames: int = 90, **options
+) -> tuple[float, np.ndarray]:
+    """The speed that the network is asked for in the end, and the shares of gaits."""
+    animation = ProceduralAnimation(network, **{"steering": 0.0, **options})
+    for _ in range(frames):
+        animation.next_pose(velocity, gait=gait, injury=hurt)
+    middle = network.layout.window
+    return float(np.hypot(*animation.state.target_velocity[0])), animation.state.gait[0, middle]
+
+
+@pytest.mark.parametrize(
+    ("hurt", "speed"),
+    [({}, 2.5), ({KNEE: 10}, 1.0), ({KNEE: 5}, 1.5), ({ARM: 10}, 1.8), ({KNEE: 5, ARM: 10}, 1.5)],
+)
+def test_the_wish_stops_at_what_the_worst_injury_allows(limited: Network, hurt, speed: float) -> None:
+    assert asked(limited, (0, 2.5), hurt)[0] == pytest.approx(speed, abs=1e-6)
+    assert asked(limited, (2.5, 0), hurt)[0] == pytest.approx(speed, abs=1e-6)
+    assert asked(limited, (0, 2.5), hurt, limits=False)[0] == pytest.approx(2.5, abs=1e-6)
+
+
+def test_a_slower_wish_is_left_alone(limited: Network) -> None:
+    assert asked(limited, (0, 0.8), {KNEE: 10})[0] == pytest.approx(0.8, abs=1e-6)
+    assert asked(limited, (0, 0.0), {KNEE: 10})[0] == 0.0
+
+
+def test_who_cannot_run_any_more_walks(limited: Network) -> None:
+    speed, gait = asked(limited, (0, 7.0), {KNEE: 8})
+    assert speed == pytest.approx(1.2, abs=1e-6)
+    assert gait[WALK] > 0.99
+    speed, gait = asked(limited, (0, 7.0), {KNEE: 3})  # 5.8 is a jog still
+    assert speed == pytest.approx(5.8, abs=1e-6)
+    assert gait[JOG] > 0.99
+    assert asked(limited, (0, 7.0), {KNEE: 8}, limits=False)[1][JOG] > 0.99
+
+
+def test_steering_makes_up_to_the_limit_and_not_beyond(limited: Network) -> None:
+    """The network glides at 1.5 whatever it is asked for: that is above the limit of 1."""
+    speed, _ = asked(limited, (0, 2.5), {KNEE: 10}, steering=2.0)
+    assert speed < 1.0
+    speed, _ = asked(limited, (0, 2.5), {}, steering=2.0)
+    assert speed > 2.5
+
+
+def test_each_of_a_crowd_has_its_own_limit(limited: Network) -> None:
+    crowd = ProceduralAnimation(limited, characters=3, steering=0.0)
+    for _ in range(90):
+        crowd.next_pose((0, 2.5), injury={KNEE: np.array([0.0, 5.0, 10.0])})
+    np.testing.assert_allclose(crowd.state.target_velocity[:, 1], [2.5, 1.5, 1.0], atol=1e-6)
+
+
+def test_a_network_file_keeps_its_limits(limited: Network, tmp_path) -> None:
+    def saved(limits) -> Network:
+        arrays = {f"W{i}": w for i, w in enumerate(limited.weights)} | {
+            f"b{i}": b for i, b in enumerate(limited.biases)
+        }
+        for key in ("x_mean", "x_std", "y_mean", "y_std"):
+            arrays[key.capitalize().replace("_", "")] = getattr(limited, key)
+        meta = {
+            "layout": limited.layout.to_dict(),
+            "skeleton": limited.skeleton.to_dict(),
+            "channels": {"injury": list(limited.links)},
+            "limits": limits,
+        }
+        np.savez(tmp_path / "weights.npz", **arrays, meta=np.array(json.dumps(meta)))
+        return load_network(tmp_path)
+
+    table = limited.limits["injury"].to_dict()
+    np.testing.assert_array_equal(
+        saved({"injury": table}).limits["injury"].speeds, limited.limits["injury"].speeds
+    )
+    for wrong in ({"injury": {**table, "levels": [0, 9]}}, {"mood": table}, {"injury": 3}, [table]):
+        with pytest.raises(InputError, match=r"weights\.npz"):
+            saved(wrong)

@@ -1,0 +1,17 @@
+"""Creates results/<configuration>/export/web/: the character as an ES module with an example page."""
+
+from pathlib import Path
+
+from hobble.models.load import load_network
+from hobble.report.web_export import export_web
+from hobble.runtime.options import Runtime
+from hobble.workflow.job import job
+
+with job(snakemake) as log:
+    export_web(
+        snakemake.output.folder,
+        load_network(snakemake.input.weights),
+        Runtime.model_validate(snakemake.params.runtime),
+        Path(snakemake.input.packages[0]).parent,
+    )
+    log.info("wrote %s", snakemake.output.folder)
