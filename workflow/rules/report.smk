@@ -195,3 +195,23 @@ rule export_web:
         code=lambda w: package.code("export_web", configurations.kind(w.configuration)),
     script:
         "../scripts/export_web.py"
+
+
+rule limp_picture:
+    """The healthy and the hurt walk side by side, going round: the picture at the top of the README."""
+    input:
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+    output:
+        picture="results/{configuration}/limp.webp",
+    log:
+        "results/{configuration}/logs/report/limp_picture.log",
+    benchmark:
+        "results/{configuration}/benchmarks/report/limp_picture.tsv"
+    resources:
+        mem_mb=1500,
+        runtime=10,
+    params:
+        runtime=lambda w: configurations.section(w.configuration, "runtime"),
+        code=lambda w: package.code("limp_picture", configurations.kind(w.configuration)),
+    script:
+        "../scripts/limp_picture.py"

@@ -1,0 +1,79 @@
+"""The looping picture at the top of the README: a healthy walk beside the same character hurt."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from hobble.core.errors import HobbleError
+from hobble.core.files import atomic_path
+from hobble.figure.mesh import body
+from hobble.figure.pack import regions
+from hobble.models.network import Network
+from hobble.report.playable import body_parts
+from hobble.report.raster import Studio
+from hobble.report.stimuli import STRIDE, frames, walk
+from hobble.runtime.options import Runtime
+
+Picture = NDArray[np.uint8]
+
+HURT = {"left thigh": 8.0, "left shank": 8.0}
+CAPTIONS = ("healthy", "left knee hurts: 8 of 10")
+SIZE = 360  # pixels of each half
+MOST_BYTES = 1_000_000
+QUALITIES = (80, 65, 50, 35, 20)
+
+
+def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> int:
+    """Write an animated WebP that goes round for ever, of at most MOST_BYTES; returns its bytes.
+
+    Both halves are asked for the same speed. Raises HobbleError for a network that is not told what hurts,
+    and where no quality makes the picture small enough.
+    """
+    if network.skeleton is None or not network.links:
+        raise HobbleError("this network is not told what hurts; make the picture of a configuration that is")
+    parts = body_parts(network.skeleton, network.links, network.hurt_links)
+    hurt = {network.links[parts[label]]: value for label, value in HURT.items()}
+    studio = Studio(body(network.skeleton), regions(network.skeleton, network.links))
+    halves = []
+    for injury in ({}, hurt):
+        severity = np.array([injury.get(link, 0.0) for link in network.links])
+        halves.append(frames(studio, network.skeleton, walk(network, injury, runtime), severity, SIZE))
+    return _save(Path(path), beside(*halves))
+
+
+def beside(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Image.Image]:
+    """Two loops side by side, as long as `hurt`; `healthy` goes round a whole number of times."""
+    rounds = max(1, round(len(hurt) / len(healthy)))
+    out = []
+    for number, right in enumerate(hurt):
+        left = healthy[number * rounds * len(healthy) // len(hurt) % len(healthy)]
+        both = Image.fromarray(np.concatenate([left, right], axis=1)[..., :3])
+        draw, font = ImageDraw.Draw(both), ImageFont.load_default(size=18)
+        for half, text in enumerate(CAPTIONS):
+            middle = (half + 0.5) * both.width / 2
+            draw.text((middle, 18), text, fill=(90, 90, 90), font=font, anchor="mm")
+        out.append(both)
+    return out
+
+
+def _save(path: Path, images: Sequence[Image.Image]) -> int:
+    for quality in QUALITIES:
+        with atomic_path(path) as temporary:
+            images[0].save(
+                temporary,
+                format="WEBP",
+                save_all=True,
+                append_images=images[1:],
+                duration=round(1000 * STRIDE / 60),
+                loop=0,
+                quality=quality,
+                method=4,
+            )
+        if (size := path.stat().st_size) <= MOST_BYTES:
+            return size
+    raise HobbleError(f"{path}: {size} bytes at the lowest quality, more than {MOST_BYTES}")

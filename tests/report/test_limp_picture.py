@@ -1,0 +1,36 @@
+"""The README's picture: both walks go round, and the file stays small."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hobble.report import limp_picture
+from hobble.report.limp_picture import beside
+
+
+def loop(length: int, shade: int) -> list[np.ndarray]:
+    """Pictures whose first pixel tells their number."""
+    out = []
+    for number in range(length):
+        picture = np.full((40, 40, 3), shade, np.uint8)
+        picture[-1, 0] = number
+        out.append(picture)
+    return out
+
+
+@pytest.mark.parametrize(("healthy", "hurt"), [(10, 10), (7, 10), (10, 7), (4, 12), (12, 4)])
+def test_both_loops_go_round(healthy, hurt):
+    images = beside(loop(healthy, 200), loop(hurt, 100))
+    assert len(images) == hurt
+    lefts = [image.getpixel((0, 39))[0] for image in images]
+    assert [image.getpixel((40, 39))[0] for image in images] == list(range(hurt))
+    steps = np.diff([*lefts, lefts[0]]) % healthy  # from the last picture on to the first again
+    assert steps.sum() % healthy == 0
+    assert steps.max() - steps.min() <= 1
+
+
+def test_a_picture_that_stays_too_large_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(limp_picture, "MOST_BYTES", 10)
+    with pytest.raises(limp_picture.HobbleError, match="at the lowest quality"):
+        limp_picture._save(tmp_path / "x.webp", beside(loop(3, 200), loop(3, 100)))

@@ -1,0 +1,14 @@
+"""Creates results/<configuration>/limp.webp: the healthy and the hurt walk side by side, going round."""
+
+from hobble.models.load import load_network
+from hobble.report.limp_picture import write_limp_picture
+from hobble.runtime.options import Runtime
+from hobble.workflow.job import job
+
+with job(snakemake) as log:
+    size = write_limp_picture(
+        load_network(snakemake.input.weights),
+        snakemake.output.picture,
+        Runtime.model_validate(snakemake.params.runtime),
+    )
+    log.info("%d bytes", size)
