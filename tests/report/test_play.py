@@ -195,7 +195,7 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
                 type=kind, x=x, y=y, button="left", clickCount=1, modifiers=modifiers,
             )  # fmt: skip
         assert tab.until(f"{shin} === {severity}"), severity
-    index = "Hobble.player.actors[0].spec.links.indexOf('LeftLeg-LeftFoot')"
+    index = "Hobble.player.actors[0].spec.channels[0].columns.indexOf('LeftLeg-LeftFoot')"
     assert tab.until(f"Hobble.player.actors[0].character.told[{index}] > .1")
     apart = f"""(() => {{
       const [{{ spec }}] = Hobble.player.actors;

@@ -17,7 +17,7 @@ def section(found: Json, material: Material) -> Section:
         return Section("mood", [])
     captured = found["captured"]
     words = (
-        f"A recogniser of the captured walks names {100 * (found['right_at_1'] or 0):.0f} % of the windows of "
+        """How often each mood is named, how much it changes the walk; empty for a network without moods."""
         "generated walks in one mood at 1; of captured clips that were left out whole, "
         f"{100 * (captured['right'] or 0):.0f} %. All figures are asked for the same three speeds about "
         f"{found['speed_asked']:.2f} m/s."

@@ -56,8 +56,8 @@ def response(
 
     captured: how many windows of clips that were left out whole, each with its mirror in turn, are named
     right by what was learnt from the others. generated: for each mood and value the share of `windows` named
-    so by what was learnt from all; at half and of `both` of two moods, the share named one of them and, for two, how far
-    the walk is from that of each alone. effects: of each mood, captured and generated, less no mood's:
+    so by what was learnt from all; of two moods together the share named one of them, and how far the walk is
+    `between` that of each alone. effects: of each mood, captured and generated, less no mood's:
     speed (m/s), stride (cm), trunk and head (degrees forward), arms (degrees of swing, standard deviation).
     """
     if MOOD not in network.channels or network.skeleton is None:
