@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
 
-from hobble.channels import channel
+from hobble.channels import channel, every
 from hobble.core.skeleton import Skeleton
 
 
@@ -84,6 +84,20 @@ def loops(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collec
         return own(skeleton, columns, trained)
     told, highest = [column for column in columns if column in trained], channel(name).highest
     return [Loop(words(name).rest.lower(), {}), *(Loop(c.replace(" ", "-"), {c: highest}) for c in told)]
+
+
+def speaker(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
+    """A function from a column's label to what a reader calls it; what is no column stays as it is.
+
+    skeleton: as a network's file holds it, empty where that is not known.
+    """
+    if not skeleton:
+        return str
+    figure, said = Skeleton.from_dict({"name": "", **skeleton}), {}
+    for one in every():
+        columns = one.columns(figure)
+        said |= dict(zip(columns, shown(one.name, figure, columns, columns).spoken, strict=True))
+    return lambda column: said.get(column, column)
 
 
 def module(name: str) -> ModuleType | None:

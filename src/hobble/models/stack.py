@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import STORAGES, Network, inverse
 
@@ -81,7 +81,7 @@ def _pack(weights: Array, storage: str) -> tuple[Array, Array]:
     return np.round(weights / scale[..., None]).astype(np.int16), scale.astype(np.float32)
 
 
-@njit(cache=True, fastmath=True)
+@njit(fastmath=True)
 def standardise(x: Any, mean: Any, factor: Any, z: Any) -> None:
     """z = (x - mean) * factor, column by column."""
     for c in range(x.shape[0]):
@@ -89,7 +89,7 @@ def standardise(x: Any, mean: Any, factor: Any, z: Any) -> None:
             z[c, i] = (x[c, i] - mean[i]) * factor[i]
 
 
-@njit(cache=True, fastmath=True)
+@njit(fastmath=True)
 def restore(y: Any, mean: Any, std: Any) -> None:
     """y = y * std + mean, column by column."""
     for c in range(y.shape[0]):
@@ -99,7 +99,7 @@ def restore(y: Any, mean: Any, std: Any) -> None:
 
 # Only the functions called from outside are kept on disk, and what they call is forced into them: otherwise
 # the compiler may round sums in another order when they come from disk.
-@njit(fastmath=True, forceinline=True)
+@njit(fastmath=True, forceinline=True, cache=False)
 def _one(w: Any, s: Any, b: Any, share: Any, x: Any, y: Any) -> None:
     """y (out,) of one character's x (in,): four sets of weights stream side by side, those that weigh nothing
     stay where they are."""
@@ -132,7 +132,7 @@ def _one(w: Any, s: Any, b: Any, share: Any, x: Any, y: Any) -> None:
         y[r] = total
 
 
-@njit(fastmath=True, forceinline=True)
+@njit(fastmath=True, forceinline=True, cache=False)
 def _crowd(w: Any, s: Any, b: Any, shares: Any, x: Any, y: Any) -> None:
     """y (C, out) of x (C, in): a row of each set of weights stays in the cache for all, four at a time."""
     sets, rows, columns = w.shape
@@ -160,7 +160,7 @@ def _crowd(w: Any, s: Any, b: Any, shares: Any, x: Any, y: Any) -> None:
             y[i, r], y[j, r], y[m, r], y[n, r] = y0, y1, y2, y3
 
 
-@njit(cache=True, fastmath=True)
+@njit(fastmath=True)
 def _run(weights: Any, scales: Any, biases: Any, x: Any, shares: Any, out: Any) -> None:
     count, h = x.shape[0], x
     for i in range(len(weights)):

@@ -3,7 +3,7 @@ what is told."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -100,18 +100,21 @@ def both_chart(found: Mapping[str, Any]) -> Chart | None:
     return Chart("speed-turn", "Speed and turn together", caption, [trace], layout, 300)
 
 
-def told_charts(found: Mapping[str, Any]) -> list[Chart]:
-    """Seconds at each value of each column, a chart for each channel that tells any clip something."""
-    return [_told_chart(name, seconds) for name, seconds in found["told"].items() if seconds]
+def told_charts(found: Mapping[str, Any], say: Callable[[str], str] = str) -> list[Chart]:
+    """Seconds at each value of each column, a chart for each channel that tells any clip something.
+
+    say: what a reader calls a column.
+    """
+    return [_told_chart(name, seconds, say) for name, seconds in found["told"].items() if seconds]
 
 
-def _told_chart(name: str, seconds: Mapping[str, Array]) -> Chart:
+def _told_chart(name: str, seconds: Mapping[str, Array], say: Callable[[str], str]) -> Chart:
     one, columns = channel(name), list(seconds)[::-1]
     tenth = one.highest / 10
     trace = {
         "type": "heatmap",
         "x": np.round(LEVELS * tenth, 6).tolist(),
-        "y": columns,
+        "y": [say(column) for column in columns],
         "z": [[round(float(v), 3) or None for v in seconds[column]] for column in columns],
         "colorscale": [[0, "@hurt-low"], [1, "@hurt-high"]],
         "xgap": 3,

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels.shown import speaker
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.formats import size
 from hobble.report.gather import Material
@@ -142,6 +143,7 @@ def strips(material: Material) -> list[dict[str, Any]]:
         highest = {"highest": report.get("highest", 10.0)}
         found = {label: (value, highest) for label, value in report["told"].items()}
         told.setdefault(report["clip"], {}).update(found)
+    say = speaker(material.network["skeleton"])
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
     known = {report["clip"] for report in material.labels}
     out = []
@@ -152,7 +154,7 @@ def strips(material: Material) -> list[dict[str, Any]]:
             continue
         length = lengths.get(clip) or strip["seconds"][-1]
         status = [
-            {"name": label, "spans": value.get("spells") or [[0, length, value["highest"]]], **highest}
+            {"name": say(label), "spans": value.get("spells") or [[0, length, value["highest"]]], **highest}
             for label, (value, highest) in told.get(clip, {}).items()
         ]
         out.append({**strip, "clip": clip, "length": length, "status": status})

@@ -7,6 +7,7 @@ from typing import Any
 
 import yaml
 
+from hobble.channels.shown import speaker
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import key
 from hobble.figure.pack import packed_body
@@ -106,7 +107,7 @@ def _sections(material: Material) -> dict[str, dict[str, Any]]:
             "speeds": data.speed_chart(material),
             "turns": coverage.turn_chart(found),
             "both": coverage.both_chart(found),
-            "told": coverage.told_charts(found),
+            "told": coverage.told_charts(found, speaker(material.network["skeleton"])),
             "clips": data.clip_table(material),
             "remarks": data.remarks_table(material),
         },

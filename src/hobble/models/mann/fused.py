@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from hobble.core.compiled import njit
 from hobble.models.kernels import bits, draw, rounded, team, widened
 from hobble.models.mann.step import Step
 from hobble.models.mann.trainable import TrainableMann
@@ -65,7 +66,7 @@ class FusedStep(Step):
         return self.buffers[key][:rows]
 
 
-@numba.njit(parallel=True, error_model="numpy", cache=True)
+@njit(parallel=True, error_model="numpy")
 def _prepare(x: Any, mask: Any, inputs: Any, slope: Any) -> None:
     """inputs (B, n + 1) and slope (B, n) of x (B, n)."""
     rows, width = x.shape
@@ -84,7 +85,7 @@ def _prepare(x: Any, mask: Any, inputs: Any, slope: Any) -> None:
             inputs[row, width] = one
 
 
-@numba.njit(parallel=True, error_model="numpy", cache=True)
+@njit(parallel=True, error_model="numpy")
 def _blend(outputs: Any, c: Any, h: Any) -> None:
     """h (B, out): the sum of outputs (B, K out) over the experts, times their shares c (B, K)."""
     rows, width = h.shape
@@ -102,7 +103,7 @@ def _blend(outputs: Any, c: Any, h: Any) -> None:
 
 
 # The sums may be taken in any order, and so several at a time.
-@numba.njit(parallel=True, error_model="numpy", cache=True, fastmath={"reassoc", "contract", "nsz"})
+@njit(parallel=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 def _spread(d: Any, outputs: Any, c: Any, da: Any, dc: Any) -> None:
     """da (B, K out) from d (B, out), and what it adds to dc (B, K)."""
     rows, width = d.shape

@@ -28,12 +28,12 @@ WINDOW, STEP = 60, 15  # frames: about a cycle
 AHEAD, LEAST = (
     0.9,
     0.5,
-)  # share of the speed that goes forward in a window that counts, and its least, cm a frame
+)  # share of the speed that goes forward in a window; its least, cm a frame
 WALKED_IN, SHOWN = 4 * FPS, 6 * FPS  # frames of a generated walk that are left out, and that are looked at
 PACES = (0.85, 1.0, 1.15)  # of the middle speed of the captured walks, asked of every mood alike
 VALUES = (0.5, 1.0)
-# cm a frame, at which people run: a Froude number of .5 with a leg of .9 m. The label of a walk that bounces, as a
-# happy one does, may say otherwise.
+# cm a frame, at which people run: a Froude number of .5 with a leg of .9 m. The label of a happy walk,
+# which bounces, may say otherwise.
 FASTEST = 3.5
 MIRROR = "_mirror"
 REASON = "this network is told no moods"
