@@ -184,7 +184,7 @@ def _window(
     effects = {
         "speed": values["speed"] / 100,
         "stride": values["step_left"] + values["step_right"],
-        "trunk": values["trunk_forward_mean"],
+        "trunk": -values["trunk_forward_mean"],  # that one is of the way down
         "arms": (values["upper_arm_left_sd"] + values["upper_arm_right_sd"]) / 2,
         "head": float(np.degrees(np.arctan2(up[2], up[1]))),
     }
