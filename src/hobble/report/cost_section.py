@@ -47,7 +47,7 @@ def stage_charts(material: Material) -> list[Chart]:
 def log_range(values: list[float]) -> list[float]:
     """Whole decades around the values that are above zero, with room to the right for the last one's text."""
     some = [math.log10(value) for value in values if value > 0] or [0.0, 1.0]
-    return [math.floor(min(some)), max(some) + 0.25 * (max(some) - math.floor(min(some)) + 1)]
+    return [math.floor(min(some)), max(some) + 0.4 * (max(some) - math.floor(min(some)) + 1)]
 
 
 def stage_table(material: Material) -> Table:

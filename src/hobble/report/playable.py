@@ -18,6 +18,7 @@ from hobble.rows.layout import RowLayout
 from hobble.runtime import animation, controller, feet, trajectory
 from hobble.runtime.bounds import Bounds
 from hobble.runtime.character import start
+from hobble.runtime.limits import LAME_BELOW
 from hobble.runtime.options import Runtime
 
 UNSEEN = 1e-7  # an input that is scaled by less than this says nothing
@@ -163,6 +164,7 @@ def _constants() -> dict[str, float]:
         "strafeFrom": float(trajectory.STRAFE_FROM),
         "turnInPlace": float(animation.TURN_IN_PLACE),
         "jogFrom": animation.JOG_FROM,
+        "lameBelow": LAME_BELOW,
         "lockAt": feet.LOCK_AT,
         "release": feet.RELEASE,
         "tooFar": feet.TOO_FAR,

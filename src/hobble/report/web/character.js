@@ -103,7 +103,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const hold = (velocity, gait) => {
     if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.told[first + l] > 0))) return velocity;
     const each = gaits.map((_, g) => allowed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");
-    if (each[jog] < k.jogFrom) {
+    if (each[jog] < k.lameBelow) {
       gait[walk] += gait[jog];
       gait[jog] = 0;
     }
