@@ -91,7 +91,7 @@ def test_a_network_file_keeps_its_limits(limited: Network, tmp_path) -> None:
         meta = {
             "layout": limited.layout.to_dict(),
             "skeleton": limited.skeleton.to_dict(),
-            "channels": {"injury": list(limited.links)},
+            "channels": {"injury": list(limited.channels["injury"])},
             "limits": limits,
         }
         np.savez(tmp_path / "weights.npz", **arrays, meta=np.array(json.dumps(meta)))

@@ -163,7 +163,7 @@ def test_weights_file_round_trip(tmp_path: Path, hurtable: Network, holden31) ->
     for path in (tmp_path, tmp_path / "weights.npz"):
         back = load_network(path)
         assert back.layout == hurtable.layout
-        assert back.links == hurtable.channels["injury"] == holden31.link_names
+        assert back.channels["injury"] == hurtable.channels["injury"] == holden31.link_names
         assert back.skeleton is not None
         assert back.skeleton.joints == holden31.joints
         assert back.sizes == hurtable.sizes
@@ -175,7 +175,7 @@ def test_a_file_without_meta_tells_its_layout(tmp_path: Path, hurtable: Network,
     np.savez(tmp_path / "weights.npz", **arrays(hurtable))
     back = load_network(tmp_path, holden31)
     assert back.layout == hurtable.layout
-    assert back.links == holden31.link_names
+    assert back.channels["injury"] == holden31.link_names
 
 
 def test_hurt_links_are_those_of_training(make_network) -> None:
