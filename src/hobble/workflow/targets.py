@@ -10,6 +10,7 @@ from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
 from hobble.synthetic.links import check_link
 from hobble.workflow.comparison import COMPARE
+from hobble.workflow.copies import refuse_copies
 from hobble.workflow.project import Project
 
 if TYPE_CHECKING:
@@ -35,6 +36,20 @@ def check(project: Project, targets: Iterable[str]) -> None:
             _asked(project, name, folder, file)
 
 
+def notes(project: Project, targets: Iterable[str]) -> list[str]:
+    """What a person should know of the folders of the data sets that the targets need, each once."""
+    names = []
+    for target in list(targets) or ["results/holden/report.html"]:
+        _, name, folder, *_ = (*Path(target).parts, "", "")
+        if name == "datasets":
+            names.append(folder)
+        elif name == COMPARE:
+            names += [project.catalogue.configuration(one).dataset for one in project.comparison.names()]
+        elif name and name != PAGE:
+            names.append(project.catalogue.configuration(name).dataset)
+    return [f"data set {name}: {note}" for name in dict.fromkeys(names) for note in project.clips.notes(name)]
+
+
 def _configuration(project: Project, name: str) -> None:
     model = project.catalogue.configuration(name)
     for other in filter(None, (model.network_of, model.training.continues)):
@@ -45,6 +60,7 @@ def _configuration(project: Project, name: str) -> None:
         _goes_on(name, model, project.catalogue.configuration(model.training.continues))
     _dataset(project, model.dataset)
     project.datasets.selected(model.dataset, model.channels)
+    refuse_copies(project.clips, project.datasets, model.dataset, tuple(model.channels))
 
 
 def _goes_on(name: str, model: Configuration, start: Configuration) -> None:
