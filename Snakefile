@@ -3,7 +3,7 @@ import os
 import sys
 from pathlib import Path
 
-from hobble.channels import NAMES, modules_of
+from hobble.channels import NAMES, modules_of, shown_modules
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import modules
 from hobble.workflow import lifetime

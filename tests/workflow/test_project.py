@@ -122,8 +122,8 @@ def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
 @pytest.mark.parametrize(
     ("target", "message"),
     [
-        ("results/one/stimuli", "configuration one is not told injury.*Ask for results/injured/stimuli"),
-        ("results/eyes/stimuli/", "configuration one is not told injury"),
+        ("results/one/stimuli", "configuration one is told nothing.*has `channels`"),
+        ("results/eyes/stimuli/", "configuration one is told nothing"),
         ("results/hurt/export/cubik.onnx", "export/cubik.onnx: there are constant, linear, cubic"),
     ],
 )

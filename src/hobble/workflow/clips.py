@@ -14,6 +14,7 @@ from hobble.config.models import ClipEntry
 from hobble.core.clip_files import NAMES, can_be_called, find_clips, orphan_notes, the_file
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular
+from hobble.hurt.options import TELLS
 from hobble.synthetic.links import WRITES
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 from hobble.workflow.told import Told
@@ -21,7 +22,6 @@ from hobble.workflow.told import Told
 DATASETS = "results/datasets"
 MIRROR = "_mirror"
 HURT = re.compile(r"_hurt([1-9])$")  # at the end of a hurt version's name
-HURTS = "injury"  # the channel that hurt versions are told
 MOST_NOTES = 10
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 
@@ -64,7 +64,7 @@ class Clips:
             )
         return {name: entry or ClipEntry() for name, entry in listed.items()}
 
-    versions_of = HURTS
+    versions_of = TELLS  # the channel that hurt versions are told
 
     @staticmethod
     def original(clip: str) -> str:
@@ -81,7 +81,7 @@ class Clips:
         """The hurt versions of the healthy clips by name, and which turn each has among them, from 0."""
         options = self.catalogue.dataset(dataset).hurt
         healthy = (
-            [clip for clip in self.own(dataset) if self.told.neutral(dataset, clip, HURTS)] if options else []
+            [clip for clip in self.own(dataset) if self.told.neutral(dataset, clip, TELLS)] if options else []
         )
         many = options.versions if options else 0
         names = [f"{clip}_hurt{version + 1}" for version in range(many) for clip in healthy]

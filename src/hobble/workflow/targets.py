@@ -16,7 +16,6 @@ from hobble.workflow.project import Project
 if TYPE_CHECKING:
     from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 
-HURTS = "injury"  # the channel that stimuli show
 PAGE = "page"  # under results/: what all reports share
 
 
@@ -139,11 +138,10 @@ def _mirrored(name: str, skeleton: SkeletonFile) -> None:
 def _asked(project: Project, name: str, folder: str, file: str) -> None:
     """What no network of this configuration could give, though it were trained."""
     owner = project.catalogue.configuration(name).network_of or name
-    if folder == "stimuli" and HURTS not in project.catalogue.configuration(owner).channels:
+    if folder == "stimuli" and not project.catalogue.configuration(owner).channels:
         raise HobbleError(
-            f"results/{name}/stimuli: the network of configuration {owner} is not told {HURTS}, so nothing "
-            "can hurt its character. Ask for results/injured/stimuli, or for those of a configuration of "
-            "your own with `extends: injured`."
+            f"results/{name}/stimuli: the network of configuration {owner} is told nothing, so that there is "
+            "one walk to show. Ask for those of a configuration that has `channels`."
         )
     stem, _, suffix = file.rpartition(".")
     if folder == "export" and suffix == "onnx" and stem not in get_args(PhaseMode):

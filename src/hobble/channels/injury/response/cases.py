@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from hobble.channels.injury.response.sweep import WALK_IN
+from hobble.channels.injury.walks import severities
 from hobble.core.quat import Array
-from hobble.evaluation.crowd import FPS, Stretch, Walks, run, severities
+from hobble.evaluation.crowd import FPS, Stretch, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import apart, mean_cycle
 from hobble.evaluation.spearman import spearman
