@@ -212,6 +212,8 @@ rule limp_picture:
         runtime=10,
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code("limp_picture", configurations.kind(w.configuration)),
+        code=lambda w: package.code(
+            "limp_picture", configurations.kind(w.configuration)
+        ),
     script:
         "../scripts/limp_picture.py"
