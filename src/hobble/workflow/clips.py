@@ -54,7 +54,7 @@ class Clips:
         if odd := [name for name in listed if name.endswith(MIRROR)]:
             raise HobbleError(
                 f"data set {dataset}: {', '.join(odd)}: only a mirror is called so, which `mirror: true` "
-                "makes from its original. Put the original beside it and list neither or the original alone, "
+                "that makes from its original. Put the original beside it and list neither or the original alone, "
                 "or rename its file."
             )
         if odd := [name for name in listed if HURT.search(name)]:
