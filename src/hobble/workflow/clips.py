@@ -54,8 +54,8 @@ class Clips:
         if odd := [name for name in listed if name.endswith(MIRROR)]:
             raise HobbleError(
                 f"data set {dataset}: {', '.join(odd)}: only a mirror is called so, which `mirror: true` "
-                "that makes from its original. Put the original beside it and list neither or the original alone, "
-                "or rename its file."
+                "makes from its original. Put the original beside it and leave the mirror off the list, or "
+                "rename its file."
             )
         if odd := [name for name in listed if HURT.search(name)]:
             raise HobbleError(
