@@ -1,34 +1,45 @@
-"""Microseconds of a prediction and of a whole frame, beside a plain numpy blend.
+"""Microseconds of a prediction and of a whole frame, beside floors that are measured in the same run.
 
     python benchmarks/runtime.py [weights.npz or folder] [skeleton.yaml]
 
 Without a file, a random network of the published size (342-512-512-311) is used: the times are the same.
-Weights are cold where it says so: 64 MB are read between two predictions, more than the caches hold.
+A prediction of one character stands beside the time it takes to read as many bytes. Cold: the predictions go
+through so many copies of the weights that no cache holds them, and the floor reads them likewise. A crowd
+stands beside onnxruntime with our own export on one thread, where it is installed; times are the processor's.
+
+To see what a processor without AVX-512 does: NUMBA_CPU_NAME=znver3 (onnxruntime still uses what there is).
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
+from typing import Any
 
 import numpy as np
 import yaml
+from numba import njit
 
+from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.models.load import load_network
 from hobble.models.network import STORAGES
-from hobble.models.pfnn.forward import weights_at
 from hobble.models.pfnn.network import Pfnn
 from hobble.models.pfnn.predictor import MODES, PfnnPredictor
+from hobble.models.tiles import MANY, SOME
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 
 SKELETON = Path(__file__).parents[1] / "config/skeletons/holden31.yaml"
 FRAMES = 1200
 PHASE_STEP = 0.017
+CACHES = 200_000_000  # bytes, more than caches hold
+CALLS = 200
 ORIGINAL = {"constant": 212, "linear": 329, "cubic": 497}  # its C++, microseconds, on this kind of machine
 
 
@@ -59,61 +70,94 @@ def random_network(skeleton: Skeleton, units: int = 512, hidden: int = 2) -> Pfn
     )
 
 
-def numpy_blend(network: Pfnn, x: np.ndarray, phase: float) -> np.ndarray:
-    """The plain way: blend every weight at the phase, then multiply."""
-    h = (x - network.x_mean) / network.x_std
-    last = len(network.weights) - 1
-    for i, (w, b) in enumerate(zip(network.weights, network.biases, strict=True)):
-        h = weights_at(w, phase)[0].astype(np.float32) @ h + weights_at(b, phase)[0].astype(np.float32)
-        if i < last:
-            h = np.where(h > 0, h, np.expm1(h))
-    return h * network.y_std + network.y_mean
+def timed(call: Callable[[int], object], count: int, clock: Callable[[], float] = perf_counter) -> Array:
+    """Microseconds of each of `count` calls call(k), the first tenth left out."""
+    times = np.zeros(count)
+    for k in range(count):
+        before = clock()
+        call(k)
+        times[k] = clock() - before
+    return 1e6 * times[count // 10 :]
 
 
-def timed(call, frames: int, cold: bool = False) -> np.ndarray:
-    """Microseconds of each of `frames` calls call(phase), the phase going on."""
-    junk = np.zeros(8 * 2**20)
-    times = np.zeros(frames)
-    for k in range(frames):
-        phase = (k * PHASE_STEP) % 1
-        if cold:
-            junk.sum()
-        before = perf_counter()
-        call(phase)
-        times[k] = perf_counter() - before
-    return 1e6 * times[frames // 10 :]
+@njit(fastmath=True)
+def read(values: Any) -> Any:
+    """The sum of all: each is read once, and nothing else is done."""
+    quarter = values.size // 4
+    a, b, c, d = values, values[quarter:], values[2 * quarter :], values[3 * quarter :]
+    total = 0
+    for i in range(quarter):
+        total += a[i] + b[i] + c[i] + d[i]
+    return total
 
 
-def show(name: str, times: np.ndarray, baseline: float, note: str = "") -> None:
-    median, p99 = np.median(times), np.percentile(times, 99)
-    print(f"{name:<34}{median:9.1f}{p99:9.1f}{baseline / median:9.1f}  {note}")
+def cpu() -> str:
+    """The kind of processor, and which of its registers are used."""
+    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return f"{(names or ['unknown processor'])[0]}, {'AVX-512' if SOME == MANY else 'no AVX-512'}"
 
 
-def predictions(network: Pfnn) -> float:
-    x = np.random.default_rng(2).normal(0, 20, (1, network.layout.x_size)).astype(np.float32)
-    blend = timed(lambda p: numpy_blend(network, x[0], p), 120)
-    baseline = float(np.median(blend))
-    print(f"{'prediction':<34}{'median':>9}{'p99':>9}{'ratio':>9}")
-    show("numpy, weights blended", blend, baseline)
-    z, out, phase = np.zeros_like(x), np.zeros((1, network.layout.y_size), np.float32), np.zeros(1)
+def predictions(network: Pfnn) -> None:
+    """One character: warm, and with weights that come from memory."""
+    print(f"\n{'prediction':<34}{'median':>9}{'p99':>9}{'floor':>9}{'over it':>9}")
+    rng = np.random.default_rng(2)
+    x = rng.normal(0, 20, (1, network.layout.x_size)).astype(np.float32)
+    z, out, phase = np.zeros_like(x), np.zeros((1, network.layout.y_size), np.float32), np.full(1, 0.3)
     for mode in MODES:
         for storage in STORAGES:
             predictor = PfnnPredictor(network, mode, storage)
             predictor.standardise(x, z)
-
-            def call(p: float, predictor: PfnnPredictor = predictor) -> None:
-                phase[0] = p
-                predictor.evaluate(z, phase, out)
-
-            call(0)
+            looked_up = {"constant": 1, "linear": 2, "cubic": 4}[mode]
+            size = network.parameters * np.dtype(storage).itemsize  # of one point
             for cold in (False, True):
-                name = f"{mode} {storage}{' cold' if cold else ''}"
-                show(name, timed(call, FRAMES, cold), baseline, f"(original {ORIGINAL[mode]})")
-    return baseline
+                copies = CACHES // (size * predictor.points) + 1 if cold else 1
+                many = [PfnnPredictor(network, mode, storage) for _ in range(copies)]
+                pool = np.ones((CACHES // (looked_up * size) if cold else 1, looked_up * size // 8), np.int64)
+                rows, times, floor = len(pool), [], []
+                for k in range(CALLS):
+                    phase[0] = rng.random() if cold else 0.3
+                    times.append(timed(lambda _, p=many[k % copies]: p.evaluate(z, phase, out), 1)[0])
+                    floor.append(timed(lambda _, p=pool[k % rows]: read(p), 1)[0])
+                least = float(np.median(floor[9:]))
+                median, p99 = np.median(times[9:]), np.percentile(times[9:], 99)
+                name = f"{mode} {storage}{' cold' if cold else ''} (original {ORIGINAL[mode]})"
+                print(f"{name:<34}{median:9.1f}{p99:9.1f}{least:9.1f}{median / least:9.2f}")
 
 
-def frames(network: Pfnn, baseline: float) -> None:
-    print(f"\n{'next_pose, a character':<34}{'median':>9}{'p99':>9}{'ratio':>9}")
+def crowds(network: Pfnn) -> None:
+    """Many characters, exact: microseconds of the processor, beside onnxruntime's of the same run."""
+    try:
+        import onnxruntime
+    except ImportError:
+        print("\nonnxruntime is not installed: no crowds beside it")
+        return
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "network.onnx"
+        network.export("onnx", path, "cubic")
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    predictor, rng = PfnnPredictor(network), np.random.default_rng(2)
+    print(
+        f"\n{'characters':<14}{'ours':>9}{'onnxruntime':>13}{'ratio':>7}{'GFLOP/s':>9}{'share of 1/60 s':>17}"
+    )
+    for count in (1, 2, 4, 10, 32, 100, 200):
+        x = (network.x_mean + network.x_std * rng.normal(size=(count, network.layout.x_size))).astype("f4")
+        phase = rng.random(count)
+        asked = {"x": x, "phase": phase.astype(np.float32)}
+        ours, theirs = [], []
+        for _ in range(max(15, 200 // count)):
+            ours.append(timed(lambda _, x=x, p=phase: predictor.predict(x, p), 1, process_time)[0])
+            theirs.append(timed(lambda _, asked=asked: session.run(None, asked), 1, process_time)[0])
+        a, b = np.median(ours), np.median(theirs)
+        speed = 2e-3 * network.parameters * network.control_points * count / a
+        print(f"{count:<14}{a:9.0f}{b:13.0f}{b / a:7.2f}{speed:9.1f}{a * 60e-6:17.2f}")
+
+
+def frames(network: Pfnn) -> None:
+    """Whole frames: microseconds for each character."""
+    print(f"\n{'next_pose, a character':<34}{'median':>9}{'p99':>9}{'a frame':>9}")
     for mode in MODES:
         for count in (1, 11, 200):
             character = ProceduralAnimation(network, mode=mode, characters=count)
@@ -122,15 +166,10 @@ def frames(network: Pfnn, baseline: float) -> None:
             velocity = 2.5 * np.stack([np.sin(angle), np.cos(angle)], axis=1)
             character.next_pose(velocity, gait="walk")
             run = max(60, FRAMES // count)
-            before = process_time()
-            times = timed(lambda p, c=character, v=velocity: c.next_pose(v, gait="walk"), run) / count
-            busy = 1000 * (process_time() - before) / run
-            note = f"{count} characters" + (
-                f": {np.median(times) * count / 1000:.1f} ms, {busy:.1f} ms of the processor"
-                if count > 1
-                else ""
-            )
-            show(mode, times, baseline, note)
+            each = timed(lambda _, c=character, v=velocity: c.next_pose(v, gait="walk"), run, process_time)
+            median, p99 = np.median(each), np.percentile(each, 99)
+            name = f"{mode}, {count} characters"
+            print(f"{name:<34}{median / count:9.1f}{p99 / count:9.1f}{median / 1000:9.2f} ms")
 
 
 def main() -> None:
@@ -142,9 +181,11 @@ def main() -> None:
     asked = parser.parse_args()
     skeleton = load_skeleton(asked.skeleton)
     network = load_network(asked.network, skeleton) if asked.network else random_network(skeleton)
-    print(f"{'-'.join(map(str, network.sizes))}, microseconds, one core; ratio: numpy's blend over this")
     network = replace(network, skeleton=network.skeleton or skeleton)
-    frames(network, predictions(network))
+    print(f"{'-'.join(map(str, network.sizes))}, microseconds, one core of {cpu()}")
+    predictions(network)
+    crowds(network)
+    frames(network)
 
 
 if __name__ == "__main__":

@@ -80,3 +80,45 @@ def test_a_cache_that_is_a_folder_of_folders_is_a_miss(tmp_path):
         path.mkdir()
     assert run(tmp_path, NUMBA_CACHE_DIR=cache).stdout == "8 12.0\n"
     shutil.rmtree(cache)
+
+
+def test_every_compiled_function_may_lose_its_cache():
+    """numba's own `njit(cache=True)` ends the program where nothing can be written."""
+    source = Path(__file__).resolve().parents[2] / "src"
+    own = [path for path in source.rglob("*.py") if path.name != "compiled.py"]
+    assert len(own) > 100
+    found = [
+        str(path) for path in own if "numba.njit" in (text := path.read_text()) or "numba import njit" in text
+    ]
+    assert found == []
+
+
+def test_the_runtime_starts_on_a_full_disk(tmp_path):
+    """The package on a disk of 1 MB that is full, and no home: one warning, and the figure moves."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if (
+        os.name != "posix"
+        or os.getuid()
+        or subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", "size=4m", "tmpfs", disk], capture_output=True
+        ).returncode
+    ):
+        pytest.skip("needs root to mount a small disk")
+    try:
+        source = Path(__file__).resolve().parents[2] / "src/hobble"
+        ignore = shutil.ignore_patterns("__pycache__", "*.j2", "web")
+        shutil.copytree(source, disk / "hobble", ignore=ignore)
+        with pytest.raises(OSError, match="No space"):
+            (disk / "filling").write_bytes(bytes(8 << 20))
+        script = "from hobble.runtime.ground import Heightmap; import numpy as np\n"
+        script += "print(Heightmap(np.ones((4, 4)))(np.zeros(2), np.zeros(2)))"
+        variables = {"PATH": os.environ["PATH"], "PYTHONPATH": str(disk), "HOME": str(disk / "home")}
+        result = subprocess.run(
+            [sys.executable, "-B", "-c", script], env=variables, capture_output=True, text=True, timeout=120
+        )
+    finally:
+        subprocess.run(["umount", disk], check=True)
+    assert result.stdout == "[1. 1.]\n", result.stderr
+    assert result.stderr.count("RuntimeWarning: compiled functions are not kept") == 1
+    assert "Traceback" not in result.stderr

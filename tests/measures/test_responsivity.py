@@ -48,6 +48,23 @@ def test_laps_that_are_finished(steady) -> None:
     assert result["track"] == {"waypoints": 3, "metres": 1.2}
 
 
+def test_what_was_asked_is_what_was_taken_unless_it_was_held_back() -> None:
+    rng = np.random.default_rng(3)
+    taken = rng.normal(size=(5, 4, 4))
+    taken /= np.linalg.norm(taken, axis=-1, keepdims=True)
+    asked = -taken  # the same rotations
+    assert module._held_back(asked, taken) == 0
+    asked[2, 1] = asked[2, 2]
+    assert module._held_back(asked, taken) == 1
+    assert module._held_back(asked[:0], taken[:0]) == 0
+
+
+def test_a_steady_figure_is_asked_for_what_is_drawn(steady) -> None:
+    result = run(steady, AHEAD, laps=1)
+    assert result["asked_turn_degrees"] == pytest.approx(result["laps"][0]["asked_turn_degrees"])
+    assert result["turns_held_back"] == 0
+
+
 def test_a_character_that_cannot_turn_is_ended_by_the_clock(steady) -> None:
     result = run(steady, ASIDE, seconds=8.0)
     for lap in result["laps"]:
@@ -98,6 +115,23 @@ def test_each_mode_runs_its_own_laps(network) -> None:
     )
     assert [entry["mode"] for entry in some["modes"]] == ["linear"]
     assert without_times(some["laps"]) == without_times(modes["linear"]["laps"])
+
+
+def test_modes_beside_the_own_run_fewer_laps(network) -> None:
+    result = responsivity(
+        network,
+        configuration="x",
+        runtime=RUNTIME,
+        laps=3,
+        laps_beside=1,
+        lap_seconds=2.0,
+        modes=("linear",),
+        track=AHEAD,
+    )
+    assert result["laps_beside"] == 1
+    assert {m["mode"]: len(m["laps"]) for m in result["modes"]} == {"linear": 1, "cubic": 3}
+    assert {m["mode"]: m["waypoints"] for m in result["modes"]} == {"linear": 2, "cubic": 6}
+    assert len(result["laps"]) == 3
 
 
 def test_times_of_steps_that_are_known() -> None:

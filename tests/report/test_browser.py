@@ -143,7 +143,7 @@ def test_choosers_change_their_pictures(tab: Any, material: Material) -> None:
     drawn = "document.querySelector('[data-chart=\"sweep-speed\"]').data[0].y[0]"
     assert tab.run(drawn) == pytest.approx(material.measured["injury"]["rows"][22]["speed"])
     choose(tab, "strip-clip", 6)
-    assert "eftUpLeg-LeftLeg" in text(tab, "strip")
+    assert "left thigh" in text(tab, "strip")
 
 
 def test_tables_sort_and_become_csv(tab: Any, material: Material) -> None:
@@ -205,6 +205,29 @@ def test_no_text_of_a_chart_is_cut_or_covered(tab: Any) -> None:
     tab.size(1280, 900)
     tab.run("Hobble.drawAll()")
     assert tab.until(f"{CUT}.length === 0"), tab.run(CUT)
+
+
+# What plotly draws inside a chart is its own; what stands around it is ours.
+AXE = """axe.run({ exclude: [[".main-svg"]] }, { resultTypes: ["violations"] }).then(({ violations }) =>
+  violations.flatMap(({ id, nodes }) => nodes.map(({ target }) => `${id}: ${target}`)))"""
+
+
+def test_axe_finds_nothing(tab: Any, modules: Path) -> None:
+    """In a wide and in a narrow window, in light and in dark."""
+    tab.run((modules / "axe-core" / "axe.min.js").read_text(encoding="utf-8") + "; 0")
+    for width, theme in ((1440, "light"), (390, "dark")):
+        tab.size(width, 900)
+        tab.run(f"document.documentElement.dataset.theme = '{theme}'")
+        assert tab.run(AXE) == []
+    tab.run("delete document.documentElement.dataset.theme")
+    tab.size(1280, 900)
+
+
+def test_the_costs_are_seen_whole(tab: Any) -> None:
+    tab.size(1440, 900)
+    table = "document.querySelector('#costs .table')"
+    assert tab.run(f"{table}.scrollWidth - {table}.clientWidth") <= 0
+    tab.size(1280, 900)
 
 
 def test_prints_every_chart_in_light(tab: Any) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from hobble.measures.responsivity.page import track_figures
 from hobble.report.findings import hints, key_figures
 from hobble.report.gather import Material
 
@@ -38,7 +39,7 @@ def history(losses: list[float]) -> dict[str, list[float | None]]:
 
 @pytest.mark.parametrize(
     ("held_out", "kind", "words"),
-    [(0.1, "warn", "2.5 times worse"), (0.041, "good", "about as well"), (0.052, "note", "1.30 times")],
+    [(0.1, "warn", "2.5 times worse"), (0.041, "good", "about as well"), (0.052, "fact", "1.30 times")],
 )
 def test_generalisation(material: Material, held_out: float, kind: str, words: str) -> None:
     found = heads(material, accuracy=accuracy(material, held_out))
@@ -114,9 +115,36 @@ def test_one_slow_frame_does_not_decide_the_time_of_a_frame(material: Material) 
     assert next(kind for head, kind in heads(slow).items() if head.startswith("A frame uses 0.1 %")) == "good"
 
 
-def test_most_pressing_first(material: Material) -> None:
-    kinds = [hint.kind for hint in hints(material)]
-    assert kinds == sorted(kinds, key=["warn", "note", "good"].index)
+def test_what_to_do_stands_first_and_data_before_what_is_learnt_from_it(material: Material) -> None:
+    falling = history([1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3])
+    found = hints(changed(material, history=falling))
+    kinds = [hint.kind for hint in found]
+    assert kinds == sorted(kinds, key=["warn", "note", "good", "fact"].index)
+    todo = [hint.head for hint in found if hint.kind == "note"]
+    look, train = (
+        next(i for i, head in enumerate(todo) if word in head) for word in ("Look", "still falling")
+    )
+    assert look < train
+    assert found[-1].head.endswith("of the time.")
+
+
+def test_a_turn_that_was_held_back_is_told(material: Material) -> None:
+    lap = material.measured["responsivity"]
+    asked = {**lap, "largest_turn_degrees": 25.0, "asked_turn_degrees": 170.0, "turns_held_back": 3}
+    assert heads(material, responsivity=asked)[
+        "The network asked a joint to turn by 170 degrees in one frame."
+    ]
+    figure = next(f for f in track_figures(asked) if "asked for" in f.label)
+    assert figure.value == "170"
+    assert "less than was asked in 3 of" in figure.beside
+    assert "drew 25.0° at most" in figure.beside
+
+
+def test_the_error_as_predicted_stands_beside_that_as_drawn(material: Material) -> None:
+    one = {"length": 1, "held_out": {"position_error_cm": 0.51}, "train": {"position_error_cm": 0.4}}
+    found = changed(material, rollouts={"lengths": [one]})
+    figure = next(f for f in key_figures(found) if f.label == "Error on held-out clips")
+    assert "cm a joint as predicted, 0.510 cm as drawn" in figure.beside
 
 
 def test_key_figures_stand_beside_the_published(material: Material) -> None:
@@ -132,3 +160,15 @@ def test_figures_of_almost_nothing(material: Material) -> None:
     )
     assert [f.label for f in key_figures(bare)] == ["Network"]
     assert [hint.head for hint in hints(bare)] == ["Nothing was held out."]
+
+
+def test_what_the_data_lack_comes_before_longer_training(material: Material) -> None:
+    """Nobody stands, and the error still falls: the clips are named first."""
+    labels = [{"clip": "a", "seconds": {"walk": 30.0}, "strip": {}}]
+    falling = history([0.5 * 0.9**k for k in range(20)])
+    found = list(heads(material, labels=labels, history=falling))
+    missing = next(k for k, head in enumerate(found) if head.startswith("Nobody stands in these clips"))
+    longer = next(k for k, head in enumerate(found) if "still falling" in head)
+    assert missing < longer
+    standing = [{"clip": "a", "seconds": {"walk": 30.0, "stand": 5.0}, "strip": {}}]
+    assert not any("Nobody stands" in head for head in heads(material, labels=standing, history=falling))

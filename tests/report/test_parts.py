@@ -43,4 +43,4 @@ def test_words_are_escaped_and_every_kind_is_drawn() -> None:
     assert '<p class="empty">&lt;b&gt;</p>' in text
     assert "<h2>&lt;S&gt;</h2>" in text
     assert text.count("<figure") == 2
-    assert 'class="plot tall" data-chart="b"' in text
+    assert 'class="plot tall" tabindex="0" data-chart="b"' in text

@@ -104,7 +104,7 @@ def test_strips_carry_what_hurts(material: Material) -> None:
     strips = {strip["clip"]: strip for strip in data_section.strips(material)}
     assert len(strips) == 8, "a mirror says the same again"
     (row,) = strips["hurt_left_knee"]["status"]
-    assert row["name"] == "LeftUpLeg-LeftLeg"
+    assert row["name"] == "left thigh"
     assert row["spans"][0][2] == 7.0
     assert strips["jog"]["status"] == []
 
@@ -122,6 +122,9 @@ def test_stages_beside_the_published(material: Material) -> None:
     }
     for name, theirs in known.items():
         table = cost_section.stage_table(replace(material, name=name))
+        if not theirs:
+            assert [c.label for c in table.columns if "published" in c.label] == []
+            continue
         assert {row[0]: row[-2:] for row in table.rows} == {
             stage["stage"]: theirs.get(stage["stage"], nothing) for stage in material.pipeline["stages"]
         }
@@ -170,7 +173,7 @@ def test_links_never_hurt_in_training_are_told_from_the_others(material: Materia
     parts = [part.content for part in injury_page.section(injury, material).parts]
     (curves,) = [content for content in parts if isinstance(content, Family)]
     overview, (_, into_a_jog) = [content.charts for content in parts if isinstance(content, Pair)]
-    never = {r["link"] for r in responses if not r["trained"]}
+    never = {"right shank", "lower back"}
     for chart in overview:
         hollow = [t for t in chart.traces if t["name"].endswith(", never hurt in training")]
         assert [set(t["y"]) for t in hollow] == [never, never]

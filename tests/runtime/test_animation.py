@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -498,3 +498,59 @@ def test_the_released_network_keeps_its_feet_on_hills(shared: Path, holden31) ->
     assert np.median(np.array(above)[standing]) < 1.5
     assert np.percentile(np.array(above)[standing], 95) < 5
     assert foot_slide(np.array(toes), np.array(contacts)).mean() < 2
+
+
+def same(a, b) -> bool:
+    """Whether two states are equal, bit for bit."""
+    return all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+
+
+@pytest.mark.parametrize(
+    ("wishes", "message"),
+    [
+        ({"target_velocity": (1e30, 0)}, "faster than a body"),
+        ({"target_velocity": (0, 31.0)}, "faster than a body"),
+        ({"target_velocity": (np.nan, 0)}, "not a finite"),
+        ({"gait": [0, 1e30, 0, 0, 0, 0]}, "from 0 to 1"),
+        ({"gait": [0, -0.1, 0, 0, 0, 0]}, "from 0 to 1"),
+        ({"terrain": lambda x, z: 1e30 + 0 * x}, "a height of 1e\\+30"),
+        ({"terrain": lambda x, z: x * np.nan}, "not finite"),
+        ({"terrain": lambda x, z: np.zeros(3)}, "heights of shape"),
+        ({"injury": {KNEE: 10.5}}, "from 0 to"),
+    ],
+)
+def test_what_no_body_can_do_is_refused_and_changes_nothing(hurtable, wishes: dict, message: str) -> None:
+    character = ProceduralAnimation(hurtable)
+    walk(character, 5, injury={KNEE: 3.0})
+    before = copy.deepcopy(character.state)
+    with pytest.raises(ValueError, match=message):
+        character.next_pose(**{"target_velocity": (0.5, 2.0), "injury": {KNEE: 9.0}, **wishes})
+    assert same(before, character.state)
+    assert np.isfinite(character.next_pose((0.5, 2.0)).positions).all()
+
+
+def test_a_start_beyond_the_world_is_refused(network) -> None:
+    with pytest.raises(ValueError, match="100 km"):
+        ProceduralAnimation(network, position=(1e30, 0))
+
+
+@pytest.mark.parametrize("call", range(2))
+def test_a_terrain_that_raises_leaves_the_state_as_it_was(hurtable, call: int) -> None:
+    """At the first question, about the path, or at the second, about the feet, after the prediction."""
+    calm, troubled = ProceduralAnimation(hurtable), ProceduralAnimation(hurtable)
+    calls = []
+
+    def fails(x, z):
+        calls.append(len(x))
+        if len(calls) == 21 + call:
+            raise RuntimeError("the level is not loaded")
+        return hills(x, z)
+
+    for character, ground in ((calm, hills), (troubled, fails)):
+        walk(character, 10, terrain=ground)
+    before = copy.deepcopy(troubled.state)
+    with pytest.raises(RuntimeError, match="level"):
+        troubled.next_pose((0.5, 2.0), terrain=fails, injury={KNEE: 8.0})
+    assert same(before, troubled.state)
+    a, b = (walk(c, 5, terrain=t)[-1] for c, t in ((calm, hills), (troubled, fails)))
+    np.testing.assert_array_equal(a.positions, b.positions)

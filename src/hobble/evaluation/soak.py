@@ -15,9 +15,9 @@ from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 
 FPS = 60
-GAITS = ("walk", "jog", "crouch", None)
+GAITS = ("walk", "jog", "crouch")
 FASTEST = 8.0  # cm a frame of a wish
-APART = 1e5  # centimetres between the places where characters start, each on ground of its own
+APART = 4e4  # centimetres between the places where characters start, each on ground of its own
 LIMITS = {"hips_lowest_cm": 60.0, "hips_highest_cm": 110.0, "added_turn_degrees": 30.0}
 
 
@@ -27,7 +27,7 @@ class Wishes:
 
     velocity: Array
     facing: Array
-    gait: list[str | None]
+    gait: list[str]
     told: dict[str, Array]
     left: np.ndarray
 
@@ -37,7 +37,7 @@ class Wishes:
         return cls(
             np.zeros((characters, 2)),
             np.zeros((characters, 2)),
-            [None] * characters,
+            [GAITS[0]] * characters,
             {name: np.zeros((characters, columns)) for name, columns in channels.items()},
             np.zeros(characters, int),
         )

@@ -9,6 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from hobble.core.compiled import njit
+
 WORTH_A_THREAD = 100_000  # numbers, some 20 microseconds of work
 ODD = np.uint64(0x9E3779B97F4A7C15)
 
@@ -24,7 +26,7 @@ def bits(array: Tensor) -> np.ndarray:
     return array.view(torch.uint16).numpy() if array.dtype == torch.bfloat16 else array.numpy()
 
 
-@numba.njit(cache=True, inline="always")
+@njit(inline="always")
 def rounded(value: Any) -> Any:
     """The bits of a float32 as bfloat16, rounded to even."""
     word = np.float32(value).view(np.uint32)
@@ -32,13 +34,13 @@ def rounded(value: Any) -> Any:
     return np.uint16(np.uint32(word + even + np.uint32(0x7FFF)) >> np.uint32(16))
 
 
-@numba.njit(cache=True, inline="always")
+@njit(inline="always")
 def widened(half: Any) -> Any:
     """The float32 whose bfloat16 bits these are."""
     return np.uint32(np.uint32(half) << np.uint32(16)).view(np.float32)
 
 
-@numba.njit(parallel=True, error_model="numpy", cache=True)
+@njit(parallel=True, error_model="numpy")
 def draw(mask: Any, counter: Any, keep: Any) -> Any:
     """Fill `mask` from a counter (splitmix64: Steele et al. 2014); returns the counter of the next one."""
     rows, width = mask.shape

@@ -17,6 +17,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.core.untrusted import read_yaml
 from hobble.models import DEFAULT, MODELS, checks, model
 from hobble.models.network import TERRAIN_SIDE, Network
+from hobble.models.seen import Seen
 from hobble.rows.layout import GAITS, RowLayout
 
 MOST_META = 1 << 22  # characters
@@ -71,7 +72,7 @@ def network_from_arrays(
         raise InputError(
             path, f"{layout.joints} joints, but skeleton {skeleton.name} has {len(skeleton.joints)}"
         )
-    common = {
+    common: dict[str, Any] = {
         **statistics,
         "layout": layout,
         "skeleton": skeleton,
@@ -79,6 +80,7 @@ def network_from_arrays(
         "channels": {name: _labels(path, name, meta, layout, skeleton) for name, _ in layout.channels},
         "terrain_side": checks.length(path, "terrain_side", meta.get("terrain_side", TERRAIN_SIDE), WIDEST),
         "meta": meta,
+        "seen": Seen.read(path, arrays, layout.x_size, layout.y_size),
     }
     common["limits"] = _limits(path, meta, common["channels"], len(common["gaits"]))
     network = model(kind).read(path, arrays, common)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hobble.core.skeleton import Skeleton
 from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
@@ -33,8 +34,11 @@ class Model(ABC):
         """How many numbers are trained, for rows of `inputs` and `outputs` columns."""
 
     @abstractmethod
-    def trainable(self, options: Any, layout: RowLayout, seed: int) -> Trainable:
-        """A network that has learnt nothing yet, on the CPU; the same seed gives the same one."""
+    def trainable(self, options: Any, layout: RowLayout, skeleton: Skeleton, seed: int) -> Trainable:
+        """A network that has learnt nothing yet, on the CPU; the same seed gives the same one.
+
+        layout: its columns, of the joints of `skeleton`.
+        """
 
     @abstractmethod
     def read(self, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Network:

@@ -15,6 +15,7 @@ from hobble.channels.limits import Limits
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.models.seen import Seen
 from hobble.rows.layout import GAITS, RowLayout
 
 TERRAIN_SIDE = 25.0  # centimetres from the path to the side heights, where a file does not tell
@@ -52,7 +53,7 @@ class Network(ABC):
     layout: the columns; gaits: the order of the gait blocks; skeleton: None where the file carries none.
     channels: name -> labels of its columns, of each channel that it is told. terrain_side: centimetres from
     the path to the heights at its sides. limits: channel -> how fast it lets the body go.
-    meta: what else the file says.
+    meta: what else the file says. seen: what training showed it, None where the file does not tell.
     """
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
@@ -70,6 +71,7 @@ class Network(ABC):
     terrain_side: float = TERRAIN_SIDE
     limits: Mapping[str, Limits] = field(default_factory=dict, repr=False)
     meta: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    seen: Seen | None = field(default=None, repr=False)
 
     def trained(self, channel: str) -> tuple[str, ...]:
         """Labels of a channel's columns that told something in training, as the means of their inputs say.

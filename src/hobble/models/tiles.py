@@ -12,10 +12,11 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils, config
 from numba.extending import intrinsic
 
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 
 WIDTH = 16  # outputs a panel: two registers with AVX2, one with AVX-512
@@ -141,7 +142,7 @@ FEW, SOME, MANY = (6, 4, 4) if _has_32_registers() else (4, 2, 1)
 ROWS = 6
 
 
-@njit(forceinline=True)
+@njit(forceinline=True, cache=False)
 def multiply(
     weights: Any, start: int, panels: int, inputs: int, x: Any, rows: int, y: Any, y_at: Any
 ) -> None:
@@ -174,7 +175,7 @@ def multiply(
             panel += together
 
 
-@njit(forceinline=True)
+@njit(forceinline=True, cache=False)
 def _chosen_tile(
     rows: int, panels: int, weights: Any, first: int, step: int, depth: int, x: Any, x_at: int, x_step: int,
     y: Any, at: Any,

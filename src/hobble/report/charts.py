@@ -44,7 +44,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class Family:
-    """Small charts that share a title, a caption and a chooser; their options have the same names."""
+    """Small charts that share a title, a caption and, where it has a name, a chooser of their options."""
 
     name: str
     title: str

@@ -47,7 +47,7 @@ def stage_charts(material: Material) -> list[Chart]:
 def log_range(values: list[float]) -> list[float]:
     """Whole decades around the values that are above zero, with room to the right for the last one's text."""
     some = [math.log10(value) for value in values if value > 0] or [0.0, 1.0]
-    return [math.floor(min(some)), max(some) + 0.25 * (max(some) - math.floor(min(some)) + 1)]
+    return [math.floor(min(some)), max(some) + 0.4 * (max(some) - math.floor(min(some)) + 1)]
 
 
 def stage_table(material: Material) -> Table:
@@ -57,14 +57,15 @@ def stage_table(material: Material) -> Table:
     columns = [
         Column("stage"),
         Column.count("jobs"),
-        Column("time, summed over jobs", lambda v: duration(float(v)), "n"),
+        Column("time of all jobs", lambda v: duration(float(v)), "n"),
         Column("longest job", lambda v: duration(float(v)), "n"),
         Column("peak memory", lambda v: f"{number(v)} MB", "n"),
         Column.count("files"),
         Column("size", lambda v: size(float(v)), "n"),
-        Column("published time", lambda v: duration(float(v)), "n"),
-        Column("published size", lambda v: size(float(v)), "n"),
     ]
+    if theirs:
+        columns.append(Column("published time", lambda v: duration(float(v)), "n"))
+        columns.append(Column("published size", lambda v: size(float(v)), "n"))
     rows = [
         [
             stage["stage"],
@@ -74,8 +75,7 @@ def stage_table(material: Material) -> Table:
             stage.get("max_rss_mb"),
             stage.get("files"),
             stage.get("bytes"),
-            theirs.get(stage["stage"], {}).get("seconds"),
-            theirs.get(stage["stage"], {}).get("bytes"),
+            *((theirs.get(stage["stage"], {}).get(key) for key in ("seconds", "bytes")) if theirs else ()),
         ]
         for stage in material.pipeline.get("stages") or ()
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -96,8 +96,8 @@ def both_chart(found: Mapping[str, Any]) -> Chart | None:
     return Chart("speed-turn", "Speed and turn together", caption, [trace], layout, 300)
 
 
-def severity_chart(found: Mapping[str, Any]) -> Chart | None:
-    """Seconds at each severity of each link."""
+def severity_chart(found: Mapping[str, Any], say: Callable[[str], str] = str) -> Chart | None:
+    """Seconds at each severity of each link; say: what a reader calls it."""
     hurt: Mapping[str, Array] = found["hurt"]
     if not hurt:
         return None
@@ -105,7 +105,7 @@ def severity_chart(found: Mapping[str, Any]) -> Chart | None:
     trace = {
         "type": "heatmap",
         "x": list(range(1, 11)),
-        "y": links,
+        "y": [say(link) for link in links],
         "z": [[round(float(v), 3) or None for v in hurt[link]] for link in links],
         "colorscale": [[0, "@hurt-low"], [1, "@hurt-high"]],
         "xgap": 3,

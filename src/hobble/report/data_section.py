@@ -10,6 +10,7 @@ from hobble.report.charts import Chart, Trace, axis
 from hobble.report.formats import size
 from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
+from hobble.report.words import speaker
 
 GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
 SPLIT_NAMES = {"train": "training", "held_out": "held out"}
@@ -140,6 +141,7 @@ def strips(material: Material) -> list[dict[str, Any]]:
     told: dict[str, dict[str, Any]] = {}
     for report in material.told:
         told.setdefault(report["clip"], {}).update(report["told"])
+    say = speaker(material.network["skeleton"])
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
     known = {report["clip"] for report in material.labels}
     out = []
@@ -150,7 +152,7 @@ def strips(material: Material) -> list[dict[str, Any]]:
             continue
         length = lengths.get(clip) or strip["seconds"][-1]
         status = [
-            {"name": label, "spans": value.get("spells") or [[0, length, value["highest"]]]}
+            {"name": say(label), "spans": value.get("spells") or [[0, length, value["highest"]]]}
             for label, value in told.get(clip, {}).items()
         ]
         out.append({**strip, "clip": clip, "length": length, "status": status})

@@ -12,6 +12,8 @@ from hobble.report.formats import duration, number, size
 from hobble.report.gather import Material
 from hobble.report.summary import Figure, Hint, placed
 
+ORDER = ("warn", "note", "good", "fact")
+
 
 def _recipe(material: Material) -> Mapping[str, Any]:
     """The training section of the configuration; empty where that is not known."""
@@ -63,16 +65,15 @@ def key_figures(material: Material) -> list[Figure]:
 
 
 def hints(material: Material) -> list[Hint]:
-    """What to do next, most pressing first."""
+    """What to do next in the order in which to do it, then what is well, then what asks for nothing."""
     found = [
         *measured.hints(material),
+        *placed(10, _coverage(material)),  # what the data lack no training makes good
+        *placed(11, _repairs(material)),
         *placed(20, _curve(material)),
-        *placed(40, _coverage(material)),
-        *placed(80, _repairs(material)),
         *placed(90, _costs(material)),
     ]
-    order = {"warn": 0, "note": 1, "good": 2}
-    return sorted(found, key=lambda hint: (order[hint.kind], hint.at))
+    return sorted(found, key=lambda hint: (ORDER.index(hint.kind), hint.at))
 
 
 def _curve(material: Material) -> Iterator[Hint]:
@@ -113,23 +114,30 @@ def _coverage(material: Material) -> Iterator[Hint]:
         for gait, seconds in (report.get("seconds") or {}).items():
             totals[gait] = totals.get(gait, 0.0) + seconds
     everything = sum(totals.values())
+    if everything and not totals.get("stand"):
+        yield Hint(
+            "warn",
+            "Nobody stands in these clips, so nobody starts or stops either.",
+            "More training will not teach it: where the character is to stand, it steps on the spot. Add "
+            "clips in which somebody stands, sets off and stops.",
+        )
     thin = [g for g, s in totals.items() if 0 < s < 0.03 * everything and g not in ("jump", "bump")]
     if thin:
         yield Hint(
             "note",
             f"There is little data of {' and '.join(sorted(thin))}:",
-            "under three per cent of the seconds. Expect those gaits to be the least steady.",
+            "under three per cent of the seconds, and those gaits will be the least steady. Add clips.",
         )
 
 
 def _repairs(material: Material) -> Iterator[Hint]:
-    repaired = [report["clip"] for report in material.motion if report.get("repairs")]
+    repaired = {report["clip"] for report in material.motion if report.get("repairs")}
     warned = {r["clip"] for r in (*material.labels, *material.told) if r.get("warnings")}
     if repaired or warned:
         yield Hint(
             "note",
-            f"Clips repaired: {len(repaired)}; clips with warnings: {len(warned)}.",
-            "They are listed under Data. Look at them before you trust those clips.",
+            f"Look at {len(repaired | warned)} clips: {len(repaired)} repaired, {len(warned)} with warnings.",
+            "They are listed under Data. What is wrong in a clip, the network learns.",
         )
 
 
@@ -140,4 +148,4 @@ def _costs(material: Material) -> Iterator[Hint]:
         slowest = max(stages, key=lambda stage: stage["seconds"])
         share = slowest["seconds"] / total
         if share > 0.5:
-            yield Hint("note", f"{slowest['stage'].capitalize()} took {100 * share:.0f} % of the time.", "")
+            yield Hint("fact", f"{slowest['stage'].capitalize()} took {100 * share:.0f} % of the time.", "")

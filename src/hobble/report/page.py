@@ -25,6 +25,7 @@ from hobble.report.ground_pictures import ground_pictures
 from hobble.report.hero import opening
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
+from hobble.report.words import speaker
 
 
 def render(
@@ -106,7 +107,7 @@ def _sections(material: Material) -> dict[str, dict[str, Any]]:
             "speeds": data.speed_chart(material),
             "turns": coverage.turn_chart(found),
             "both": coverage.both_chart(found),
-            "hurt": coverage.severity_chart(found),
+            "hurt": coverage.severity_chart(found, speaker(material.network["skeleton"])),
             "clips": data.clip_table(material),
             "remarks": data.remarks_table(material),
         },

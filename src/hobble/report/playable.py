@@ -16,6 +16,9 @@ from hobble.models.packing import packed
 from hobble.report.words import PARTS, spoken_links, way
 from hobble.rows.layout import RowLayout
 from hobble.runtime import animation, controller, feet, trajectory
+from hobble.runtime.bounds import Bounds
+from hobble.runtime.character import start
+from hobble.runtime.limits import LAME_BELOW
 from hobble.runtime.options import Runtime
 
 UNSEEN = 1e-7  # an input that is scaled by less than this says nothing
@@ -57,6 +60,8 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "joints": layout.joints,
         "names": list(skeleton.joints),
         "parents": list(skeleton.parents),
+        "bounds": _bounds(network, rows),
+        "start": _start(network),
         "offsets": np.round(skeleton.offsets, 4).tolist(),
         "roles": dict(skeleton.roles),
         "window": layout.window,
@@ -127,6 +132,22 @@ def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] =
     return found
 
 
+def _bounds(network: Network, rows: NDArray[np.int64]) -> dict[str, Any]:
+    """What keeps the character whole: `hobble.runtime.bounds`, of the outputs `rows`."""
+    found = Bounds.of(network)
+    low, high = found.y_low[rows], found.y_high[rows]
+    arrays = {"xLow": found.x_low, "xHigh": found.x_high, "yLow": low, "yHigh": high}
+    return {name: packed(a.astype(np.float32)) for name, a in arrays.items()} | {"fastest": found.fastest}
+
+
+def _start(network: Network) -> dict[str, Any]:
+    """The state in which a character begins, at the origin and facing ahead."""
+    state = start(network, 1, np.zeros((1, 2)), np.zeros(1))
+    names = ("position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation")
+    arrays = {name: packed(getattr(state, name)[0].astype(np.float32)) for name in names}
+    return {**arrays, "phase": float(state.phase[0])}
+
+
 def _constants() -> dict[str, float]:
     """The numbers of the Python runtime, so that they stand in one place."""
     return {
@@ -139,9 +160,10 @@ def _constants() -> dict[str, float]:
         "mostOwed": trajectory.MOST_OWED,
         "held": trajectory.HELD,
         "furthestTurn": float(trajectory.FURTHEST_TURN),
-        "strafeFrom": float(animation.STRAFE_FROM),
+        "strafeFrom": float(trajectory.STRAFE_FROM),
         "turnInPlace": float(animation.TURN_IN_PLACE),
         "jogFrom": animation.JOG_FROM,
+        "lameBelow": LAME_BELOW,
         "lockAt": feet.LOCK_AT,
         "release": feet.RELEASE,
         "tooFar": feet.TOO_FAR,

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.figure.mesh import Mesh
 
@@ -147,7 +147,7 @@ def _normals(corners: Array, faces: NDArray[np.int64]) -> Array:
     return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
 
 
-@numba.njit(cache=True)
+@njit
 def _shade(
     points: Array, colours: Array, faces: Any, picture: Array, depth: Array
 ) -> None:  # pragma: no cover
@@ -178,7 +178,7 @@ def _shade(
                         )
 
 
-@numba.njit(cache=True)
+@njit
 def _fill(points: Array, faces: Any, cover: Array) -> None:  # pragma: no cover
     """Set to 1 what triangles of corners (V, 3) in pixels cover, from whichever side."""
     height, width = cover.shape

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from hobble.report.charts import Chart, axis, line, log_axis
+import math
+from collections.abc import Sequence
+
+from hobble.report.charts import Chart, Family, axis, line, log_axis
+from hobble.report.formats import number
 from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
-
-BLOCK_COLOURS = ("@g1", "@g2", "@g3", "@g4", "@g5", "@g0")
 
 
 def passes_axis(material: Material) -> list[float]:
@@ -41,30 +43,43 @@ def learning_curve(material: Material) -> Chart:
     )
 
 
-def block_curves(material: Material) -> Chart | None:
-    """The held-out error of each block of Y."""
-    x, traces = passes_axis(material), []
-    for i, block in enumerate(material.blocks):
-        values = material.history[block]
-        if any(v is not None for v in values):
-            label = block.removeprefix("held_out_").removesuffix("_mse").replace("_", " ")
-            dash = "solid" if i < len(BLOCK_COLOURS) else "dash"
-            colour = BLOCK_COLOURS[i % len(BLOCK_COLOURS)]
-            traces.append(line(label, x, values, colour, width=1.6, dash=dash))
-    if not traces:
+def block_curves(material: Material) -> Family | None:
+    """The held-out error of each block of Y, a small chart for each on one scale, hardest first."""
+    x, history = passes_axis(material), material.history
+    whole = [v for v in history.get("held_out_mse", ()) if v is not None]
+    blocks = {
+        name.removeprefix("held_out_").removesuffix("_mse").replace("_", " "): history[name]
+        for name in material.blocks
+        if any(v is not None for v in history[name])
+    }
+    if not blocks:
         return None
-    return Chart(
+    last = {name: next(v for v in values[::-1] if v is not None) for name, values in blocks.items()}
+    every = [v for values in blocks.values() for v in values] + whole
+    charts = []
+    for i, name in enumerate(sorted(blocks, key=lambda name: last[name], reverse=True)):
+        traces = [line("all of it", x, history["held_out_mse"], "@muted", width=1.2)] if whole else []
+        traces.append(line(name, x, blocks[name], "@accent"))
+        layout = {
+            "xaxis": axis("pass", rangemode="tozero"),
+            "yaxis": log_axis("", every) | {"range": _log_span(every)},
+            "showlegend": False,
+        }
+        charts.append(Chart(f"block-{i}", f"{name}, {number(last[name])}", "", traces, layout, height=190))
+    return Family(
         "block-curves",
         "Held-out error by what is predicted",
-        "The same error for each part of the output: the parts that stay high are those the network finds "
-        "hardest. Click a name in the legend to hide its line, twice to see it alone.",
-        traces,
-        {
-            "xaxis": axis("pass", rangemode="tozero"),
-            "yaxis": log_axis("mean squared error", [v for t in traces for v in t["y"]]),
-        },
-        height=380,
+        "The same error for each part of the output, hardest first, with its last value; in grey that of the "
+        "whole output. All are drawn to one logarithmic scale.",
+        charts,
     )
+
+
+def _log_span(values: Sequence[float | None]) -> list[float]:
+    """The range of a logarithmic axis that holds the values, in powers of ten, with a little room."""
+    powers = [math.log10(v) for v in values if v is not None and v > 0] or [0.0]
+    room = 0.05 * (max(powers) - min(powers)) + 0.02
+    return [min(powers) - room, max(powers) + room]
 
 
 def history_table(material: Material) -> Table:

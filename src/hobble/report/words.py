@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from hobble.core.skeleton import Skeleton
 from hobble.figure.pack import link_ends
@@ -67,6 +68,18 @@ def spoken_links(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
         word = spoken(skeleton, link)
         out.append(word if word not in out or word == link else f"{word} ({link})")
     return out
+
+
+def speaker(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
+    """A function from a link's name to what a reader calls it; names of no link stay as they are.
+
+    skeleton: as a network's file holds it, empty where that is not known.
+    """
+    if not skeleton:
+        return str
+    figure = Skeleton.from_dict({"name": "", **skeleton})
+    words = dict(zip(figure.link_names, spoken_links(figure, figure.link_names), strict=True))
+    return lambda link: words.get(link, link)
 
 
 def _above(skeleton: Skeleton, joint: int) -> list[str]:

@@ -10,20 +10,24 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
+from hobble.core import quat
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.axes import Axes
-from hobble.runtime.character import Character, standing
+from hobble.runtime.character import Character, Kept, start
 from hobble.runtime.controller import Controller
 from hobble.runtime.ground import as_ground
 from hobble.runtime.limits import JOG_FROM, Holder
 from hobble.runtime.told import Told, UnknownName
-from hobble.runtime.trajectory import STILL
+from hobble.runtime.trajectory import STILL, wished
 from hobble.runtime.waypoints import Follower, Waypoint
 
+# What a body can do, with room: sprinters reach 21 cm a frame, and the highest mountain is 9 km high.
+FASTEST_WISH = 30.0  # cm a frame, 18 m/s
+FARTHEST = 1e7  # cm from the origin, 100 km: beyond it, places lose digits that a step needs
 TURN_IN_PLACE = np.radians(20)  # a standing figure steps around to face what is further aside than this
 
 
@@ -94,6 +98,7 @@ class ProceduralAnimation:
         }
         self._predictor = network.predictor(mode, storage)
         self._waypoints = list(waypoints) if waypoints is not None else None
+        self._contacts = network.layout.y_contacts
         self._gaits = {name: i for i, name in enumerate(network.gaits)}
         for waypoint in self._waypoints or ():
             self._known_gait(waypoint.gait)
@@ -136,20 +141,34 @@ class ProceduralAnimation:
             if position is None
             else self._level("position", position, self.axes.points_in)
         )
+        if np.abs(places).max() > FARTHEST:
+            raise ValueError(f"position is further than {FARTHEST / 1e5:g} km from the origin: {position}")
         if facing is None:
             yaws = np.full(count, yaw)
         else:
             ahead = self._level("facing", facing, self.axes.directions_in)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
-        self.state: Character = standing(self.network, count, np.array(places, float), yaws)
+        self.state: Character = start(self.network, count, np.array(places, float), yaws)
         self._controller = Controller(self._predictor, self.state, **self._of_controller)
         self._wish_gait = np.zeros((count, len(self._gaits)))
+        self._wish_strafe, self._wish_look = np.zeros(count), np.zeros((count, 2))
+        self._nowhere = np.zeros((count, 2))
         self._holder = Holder(self.network, self._told.columns, count)
 
     @property
     def seconds(self) -> Array:
         """(6,) seconds that the last frame spent in prepare, input, insert, predict, output, update."""
         return self._controller.seconds
+
+    @property
+    def predicted_rotations(self) -> Array:
+        """(C, J, 4) world rotations that the network predicted for the last frame, before any was held back.
+
+        In axes of our own: Y up, Z ahead.
+        """
+        made = self._controller
+        turns = made.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)
+        return quat.mul(quat.yaw(made.yaw)[:, None], quat.exp(turns.astype(float)))
 
     def next_pose(
         self,
@@ -171,36 +190,56 @@ class ProceduralAnimation:
         None for flat at zero, a function of two ground coordinates (arrays) to heights, a `ground.Heightmap`
         or a 2D array around the origin, all in your axes and unit; give the same object every frame. Raises
         UnknownName (a KeyError) for a label or gait that the network does not have, TypeError for a keyword
-        that is no channel, ValueError for a channel that the network is not told, for values out of range and
-        for what is not finite or of another shape.
+        that is no channel, ValueError for a channel that the network is not told, for values out of range (a
+        velocity above 18 m/s, a share of a gait above 1, ground above 100 km) and for what is not finite or
+        of another shape. Whatever is raised, in the terrain function too, the state is as it was.
         """
         velocity, ahead, gait = self._wish(target_velocity, facing, gait)
-        strafe, direction = self._facing(velocity, ahead)
+        strafe, direction = self._wish_strafe, self._wish_look
+        ahead = self._nowhere if ahead is None else ahead
+        wished(velocity, ahead, self.state.target_direction, strafe, direction)
         shares = self._gait(velocity, direction, gait)
         if terrain is not self._terrain[0]:
             self._terrain = (terrain, as_ground(terrain, self.axes))
-        for name, given in told.items():
-            if given is not None:
-                columns, values = self._told.values(name, given, self.characters)
+        targets = [
+            self._told.values(name, given, self.characters)
+            for name, given in told.items()
+            if given is not None
+        ]
+        before = None if self._terrain[1] is None else Kept(self.state)
+        try:
+            for columns, values in targets:
                 self.state.told_target[:, columns] = values
-        if self._limited:
-            self._holder.hold(self.state.told, velocity, shares)
-        self._controller.frame(velocity, direction, strafe, shares, self._terrain[1])
+            if self._limited:
+                self._holder.hold(self.state.told, velocity, shares)
+            self._controller.frame(velocity, direction, strafe, shares, self._terrain[1])
+        except BaseException:
+            if before is not None:  # without a ground of the caller's own nothing in a frame can fail
+                before.restore()
+            raise
         return self._pose()
 
     def _wish(self, velocity: Any, facing: Any, gait: Any) -> tuple[Array, Array | None, Any]:
         if velocity is not None:
             ahead = None if facing is None else self._level("facing", facing, self.axes.directions_in)
-            return self._level("target_velocity", velocity, self.axes.points_in), ahead, gait
+            wish = self._level("target_velocity", velocity, self.axes.points_in)
+            if (fastest := np.hypot(wish[:, 0], wish[:, 1]).max()) > FASTEST_WISH:
+                raise ValueError(
+                    f"target_velocity is {fastest:.4g} cm a frame, faster than a body can move: "
+                    f"{FASTEST_WISH:g} cm a frame at most ({FASTEST_WISH * 0.6:g} m/s at 60 frames a second)"
+                )
+            return wish, ahead, gait
         if self.follower is None:
             ahead = None if facing is None else self._level("facing", facing, self.axes.directions_in)
             return np.zeros((self.characters, 2)), ahead, gait
         middle = self.network.layout.window
         wish, heading = self.follower.lead(self.state.position[:, middle])
-        ahead = wish.copy()
-        for c, waypoint in enumerate(heading):
-            if waypoint.facing is not None:
-                ahead[c] = waypoint.facing
+        ahead = wish
+        if any(waypoint.facing is not None for waypoint in heading):
+            ahead = wish.copy()
+            for c, waypoint in enumerate(heading):
+                if waypoint.facing is not None:
+                    ahead[c] = waypoint.facing
         return wish, ahead, [w.gait for w in heading] if gait is None else gait
 
     def _level(self, what: str, vector: Any, convert: Any) -> Array:
@@ -225,30 +264,16 @@ class ProceduralAnimation:
             v = convert(v)
         return np.array(np.broadcast_to(v[..., ::2], (self.characters, 2)), order="C")
 
-    def _facing(self, velocity: Array, ahead: Array | None) -> tuple[Array, Array]:
-        """How much each figure strafes (C,) and where it wants to look (C, 2)."""
-        going = np.hypot(velocity[:, 0], velocity[:, 1]) >= STILL
-        if ahead is None:
-            return np.zeros(self.characters), np.where(going[:, None], velocity, self.state.target_direction)
-        angle = np.arctan2(velocity[:, 0], velocity[:, 1]) - np.arctan2(ahead[:, 0], ahead[:, 1])
-        aside = np.abs(np.mod(angle + np.pi, 2 * np.pi) - np.pi)
-        strafe = np.where(going, np.minimum(1.0, aside / STRAFE_FROM), 1.0)
-        nowhere = (ahead == 0).all(axis=1)
-        if nowhere.any():
-            _, where = self._facing(velocity, None)
-            strafe, ahead = np.where(nowhere, 0.0, strafe), np.where(nowhere[:, None], where, ahead)
-        return strafe, ahead
-
     def _gait(self, velocity: Array, direction: Array, gait: Any) -> Array:
         """Shares (C, 6) of each gait that the wish amounts to."""
         shares = self._wish_gait
         speed = np.hypot(velocity[:, 0], velocity[:, 1])
         given = np.asarray(gait)
         if given.dtype.kind in "biuf":
-            known = (given >= 0) & (given < np.inf)
+            known = (given >= 0) & (given <= 1)
             if given.shape not in (shares.shape, shares.shape[1:]) or not known.all():
                 raise ValueError(
-                    f"shares of gaits are {shares.shape[1:]} or {shares.shape} numbers of 0 or more, not "
+                    f"shares of gaits are {shares.shape[1:]} or {shares.shape} numbers from 0 to 1, not "
                     f"{given.tolist()}; their order: {', '.join(self._gaits)}"
                 )
             shares[:] = given
@@ -285,7 +310,7 @@ class ProceduralAnimation:
         if not self.axes.native:
             positions[:], root[:] = self.axes.points_out(positions), self.axes.points_out(root)
             rotations = self.axes.rotations_out(rotations)
-        contacts = np.clip(c.y[:, c.layout.y_contacts], 0, 1)
+        contacts = np.minimum(np.maximum(c.y[:, self._contacts], 0), 1)
         told = {name: state.told[:, columns].copy() for name, columns in self._told.columns.items()}
         if self.characters > 1:
             return Pose(positions, rotations, contacts, state.phase.copy(), root, c.yaw.copy(), told)
@@ -298,6 +323,3 @@ class ProceduralAnimation:
             float(c.yaw[0]),
             {name: values[0] for name, values in told.items()},
         )
-
-
-STRAFE_FROM = np.radians(45)  # from this angle between facing and going, strafing is full

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -44,36 +44,47 @@ class Character:
     foot_added: Array
 
 
-def standing(network: Network, characters: int, position: Array, yaw: Array) -> Character:
-    """C characters in the network's mean pose at ground positions (C, 2), facing `yaw` (C,) in radians."""
-    layout = network.layout
-    count, joints, length = characters, layout.joints, 2 * layout.window
+class Kept:
+    """What a character is now, to be put back where the frame that follows fails."""
+
+    def __init__(self, state: Character) -> None:
+        self._state = state
+        self._arrays = {field.name: getattr(state, field.name).copy() for field in fields(state)}
+
+    def restore(self) -> None:
+        """Write it back, into the arrays in which it was."""
+        for name, array in self._arrays.items():
+            getattr(self._state, name)[...] = array
+
+
+def start(network: Network, characters: int, position: Array, yaw: Array) -> Character:
+    """C characters at ground positions (C, 2), facing `yaw` (C,) in radians, healthy.
+
+    They are in a frame of the clips, one of a figure that stands where there was any, as the network's file
+    has it; in its mean pose where the file has none.
+    """
+    layout, seen = network.layout, network.seen
+    count = characters
     columns = sum(columns for _, columns in layout.channels)
-    mean = network.y_mean.astype(float)
+    now = network.y_mean.astype(float) if seen is None else seen.start_y.astype(float)
+    path, heading, gait = _past(network)
     sin, cos = np.sin(yaw)[:, None], np.cos(yaw)[:, None]
-    x, y, z = mean[layout.y_joint_position].reshape(joints, 3).T
-    turns = mean[layout.y_joint_rotation].reshape(joints, 3)
-    placed = np.stack(
-        [
-            x * cos + z * sin + position[:, :1],
-            np.broadcast_to(y, (count, joints)),
-            z * cos - x * sin + position[:, 1:],
-        ],
-        axis=-1,
-    )
-    gait = np.zeros((count, length, len(network.gaits)))
-    gait[..., network.gaits.index("stand")] = 1.0
+    joints = now[layout.y_joint_position].reshape(-1, 3)
+    placed = _turned(joints, sin, cos)
+    placed[..., ::2] += position[:, None]
+    moving = np.zeros_like(joints) if seen is None else now[layout.y_joint_velocity].reshape(-1, 3)
+    turns = now[layout.y_joint_rotation].reshape(-1, 3)
     facing = np.concatenate([sin, cos], axis=1)
     return Character(
-        position=np.repeat(position[:, None], length, axis=1).astype(float),
-        direction=np.repeat(facing[:, None], length, axis=1),
-        gait=gait,
+        position=_turned(path, sin, cos) + position[:, None],
+        direction=_turned(heading, sin, cos),
+        gait=np.repeat(gait[None], count, axis=0),
         ground=np.zeros((count, layout.samples, 3)),
         root_height=np.zeros(count),
         joint_position=np.ascontiguousarray(placed),
-        joint_velocity=np.zeros((count, joints, 3)),
+        joint_velocity=np.ascontiguousarray(_turned(moving, sin, cos)),
         joint_rotation=quat.mul(quat.yaw(yaw)[:, None], quat.exp(turns)),
-        phase=np.zeros(count),
+        phase=np.full(count, 0.0 if seen is None else seen.start_phase),
         told=np.zeros((count, columns)),
         told_target=np.zeros((count, columns)),
         target_velocity=np.zeros((count, 2)),
@@ -85,3 +96,33 @@ def standing(network: Network, characters: int, position: Array, yaw: Array) -> 
         foot_lift=np.zeros((count, 2)),
         foot_added=np.tile([1.0, 0.0, 0.0, 0.0], (count, 2, 2, 1)),
     )
+
+
+def _past(network: Network) -> tuple[Array, Array, Array]:
+    """Path (T, 2), facing (T, 2) and gait (T, 6) of the start, from its root; still where none is known."""
+    layout, seen = network.layout, network.seen
+    length = 2 * layout.window
+    if seen is None:
+        gait = np.zeros((length, len(network.gaits)))
+        gait[:, network.gaits.index("stand")] = 1.0
+        return np.zeros((length, 2)), np.tile([0.0, 1.0], (length, 1)), gait
+    frames, samples = np.arange(-layout.window, layout.window), np.array(layout.offsets)
+
+    def through(block: slice) -> Array:
+        rows = seen.start_x[block].astype(float).reshape(-1, layout.samples)
+        return np.stack([np.interp(frames, samples, row) for row in rows], axis=1)
+
+    facing = through(layout.x_direction)
+    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-6)
+    return through(layout.x_position), facing, through(layout.x_gait)
+
+
+def _turned(vectors: Array, sin: Array, cos: Array) -> Array:
+    """Vectors (N, 2 or 3) turned about Y by C angles whose sine and cosine are (C, 1): (C, N, 2 or 3)."""
+    x, z = vectors[:, 0], vectors[:, -1]
+    parts = [
+        x * cos + z * sin,
+        *(np.broadcast_to(v, (len(sin), len(x))) for v in vectors.T[1:-1]),
+        z * cos - x * sin,
+    ]
+    return np.stack(parts, axis=-1)

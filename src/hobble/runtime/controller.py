@@ -12,24 +12,28 @@ frame;
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from hobble.character import rule
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import Predictor
 from hobble.rows.layout import BODY
 from hobble.runtime import feet, trajectory
-from hobble.runtime.character import Character
+from hobble.runtime.bounds import Bounds, keep_within, unsound
+from hobble.runtime.character import Character, start
 
 met = register_jitable(rule.met)
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
+HIGHEST = 1e7  # cm that ground may be above or below 0, 100 km: beyond it, heights lose digits
 # Radians a frame (1500 degrees a second). No joint of a person who walks or runs turns as fast, but a
 # prediction between rotations half a turn apart, such as hands have, may point anywhere, and a new wish
 # changes the next pose at once.
@@ -65,8 +69,11 @@ class Controller:
         self.x = np.zeros((count, layout.x_size), np.float32)
         self.z = np.zeros_like(self.x)
         self.y = np.zeros((count, layout.y_size), np.float32)
-        self.root = np.zeros((count, 3))
-        self.yaw = np.zeros(count)
+        here, ahead = character.position[:, layout.window], character.direction[:, layout.window]
+        self.root = np.stack([here[:, 0], np.zeros(count), here[:, 1]], axis=1)
+        self.yaw = np.arctan2(ahead[:, 0], ahead[:, 1])
+        self.bounds = Bounds.of(network)
+        self._wild = np.zeros(count, bool)
         self.pose_position = character.joint_position.copy()
         self.pose_rotation = character.joint_rotation.copy()
         self._points = np.zeros((count, layout.samples, 3, 2))
@@ -83,6 +90,7 @@ class Controller:
         self._carried = feet.carried(network.skeleton, self._legs)
         self._sole = feet.sole_heights(network, self._legs)
         self._foot_ground = np.zeros((count, 4))
+        self._warned = False
 
     def frame(
         self,
@@ -95,19 +103,51 @@ class Controller:
         """Run one frame; wishes as of `trajectory.follow_wish`; ground gives heights (N,) at x, z (N,)."""
         clock = perf_counter
         t0 = clock()
+        c = self.character
+        if unsound(
+            c.position, c.direction, c.gait, c.joint_position, c.joint_velocity, c.joint_rotation, c.told,
+            c.target_velocity, c.target_direction, c.owed, c.foot_hold, c.foot_lift, c.foot_added, c.phase,
+            self._wild,
+        ):  # fmt: skip
+            self._restore("the state")
         self._prepare(wish_velocity, wish_direction, wish_strafe, wish_gait, ground)
         t1 = clock()
         self._input()
+        keep_within(self.x, self.bounds.x_low, self.bounds.x_high, self._wild)
         t2 = clock()
         self.predictor.standardise(self.x, self.z)
         t3 = clock()
-        self.predictor.evaluate(self.z, self.character.phase, self.y)
+        self.predictor.evaluate(self.z, c.phase, self.y)
+        if keep_within(self.y, self.bounds.y_low, self.bounds.y_high, self._wild):
+            self._warn("the network's answer")
         t4 = clock()
         self._output(ground)
         t5 = clock()
         self._update(wish_velocity)
         t6 = clock()
         self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
+
+    def _restore(self, what: str) -> None:
+        """Start the characters of `_wild` anew where they were; what they are told stays."""
+        self._warn(what)
+        some = np.flatnonzero(self._wild)
+        fresh = start(self.predictor.network, len(some), self.root[some][:, ::2], self.yaw[some])
+        for part in fields(fresh):
+            if part.name != "told_target":
+                getattr(self.character, part.name)[some] = getattr(fresh, part.name)
+        lifted = self.root[some, 1]
+        self.character.joint_position[some, :, 1] += lifted[:, None]
+        self.character.root_height[some] = lifted
+
+    def _warn(self, what: str) -> None:
+        if not self._warned:
+            warnings.warn(
+                f"{what} was not finite for {int(self._wild.sum())} characters; they go on from a pose of "
+                "the clips, where they were",
+                RuntimeWarning,
+                stacklevel=4,
+            )
+        self._warned = True
 
     def _prepare(
         self, velocity: Array, direction: Array, strafe: Array, gait: Array, ground: Ground | None
@@ -119,11 +159,11 @@ class Controller:
             self.layout.step, self.side, self._points,
         )  # fmt: skip
         if ground is None:
-            c.ground[:] = 0.0
+            c.ground.fill(0.0)
         else:
             level = self._points.reshape(-1, 2)
             c.ground[:] = _heights(ground, level[:, 0], level[:, 1]).reshape(c.ground.shape)
-        c.root_height[:] = c.ground[:, :, 1].mean(axis=1)
+        trajectory.stand_on(c.ground, c.root_height)
 
     def _input(self) -> None:
         c = self.character
@@ -136,7 +176,8 @@ class Controller:
         c = self.character
         _take_output(
             self.y, self._y_joints, c.position, c.direction, c.root_height, c.joint_position,
-            c.joint_velocity, c.joint_rotation, self.root, self.yaw, self.pose_position, self.pose_rotation,
+            c.joint_velocity, c.joint_rotation, self.bounds.fastest, self.root, self.yaw,
+            self.pose_position, self.pose_rotation,
         )  # fmt: skip
         if ground is not None:
             points = self.pose_position[:, self._legs[:, 2:].reshape(-1)]
@@ -164,10 +205,12 @@ def _heights(ground: Ground, x: Array, z: Array) -> Array:
         raise ValueError(f"the terrain gave heights of shape {heights.shape} for {x.size} places")
     if not np.isfinite(heights).all():
         raise ValueError("the terrain has heights that are not finite")
+    if np.abs(heights).max() > HIGHEST:
+        raise ValueError(f"the terrain has a height of {np.abs(heights).max():.4g} cm; {HIGHEST:g} at most")
     return np.broadcast_to(heights, x.shape)
 
 
-@njit(cache=True)
+@njit
 def _fill_input(
     position: Any, direction: Any, gait: Any, ground: Any, height: Any, joints: Any, velocities: Any,
     told: Any, at: Any, told_at: Any, step: int, x: Any,
@@ -205,17 +248,19 @@ def _fill_input(
             x[c, told_at[k]] = told[c, k]
 
 
-@njit(cache=True)
+@njit
 def _take_output(
     y: Any, at: Any, position: Any, direction: Any, height: Any, joints: Any, velocities: Any, rotations: Any,
-    root: Any, yaw: Any, pose_position: Any, pose_rotation: Any,
+    fastest: float, root: Any, yaw: Any, pose_position: Any, pose_rotation: Any,
 ) -> None:  # fmt: skip
     """Bring predicted joints into the world; positions meet halfway with where their velocity carries
-    them, and no rotation goes further from that of the frame before than FASTEST_TURN."""
+    them. No joint moves further than `fastest`, up and down not counting what the ground does, and no
+    rotation goes further from that of the frame before than FASTEST_TURN."""
     slowest = np.cos(FASTEST_TURN / 2)
     middle, count = position.shape[1] // 2, joints.shape[1]
     for c in range(y.shape[0]):
         sin, cos = direction[c, middle, 0], direction[c, middle, 1]
+        climbed = height[c] - root[c, 1]
         root[c, 0], root[c, 1], root[c, 2] = position[c, middle, 0], height[c], position[c, middle, 1]
         yaw[c] = np.arctan2(sin, cos)
         half_cos, half_sin = np.cos(yaw[c] / 2), np.sin(yaw[c] / 2)
@@ -227,9 +272,19 @@ def _take_output(
             velocities[c, j, 2] = y[c, v + 2] * cos - y[c, v] * sin
             new_x = y[c, p] * cos + y[c, p + 2] * sin + root[c, 0]
             new_z = y[c, p + 2] * cos - y[c, p] * sin + root[c, 2]
-            joints[c, j, 0] = met(joints[c, j, 0] + velocities[c, j, 0], new_x)
-            joints[c, j, 1] = met(joints[c, j, 1] + velocities[c, j, 1], y[c, p + 1] + root[c, 1])
-            joints[c, j, 2] = met(joints[c, j, 2] + velocities[c, j, 2], new_z)
+            sx = met(joints[c, j, 0] + velocities[c, j, 0], new_x) - joints[c, j, 0]
+            sy = met(joints[c, j, 1] + velocities[c, j, 1], y[c, p + 1] + root[c, 1]) - joints[c, j, 1]
+            sz = met(joints[c, j, 2] + velocities[c, j, 2], new_z) - joints[c, j, 2]
+            step = np.sqrt(sx * sx + (sy - climbed) ** 2 + sz * sz)
+            if step > fastest:
+                sx, sy, sz = (
+                    sx * fastest / step,
+                    climbed + (sy - climbed) * fastest / step,
+                    sz * fastest / step,
+                )
+            joints[c, j, 0] += sx
+            joints[c, j, 1] += sy
+            joints[c, j, 2] += sz
             rx, ry, rz = y[c, r], y[c, r + 1], y[c, r + 2]
             half = np.sqrt(rx * rx + ry * ry + rz * rz)
             scale = np.sin(half) / half if half > 1e-8 else 1.0

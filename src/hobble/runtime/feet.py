@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from hobble.core.compiled import njit
 from hobble.core.skeleton import Skeleton
 from hobble.models.network import Network
 
@@ -42,7 +42,7 @@ def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
 # Vectors are written out by component below: compiling array expressions takes seconds, and calls allocate.
 
 
-@njit(cache=True)
+@njit
 def between(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
     """The least rotation (w, x, y, z) that takes direction a to b; none where they are opposite."""
     w = np.sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)) + ax * bx + ay * by + az * bz
@@ -53,7 +53,7 @@ def between(ax: float, ay: float, az: float, bx: float, by: float, bz: float) ->
     return w / norm, x / norm, y / norm, z / norm
 
 
-@njit(cache=True)
+@njit
 def approach(held: Any, w: float, x: float, y: float, z: float) -> bool:
     """Turn `held` (4,) in place to the rotation (w, x, y, z), by MOST_ADDED at most; whether it is late."""
     dot = held[0] * w + held[1] * x + held[2] * y + held[3] * z
@@ -70,7 +70,7 @@ def approach(held: Any, w: float, x: float, y: float, z: float) -> bool:
     return True
 
 
-@njit(cache=True)
+@njit
 def turned(by: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
     """The vector turned by the rotation `by` (4,)."""
     w, a, b, c = by[0], by[1], by[2], by[3]
@@ -78,7 +78,7 @@ def turned(by: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
     return x + w * p + b * r - c * q, y + w * q + c * p - a * r, z + w * r + a * q - b * p
 
 
-@njit(cache=True)
+@njit
 def turn(by: Any, rotation: Any) -> None:
     """Turn the rotation (4,) in place by the rotation `by` (4,)."""
     w, x, y, z = by[0], by[1], by[2], by[3]
@@ -89,7 +89,7 @@ def turn(by: Any, rotation: Any) -> None:
     rotation[3] = w * d + x * c - y * b + z * a
 
 
-@njit(cache=True)
+@njit
 def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, sz: float) -> None:
     """Move the heel of a pose, positions (J, 3), by (sx, sy, sz), bending the knee.
 
@@ -127,7 +127,7 @@ def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, s
     position[heel, 2] = hz + wz * distance
 
 
-@njit(cache=True)
+@njit
 def bend(position: Any, rotation: Any, hip: int, knee: int, heel: int, shift: Any, added: Any) -> None:
     """`reach` by `shift` (3,); thigh and shank turn no further than MOST_ADDED beyond the network's own turn.
 
@@ -155,7 +155,7 @@ def bend(position: Any, rotation: Any, hip: int, knee: int, heel: int, shift: An
     turn(added[1], rotation[knee])
 
 
-@njit(cache=True)
+@njit
 def place_feet(
     y: Any, first: int, ground: Any, locking: bool, legs: Any, below: Any, sole: Any,
     lock: Any, hold: Any, lift: Any, added: Any, position: Any, rotation: Any,

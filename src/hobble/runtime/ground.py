@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.runtime.axes import Axes
 
@@ -69,7 +69,7 @@ def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | Non
     return converted
 
 
-@njit(cache=True)
+@njit
 def _bilinear(heights: Any, cell: float, centre_x: float, centre_z: float, x: Any, z: Any) -> Any:
     rows, columns = heights.shape
     out = np.empty(x.size)

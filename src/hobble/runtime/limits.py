@@ -10,6 +10,7 @@ from hobble.core.quat import Array
 from hobble.models.network import Network
 
 JOG_FROM = 5.0  # cm a frame: between walking at 2.5 and jogging at 7.5
+LAME_BELOW = 4.5  # cm a frame: who cannot jog as fast as that walks
 
 
 class Holder:
@@ -27,7 +28,7 @@ class Holder:
     def hold(self, told: Array, velocity: Array, shares: Array) -> None:
         """Shorten velocities (C, 2) to what bodies that are told (C, K) can do in gaits of shares (C, G).
 
-        Both are changed in place. Who cannot run any more walks: a jog slower than JOG_FROM is none.
+        Both are changed in place. Who cannot run any more walks: a jog slower than LAME_BELOW is none.
         """
         if not self._tables:
             return
@@ -38,7 +39,7 @@ class Holder:
         if not np.isfinite(self._allowed).any():
             return
         walk, jog = self._gaits["walk"], self._gaits["jog"]
-        lame = self._allowed[:, jog] < JOG_FROM
+        lame = self._allowed[:, jog] < LAME_BELOW
         shares[lame, walk] += shares[lame, jog]
         shares[lame, jog] = 0.0
         going = shares.copy()

@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from hobble.character import rule
+from hobble.core.compiled import njit
 from hobble.rows.layout import RowLayout
 
 phase_change, moving_share = register_jitable(rule.phase_change), register_jitable(rule.moving)
@@ -26,16 +26,37 @@ OWED_WITHIN = 0.8  # share of the wish; who lacks more is still on the way to it
 MOST_OWED = 1.0  # share of the wish
 FURTHEST_TURN = np.radians(137)
 HELD = 0.5  # share of a movement that nobody asked for; all of it would drag the feet along
+STRAFE_FROM = np.radians(45)  # from this angle between facing and going, strafing is full
 STILL = 0.1  # cm a frame: a slower wish is a wish to stand
 
 
-@njit(cache=True)
+@njit
 def wrap(angle: float) -> float:
     """The same angle within -pi..pi."""
     return angle - 2 * np.pi * np.floor((angle + np.pi) / (2 * np.pi))
 
 
-@njit(cache=True)
+@njit
+def wished(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: Any) -> None:
+    """How much each figure strafes, into `strafe` (C,), and where it wants to look, into `look` (C, 2).
+
+    velocity (C, 2): where it is to go; ahead (C, 2): where it is to look, or zero to look where it goes, and
+    where it stands as before, in `direction` (C, 2).
+    """
+    for c in range(velocity.shape[0]):
+        x, z = velocity[c, 0], velocity[c, 1]
+        going = np.sqrt(x * x + z * z) >= STILL
+        if ahead[c, 0] == 0.0 and ahead[c, 1] == 0.0:
+            strafe[c] = 0.0
+            look[c, 0] = x if going else direction[c, 0]
+            look[c, 1] = z if going else direction[c, 1]
+        else:
+            aside = abs(wrap(np.arctan2(x, z) - np.arctan2(ahead[c, 0], ahead[c, 1])))
+            strafe[c] = min(1.0, aside / STRAFE_FROM) if going else 1.0
+            look[c, 0], look[c, 1] = ahead[c, 0], ahead[c, 1]
+
+
+@njit
 def follow_wish(
     wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
     velocity: Any, direction: Any, strafe: Any, gait: Any, position: Any, heading: Any, owed: Any,
@@ -65,7 +86,7 @@ def follow_wish(
             gait[c, middle, k] += GAIT_MIX * (wish_gait[c, k] - gait[c, middle, k])
 
 
-@njit(cache=True)
+@njit
 def _ask(steering: float, x: float, z: float, position: Any, owed: Any) -> tuple[float, float]:
     """The velocity to ask for so that (x, z) comes of it.
 
@@ -96,7 +117,7 @@ def _ask(steering: float, x: float, z: float, position: Any, owed: Any) -> tuple
     return x + more_x * min(1.0, limit), z + more_z * min(1.0, limit)
 
 
-@njit(cache=True)
+@njit
 def _ask_turn(gain: float, turn: float) -> float:
     """Radians to ask for beyond a `turn` that is still to be made: `gain` times it, and never as far round
     as to be nearer the other way."""
@@ -104,7 +125,7 @@ def _ask_turn(gain: float, turn: float) -> float:
     return min(max(gain * turn, -room), room)
 
 
-@njit(cache=True)
+@njit
 def blend_future(velocity: Any, target: Any, strafe: Any, position: Any, direction: Any, gait: Any) -> None:
     """Bend the predicted future toward the wished velocity and facing, more the further ahead.
 
@@ -133,7 +154,7 @@ def blend_future(velocity: Any, target: Any, strafe: Any, position: Any, directi
                 gait[c, i, k] = gait[c, middle, k]
 
 
-@njit(cache=True)
+@njit
 def sample_points(position: Any, direction: Any, step: int, side: float, points: Any) -> None:
     """Where the ground is looked up: points (C, samples, 3, 2) to the left, on the path and to the right."""
     for c in range(points.shape[0]):
@@ -145,7 +166,17 @@ def sample_points(position: Any, direction: Any, step: int, side: float, points:
             points[c, s, 2, 0], points[c, s, 2, 1] = x - side * dz, z + side * dx
 
 
-@njit(cache=True)
+@njit
+def stand_on(ground: Any, height: Any) -> None:
+    """height (C,): the mean of the heights (C, samples, 3) on the path."""
+    for c in range(ground.shape[0]):
+        total = 0.0
+        for s in range(ground.shape[1]):
+            total += ground[c, s, 1]
+        height[c] = total / ground.shape[1]
+
+
+@njit
 def prepare(
     wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
     velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
@@ -168,7 +199,7 @@ def prepare(
             told[c, k] += min(max(change, -told_step[k]), told_step[k])
 
 
-@njit(cache=True)
+@njit
 def advance(
     y: Any, at: Any, wish: Any, held: float, position: Any, direction: Any, gait: Any, phase: Any
 ) -> None:

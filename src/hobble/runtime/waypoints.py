@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 
 
@@ -50,6 +52,7 @@ class Follower:
             raise ValueError("a track has two waypoints or more")
         self.track, self.arrived = tuple(track), arrived
         self.places = np.array([w.position for w in self.track], float)
+        self._speeds = np.array([w.speed for w in self.track], float)
         self.reached = np.zeros(characters, int)
         self.off_path = np.zeros(characters)
 
@@ -62,26 +65,33 @@ class Follower:
     def lead(self, position: Array) -> tuple[Array, list[Waypoint]]:
         """Velocities (C, 2) toward the present waypoints of characters at ground positions (C, 2), and
         those."""
-        velocity = np.zeros_like(position)
-        heading = []
-        for c, place in enumerate(position):
-            n = self.reached[c] % len(self.track)
-            x, z = self.places[n] - place
-            distance = (x * x + z * z) ** 0.5
-            if distance < self.arrived:
-                self.reached[c] += 1
-                n = (n + 1) % len(self.track)
-                x, z = self.places[n] - place
-                distance = (x * x + z * z) ** 0.5
-            self.off_path[c] = _distance_to_line(place, self.places[n - 1], self.places[n])
-            scale = self.track[n].speed / max(distance, 1e-6)
-            velocity[c] = x * scale, z * scale
-            heading.append(self.track[n])
-        return velocity, heading
+        velocity = np.empty((len(position), 2))
+        _lead(self.places, self._speeds, self.arrived, position, self.reached, self.off_path, velocity)
+        return velocity, [self.track[n % len(self.track)] for n in self.reached.tolist()]
 
 
-def _distance_to_line(p: Array, a: Array, b: Array) -> float:
+@njit
+def _distance_to_line(p: Any, a: Any, b: Any) -> float:
     """Distance in cm of point p from the stretch from a to b, each (2,)."""
     ax, az, bx, bz = p[0] - a[0], p[1] - a[1], b[0] - a[0], b[1] - a[1]
     t = min(max((ax * bx + az * bz) / max(bx * bx + bz * bz, 1e-9), 0.0), 1.0)
-    return float(((ax - t * bx) ** 2 + (az - t * bz) ** 2) ** 0.5)
+    return np.sqrt((ax - t * bx) ** 2 + (az - t * bz) ** 2)
+
+
+@njit
+def _lead(
+    places: Any, speeds: Any, arrived: float, position: Any, reached: Any, off_path: Any, velocity: Any
+) -> None:
+    count = len(places)
+    for c in range(position.shape[0]):
+        n = reached[c] % count
+        x, z = places[n, 0] - position[c, 0], places[n, 1] - position[c, 1]
+        distance = np.sqrt(x * x + z * z)
+        if distance < arrived:
+            reached[c] += 1
+            n = (n + 1) % count
+            x, z = places[n, 0] - position[c, 0], places[n, 1] - position[c, 1]
+            distance = np.sqrt(x * x + z * z)
+        off_path[c] = _distance_to_line(position[c], places[n - 1], places[n])
+        scale = speeds[n] / max(distance, 1e-6)
+        velocity[c, 0], velocity[c, 1] = x * scale, z * scale

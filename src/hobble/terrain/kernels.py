@@ -11,8 +11,9 @@ and along with them when they come from disk, and sums would be rounded in anoth
 
 from __future__ import annotations
 
-import numba
 import numpy as np
+
+from hobble.core.compiled import njit
 
 DOWN_WEIGHT = 0.1
 JUMP_HEIGHT = 5.0
@@ -21,7 +22,7 @@ FAST = {"reassoc", "contract", "nsz", "nnan"}  # lets sums be vectorised; no hei
 ONE = np.uint32(1)
 
 
-@numba.njit(fastmath=FAST, forceinline=True)
+@njit(fastmath=FAST, forceinline=True, cache=False)
 def height(heights, rows, columns, r, c):
     """Bilinear height of one map at row r, column c (float32, inside the map)."""
     i = min(np.int32(r), np.int32(rows - 2))
@@ -35,14 +36,14 @@ def height(heights, rows, columns, r, c):
     return near + fr * (far - near)
 
 
-@numba.njit(inline="always")
+@njit(inline="always", cache=False)
 def map_of(heights, starts, shapes, m):
     """The cells of map m, its rows and its columns."""
     rows, columns = shapes[m, 0], shapes[m, 1]
     return heights[starts[m] : starts[m] + rows * columns], rows, columns
 
 
-@numba.njit(cache=True)
+@njit
 def view_heights(heights, starts, shapes, which, affine, mean, points):
     """Heights (P, N) of P patches at the same N points (N, 2), in cells from the middle, inside the patch."""
     out = np.empty((len(which), len(points)), np.float32)
@@ -57,7 +58,7 @@ def view_heights(heights, starts, shapes, which, affine, mean, points):
     return out
 
 
-@numba.njit(cache=True)
+@njit
 def view_extents(heights, starts, shapes, which, affine, size, highest):
     """Mean height of each of P views over its `size` x `size` cells, and whether no cell is further from it
     than `highest`.
@@ -102,7 +103,7 @@ def view_extents(heights, starts, shapes, which, affine, size, highest):
     return mean, passes
 
 
-@numba.njit(cache=True, fastmath=FAST)
+@njit(fastmath=FAST)
 def distance_sum(x, z, place_x, place_z, weights):
     """(M,): at each point x, z (M,) the sum of its distances from N places, weighed by `weights` (N,)."""
     out = np.empty(len(x))
@@ -115,7 +116,7 @@ def distance_sum(x, z, place_x, place_z, weights):
     return out
 
 
-@numba.njit(cache=True, fastmath=FAST)
+@njit(fastmath=FAST)
 def lowest_cone(x, z, place_x, place_z, heights, steepness):
     """(M,): at each point x, z (M,) the lowest of the cones that rise by `steepness` (N,) from N places."""
     out = np.empty(len(x))
@@ -128,7 +129,7 @@ def lowest_cone(x, z, place_x, place_z, heights, steepness):
     return out
 
 
-@numba.njit(fastmath=FAST, forceinline=True)
+@njit(fastmath=FAST, forceinline=True, cache=False)
 def _down_means(heights, rows, columns, a, points):
     """How far the patch is above the first foot in contact; mean, mean square of how much further above all.
 
@@ -148,7 +149,7 @@ def _down_means(heights, rows, columns, a, points):
     return first, total / len(u), squares / len(u)
 
 
-@numba.njit(fastmath=FAST, forceinline=True)
+@njit(fastmath=FAST, forceinline=True, cache=False)
 def _up_sum(heights, rows, columns, a, offset, points, jumps):
     """Sum of squares of how far the ground is above feet that are up, or too far below them in jumps."""
     u, v, foot = points
@@ -164,7 +165,7 @@ def _up_sum(heights, rows, columns, a, offset, points, jumps):
     return squares
 
 
-@numba.njit(fastmath=FAST, forceinline=True)
+@njit(fastmath=FAST, forceinline=True, cache=False)
 def _beside_sum(heights, rows, columns, a, points):
     """Sum of squares of how far the ground beside the path is above BEAM_HEIGHT below the path."""
     u, v, path_u, path_v = points
@@ -181,7 +182,7 @@ def _beside_sum(heights, rows, columns, a, points):
     return squares
 
 
-@numba.njit(forceinline=True)
+@njit(forceinline=True, cache=False)
 def _error(heights, rows, columns, a, tables, jumps, limit):
     """The error of one patch, or infinity as soon as it is known to lie above `limit`."""
     down, up_head, up_rest, beside = tables
@@ -202,12 +203,12 @@ def _error(heights, rows, columns, a, tables, jumps, limit):
     return error
 
 
-@numba.njit(inline="always")
+@njit(inline="always", cache=False)
 def _terms(a):
     return (a[0, 0], a[0, 1], a[0, 2]), (a[1, 0], a[1, 1], a[1, 2])
 
 
-@numba.njit(cache=True)
+@njit
 def view_errors(heights, starts, shapes, which, affine, tables, jumps):
     """The error (P,) of every view. tables: see `hobble.terrain.search`."""
     out = np.empty(len(which))
@@ -217,7 +218,7 @@ def view_errors(heights, starts, shapes, which, affine, tables, jumps):
     return out
 
 
-@numba.njit(cache=True)
+@njit
 def search_views(heights, starts, shapes, which, affine, tables, jumps, count):
     """Indices and errors (count,) of the views of lowest error, the best first; of equal ones the first."""
     best = np.full(count, -1)

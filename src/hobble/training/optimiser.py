@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from hobble.core.compiled import njit
 from hobble.models.kernels import bits, team, widened
 from hobble.models.trainable import Trainable
 
@@ -85,7 +86,7 @@ class Adam:
             w.addcdiv_(m * -rate, v.sqrt().mul_(root).add_(EPSILON))
 
 
-@numba.njit(parallel=True, error_model="numpy", cache=True)
+@njit(parallel=True, error_model="numpy")
 def _fused(
     w: Any, m: Any, v: Any, g: Any, b1: Any, b2: Any, rate: Any, root: Any, slope: Any, epsilon: Any
 ) -> None:

@@ -12,6 +12,7 @@ import torch
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import Arrays, load_npz
+from hobble.core.skeleton import Skeleton
 from hobble.database.manifest import FILE
 from hobble.database.reader import Database
 from hobble.models import model
@@ -123,7 +124,8 @@ def _check_start(state: State, training: Training, path: Path) -> None:
 
 def fresh(database: Database, network: Options, training: Training) -> State:
     """A new network, sized for the database's rows, and an optimiser that has not moved."""
-    new = model(network.kind).trainable(network, database.layout, training.seed)
+    skeleton = Skeleton.from_dict(database.skeleton)
+    new = model(network.kind).trainable(network, database.layout, skeleton, training.seed)
     new = new.to(device(training.device))
     return State(new, Adam(new, **training.model_dump(include=set(OF_ADAM))))
 

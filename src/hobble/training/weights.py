@@ -13,8 +13,10 @@ from hobble.channels import channel
 from hobble.core.files import save_npz
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
+from hobble.models.seen import Seen
 from hobble.models.trainable import Trainable
 from hobble.rows.layout import CONTACTS, GAITS
+from hobble.training.batches import TRAIN
 
 UNITS = "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z forward, +X left"
 
@@ -22,13 +24,15 @@ UNITS = "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z
 def write_weights(
     path: Path, network: Trainable, database: Database, configuration: str, facts: Mapping[str, Any]
 ) -> None:
-    """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd` and `meta`, a JSON text.
+    """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd`, those of `Seen` and `meta`, a JSON
+    text.
 
     facts: numbers about the training and its rows that go into `meta` as they are. Equal networks give equal
     bytes.
     """
     s = database.statistics
     arrays = {**network.arrays(), "Xmean": s.x_mean, "Xstd": s.x_std, "Ymean": s.y_mean, "Ystd": s.y_std}
+    arrays |= Seen.of(database.layout, database.blocks(TRAIN, 0, 0, 1, 0), s).arrays()
     save_npz(path, **arrays, meta=np.array(meta(network, database, configuration, facts)))
 
 

@@ -30,7 +30,7 @@ class Package:
 
     def web(self, suffix: str) -> list[str]:
         """The page's scripts (".js"), or what says which packages they need (".json")."""
-        files = [*(self.folder / "report" / "web").iterdir(), *self.folder.glob("models/*/*.js")]
+        files = [*(self.folder / "report" / "web").iterdir(), *self.folder.glob("models/**/*.js")]
         return sorted(str(path) for path in files if path.suffix == suffix)
 
     def published(self) -> str:

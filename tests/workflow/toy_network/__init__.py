@@ -12,7 +12,7 @@ class _Toy(Model):
     def parameters(self, options, inputs, outputs):
         return (inputs + 1) * outputs
 
-    def trainable(self, options, layout, seed):
+    def trainable(self, options, layout, skeleton, seed):
         from hobble.models.toy.trainable import fresh
 
         return fresh(layout.x_size, layout.y_size, seed)

@@ -14,7 +14,10 @@ from hobble.runtime.options import Runtime
 class Options(Section):
     """Its keys of the section `evaluation`."""
 
-    laps: Positive = 19
+    laps: Positive = Field(19, description="in the runtime's own phase mode")
+    laps_beside: Positive = Field(
+        3, description="at most, in each other mode: from the second on, a lap repeats the one before"
+    )
     lap_seconds: Annotated[float, Field(ge=1, allow_inf_nan=False)] = Field(
         400.0, description="a lap that takes longer is ended there"
     )

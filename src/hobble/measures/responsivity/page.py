@@ -63,8 +63,8 @@ def figures(found: Json, material: Material) -> Iterator[Figure]:
 
 def hints(found: Json, material: Material) -> Iterator[Hint]:
     """Whether a frame has time, and whether the track was followed."""
-    yield from placed(50, _speed(found))
-    yield from placed(60, _track(found))
+    yield from placed(60, _speed(found))
+    yield from placed(40, _track(found))
 
 
 def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
@@ -95,13 +95,19 @@ def lap_chart(found: Json, material: Material) -> Chart | None:
     if theirs:
         shape, note = mark(theirs["milliseconds"], f"{theirs['label']}: mean as published", vertical=False)
         shapes, notes = [shape], [note]
-    laps = max(len(trace["x"]) for traces in options.values() for trace in traces)
+    counts = [max(len(trace["x"]) for trace in traces) for traces in options.values()]
+    laps = max(counts)
+    fewer = (
+        f" Other modes than the runtime's own ran {min(counts)}: from the second on, laps repeat each other."
+        if min(counts) < laps
+        else ""
+    )
     return Chart(
         "laps",
         "Milliseconds a frame, lap by lap",
         "Each bar is one lap of the six-waypoint track; its parts are the steps of a frame, means over the "
         "lap. Diamonds are medians of the whole frame. A few frames that another program held up raise a "
-        "bar and leave the diamond where it is. A frame at 60 Hz has 16.7 ms.",
+        "bar and leave the diamond where it is. A frame at 60 Hz has 16.7 ms." + fewer,
         layout={
             "barmode": "stack",
             "xaxis": axis("lap", dtick=1 if laps < 25 else None),
@@ -190,15 +196,21 @@ def track_figures(found: Json) -> list[Figure]:
         Figure("Waypoints reached", reached, "", laps),
         Figure("Furthest off the path", number(found.get("path_overshoot_cm")), "cm", "at the turns"),
         Figure("Foot slide", number(slide), "cm" if slide is not None else "", measured),
-        Figure(
-            "Largest turn of a joint, as drawn",
-            number(found.get("largest_turn_degrees")),
-            "°",
-            f"from a frame to the next; the runtime allows {np.degrees(FASTEST_TURN):.0f}°, "
-            "whatever the network asks for",
-        ),
+        _turn(found),
         Figure("Slow frames", number(spread.get("p99")), "ms", "one frame in a hundred is slower"),
     ]
+
+
+def _turn(found: Json) -> Figure:
+    """What the network asked for, which the runtime holds back, and what was drawn."""
+    drawn, asked = (number(found.get(key)) for key in ("largest_turn_degrees", "asked_turn_degrees"))
+    allowed = f"the runtime allows {np.degrees(FASTEST_TURN):.0f}°"
+    if found.get("asked_turn_degrees") is None:
+        return Figure("Largest turn of a joint, as drawn", drawn, "°", f"from a frame to the next; {allowed}")
+    frames = sum(lap.get("frames") or 0 for lap in found["laps"])
+    held = f"{found['turns_held_back']:,} of {frames:,} frames"
+    beside = f"from a frame to the next; {allowed}, less than was asked in {held}, and drew {drawn}° at most"
+    return Figure("Largest turn that the network asked for", asked, "°", beside)
 
 
 def speed_published(found: Json, material: Material) -> Table | None:
@@ -286,10 +298,16 @@ def _track(found: Json) -> Iterator[Hint]:
             f"The character reached {reached} of {asked} waypoints.",
             "Where it does not arrive, it circles or stands: look at Speed and response, lap by lap.",
         )
-    turn = found.get("largest_turn_degrees")
-    if turn is not None and turn > 60:
+    drawn, asked = (found.get(key) for key in ("largest_turn_degrees", "asked_turn_degrees"))
+    if drawn is not None and drawn > 60:
         yield Hint(
             "warn",
-            f"A joint turned by {turn:.0f} degrees in one frame.",
+            f"A joint turned by {drawn:.0f} degrees in one frame.",
             "That is a flip, and will be seen on a skinned figure.",
+        )
+    elif asked is not None and asked > 60:
+        yield Hint(
+            "note",
+            f"The network asked a joint to turn by {asked:.0f} degrees in one frame.",
+            f"The runtime drew {drawn:.0f}. See whether rotations of the clips flip.",
         )

@@ -31,20 +31,31 @@ def responsivity(
     runtime: Runtime,
     laps: int,
     lap_seconds: float,
+    laps_beside: int | None = None,
     modes: Sequence[str] | None = None,
     track: Sequence[Waypoint] = TRACK,
 ) -> dict[str, Any]:
-    """Run `laps` laps of the track of Segerstedt 2021 in each of `modes` and in the runtime's own.
+    """Run the track of Segerstedt 2021, `laps` laps in the runtime's own mode and fewer in other `modes`.
 
-    modes: by default all that the network has. A lap that takes longer than `lap_seconds` of simulated time
-    is ended there, its remaining waypoints not reached, and the next one starts from the beginning of the
-    track. `modes` holds the laps of each mode and what they come to; those of the runtime's own mode stand at
-    the top too. Measured times stand under "milliseconds" only, each with the steps' means, their `total`,
-    and `spread`: sd, median and 99th percentile of the total, and the mean of a whole call.
+    laps_beside: laps in those; by default, and at most, `laps`. modes: by default all that the network has. A
+    lap that takes longer than `lap_seconds` of simulated time is ended there, its remaining waypoints not
+    reached, and the next one starts from the beginning of the track. `modes` holds the laps of each mode and
+    what they come to; those of the runtime's own mode stand at the top too. Measured times stand under
+    "milliseconds" only, each with the steps' means, their `total`, and `spread`: sd, median and 99th
+    percentile of the total, and the mean of a whole call.
+    `largest_turn_degrees` is of the pose as drawn, `asked_turn_degrees` of what the network predicted, both
+    from a frame to the next; in `turns_held_back` frames the runtime let a joint turn less than was asked.
     """
     own = network.mode(runtime.mode)
+    beside = min(laps, laps_beside or laps)
     found = {
-        mode: _laps(network, runtime.model_copy(update={"mode": mode}), track, laps, lap_seconds)
+        mode: _laps(
+            network,
+            runtime.model_copy(update={"mode": mode}),
+            track,
+            laps if mode == own else beside,
+            lap_seconds,
+        )
         for mode in dict.fromkeys((*map(network.mode, network.modes if modes is None else modes), own))
     }
     return {
@@ -56,6 +67,7 @@ def responsivity(
             ),
         },
         "parameters": parameter_counts(network.sizes),
+        "laps_beside": beside,
         **found[own],
         "modes": list(found.values()),
     }
@@ -86,6 +98,8 @@ def _laps(
         "path_overshoot_cm": max(lap["path_overshoot_cm"] for lap in results),
         "foot_slide_cm": _mean([lap["foot_slide_cm"] for lap in results]),
         "largest_turn_degrees": max(lap["largest_turn_degrees"] for lap in results),
+        "asked_turn_degrees": max(lap["asked_turn_degrees"] for lap in results),
+        "turns_held_back": sum(lap["turns_held_back"] for lap in results),
         "milliseconds": _milliseconds(np.concatenate(times)),
     }
 
@@ -128,6 +142,7 @@ def run(given: Given, options: Options) -> Outcome:
         runtime=given.runtime,
         laps=options.laps,
         lap_seconds=options.lap_seconds,
+        laps_beside=options.laps_beside,
         modes=options.modes,
     )
     says = [f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]]
@@ -142,6 +157,7 @@ def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[dic
     start = int(follower.reached[0])
     goal = start + len(follower.track)
     positions, rotations, contacts, off = [], [], [], []
+    asked, taken = [], []
     times: list[tuple[float, ...]] = []
     while follower.reached[0] < goal and len(times) < longest:
         before = perf_counter()
@@ -150,6 +166,8 @@ def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[dic
         times.append((*animation.seconds, whole))
         positions.append(pose.positions[toes])
         rotations.append(pose.rotations.astype(np.float32))
+        asked.append(animation.predicted_rotations[0])
+        taken.append(animation.state.joint_rotation[0].copy())
         contacts.append(pose.contacts)
         off.append(follower.off_path[0])
     slide = foot_slide(np.array(positions), np.array(contacts))
@@ -165,9 +183,17 @@ def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[dic
         "foot_slide_cm": round(float(slide.mean()), 4) if len(slide) else None,
         "steps": len(slide),
         "largest_turn_degrees": round(largest_turn(np.array(rotations)), 3),
+        "asked_turn_degrees": round(largest_turn(np.array(asked)), 3),
+        "turns_held_back": _held_back(np.array(asked), np.array(taken)),
         "milliseconds": _milliseconds(seconds),
     }
     return lap, seconds
+
+
+def _held_back(asked: Array, taken: Array) -> int:
+    """Frames in which any joint was not turned as was asked; both (F, J, 4), equal but for rounding."""
+    same = np.abs(np.sum(asked * taken, axis=-1)) > 1 - 1e-6
+    return int((~same).any(axis=1).sum()) if len(asked) else 0
 
 
 def _milliseconds(seconds: Array) -> dict[str, Any]:

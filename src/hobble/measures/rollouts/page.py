@@ -33,7 +33,9 @@ def rollout_chart(found: Json) -> Chart | None:
         "Fed its own pose",
         "Mean distance of a joint from the captured one when the network goes on from what it predicted "
         "itself, as at run time, over roll-outs of so many frames. A line that flattens is a figure that "
-        "keeps to its feet; 60 frames are a second.",
+        "keeps to its feet; 60 frames are a second. This is the pose as drawn, halfway between the "
+        "predicted position and where the predicted velocity carries the one before. The charts above take "
+        "the predicted position alone, so their error of one frame is another.",
         traces,
         {
             "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),

@@ -7,6 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hobble.core.skeleton import Skeleton
 from hobble.models.model import Model
 from hobble.rows.layout import RowLayout
 
@@ -28,7 +29,9 @@ class _Pfnn(Model):
         sizes = options.sizes(inputs, outputs)
         return options.control_points * sum((a + 1) * b for a, b in pairwise(sizes))
 
-    def trainable(self, options: PfnnOptions, layout: RowLayout, seed: int) -> TrainablePfnn:
+    def trainable(
+        self, options: PfnnOptions, layout: RowLayout, skeleton: Skeleton, seed: int
+    ) -> TrainablePfnn:
         from hobble.models.pfnn.trainable import initialise
 
         return initialise(options.sizes(layout.x_size, layout.y_size), options.control_points, seed)

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from hobble.core.compiled import njit
 from hobble.models.kernels import bits, draw, rounded, team, widened
 from hobble.models.pfnn.step import Step
 from hobble.models.pfnn.trainable import TrainablePfnn
@@ -64,7 +65,7 @@ class FusedStep(Step):
         return self.buffers[key][:rows]
 
 
-@numba.njit(cache=True)
+@njit
 def _coefficients(p: Any, c: Any) -> None:
     """As `hobble.models.pfnn.trainable.coefficients`."""
     points = c.shape[1]
@@ -79,7 +80,7 @@ def _coefficients(p: Any, c: Any) -> None:
         c[row, (knot + 2) % points] += (t - 1) * t * t / 2
 
 
-@numba.njit(parallel=True, error_model="numpy", cache=True)
+@njit(parallel=True, error_model="numpy")
 def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
     """e (B, K (n + 1)) and slope (B, n) of x (B, n)."""
     rows, width = x.shape
@@ -100,7 +101,7 @@ def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
                 e[row, start + width] = share
 
 
-@numba.njit(parallel=True, error_model="numpy", cache=True)
+@njit(parallel=True, error_model="numpy")
 def _contract(de: Any, c: Any, slope: Any, d: Any) -> None:
     """d (B, n): the sum of de (B, K (n + 1)) over the control points, times the slope."""
     rows, width = d.shape

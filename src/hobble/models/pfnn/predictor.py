@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numba import njit
 
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import STORAGES, inverse
 from hobble.models.pfnn.forward import weights_at
@@ -116,7 +116,7 @@ def _pack(weights: Array, storage: str) -> tuple[Array, Array]:
     return np.round(weights / scale[..., None]).astype(np.int16), scale.astype(np.float32)
 
 
-@njit(cache=True, fastmath=True)
+@njit(fastmath=True)
 def _standardise(x: Any, mean: Any, inverse: Any, z: Any) -> None:
     for c in range(x.shape[0]):
         for i in range(x.shape[1]):
@@ -126,7 +126,7 @@ def _standardise(x: Any, mean: Any, inverse: Any, z: Any) -> None:
 # Only the functions called from outside are kept on disk, and what they call is forced into them: into
 # functions of their own the compiler may look the first time and not when they come from disk, and then
 # rounds sums in another order.
-@njit(forceinline=True)
+@njit(forceinline=True, cache=False)
 def _phase(phase: float, kind: int, points: int, index: Any, share: Any) -> None:
     """Fill the `kind` points that phase blends and their coefficients."""
     # A phase of exactly 1 is the end of the cycle, not its start: in constant mode the two have different
@@ -150,7 +150,7 @@ def _phase(phase: float, kind: int, points: int, index: Any, share: Any) -> None
         share[3] = 0.5 * (-t * t + t * t * t)
 
 
-@njit(forceinline=True)
+@njit(forceinline=True, cache=False)
 def _exp(x: Any) -> Any:
     """e^x for x <= 0 in float32, within 2e-7 of 1; written out so that a row of them goes side by side."""
     one = np.float32(1)
@@ -166,7 +166,7 @@ def _exp(x: Any) -> Any:
     return p * np.uint32(np.uint32(np.int32(n) + np.int32(127)) << np.uint32(23)).view(np.float32)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _evaluate(
     weights: Any, numbers: Any, plan: Any, kind: int, points: int, z: Any, phase: Any, out: Any
 ) -> None:
@@ -210,7 +210,7 @@ def _evaluate(
         _restore(h[c * outputs :], numbers, outputs, out[c])
 
 
-@njit(forceinline=True)
+@njit(forceinline=True, cache=False)
 def _who(point: int, index: Any, share: Any, members: Any, shares: Any) -> int:
     """Write down which characters blend `point`, and their shares of it; returns how many."""
     rows = 0
@@ -226,26 +226,26 @@ def _who(point: int, index: Any, share: Any, members: Any, shares: Any) -> int:
 # negative ones at every step and takes numbers one by one.
 
 
-@njit(forceinline=True)
+@njit(forceinline=True, cache=False)
 def _copy(x: Any, count: int, to: Any) -> None:
     for i in range(count):
         to[i] = x[i]
 
 
-@njit(forceinline=True)
+@njit(forceinline=True, cache=False)
 def _add(sums: Any, scales: Any, biases: Any, share: Any, count: int, y: Any) -> None:
     for r in range(count):
         y[r] += share * (sums[r] * scales[r] + biases[r])
 
 
-@njit(forceinline=True)
+@njit(forceinline=True, cache=False)
 def _elu(y: Any, count: int) -> None:
     for r in range(count):
         below = _exp(min(y[r], np.float32(0))) - np.float32(1)
         y[r] = y[r] if y[r] > 0 else below
 
 
-@njit(forceinline=True)
+@njit(forceinline=True, cache=False)
 def _restore(h: Any, statistics: Any, count: int, out: Any) -> None:
     """out = h std + mean; statistics: the means, then the standard deviations."""
     std = statistics[count:]

@@ -9,7 +9,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const S = T / step, F = M / step, G = gaits.length, L = spec.links.length, predict = networks[spec.network.kind](spec);
   const { atan2, sin, cos, hypot, floor, min, max, abs, sqrt, PI } = Math;
   const wrap = (angle) => angle - 2 * PI * floor((angle + PI) / (2 * PI));
-  const mean = new Float32Array(bytes(spec.yMean)), x = new Float32Array(X.size);
+  const x = new Float32Array(X.size);
   const filled = (n, value) => new Float64Array(n).fill(value);
 
   const c = {
@@ -32,19 +32,30 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     c.turns.set(c.rotations);
     for (const [j, p] of rests) for (let i = 0; i < 4; i++) c.turns[4 * j + i] = c.turns[4 * p + i];
   };
-  for (let t = 0; t < T; t++) c.gait[t * G + gaits.indexOf("stand")] = 1;
-  for (let j = 0; j < J; j++) {
-    const [a, b, d] = [0, 1, 2].map((i) => mean[Y.joint_position + 3 * j + i]);
-    c.joints[3 * j] = a * cos(heading) + d * sin(heading) + place[0];
-    c.joints[3 * j + 1] = b;
-    c.joints[3 * j + 2] = d * cos(heading) - a * sin(heading) + place[1];
+  // It begins in a frame of the clips, turned to its heading.
+  const at = (name) => new Float32Array(bytes(spec.start[name])), [si, co] = [sin(heading), cos(heading)];
+  const [path, ahead, joints, velocities] = ["position", "direction", "joint_position", "joint_velocity"].map(at);
+  for (let t = 0; t < T; t++) {
+    c.px[t] = path[2 * t] * co + path[2 * t + 1] * si + place[0];
+    c.pz[t] = path[2 * t + 1] * co - path[2 * t] * si + place[1];
+    c.dx[t] = ahead[2 * t] * co + ahead[2 * t + 1] * si;
+    c.dz[t] = ahead[2 * t + 1] * co - ahead[2 * t] * si;
   }
+  for (let j = 0; j < 3 * J; j += 3) for (const [from, to, a, b] of [[joints, c.joints, ...place], [velocities, c.velocities, 0, 0]]) {
+    to[j] = from[j] * co + from[j + 2] * si + a;
+    to[j + 1] = from[j + 1];
+    to[j + 2] = from[j + 2] * co - from[j] * si + b;
+  }
+  c.gait.set(at("gait"));
+  c.phase = spec.start.phase;
   c.pose.set(c.joints);
-  spec.turning.forEach((j, n) => {
-    turned(mean, Y.joint_rotation + 3 * n, cos(heading / 2), sin(heading / 2));
-    c.rotations.set(q, 4 * j);
-  });
+  const rotations = at("joint_rotation"), facing0 = [cos(heading / 2), 0, sin(heading / 2), 0];
+  for (let j = 0; j < J; j++) c.rotations.set(multiply(facing0, at4(rotations, j)), 4 * j);
   settle();
+
+  // What the network is told and answers keeps within what it saw in training.
+  const [xLow, xHigh, yLow, yHigh] = ["xLow", "xHigh", "yLow", "yHigh"].map((name) => new Float32Array(bytes(spec.bounds[name])));
+  const within = (row, low, high) => { for (let i = 0; i < row.length; i++) row[i] = min(max(row[i], low[i]), high[i]); };
 
   // Wishes, as `ProceduralAnimation.next_pose` takes them: velocity [x, z], facing [x, z] or null, gait or null.
 
@@ -87,7 +98,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const hold = (velocity, gait) => {
     if (!spec.limits || !c.severity.some((v) => v > 0)) return velocity;
     const each = gaits.map((_, g) => allowed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");
-    if (each[jog] < k.jogFrom) {
+    if (each[jog] < k.lameBelow) {
       gait[walk] += gait[jog];
       gait[jog] = 0;
     }
@@ -188,14 +199,17 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   };
   const output = (y, ground) => {
     const si = c.dx[M], co = c.dz[M];
+    const climbed = c.height - c.root[1];
     c.root = [c.px[M], c.height, c.pz[M]];
     for (let j = 0; j < 3 * J; j += 3) {
       const p = Y.joint_position + j, v = Y.joint_velocity + j;
       const velocity = [y[v] * co + y[v + 2] * si, y[v + 1], y[v + 2] * co - y[v] * si];
       const point = [y[p] * co + y[p + 2] * si + c.root[0], y[p + 1] + c.root[1], y[p + 2] * co - y[p] * si + c.root[2]];
+      const move = point.map((v, i) => .5 * (c.joints[j + i] + velocity[i] + v) - c.joints[j + i]);
+      const far = hypot(move[0], move[1] - climbed, move[2]), share = min(1, spec.bounds.fastest / max(far, 1e-9));
       for (let i = 0; i < 3; i++) {
         c.velocities[j + i] = velocity[i];
-        c.joints[j + i] = .5 * (c.joints[j + i] + velocity[i] + point[i]);
+        c.joints[j + i] += i === 1 ? climbed + share * (move[1] - climbed) : share * move[i];
       }
     }
     // No joint turns further than fastestTurn in a frame, along the shorter way.
@@ -336,7 +350,9 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     velocity = hold(velocity, share);
     prepare(velocity, direction, strafe, share, ground);
     input();
+    within(x, xLow, xHigh);
     const y = predict(x, c.phase);
+    within(y, yLow, yHigh);
     output(y, ground);
     update(y, velocity);
   };

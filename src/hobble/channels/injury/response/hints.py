@@ -32,7 +32,7 @@ def injury_hints(found: Json) -> Iterator[Hint]:
             f"{len(deaf)} of {_plural(len(walks), 'link')} hardly "
             f"{'changes' if len(deaf) == 1 else 'change'} the walk at severity 10",
             "(under half a centimetre a joint, or no different from an unhurt walk): "
-            f"{', '.join(deaf[:4])}{' …' if len(deaf) > 4 else ''}.",
+            f"{', '.join(deaf[:4])}{' …' if len(deaf) > 4 else ''}. Add clips in which more of it hurts.",
         )
     rough = [r["link"] for r in walks if _rho(r) < 0.7 and r["link"] not in deaf]
     if rough:

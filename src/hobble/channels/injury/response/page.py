@@ -15,11 +15,13 @@ from hobble.report.gather import Material
 from hobble.report.parts import Pair, Part, Section, Words
 from hobble.report.summary import Hint, placed
 from hobble.report.tables import Column, Table
+from hobble.report.words import speaker
 
 NOTHING = Markup(
     "This network has no severities among its inputs, so nothing can hurt it. The configuration "
     "<code>injured</code> has."
 )
+LINKS = ("link", "first", "second")  # keys under which the JSON names one
 UNTRAINED = "never hurt in training"
 GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
 HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
@@ -61,13 +63,28 @@ PANELS: tuple[tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool
 
 def section(found: Json, material: Material) -> Section:
     """Charts and tables, or that there are none for a network without severities."""
+    found = in_words(found, material)
     parts = _parts(found, material.name) if found.get("applies") else [Part(0, Words(NOTHING, empty=True))]
     return Section("injury", parts, title="Injury response", at=20)
 
 
 def hints(found: Json, material: Material) -> Iterator[Hint]:
     """What the response suggests."""
-    return placed(70, injury_hints(found))
+    return placed(50, injury_hints(in_words(found, material)))
+
+
+def in_words(found: Json, material: Material) -> dict[str, Any]:
+    """The same with every link called as a reader calls it."""
+    say = speaker(material.network["skeleton"])
+
+    def told(value: Any, key: str = "") -> Any:
+        if isinstance(value, Mapping):
+            return {k: told(v, k) for k, v in value.items()}
+        if isinstance(value, list | tuple):
+            return [told(item) for item in value]
+        return say(value) if key in LINKS and isinstance(value, str) else value
+
+    return {key: told(value) for key, value in found.items()}
 
 
 def _parts(found: Json, name: str) -> list[Part]:

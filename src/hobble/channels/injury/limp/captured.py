@@ -1,0 +1,106 @@
+"""Captured clips as limps: their cycles, what hurts in them, and whether a generator made that."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.evaluation.captured import captured, turned
+from hobble.evaluation.crowd import FPS, INJURY
+from hobble.gait.cycles import Walk, joined, measure
+from hobble.gait.people import people
+from hobble.gait.profile import Profile, profile
+from hobble.rows.clip_rows import ClipRows, load_clip_rows
+
+VERSION = re.compile(
+    r"_hurt[1-9](_mirror)?$"
+)  # at the end of the name of a clip that was hurt by a generator
+MIRROR = "_mirror"
+PLAYED = re.compile(r"^([^_]+)_")  # the performer, in names such as 105_25
+
+
+@dataclass(frozen=True)
+class Limp:
+    """The walking of one clip. hurt: link -> severity, where the same hurts throughout. speed: cm a frame."""
+
+    clip: str
+    hurt: Mapping[str, float]
+    walk: Walk = field(repr=False)
+    speed: float
+
+    @property
+    def performer(self) -> str:
+        """The part of the clip's name before the first underline, mirrors apart from originals."""
+        found = PLAYED.match(self.clip)
+        name = found[1] if found else self.clip
+        return name + (MIRROR if self.clip.endswith(MIRROR) else "")
+
+
+@dataclass
+class Told:
+    """Seconds in which each link hurts, of captured motion and of motion that a generator made of healthy."""
+
+    captured: dict[str, float] = field(default_factory=dict)
+    made: dict[str, float] = field(default_factory=dict)
+
+
+def limps(
+    files: Iterable[Path], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
+) -> tuple[list[Limp], Told]:
+    """The walks of all captured clips, and what hurts how long in those that are trained on."""
+    found, told = [], Told()
+    for file in sorted(files, key=lambda file: Path(file).stem):
+        rows = load_clip_rows(file)
+        severity = rows.channels.get(INJURY, np.zeros((len(rows), 0)))
+        is_made = VERSION.search(rows.clip) is not None
+        if splits.get(rows.clip) == "train":
+            kept = told.made if is_made else told.captured
+            for link, column in zip(links, severity.T, strict=False):
+                if column.any():
+                    kept[link] = round(kept.get(link, 0.0) + float(np.sum(column > 0)) / FPS, 2)
+        if not is_made:
+            found += _walked(rows, links, skeleton)
+    return found, told
+
+
+def healthy_of(limp: Limp, every: Sequence[Limp]) -> tuple[Profile, str]:
+    """The healthy walk beside which a clip is set, and whose: the performer's, the data set's, people's."""
+    well = [one for one in every if not one.hurt and len(one.walk)]
+    own = [one for one in well if one.performer == limp.performer]
+    for some, whose in ((own, "performer"), (well, "data set")):
+        if some:
+            return profile(joined(one.walk for one in some)), whose
+    return people().normal(), "people"
+
+
+def _walked(rows: ClipRows, links: Sequence[str], skeleton: Skeleton) -> list[Limp]:
+    """A clip's stretches of walking together, where the same hurts throughout; none without a cycle."""
+    severity = rows.channels.get(INJURY, np.zeros((len(rows), len(links))))
+    if not len(rows) or np.ptp(severity, axis=0).any():
+        return []
+    walks, speeds = [], []
+    turn = rows.y[:, rows.layout.y_turn][:, 0].astype(float)
+    for part in captured(rows):
+        if part.gait.mean(axis=0).argmax() != 1:
+            continue
+        yaw = np.concatenate([[0.0], -np.cumsum(turn[part.rows])[:-1]])
+        walks.append(measure(skeleton, _placed(part.local, part.root, yaw), FPS))
+        speeds.append(np.hypot(part.velocity[:, 0], part.velocity[:, 1]).mean())
+    walk = joined(walks) if walks else Walk(FPS, (), ())
+    if not len(walk):
+        return []
+    hurt = {link: float(value) for link, value in zip(links, severity[0], strict=True) if value > 0}
+    return [Limp(rows.clip, hurt, walk, float(np.mean(speeds)))]
+
+
+def _placed(local: Array, root: Array, yaw: Array) -> Array:
+    """(F, J, 3) in the world, of positions in a root frame at `root` (F, 3) that faces `yaw` (F,)."""
+    out = local.copy()
+    out[..., ::2] = turned(local[..., ::2], yaw[:, None])
+    return out + root[:, None]

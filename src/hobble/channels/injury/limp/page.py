@@ -1,0 +1,182 @@
+"""The limp in sizes, beside people's: in the section on the response to injury."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from hobble.measures.given import Json
+from hobble.report.charts import Chart, Trace, axis, line
+from hobble.report.formats import number
+from hobble.report.gather import Material
+from hobble.report.parts import Part, Section, Words
+from hobble.report.tables import Column, Table
+
+SHOWN = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")
+IMPAIRMENTS = {
+    "hip": "trendelenburg",
+    "pelvis": "trendelenburg",
+    "thigh": "antalgic",
+    "shank": "antalgic",
+    "foot": "antalgic",
+    "back": "lurch",
+}
+
+
+def section(found: Json, material: Material) -> Section:
+    """Charts of sizes, tables, the exam, and what in training was captured and what made."""
+    if not found.get("applies"):
+        return Section("injury", [])
+    name = material.name
+    return Section(
+        "injury",
+        [
+            Part(1, Words(provenance(found["told_seconds"]))),
+            Part(2, size_chart(found)),
+            Part(
+                3,
+                Table(f"{name}-limp-named", *_named(found["named"]), "Would one name it? Legs hurt, walking"),
+            ),
+            Part(4, exam_table(name, found["exam"])),
+            Part(80, size_table(name, found["sizes"])),
+            Part(81, captured_table(name, found["captured"])),
+            Part(82, second_table(name, found["second"])),
+        ],
+    )
+
+
+def provenance(told: Mapping[str, Mapping[str, float]]) -> str:
+    """Which injuries of the training data were captured and which were made of healthy clips."""
+    parts = []
+    for kind, words in (("captured", "were captured"), ("made", "were made of healthy clips by a generator")):
+        if some := told[kind]:
+            seconds = sum(some.values())
+            parts.append(f"{len(some)} links {words} ({number(seconds, 3)} s: {', '.join(sorted(some))})")
+    return f"Of the injuries in training, {'; '.join(parts)}." if parts else "No link was hurt in training."
+
+
+def size_chart(found: Json) -> Chart:
+    """Each effect over severity for a chosen effect; a line for each link, people's mean beside."""
+    options: dict[str, list[Trace]] = {}
+    rows = [row for row in found["sizes"] if row["gait"] == "walk"]
+    for effect in SHOWN:
+        traces = []
+        for link in dict.fromkeys(
+            row["link"] for row in rows if row["part"] in IMPAIRMENTS or "arm" in row["part"]
+        ):
+            some = [row for row in rows if row["link"] == link]
+            colour = "@accent" if some[0]["side"] == "left" else "@g2"
+            traces.append(line(link, [r["severity"] for r in some], [r[effect] for r in some], colour))
+        for gait, values in found["people"].items():
+            mean, spread = values[effect]
+            traces.append(
+                {
+                    "type": "scatter",
+                    "mode": "markers",
+                    "name": f"people, {gait.replace('_', ' ')}",
+                    "x": [10.4],
+                    "y": [mean],
+                    "error_y": {"type": "data", "array": [spread], "visible": True},
+                    "marker": {"color": "@muted", "size": 8},
+                }
+            )
+        options[found["effects"][effect]] = traces
+    return Chart(
+        "limp-sizes",
+        "How large is the limp?",
+        "Each link at severities 3, 5, 7 and 10, walking, asked for 1.2 m/s, beside the healthy character. "
+        "Grey: the mean and the spread of ten people who imitated impairments strongly.",
+        layout={"xaxis": axis("severity", range=[2.5, 11]), "yaxis": axis("size")},
+        height=360,
+        choose="Effect",
+        options=options,
+    )
+
+
+def _named(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Column], list[list[Any]]]:
+    columns = [
+        Column.number("severity"),
+        Column.count("walks"),
+        Column.number("called impaired by a classifier of strong limps"),
+        Column.number("named by a recogniser of mild ones"),
+        Column.number("the wrong side"),
+    ]
+    return columns, [[r["severity"], r["walks"], r["impaired"], r["named"], r["wrong_side"]] for r in rows]
+
+
+def exam_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+    """Captured limps kept from training."""
+    if not rows:
+        return None
+    columns = [
+        Column("clip"),
+        Column("hurt"),
+        Column("healthy walk of"),
+        Column.number("healthy character, from it"),
+        Column.number("hurt character, from it"),
+        Column("nearer", lambda v: "yes" if v else "no"),
+    ]
+    table = [
+        [
+            r["clip"],
+            ", ".join(f"{k} {v:g}" for k, v in r["hurt_links"].items()),
+            r["beside"],
+            r["healthy"],
+            r["hurt"],
+            r["nearer"],
+        ]
+        for r in rows
+    ]
+    return Table(
+        f"{name}-limp-exam",
+        columns,
+        table,
+        "Captured limps kept from training: is the hurt character nearer?",
+    )
+
+
+def size_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+    """Every walk with its effects and what it is called."""
+    texts = ("gait", "link", "part", "side", "called", "graded")
+    if not rows:
+        return None
+    columns = [Column(k) if k in texts else Column.number(k.replace("_", " ")) for k in rows[0]]
+    return Table(
+        f"{name}-limp-sizes", columns, [list(row.values()) for row in rows], "The size of every effect"
+    )
+
+
+def captured_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+    """Captured limps with the same sizes."""
+    if not rows:
+        return None
+    columns = [
+        Column("clip"),
+        Column("hurt"),
+        Column("healthy walk of"),
+        *(Column.number(k.replace("_", " ")) for k in SHOWN),
+    ]
+    table = [
+        [
+            r["clip"],
+            ", ".join(f"{k} {v:g}" for k, v in r["hurt"].items()),
+            r["healthy"],
+            *(r[k] for k in SHOWN),
+        ]
+        for r in rows
+    ]
+    return Table(f"{name}-limp-captured", columns, table, "Captured limps in the same sizes")
+
+
+def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+    """A second injury over a first at 5 and at 10, with speed."""
+    if not rows:
+        return None
+    keys = list(rows[0])
+    columns = [Column(k) if k in ("first", "second") else Column.number(k.replace("_", " ")) for k in keys]
+    return Table(
+        f"{name}-limp-second",
+        columns,
+        [[r[k] for k in keys] for r in rows],
+        "A second injury over a first, with speed",
+    )

@@ -1,0 +1,271 @@
+"""The limp of each link in sizes, beside people's and captured ones, named by who learnt people's walks.
+
+A rank correlation says nothing about size: 1 may be a change of 2 %. So each effect stands with its size at
+severities 3, 5, 7 and 10, relative to the same network's healthy character. The recognisers are those of
+`hobble.gait`, which know people's walks and nothing that Hobble made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hobble.channels.injury.limp import Options
+from hobble.channels.injury.limp.captured import Limp, Told, healthy_of, limps
+from hobble.channels.injury.limp.walks import Shown, shown
+from hobble.core.errors import HobbleError
+from hobble.core.skeleton import Skeleton
+from hobble.evaluation.spearman import spearman
+from hobble.gait.compare import compare_walk
+from hobble.gait.effects import EFFECTS, effects, effects_of_people
+from hobble.gait.features import features
+from hobble.gait.people import people
+from hobble.gait.profile import Profile, profile
+from hobble.gait.recogniser import RIGHT, SIDES, examples
+from hobble.hurt.parts import part_of_link
+from hobble.measures.given import Given, Outcome
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.runtime.options import Runtime
+
+REASON = "this network has no severity inputs"
+STILL = "its healthy character makes no cycle of a walk"
+SEVERITIES = (3.0, 5.0, 7.0, 10.0)
+ASKED = {"walk": 2.0, "jog": 7.0}  # cm a frame; 1.2 m/s, as people walk
+FIRSTS = (5.0, 10.0)  # severities of a first injury over which a second one comes
+SECONDS = (0.0, 5.0, 10.0)
+LEG = ("hip", "thigh", "shank", "foot")
+WINDOW = 4.0  # seconds
+
+
+def limp(
+    network: Network,
+    every: Sequence[Limp],
+    told: Told,
+    splits: Mapping[str, str],
+    *,
+    configuration: str,
+    runtime: Runtime,
+    seconds: float,
+    links: Sequence[str] | None = None,
+) -> dict[str, Any]:
+    """limp.json; `applies` is false, with a `reason`, where nothing can be measured.
+
+    every: the walks of the data set's captured clips. told: what hurts how long in training. links: to hurt,
+    by default all. `sizes`: a row for each gait, link and severity, with EFFECTS as if the link's side were
+    hurt and what the walk is called; `steady`: Spearman's rho of each effect with severity, beside its
+    size at 10; `named`: shares of windows by severity over the links of the legs; `people`: mean and spread
+    of each effect; `captured`: effects of captured clips; `exam`: see `examined`; `second`: see
+    `second_injuries`.
+    """
+    head: dict[str, Any] = {"configuration": configuration}
+    if not network.links or network.skeleton is None:
+        return {**head, "applies": False, "reason": REASON}
+    links = list(links or network.links)
+    rows: list[dict[str, Any]] = []
+    for gait, asked in ASKED.items():
+        cases = [(link, s) for link in links for s in SEVERITIES]
+        figures = shown(network, [{}, *({link: s} for link, s in cases)], asked, gait, seconds, runtime)
+        healthy = figures[0]
+        if healthy.profile is None:
+            if gait == "walk":
+                return {**head, "applies": False, "reason": STILL}
+            continue
+        rows += [
+            _row(network, gait, *case, figure, healthy)
+            for case, figure in zip(cases, figures[1:], strict=True)
+        ]
+    return {
+        **head,
+        "applies": True,
+        "asked_cm_per_second": {gait: 60 * speed for gait, speed in ASKED.items()},
+        "seconds": seconds,
+        "effects": EFFECTS,
+        "trained": [link for link in links if link in network.hurt_links],
+        "told_seconds": {"captured": told.captured, "made": told.made},
+        "sizes": rows,
+        "steady": _steady(rows),
+        "named": _named(rows),
+        "people": {
+            gait: {name: [round(v, 5) for v in pair] for name, pair in found.items()}
+            for gait, found in effects_of_people(people()).items()
+        },
+        "captured": [_of_clip(network.skeleton, one, every) for one in every if one.hurt],
+        "exam": examined(network, every, splits, seconds, runtime),
+        "second": second_injuries(network, links, seconds, runtime),
+    }
+
+
+def hurt_side(skeleton: Skeleton, link: str) -> str:
+    """The side of the body on which a link is; the right one for links on the midline."""
+    side = part_of_link(skeleton, _pair(skeleton, link)).side
+    return RIGHT if side is None else ("left", "right")[side]
+
+
+def _pair(skeleton: Skeleton, link: str) -> tuple[str, str]:
+    return skeleton.links[skeleton.link_names.index(link)]
+
+
+def _row(
+    network: Network, gait: str, link: str, severity: float, figure: Shown, healthy: Shown
+) -> dict[str, Any]:
+    """One walk: where it belongs, its effects (None without a cycle), and what it is called."""
+    assert network.skeleton is not None
+    assert healthy.profile is not None
+    part = part_of_link(network.skeleton, _pair(network.skeleton, link))
+    side = hurt_side(network.skeleton, link)
+    row: dict[str, Any] = {"gait": gait, "link": link, "part": part.name, "severity": severity}
+    row["side"] = side if part.side is not None else None
+    row["speed_share"] = round(figure.speed / max(healthy.speed, 1e-9), 5)
+    if figure.profile is None:
+        return {
+            **row,
+            **dict.fromkeys(EFFECTS),
+            **dict.fromkeys(("called", "graded", "impaired", "named", "wrong_side")),
+        }
+    row |= _plain(effects(figure.profile, healthy.profile, side))
+    found = compare_walk(figure.walk, figure.frames, healthy.profile, WINDOW)
+    answers, grades = ([answer for _, answer in some] for some in (found.windows, found.grades))
+    other = SIDES[1 - SIDES.index(side)]
+    row["called"] = " ".join(filter(None, (found.answer.label, found.answer.side)))
+    row["graded"] = " ".join(filter(None, (found.grade.label, found.grade.side)))
+    row["impaired"] = _share([a.impaired for a in answers])
+    row["named"] = _share([g.impaired and g.side != other for g in grades])
+    row["wrong_side"] = (
+        _share([g.impaired and g.side == other for g in grades]) if part.side is not None else None
+    )
+    return row
+
+
+def _plain(values: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: round(float(v), 5) if np.isfinite(v) else None for name, v in values.items()}
+
+
+def _share(values: Sequence[bool]) -> float | None:
+    return round(sum(values) / len(values), 5) if values else None
+
+
+def _steady(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """For each gait, link and effect Spearman's rho with severity, never without its size at 10."""
+    out = []
+    for gait, link in dict.fromkeys((row["gait"], row["link"]) for row in rows):
+        some = [row for row in rows if (row["gait"], row["link"]) == (gait, link)]
+        for name in EFFECTS:
+            values = [row[name] for row in some]
+            if None not in values:
+                rho = spearman([row["severity"] for row in some], values)
+                out.append({"gait": gait, "link": link, "effect": name, "at_10": values[-1], "spearman": rho})
+    return out
+
+
+def _named(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """By severity, over the walks with a link of a leg hurt: how they are called."""
+    out = []
+    for severity in SEVERITIES:
+        legs = [r for r in rows if r["gait"] == "walk" and r["severity"] == severity and r["part"] in LEG]
+        row: dict[str, Any] = {"severity": severity, "walks": len(legs)}
+        for key in ("impaired", "named", "wrong_side"):
+            known = [r[key] for r in legs if r[key] is not None]
+            row[key] = round(float(np.mean(known)), 5) if known else None
+        out.append(row)
+    return out
+
+
+def _of_clip(skeleton: Skeleton, one: Limp, every: Sequence[Limp]) -> dict[str, Any]:
+    """A captured clip's effects beside a healthy walk."""
+    healthy, whose = healthy_of(one, every)
+    side = hurt_side(skeleton, max(one.hurt, key=lambda link: one.hurt[link]))
+    sizes = _plain(effects(profile(one.walk), healthy, side))
+    return {"clip": one.clip, "hurt": dict(one.hurt), "side": side, "healthy": whose, **sizes}
+
+
+def distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Profile) -> float:
+    """How far two bodies' changes from their own healthy walks are apart, in spreads of people a feature."""
+    known = examples(people(), range(people().count))[0]
+    spread = known.std(axis=0)
+    a, b = (np.array(list(features(*pair).values())) for pair in ((walk, healthy), (other, other_healthy)))
+    return float(np.sqrt(np.mean(((a - b) / spread) ** 2)))
+
+
+def examined(
+    network: Network, every: Sequence[Limp], splits: Mapping[str, str], seconds: float, runtime: Runtime
+) -> list[dict[str, Any]]:
+    """Captured limps that were kept from training: does the character, told what hurts, come nearer to them?
+
+    Each is set beside the character with the clip's status and beside the healthy character, both asked for
+    the speed at which the healthy walk of the performer is likely: 1.2 m/s. `hurt` and `healthy` are
+    distances; `nearer` is what has to be.
+    """
+    asked = [one for one in every if one.hurt and splits.get(one.clip) == "held_out"]
+    if not asked:
+        return []
+    figures = shown(network, [{}, *(one.hurt for one in asked)], ASKED["walk"], "walk", seconds, runtime)
+    own = figures[0].profile
+    out = []
+    for one, figure in zip(asked, figures[1:], strict=True):
+        healthy, whose = healthy_of(one, every)
+        row: dict[str, Any] = {"clip": one.clip, "hurt_links": dict(one.hurt), "beside": whose}
+        if own is None or figure.profile is None:
+            out.append({**row, "healthy": None, "hurt": None, "nearer": False})
+            continue
+        limps_so = profile(one.walk)
+        well, ill = (distance(limps_so, healthy, p, own) for p in (own, figure.profile))
+        out.append({**row, "healthy": round(well, 5), "hurt": round(ill, 5), "nearer": ill < well})
+    return out
+
+
+def second_injuries(
+    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
+) -> list[dict[str, Any]]:
+    """Each link over a hurt right thigh, at 5 and at 10: `speed_share` of the healthy walk's speed.
+
+    `from_first`: share of the first's speed that is left; a second injury must not make it faster.
+    """
+    assert network.skeleton is not None
+    first = next((link for link in links if _is(network.skeleton, link, "thigh", "right")), None)
+    if first is None:
+        return []
+    pairs = [(a, b, s) for a in FIRSTS for b in links if b != first for s in SECONDS[1:]]
+    each = [{}, *({first: a} for a in FIRSTS), *({first: a, b: s} for a, b, s in pairs)]
+    figures = shown(network, each, ASKED["walk"], "walk", min(seconds, 4.0), runtime)
+    healthy = max(figures[0].speed, 1e-9)
+    alone = dict(zip(FIRSTS, figures[1:], strict=False))
+    return [
+        {
+            "first": first,
+            "first_severity": a,
+            "second": b,
+            "severity": s,
+            "speed_share": round(figure.speed / healthy, 5),
+            "from_first": round(figure.speed / max(alone[a].speed, 1e-9), 5),
+        }
+        for (a, b, s), figure in zip(pairs, figures[1 + len(FIRSTS) :], strict=True)
+    ]
+
+
+def _is(skeleton: Skeleton, link: str, part: str, side: str) -> bool:
+    found = part_of_link(skeleton, _pair(skeleton, link))
+    return found.name == part and hurt_side(skeleton, link) == side
+
+
+def run(given: Given, options: Options) -> Outcome:
+    """limp.json, and its tables."""
+    network = load_network(given.weights)
+    if network.skeleton is None:
+        raise HobbleError(f"{given.weights} carries no skeleton")
+    every, told = limps(given.clips.values(), given.splits, network.links, network.skeleton)
+    result = limp(
+        network,
+        every,
+        told,
+        given.splits,
+        configuration=given.configuration,
+        runtime=given.runtime,
+        seconds=options.limp_seconds,
+    )
+    tables = {name: result.get(name, []) for name in ("sizes", "steady", "named", "second")}
+    at_10 = next((row for row in result.get("named", []) if row["severity"] == SEVERITIES[-1]), None)
+    says = f"legs at 10: called impaired in {at_10['impaired']} of windows" if at_10 else result["reason"]
+    return Outcome(result, tables, says)

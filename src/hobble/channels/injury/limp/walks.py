@@ -1,0 +1,61 @@
+"""One crowd in which every link hurts at every severity, and the cycles of each figure's walk."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.evaluation.crowd import FPS, INJURY, severities
+from hobble.gait.cycles import Walk, measure
+from hobble.gait.profile import Profile, profile
+from hobble.models.network import Network
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.options import Runtime
+
+BEGIN = 5 * FPS  # frames that a figure has to get up to speed and to feel what hurts
+SLOW = 0.1  # cm a frame
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What one figure did in `frames` frames: its cycles, their profile (None without one), cm a frame."""
+
+    walk: Walk = field(repr=False)
+    profile: Profile | None = field(repr=False)
+    speed: float
+    frames: int
+
+
+def shown(
+    network: Network,
+    each: Sequence[Mapping[str, float]],
+    speeds: float | Sequence[float],
+    gait: str,
+    seconds: float,
+    runtime: Runtime,
+) -> list[Shown]:
+    """Figures that walk straight ahead, hurt as `each` says (link -> severity), asked for cm a frame."""
+    assert network.skeleton is not None
+    count, frames = len(each), max(4, round(seconds * FPS))
+    animation = ProceduralAnimation(network, characters=count, **dict(runtime))
+    velocity = np.zeros((count, 2))
+    velocity[:, 1] = speeds
+    told = {INJURY: severities(network, each)} if network.links else {}
+    shares = np.tile([float(name == gait) for name in network.gaits], (count, 1))
+    places = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
+    for frame in range(-BEGIN, frames):
+        pose = animation.next_pose(velocity, gait=shares.copy(), **told)
+        if frame >= 0:
+            places[frame] = pose.positions.reshape(count, -1, 3)
+    return [_shown(network, places[:, i].astype(float)) for i in range(count)]
+
+
+def _shown(network: Network, places: Array) -> Shown:
+    assert network.skeleton is not None
+    hips = network.skeleton.role("hips")
+    speed = float(np.linalg.norm((places[-1, hips] - places[0, hips])[::2])) / (len(places) - 1)
+    walk = measure(network.skeleton, places, FPS)
+    return Shown(walk, profile(walk) if len(walk) else None, speed, len(places))

@@ -1,0 +1,50 @@
+"""The mode-adaptive network (Zhang, Starke, Komura, Saito 2018). `forward` is all of it in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hobble.core.skeleton import Skeleton
+from hobble.models.model import Model
+from hobble.rows.layout import RowLayout
+
+if TYPE_CHECKING:
+    from hobble.models.mann.network import Mann
+    from hobble.models.mann.options import MannOptions
+    from hobble.models.mann.trainable import TrainableMann
+
+
+class _Mann(Model):
+    def options(self) -> type[MannOptions]:
+        from hobble.models.mann.options import MannOptions
+
+        return MannOptions
+
+    def parameters(self, options: MannOptions, inputs: int, outputs: int) -> int:
+        from hobble.models.mann.forward import GATE_INPUTS
+
+        expert = sum((a + 1) * b for a, b in pairwise(options.sizes(inputs, outputs)))
+        gate = sum((a + 1) * b for a, b in pairwise(options.gate_sizes(GATE_INPUTS)))
+        return options.experts * expert + gate
+
+    def trainable(
+        self, options: MannOptions, layout: RowLayout, skeleton: Skeleton, seed: int
+    ) -> TrainableMann:
+        from hobble.models.mann.forward import gate_columns
+        from hobble.models.mann.trainable import initialise
+
+        columns = gate_columns(layout, skeleton)
+        return initialise(
+            options.sizes(layout.x_size, layout.y_size), options.gate_sizes(len(columns)), columns, seed
+        )
+
+    def read(self, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Mann:
+        from hobble.models.mann.network import Mann
+
+        return Mann.read(path, arrays, common)
+
+
+MODEL = _Mann()

@@ -1,0 +1,122 @@
+"""The step on a CPU: what lies between the experts' products, as compiled loops over rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+import torch
+from torch import Tensor
+
+from hobble.core.compiled import njit
+from hobble.models.kernels import bits, draw, rounded, team, widened
+from hobble.models.mann.step import Step
+from hobble.models.mann.trainable import TrainableMann
+
+
+class FusedStep(Step):
+    """As `Step`, several times faster outside the products, in buffers that are kept from batch to batch."""
+
+    def __init__(self, network: TrainableMann, dropout: float, half: bool = False) -> None:
+        super().__init__(network, dropout, half)
+        self.counter = np.uint64(0)
+        self.buffers: dict[tuple[str, int], Tensor] = {}
+
+    def seed(self, seed: int) -> None:
+        """Begin a new sequence of dropout masks, 0 <= seed < 2^63."""
+        self.counter = np.uint64(seed)
+
+    def masks(self, rows: int) -> list[Tensor]:
+        """As in `Step`, from another generator; valid until the next call."""
+        masks = []
+        for number, width in enumerate(self.widths):
+            masks.append(self._buffer(f"mask {number}", rows, width))
+            team(rows * width)
+            self.counter = np.uint64(draw(masks[-1].numpy(), self.counter, self.keep))
+        return masks
+
+    def prepared(self, number: int, x: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
+        """As in `Step`, in one sweep."""
+        inputs = self._buffer(f"inputs {number}", len(x), x.shape[1] + 1, self.factors.dtype)
+        slope = self._buffer(f"slope {number}", *x.shape)
+        team(x.numel())
+        _prepare(x.numpy(), mask.numpy(), bits(inputs), slope.numpy())
+        return inputs, slope
+
+    def blended(self, number: int, outputs: Tensor, c: Tensor) -> Tensor:
+        """As in `Step`, in one sweep."""
+        h = self._buffer(f"h {number}", len(c), outputs.shape[1] // c.shape[1])
+        team(outputs.numel())
+        _blend(bits(outputs), c.numpy(), h.numpy())
+        return h
+
+    def spread(self, number: int, d: Tensor, outputs: Tensor, c: Tensor, dc: Tensor) -> Tensor:
+        """As in `Step`, in one sweep."""
+        da = self._buffer(f"da {number}", len(c), outputs.shape[1], self.factors.dtype)
+        team(outputs.numel())
+        _spread(d.numpy(), bits(outputs), c.numpy(), bits(da), dc.numpy())
+        return da
+
+    def _buffer(self, name: str, rows: int, width: int, dtype: torch.dtype | None = None) -> Tensor:
+        """(rows, width) of uninitialised memory; the same memory whenever the name and the width are."""
+        key = (name, width)
+        if key not in self.buffers or len(self.buffers[key]) < rows:
+            self.buffers[key] = torch.empty(rows, width, dtype=dtype or self.network.flat.dtype)
+        return self.buffers[key][:rows]
+
+
+@njit(parallel=True, error_model="numpy")
+def _prepare(x: Any, mask: Any, inputs: Any, slope: Any) -> None:
+    """inputs (B, n + 1) and slope (B, n) of x (B, n)."""
+    rows, width = x.shape
+    half = inputs.itemsize == 2
+    one = slope.dtype.type(1)
+    for row in numba.prange(rows):
+        for i in range(width):
+            slope[row, i] = mask[row, i] * min(x[row, i] + one, one)
+        if half:
+            for i in range(width):
+                inputs[row, i] = rounded(mask[row, i] * x[row, i])
+            inputs[row, width] = rounded(one)
+        else:
+            for i in range(width):
+                inputs[row, i] = mask[row, i] * x[row, i]
+            inputs[row, width] = one
+
+
+@njit(parallel=True, error_model="numpy")
+def _blend(outputs: Any, c: Any, h: Any) -> None:
+    """h (B, out): the sum of outputs (B, K out) over the experts, times their shares c (B, K)."""
+    rows, width = h.shape
+    half = outputs.itemsize == 2
+    for row in numba.prange(rows):
+        h[row] = 0
+        for k in range(c.shape[1]):
+            start, share = k * width, c[row, k]
+            if half:
+                for i in range(width):
+                    h[row, i] += share * widened(outputs[row, start + i])
+            else:
+                for i in range(width):
+                    h[row, i] += share * outputs[row, start + i]
+
+
+# The sums may be taken in any order, and so several at a time.
+@njit(parallel=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+def _spread(d: Any, outputs: Any, c: Any, da: Any, dc: Any) -> None:
+    """da (B, K out) from d (B, out), and what it adds to dc (B, K)."""
+    rows, width = d.shape
+    half = outputs.itemsize == 2
+    for row in numba.prange(rows):
+        for k in range(c.shape[1]):
+            start, share, total = k * width, c[row, k], c.dtype.type(0)
+            if half:
+                for i in range(width):
+                    total += d[row, i] * widened(outputs[row, start + i])
+                    da[row, start + i] = rounded(share * d[row, i])
+            else:
+                for i in range(width):
+                    total += d[row, i] * outputs[row, start + i]
+                    da[row, start + i] = share * d[row, i]
+            dc[row, k] += total

@@ -1,0 +1,167 @@
+"""The trained mode-adaptive network: its experts and its gate, and what each part of Hobble gets of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.models.checks import layers, numbers
+from hobble.models.mann.forward import forward, softmax
+from hobble.models.network import Export, Network, standardised
+from hobble.models.packing import packed_rows
+from hobble.models.stack import Stack, StackPredictor
+
+MOST_EXPERTS = 64
+
+
+@dataclass(frozen=True)
+class Mann(Network):
+    """weights: per layer (K, out, in) float32; biases: per layer (K, out); gate_weights: (out, in) and
+    gate_biases: (out,) of the gating network; columns: of X, (G,), those that it sees."""
+
+    kind: ClassVar[str] = "mann"
+    phase: ClassVar[bool] = False
+
+    weights: tuple[Array, ...] = field(repr=False)
+    biases: tuple[Array, ...] = field(repr=False)
+    gate_weights: tuple[Array, ...] = field(repr=False)
+    gate_biases: tuple[Array, ...] = field(repr=False)
+    columns: NDArray[np.int64] = field(repr=False)
+
+    @classmethod
+    def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Mann:
+        """From the arrays W0 (K, out, in), b0 (K, out), ..., V0 (out, in), d0 (out,), ... and `gate` (G,)."""
+        found: dict[str, tuple[Array, ...]] = {}
+        for name, partner, axes in (("W", "b", 3), ("V", "d", 2)):
+            count = layers(path, arrays, name, partner)
+            found[name] = tuple(numbers(path, arrays, f"{name}{i}", axes) for i in range(count))
+            found[partner] = tuple(numbers(path, arrays, f"{partner}{i}", axes - 1) for i in range(count))
+        inputs, outputs, experts = len(common["x_mean"]), len(common["y_mean"]), len(found["W"][0])
+        columns = _columns(path, arrays, inputs)
+        if not 2 <= experts <= MOST_EXPERTS:
+            raise InputError(path, f"{experts} experts; 2 to {MOST_EXPERTS} are read")
+        for name, partner, size, last in (("W", "b", inputs, outputs), ("V", "d", len(columns), experts)):
+            for i, (w, b) in enumerate(zip(found[name], found[partner], strict=True)):
+                fits = w.shape[-1] == size and b.shape == w.shape[:-1]
+                if not fits or (name == "W" and len(w) != experts):
+                    raise InputError(
+                        path,
+                        f"{name}{i} {w.shape} and {partner}{i} {b.shape} do not follow {size} units",
+                    )
+                size = w.shape[-2]
+            if size != last:
+                raise InputError(path, f"{name}{i} has {size} units, and {last} are needed")
+        return cls(
+            weights=found["W"],
+            biases=found["b"],
+            gate_weights=found["V"],
+            gate_biases=found["d"],
+            columns=columns,
+            **common,
+        )
+
+    @property
+    def experts(self) -> int:
+        """K, sets of weights of each layer."""
+        return len(self.weights[0])
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Units of each layer of an expert, the input first: (342, 512, 512, 311)."""
+        return (self.weights[0].shape[2], *(w.shape[1] for w in self.weights))
+
+    @property
+    def parameters(self) -> int:
+        """All weights and biases: each prediction goes through all experts."""
+        gate = sum(w.size + b.size for w, b in zip(self.gate_weights, self.gate_biases, strict=True))
+        return gate + self.experts * sum(a * b + b for a, b in pairwise(self.sizes))
+
+    @property
+    def described(self) -> str:
+        """As in `Network`."""
+        hidden = len(self.sizes) - 2
+        return (
+            f"mode-adaptive network of {hidden} hidden layer{'s' * (hidden != 1)} and {self.experts} experts"
+        )
+
+    def predict(self, x: Array, phase: Array) -> Array:
+        """As in `Network`; the phase is not looked at."""
+        z = standardised(self, x)
+        y = forward(self.weights, self.biases, self.gate_weights, self.gate_biases, self.columns, z)
+        return y * self.y_std + self.y_mean
+
+    def predictor(self, mode: str | None = None, storage: str = "float32") -> MannPredictor:
+        """As in `Network`; there is one mode."""
+        self.mode(mode)
+        return MannPredictor(self, storage)
+
+    def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
+        """As in `Network`: weights as integers with a factor for each row, `gate`: the places among `inputs`
+        that the gating network sees."""
+        weights, biases, gate = list(self.weights), list(self.biases), list(self.gate_weights)
+        weights[0] = weights[0][:, :, inputs]
+        weights[-1], biases[-1] = weights[-1][:, outputs], biases[-1][:, outputs]
+        place = {int(column): i for i, column in enumerate(inputs)}
+        there = [i for i, column in enumerate(self.columns) if int(column) in place]
+        gate[0] = gate[0][:, there]
+        return {
+            "layers": [packed_rows(w, b) for w, b in zip(weights, biases, strict=True)],
+            "gateLayers": [
+                packed_rows(w[None], b[None]) for w, b in zip(gate, self.gate_biases, strict=True)
+            ],
+            "gate": [place[int(self.columns[i])] for i in there],
+        }
+
+    @property
+    def exports(self) -> dict[str, Export]:
+        """ONNX."""
+
+        def onnx(target: Path, mode: str) -> str:
+            from hobble.models.mann.onnx_export import write_checked
+
+            return f"{target}: within {write_checked(target, self):.1g} of the runtime"
+
+        return {"onnx": onnx}
+
+
+class MannPredictor(StackPredictor):
+    """It prepared to run, its experts' weights stored as float32 or int16."""
+
+    network: Mann
+
+    def __init__(self, network: Mann, storage: str = "float32") -> None:
+        super().__init__(network)
+        self._experts = Stack(network.weights, network.biases, storage)
+        # Its rounding would be multiplied by every expert, and it is small.
+        self._gate = Stack([w[None] for w in network.gate_weights], [b[None] for b in network.gate_biases])
+
+    def evaluate(self, z: Array, phase: Array, out: Array) -> None:
+        """As in `Predictor`; the phase is not looked at."""
+        self._experts.run(z, self.shares(z), out)
+        self.restore(out)
+
+    def shares(self, z: Array) -> Array:
+        """(C, K) float32: the share of each expert for standardised inputs z (C, X)."""
+        logits = np.empty((len(z), self.network.experts), np.float32)
+        self._gate.run(z[:, self.network.columns], np.ones((len(z), 1), np.float32), logits)
+        return softmax(logits)
+
+
+def _columns(path: str | Path, arrays: Mapping[str, Any], inputs: int) -> NDArray[np.int64]:
+    """The array `gate`: different columns of X."""
+    if "gate" not in arrays:
+        raise InputError(path, "not a network: no gate")
+    array = np.asarray(arrays["gate"])
+    if array.ndim != 1 or array.dtype.kind not in "iu" or not array.size:
+        raise InputError(path, f"gate has shape {array.shape} and type {array.dtype}, not columns of X")
+    if array.min() < 0 or array.max() >= inputs or len(np.unique(array)) != array.size:
+        raise InputError(path, f"gate does not name different columns of {inputs}")
+    return array.astype(np.int64)

@@ -1,0 +1,28 @@
+"""The keys of a configuration's `network` section where its kind is mann."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from hobble.models.options import Options
+
+
+class MannOptions(Options):
+    """The mode-adaptive network; the sizes are those of Zhang et al. 2018."""
+
+    kind: Literal["mann"] = "mann"
+    experts: Annotated[int, Field(ge=2, le=32)] = 8
+    hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
+    units: Annotated[int, Field(gt=0, le=8192)] = 512
+    gate_layers: Annotated[int, Field(ge=1, le=4)] = 2
+    gate_units: Annotated[int, Field(gt=0, le=1024)] = 32
+
+    def sizes(self, inputs: int, outputs: int) -> tuple[int, ...]:
+        """Units of each layer of an expert, the input first."""
+        return (inputs, *[self.units] * self.hidden_layers, outputs)
+
+    def gate_sizes(self, inputs: int) -> tuple[int, ...]:
+        """Units of each layer of the gating network, its input first."""
+        return (inputs, *[self.gate_units] * self.gate_layers, self.experts)

@@ -1,0 +1,130 @@
+"""The mode-adaptive network while it is trained: its experts, its gate, what they compute."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import prod
+from typing import Any, ClassVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from hobble.models.products import product
+from hobble.models.trainable import Step, Trainable, uniform_start
+
+
+@dataclass(frozen=True)
+class TrainableMann(Trainable):
+    """The layers of the gate, then those of the experts.
+
+    A layer of experts lies in the buffer as (K * out, 1, in + 1), expert after expert: one product gives the
+    outputs of all, and the shares blend them behind it.
+    sizes: units of an expert from the input to the output; gate_sizes: of the gate, of which the last is K,
+    the number of experts; columns: of X, those that the gate sees.
+    """
+
+    kind: ClassVar[str] = "mann"
+
+    sizes: tuple[int, ...]
+    gate_sizes: tuple[int, ...]
+    columns: tuple[int, ...]
+
+    @property
+    def experts(self) -> int:
+        """K, sets of weights of each layer."""
+        return self.gate_sizes[-1]
+
+    @property
+    def shapes(self) -> list[tuple[int, int, int]]:
+        """As in `Trainable`."""
+        return shapes(self.sizes, self.gate_sizes)
+
+    @property
+    def inputs(self) -> int:
+        """Columns of X."""
+        return self.sizes[0]
+
+    @property
+    def outputs(self) -> int:
+        """Columns of Y."""
+        return self.sizes[-1]
+
+    def __call__(self, x: Tensor, p: Tensor) -> Tensor:
+        """As in `Trainable`; p is not looked at."""
+        gates = len(self.gate_sizes) - 1
+        h = x[:, list(self.columns)]
+        for number, layer in enumerate(self.layers[:gates]):
+            h = product(with_one(torch.nn.functional.elu(h) if number else h), layer.flatten(1))
+        shares = torch.softmax(h, dim=1)
+        for number, layer in enumerate(self.layers[gates:]):
+            x = product(with_one(torch.nn.functional.elu(x) if number else x), layer.flatten(1))
+            x = torch.bmm(shares[:, None, :], x.view(len(x), self.experts, -1))[:, 0]
+        return x
+
+    def step(self, dropout: float, half: bool) -> Step:
+        """Compiled loops on a CPU, PyTorch elsewhere."""
+        from hobble.models.mann import fused, step
+
+        on_cpu = self.flat.device.type == "cpu"
+        return (fused.FusedStep if on_cpu else step.Step)(self, dropout, half)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """`V0` (out, in), `d0` (out,), ... of the gate; `W0` (K, out, in), `b0` (K, out), ...; `gate`."""
+        arrays, gates = {}, len(self.gate_sizes) - 1
+        for number, layer in enumerate(self.layers):
+            values = layer[:, 0].cpu().numpy()
+            names = f"V{number}", f"d{number}"
+            if number >= gates:
+                names = f"W{number - gates}", f"b{number - gates}"
+                values = values.reshape(self.experts, -1, values.shape[-1])
+            arrays[names[0]] = np.ascontiguousarray(values[..., :-1])
+            arrays[names[1]] = np.ascontiguousarray(values[..., -1])
+        arrays["gate"] = np.array(self.columns, np.int64)
+        return arrays
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """As in `Trainable`."""
+        gate, inside = "x[gate]", "x"
+        for i in range(len(self.gate_sizes) - 1):
+            gate = f"V{i} {gate} + d{i}" if i == 0 else f"V{i} elu({gate}) + d{i}"
+        for i in range(len(self.sizes) - 2):
+            inside = f"elu(W{i} {inside} + b{i})"
+        last = len(self.sizes) - 2
+        text = f"y = W{last} {inside} + b{last} on standardised x and y; W and b are sums of those of the "
+        return {"experts": self.experts, "network": f"{text}experts in the shares softmax({gate})"}
+
+    @property
+    def described(self) -> str:
+        """As in `Trainable`."""
+        units, gate = ("-".join(map(str, sizes)) for sizes in (self.sizes, self.gate_sizes))
+        return (
+            f"{units} units, {self.experts} experts and a gate of {gate} ({self.flat.numel():,} parameters)"
+        )
+
+
+def shapes(sizes: tuple[int, ...], gate_sizes: tuple[int, ...]) -> list[tuple[int, int, int]]:
+    """(out, 1, in + 1) of the gate's layers, (K * out, 1, in + 1) of the experts'."""
+    gate = [(out, 1, size + 1) for size, out in pairwise(gate_sizes)]
+    return gate + [(gate_sizes[-1] * out, 1, size + 1) for size, out in pairwise(sizes)]
+
+
+def initialise(
+    sizes: tuple[int, ...], gate_sizes: tuple[int, ...], columns: tuple[int, ...], seed: int
+) -> TrainableMann:
+    """Weights of each expert and of the gate within +-sqrt(6 / (in * out)), biases 0."""
+    flat = torch.zeros(sum(map(prod, shapes(sizes, gate_sizes))))
+    network = TrainableMann(flat, tuple(sizes), tuple(gate_sizes), tuple(columns))
+    gates, generator = len(gate_sizes) - 1, np.random.default_rng([seed, 0])
+    uniform_start(network.layers[:gates], generator)
+    for layer in network.layers[gates:]:
+        experts = layer.view(network.experts, -1, layer.shape[-1])
+        uniform_start([experts.transpose(0, 1)], generator)
+    return network
+
+
+def with_one(x: Tensor) -> Tensor:
+    """x (B, n) with a 1 behind each row, which the bias multiplies."""
+    return torch.cat([x, torch.ones_like(x[:, :1])], dim=1)

@@ -1,0 +1,133 @@
+"""Networks as one ONNX file: standardised, evaluated and restored inside the graph, and checked when written.
+
+Inputs `x` (batch, X) and `phase` (batch,) in cycles, output `y` (batch, Y), float32, any batch. A network
+without a phase has that input too, so that every file is called alike. What it takes to write and to check a
+file is wanted here alone: pip install "hobble[onnx]".
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.files import atomic_path
+from hobble.models.network import Network, inverse
+
+OPSET = 15
+TOLERANCE = 1e-4  # of the runtime, in the units of Y, or of the value where it is above 1
+CHECKED_ROWS = 64
+
+
+class Graph:
+    """Collects nodes and constants under names of their own."""
+
+    def __init__(self, helper: Any, numpy_helper: Any) -> None:
+        self.helper, self.numpy_helper = helper, numpy_helper
+        self.nodes: list[Any] = []
+        self.constants: list[Any] = []
+
+    def constant(self, value: Any, dtype: Any = np.float32) -> str:
+        """Its name in the graph."""
+        name = f"c{len(self.constants)}"
+        array = np.ascontiguousarray(value, dtype).reshape(np.shape(value))
+        self.constants.append(self.numpy_helper.from_array(array, name))
+        return name
+
+    def __call__(self, op: str, *inputs: str, output: str = "", **attributes: Any) -> str:
+        """Add a node; returns the name of its output."""
+        output = output or f"n{len(self.nodes)}"
+        self.nodes.append(self.helper.make_node(op, inputs, [output], **attributes))
+        return output
+
+
+Body = Callable[[Graph, str], str]
+
+
+def export(path: str | Path, network: Network, mode: str, body: Body) -> None:
+    """Write the network; its columns, skeleton and channels go along as metadata `hobble`.
+
+    body: adds what lies between standardised inputs, by name, and standardised outputs, whose name it
+    returns; "phase" names the phases. Raises HobbleError where the onnx package is not installed.
+    """
+    try:
+        import onnx
+        from onnx import TensorProto, helper, numpy_helper
+    except ImportError as error:
+        raise HobbleError('ONNX needs its package: pip install "hobble[onnx]"') from error
+    g = Graph(helper, numpy_helper)
+    z = g("Sub", "x", g.constant(network.x_mean))
+    z = g("Mul", z, g.constant(inverse(network.x_std)))
+    h = body(g, z)
+    g("Add", g("Mul", h, g.constant(network.y_std)), g.constant(network.y_mean), output="y")
+    columns: tuple[tuple[str, list[int]], ...] = (
+        ("x", [len(network.x_mean)]),
+        ("phase", []),
+        ("y", [len(network.y_mean)]),
+    )
+    ends = [
+        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *sizes]) for name, sizes in columns
+    ]
+    graph = helper.make_graph(g.nodes, "hobble", ends[:2], ends[2:], g.constants)
+    opset = helper.make_opsetid("", OPSET)
+    model = helper.make_model(
+        graph,
+        opset_imports=[opset],
+        producer_name="hobble",
+        ir_version=helper.find_min_ir_version_for([opset]),
+    )
+    helper.set_model_props(model, {"hobble": json.dumps(_about(network, mode))})
+    onnx.checker.check_model(model, full_check=True)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(model.SerializeToString(deterministic=True))
+
+
+def check(path: str | Path, network: Network, mode: str) -> float:
+    """The largest difference between the file, run by onnxruntime, and the runtime, over random rows.
+
+    It is in the units of Y, or in shares of the value where that is above 1.
+
+    Raises InputError where it is above TOLERANCE, HobbleError where onnxruntime is not installed.
+    """
+    try:
+        import onnxruntime
+    except ImportError as error:
+        raise HobbleError('onnxruntime is not installed: pip install "hobble[onnx]"') from error
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    rng = np.random.default_rng(1)
+    x = network.x_mean + network.x_std * rng.normal(size=(CHECKED_ROWS, len(network.x_mean)))
+    phase = rng.random(CHECKED_ROWS).astype(np.float32)
+    phase[:3] = 0.0, 0.5, 1.0
+    x = x.astype(np.float32)
+    (y,) = session.run(["y"], {"x": x, "phase": phase})
+    expected = network.predictor(mode).predict(x, phase.astype(float))
+    difference = float((np.abs(y - expected) / np.maximum(1.0, np.abs(expected))).max())
+    if not difference <= TOLERANCE:
+        raise InputError(path, f"onnxruntime gives other numbers than the runtime: off by {difference:.2g}")
+    return difference
+
+
+def write(path: str | Path, network: Network, mode: str, body: Body) -> float:
+    """Export, and check before the file has its name; returns and raises what the two functions do."""
+    with atomic_path(path) as temporary:
+        export(temporary, network, mode, body)
+        return check(temporary, network, mode)
+
+
+def _about(network: Network, mode: str) -> dict[str, Any]:
+    """What a reader has to know of the columns."""
+    keys = ("configuration", "contacts", "limits", "units")
+    return {
+        "mode": mode,
+        "layout": network.layout.to_dict(),
+        "gaits": list(network.gaits),
+        "channels": {name: list(labels) for name, labels in network.channels.items()},
+        "skeleton": network.skeleton.to_dict() if network.skeleton is not None else None,
+        **{key: network.meta[key] for key in keys if key in network.meta},
+    }

@@ -1,0 +1,42 @@
+"""A feed-forward network that is given sine and cosine of the phase: shows what control points buy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hobble.core.skeleton import Skeleton
+from hobble.models.model import Model
+from hobble.rows.layout import RowLayout
+
+if TYPE_CHECKING:
+    from hobble.models.plain.network import Plain
+    from hobble.models.plain.options import PlainOptions
+    from hobble.models.plain.trainable import TrainablePlain
+
+
+class _Plain(Model):
+    def options(self) -> type[PlainOptions]:
+        from hobble.models.plain.options import PlainOptions
+
+        return PlainOptions
+
+    def parameters(self, options: PlainOptions, inputs: int, outputs: int) -> int:
+        return sum((a + 1) * b for a, b in pairwise(options.sizes(inputs, outputs))) + 2 * options.units
+
+    def trainable(
+        self, options: PlainOptions, layout: RowLayout, skeleton: Skeleton, seed: int
+    ) -> TrainablePlain:
+        from hobble.models.plain.trainable import initialise
+
+        return initialise(options.sizes(layout.x_size, layout.y_size), seed)
+
+    def read(self, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Plain:
+        from hobble.models.plain.network import Plain
+
+        return Plain.read(path, arrays, common)
+
+
+MODEL = _Plain()

@@ -1,0 +1,13 @@
+// One feed-forward network, whose inputs are the row and sine and cosine of the phase. See `network.py`.
+import { createLayers, createScales } from "../layers.js";
+
+export const createNetwork = (spec) => {
+  const layers = createLayers(spec.network.layers), { inputs, standardise, restore } = createScales(spec);
+  const z = new Float32Array(inputs + 2);
+  return (x, phase) => {
+    standardise(x, z);
+    z[inputs] = Math.sin(2 * Math.PI * phase);
+    z[inputs + 1] = Math.cos(2 * Math.PI * phase);
+    return restore(layers(z));
+  };
+};

@@ -1,0 +1,119 @@
+"""A feed-forward network with sine and cosine of the phase behind its inputs: `Plain.predict` is it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.models.checks import layers, numbers
+from hobble.models.network import Export, Network, standardised
+from hobble.models.packing import packed_rows
+from hobble.models.stack import Stack, StackPredictor
+
+OF_PHASE = 2  # columns behind those of X: sine, cosine
+
+
+@dataclass(frozen=True)
+class Plain(Network):
+    """weights: per layer (out, in) float32, the first with OF_PHASE more inputs than X; biases: (out,)."""
+
+    kind: ClassVar[str] = "plain"
+
+    weights: tuple[Array, ...] = field(repr=False)
+    biases: tuple[Array, ...] = field(repr=False)
+
+    @classmethod
+    def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Plain:
+        """From the arrays W0 (out, in), b0 (out,), ... of a file; see `hobble.models.load`."""
+        count = layers(path, arrays, "W", "b")
+        weights = tuple(numbers(path, arrays, f"W{i}", 2) for i in range(count))
+        biases = tuple(numbers(path, arrays, f"b{i}", 1) for i in range(count))
+        size = len(common["x_mean"]) + OF_PHASE
+        for i, (w, b) in enumerate(zip(weights, biases, strict=True)):
+            if w.shape[1] != size or b.shape != w.shape[:1]:
+                raise InputError(
+                    path, f"W{i} {w.shape} and b{i} {b.shape} do not follow a layer of {size} units"
+                )
+            size = w.shape[0]
+        if size != len(common["y_mean"]):
+            raise InputError(path, f"its last layer has {size} units for {len(common['y_mean'])} outputs")
+        return cls(weights=weights, biases=biases, **common)
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Units of each layer, the columns of X first: (342, 512, 512, 311)."""
+        return (len(self.x_mean), *(len(b) for b in self.biases))
+
+    @property
+    def parameters(self) -> int:
+        """All weights and biases."""
+        return sum(a * b + b for a, b in pairwise(self.sizes)) + OF_PHASE * self.sizes[1]
+
+    @property
+    def described(self) -> str:
+        """As in `Network`."""
+        hidden = len(self.sizes) - 2
+        return f"feed-forward network of {hidden} hidden layer{'s' * (hidden != 1)}, given the phase"
+
+    def predict(self, x: Array, phase: Array) -> Array:
+        """As in `Network`."""
+        h = np.concatenate([standardised(self, x), of_phase(phase)], axis=1)
+        for number, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            h = h @ weight.T + bias
+            if number < len(self.weights) - 1:
+                h = np.where(h > 0, h, np.expm1(np.minimum(h, 0)))
+        return h * self.y_std + self.y_mean
+
+    def predictor(self, mode: str | None = None, storage: str = "float32") -> PlainPredictor:
+        """As in `Network`; there is one mode."""
+        self.mode(mode)
+        return PlainPredictor(self, storage)
+
+    def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
+        """As in `Network`: weights as integers with a factor for each row."""
+        weights, biases = list(self.weights), list(self.biases)
+        phase = len(self.x_mean) + np.arange(OF_PHASE)
+        weights[0] = weights[0][:, np.concatenate([inputs, phase])]
+        weights[-1], biases[-1] = weights[-1][outputs], biases[-1][outputs]
+        return {"layers": [packed_rows(w[None], b[None]) for w, b in zip(weights, biases, strict=True)]}
+
+    @property
+    def exports(self) -> dict[str, Export]:
+        """ONNX."""
+
+        def onnx(target: Path, mode: str) -> str:
+            from hobble.models.plain.onnx_export import write_checked
+
+            return f"{target}: within {write_checked(target, self):.1g} of the runtime"
+
+        return {"onnx": onnx}
+
+
+class PlainPredictor(StackPredictor):
+    """It prepared to run, its weights stored as float32 or int16."""
+
+    network: Plain
+
+    def __init__(self, network: Plain, storage: str = "float32") -> None:
+        super().__init__(network)
+        self._stack = Stack([w[None] for w in network.weights], [b[None] for b in network.biases], storage)
+
+    def evaluate(self, z: Array, phase: Array, out: Array) -> None:
+        """As in `Predictor`."""
+        inputs = np.concatenate([z, of_phase(phase)], axis=1)
+        self._stack.run(inputs, np.ones((len(z), 1), np.float32), out)
+        self.restore(out)
+
+
+def of_phase(phase: Array) -> Array:
+    """(n, 2) float32: sine and cosine of phases (n,) in cycles."""
+    angle = 2 * np.pi * np.asarray(phase, float)
+    return np.stack([np.sin(angle), np.cos(angle)], axis=1).astype(np.float32)

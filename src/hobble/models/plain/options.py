@@ -1,0 +1,21 @@
+"""The keys of a configuration's `network` section where its kind is plain."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from hobble.models.options import Options
+
+
+class PlainOptions(Options):
+    """A feed-forward network of the sizes of the phase-functioned one."""
+
+    kind: Literal["plain"] = "plain"
+    hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
+    units: Annotated[int, Field(gt=0, le=8192)] = 512
+
+    def sizes(self, inputs: int, outputs: int) -> tuple[int, ...]:
+        """Units of each layer, the columns of X first; the first layer is given two more, of the phase."""
+        return (inputs, *[self.units] * self.hidden_layers, outputs)

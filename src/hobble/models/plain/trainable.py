@@ -1,0 +1,128 @@
+"""The plain network while it is trained, and its step: that of layers with one set of weights each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import prod
+from typing import Any, ClassVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from hobble.models.pfnn.fused import FusedStep
+from hobble.models.pfnn.step import Step as BlendedStep
+from hobble.models.plain.network import OF_PHASE
+from hobble.models.products import product
+from hobble.models.trainable import Step, Trainable, uniform_start
+
+
+@dataclass(frozen=True)
+class TrainablePlain(Trainable):
+    """units: of each layer, the columns of X first; the first layer has OF_PHASE more inputs."""
+
+    kind: ClassVar[str] = "plain"
+    control_points: ClassVar[int] = 1  # as the step calls sets of weights
+
+    units: tuple[int, ...]
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Inputs of each layer, those of the phase among them, and the outputs."""
+        return (self.units[0] + OF_PHASE, *self.units[1:])
+
+    @property
+    def shapes(self) -> list[tuple[int, int, int]]:
+        """As in `Trainable`."""
+        return shapes(self.units)
+
+    @property
+    def inputs(self) -> int:
+        """Columns of X."""
+        return self.units[0]
+
+    @property
+    def outputs(self) -> int:
+        """Columns of Y."""
+        return self.units[-1]
+
+    def __call__(self, x: Tensor, p: Tensor) -> Tensor:
+        """As in `Trainable`."""
+        x = with_phase(x, p)
+        for number, layer in enumerate(self.layers):
+            if number:
+                x = torch.nn.functional.elu(x)
+            x = product(torch.cat([x, torch.ones_like(x[:, :1])], dim=1), layer.flatten(1))
+        return x
+
+    def step(self, dropout: float, half: bool) -> Step:
+        """Compiled loops on a CPU, PyTorch elsewhere."""
+        step: Any = FusedPlainStep if self.flat.device.type == "cpu" else PlainStep
+        return step(self, dropout, half)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """`W0` (out, in), `b0` (out,), ..."""
+        arrays = {}
+        for number, layer in enumerate(self.layers):
+            values = layer[:, 0].cpu().numpy()
+            arrays[f"W{number}"] = np.ascontiguousarray(values[:, :-1])
+            arrays[f"b{number}"] = np.ascontiguousarray(values[:, -1])
+        return arrays
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """As in `Trainable`."""
+        hidden, inside = len(self.units) - 2, "(x, sin 2 pi p, cos 2 pi p)"
+        for i in range(hidden):
+            inside = f"elu(W{i} {inside} + b{i})"
+        return {"network": f"y = W{hidden} {inside} + b{hidden} on standardised x and y; p is the phase"}
+
+    @property
+    def described(self) -> str:
+        """As in `Trainable`."""
+        return f"{'-'.join(map(str, self.units))} units, given the phase ({self.flat.numel():,} parameters)"
+
+
+class _OfPhase:
+    """Puts sine and cosine behind the inputs of a step whose layers have one set of weights."""
+
+    def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
+        """As in `Step`."""
+        return super().__call__(with_phase(x, p), y, p, masks)  # type: ignore[misc]
+
+    def masks(self, rows: int) -> list[Tensor]:
+        """As in `Step`; the phase is never dropped, no more than where control points follow it."""
+        masks: list[Tensor] = super().masks(rows)  # type: ignore[misc]
+        masks[0][:, -OF_PHASE:] = 1
+        return masks
+
+    def coefficients(self, p: Tensor) -> Tensor:
+        """(B, 1) of ones."""
+        return torch.ones_like(p[:, None])
+
+
+class PlainStep(_OfPhase, BlendedStep):  # type: ignore[misc]
+    """Its gradient in PyTorch, on any device."""
+
+
+class FusedPlainStep(_OfPhase, FusedStep):  # type: ignore[misc]
+    """Its gradient on a CPU."""
+
+
+def with_phase(x: Tensor, p: Tensor) -> Tensor:
+    """x (B, X) with sine and cosine of phases (B,) behind it."""
+    angle = 2 * torch.pi * p[:, None]
+    return torch.cat([x, torch.sin(angle), torch.cos(angle)], dim=1)
+
+
+def shapes(units: tuple[int, ...]) -> list[tuple[int, int, int]]:
+    """(out, 1, in + 1) of each layer."""
+    inputs = (units[0] + OF_PHASE, *units[1:-1])
+    return [(out, 1, size + 1) for size, out in zip(inputs, units[1:], strict=True)]
+
+
+def initialise(units: tuple[int, ...], seed: int) -> TrainablePlain:
+    """Weights uniform within +-sqrt(6 / (in * out)), biases 0, as those of the phase-functioned network."""
+    network = TrainablePlain(torch.zeros(sum(map(prod, shapes(units)))), units)
+    uniform_start(network.layers, np.random.default_rng([seed, 0]))
+    return network

@@ -1,0 +1,102 @@
+"""What a network saw in training: the range of each column, the fastest joint, and a frame to start from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.models import checks
+from hobble.rows.layout import GAITS, RowLayout
+
+ARRAYS = {
+    "Xlow": "x_low",
+    "Xhigh": "x_high",
+    "Ylow": "y_low",
+    "Yhigh": "y_high",
+    "start_x": "start_x",
+    "start_y": "start_y",
+}
+STANDING = 0.99  # share of the gait from which a frame counts as standing
+FEW = 0.005  # share of the rows below which standing is too rare to be a start
+
+
+@dataclass(frozen=True)
+class Seen:
+    """x_low, x_high, start_x (X,), y_low, y_high, start_y (Y,): raw units, float32.
+
+    fastest: of any joint in any row, cm a frame. start_x, start_y, start_phase: a row, one of a figure that
+    stands where the rows have it, else the one that is nearest to the mean of all.
+    """
+
+    x_low: Array = field(repr=False)
+    x_high: Array = field(repr=False)
+    y_low: Array = field(repr=False)
+    y_high: Array = field(repr=False)
+    start_x: Array = field(repr=False)
+    start_y: Array = field(repr=False)
+    start_phase: float
+    fastest: float
+
+    def arrays(self) -> dict[str, Array]:
+        """As they stand in a file."""
+        of_rows = {name: getattr(self, key) for name, key in ARRAYS.items()}
+        return {**of_rows, "start_phase": np.float64(self.start_phase), "fastest": np.float64(self.fastest)}
+
+    @classmethod
+    def of(cls, layout: RowLayout, blocks: Iterable[Any], statistics: Any) -> Seen:
+        """From blocks of standardised rows, as `Database.blocks` gives them, and their statistics."""
+        s = statistics
+        stand = layout.x_gait.start + GAITS.index("stand") * layout.samples + layout.samples // 2
+        rest = s.x_mean[stand] > FEW
+        body = np.r_[layout.x_position, layout.x_direction, layout.x_joint_position, layout.x_joint_velocity]
+        low, high = (np.inf, np.inf), (-np.inf, -np.inf)
+        best, start, fastest = np.inf, None, 0.0
+        for block in blocks:
+            x, y = block.x * s.x_std + s.x_mean, block.y * s.y_std + s.y_mean
+            low = tuple(np.minimum(a, rows.min(axis=0)) for a, rows in zip(low, (x, y), strict=True))
+            high = tuple(np.maximum(a, rows.max(axis=0)) for a, rows in zip(high, (x, y), strict=True))
+            speed = np.linalg.norm(y[:, layout.y_joint_velocity].reshape(len(y), -1, 3), axis=-1)
+            fastest = max(fastest, float(speed.max()))
+            if rest:  # the stillest of those that stand
+                far = np.square(x[:, layout.x_position]).sum(axis=1) + np.square(speed).sum(axis=1)
+                far = np.where(x[:, stand] >= STANDING, far, np.inf)
+            else:
+                far = np.square(block.x[:, body]).mean(axis=1)
+            k = int(far.argmin())
+            if start is None or far[k] < best:
+                best, start = float(far[k]), (x[k], y[k], float(block.p[k]))
+        assert start is not None, "a database has rows"
+        found = (low[0], high[0], low[1], high[1], *start[:2])
+        of_rows: dict[str, Any] = {
+            key: np.asarray(a, np.float32) for key, a in zip(ARRAYS.values(), found, strict=True)
+        }
+        return cls(**of_rows, start_phase=start[2], fastest=fastest)
+
+    @classmethod
+    def read(cls, path: str | Path, arrays: Mapping[str, Any], x_size: int, y_size: int) -> Seen | None:
+        """From a file's arrays; None where it has none, as the original release. Raises InputError."""
+        if not any(name in arrays for name in (*ARRAYS, "start_phase", "fastest")):
+            return None
+        found: dict[str, Any] = {}
+        for name, key in ARRAYS.items():
+            found[key] = checks.numbers(path, arrays, name, 1, checks.LARGEST_MEAN)
+            if len(found[key]) != (x_size if key.startswith("x") or key == "start_x" else y_size):
+                raise InputError(path, f"{name} has {len(found[key])} columns")
+        for name in ("start_phase", "fastest"):
+            if (
+                name not in arrays
+                or np.shape(arrays[name]) != ()
+                or np.asarray(arrays[name]).dtype.kind != "f"
+            ):
+                raise InputError(path, f"{name} is no number")
+            found[name] = checks.length(path, name, float(arrays[name]), 1e6, -1e-9)
+        for block in "xy":
+            if (found[f"{block}_low"] > found[f"{block}_high"]).any():
+                raise InputError(path, f"{block.upper()}low is above {block.upper()}high in a column")
+        return cls(**found)

@@ -1,0 +1,156 @@
+"""The limp in sizes: a character that limps by known amounts, one that does not, one on the wrong side."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.channels.injury.limp import run as module
+from hobble.channels.injury.limp.captured import VERSION, Limp, Told, healthy_of
+from hobble.channels.injury.limp.run import SEVERITIES, distance, hurt_side, limp
+from hobble.channels.injury.limp.walks import Shown
+from hobble.gait.cycles import SCALARS, Cycle, Walk
+from hobble.gait.people import NORMAL, people
+from hobble.gait.profile import profile
+from hobble.gait.signals import CURVES, TURNS_ROUND
+from hobble.runtime.options import Runtime
+
+LEFT_KNEE, RIGHT_KNEE = "LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg"
+FRAMES = 480
+
+
+def mirrored(cycle: Cycle) -> Cycle:
+    """The same cycle in a mirror."""
+
+    def across(name: str) -> str:
+        return name[:-1] + {"R": "L", "L": "R"}[name[-1]] if name[-2:] in ("_R", "_L") else name
+
+    curves = [
+        cycle.curves[CURVES.index(across(name))] * (-1 if name in TURNS_ROUND else 1) for name in CURVES
+    ]
+    scalars = {name: cycle.scalars[across(name)] for name in cycle.scalars}
+    scalars["left_strike_phase"] = 1 - cycle.scalars["left_strike_phase"]
+    return Cycle(cycle.start, cycle.end, scalars, np.array(curves))
+
+
+def walking(limp: dict[str, float], speed: float) -> Shown:
+    """A figure that walks as people do, and limps on a side by a share of what people with pain in the right
+    leg do."""
+    known, strength = people(), max(limp.values(), default=0.0)
+
+    def mixed(of: Callable[[str], Any]) -> Any:
+        return (1 - strength) * of(NORMAL) + strength * of("antalgic")
+
+    curves = np.array([mixed(lambda gait, n=n: known.curve(gait, n)[0]) for n in CURVES])
+    scalars = {n: float(mixed(lambda gait, n=n: known.scalar(gait, n)[0])) for n in SCALARS}
+    cycles = [Cycle(start, start + 70, scalars, curves) for start in range(0, FRAMES - 70, 70)]
+    walk = Walk(60.0, tuple(cycles), tuple(map(mirrored, cycles)))
+    walk = walk.mirrored() if "left" in limp else walk
+    return Shown(walk, profile(walk), speed, FRAMES)
+
+
+@pytest.fixture
+def measured(hurtable, holden31, monkeypatch):
+    """measured(effect): limp.json of a character who limps by `effect(severity)` of what people do."""
+
+    def run(effect, other_side: bool = False, every: tuple[Limp, ...] = (), splits=None) -> dict[str, Any]:
+        def shown(network, each, speeds, gait, seconds, runtime):
+            out = []
+            for hurt in each:
+                amount = {hurt_side(holden31, link): effect(s) for link, s in hurt.items()}
+                if other_side:
+                    amount = {("left" if side == "right" else "right"): v for side, v in amount.items()}
+                worst = max(amount.values(), default=0.0)
+                out.append(walking(amount, speeds * (1 - 0.5 * worst)))
+            return out
+
+        monkeypatch.setattr(module, "shown", shown)
+        options = {
+            "configuration": "x",
+            "runtime": Runtime(),
+            "seconds": 8.0,
+            "links": [LEFT_KNEE, RIGHT_KNEE],
+        }
+        return limp(hurtable, list(every), Told(), splits or {}, **options)
+
+    return run
+
+
+def test_effects_have_their_sizes_and_sides_are_alike(measured) -> None:
+    found = measured(lambda s: 0.1 * s)
+    rows = [row for row in found["sizes"] if row["gait"] == "walk"]
+    assert [row["severity"] for row in rows] == 2 * list(SEVERITIES)
+    rows = [row for row in rows if row["side"] == "right"]  # people's normal walks are not quite even
+    full = rows[-1]
+    assert full["knee_hurt"] < 0.5
+    assert full["stance"] > 0.15
+    for row in rows:
+        share = 0.1 * row["severity"]
+        assert row["knee_hurt"] == pytest.approx(1 - share * (1 - full["knee_hurt"]), abs=0.05)
+        assert row["stance"] == pytest.approx(share * full["stance"], abs=0.01)
+        assert row["speed_share"] == pytest.approx(1 - 0.05 * row["severity"])
+    last = found["named"][-1]
+    assert last["severity"] == 10
+    assert last["named"] == 1
+    assert last["wrong_side"] == 0
+    json.dumps(found, allow_nan=False)
+
+
+def test_severities_that_do_nothing_are_nobodys_limp(measured) -> None:
+    found = measured(lambda s: 0.0)
+    assert all(row["called"] == "normal" for row in found["sizes"] if row["gait"] == "walk")
+    assert [row["named"] for row in found["named"]] == [0, 0, 0, 0]
+    assert [row["impaired"] for row in found["named"]] == [0, 0, 0, 0]
+
+
+def test_a_change_of_two_percent_is_steady_and_still_small(measured) -> None:
+    """The rank correlation that the size has to stand beside."""
+    found = measured(lambda s: 0.002 * s)
+    knee = next(row for row in found["steady"] if row["gait"] == "walk" and row["effect"] == "knee_hurt")
+    assert knee["spearman"] == pytest.approx(-1)
+    assert 0.95 < knee["at_10"] < 1
+    assert found["named"][-1]["named"] == 0
+
+
+def test_a_limp_of_the_other_leg_is_seen(measured) -> None:
+    last = measured(lambda s: 0.1 * s, other_side=True)["named"][-1]
+    assert last["named"] == 0
+    assert last["wrong_side"] == 1
+
+
+def clip(name: str, hurt: dict[str, float], limp: dict[str, float]) -> Limp:
+    return Limp(name, hurt, walking(limp, 2.0).walk, 2.0)
+
+
+def test_the_exam_is_passed_by_the_right_leg_alone(measured) -> None:
+    every = (
+        clip("7_1", {}, {}),
+        clip("7_2", {RIGHT_KNEE: 8.0}, {"right": 0.8}),
+        clip("7_3", {RIGHT_KNEE: 8.0}, {"right": 0.8}),
+    )
+    splits = {"7_1": "train", "7_2": "held_out", "7_3": "train"}
+    (row,) = measured(lambda s: 0.1 * s, every=every, splits=splits)["exam"]
+    assert row["clip"] == "7_2"
+    assert row["nearer"]
+    assert row["hurt"] < 0.3 * row["healthy"]
+    assert not measured(lambda s: 0.1 * s, True, every, splits)["exam"][0]["nearer"]
+    assert not measured(lambda s: 0.0, False, every, splits)["exam"][0]["nearer"]
+
+
+def test_a_clip_is_set_beside_its_own_performer() -> None:
+    own, other = clip("7_1", {}, {}), clip("8_1", {}, {"left": 0.3})
+    hurt = clip("7_2", {RIGHT_KNEE: 8.0}, {"right": 0.8})
+    healthy, whose = healthy_of(hurt, [other, own, hurt])
+    assert whose == "performer"
+    assert healthy == profile(own.walk)
+    assert healthy_of(hurt, [hurt])[1] == "people"
+    assert distance(healthy, healthy, healthy, healthy) == 0
+
+
+def test_what_a_generator_made_is_known_by_its_name() -> None:
+    names = ("walk_hurt1", "walk_hurt3_mirror", "walk", "hurt1", "walk_hurt", "walk_mirror")
+    assert [VERSION.search(name) is not None for name in names] == [True, True, False, False, False, False]

