@@ -3,7 +3,7 @@ import os
 import sys
 from pathlib import Path
 
-from hobble.channels import NAMES, modules_of
+from hobble.channels import NAMES, modules_of, shown_modules
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import modules
 from hobble.workflow import lifetime
@@ -11,16 +11,19 @@ from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
 from hobble.workflow.project import Project
-from hobble.workflow.targets import check
+from hobble.workflow.targets import check, notes
 from hobble.workflow.told import told_by
 
 try:
     # Relative, so that a checkout can be moved without making anything again.
     project = Project(Path(os.path.relpath(workflow.basedir)), config)
-    check(
-        project,
-        (argument for argument in sys.argv[1:] if argument.startswith("results/")),
-    )
+    targets = [
+        argument for argument in sys.argv[1:] if argument.startswith("results/")
+    ]
+    check(project, targets)
+    if workflow.is_main_process:
+        for note in notes(project, targets):
+            logger.warning(note)
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from hobble.evaluation.crowd import Stretch, run, severities
+from hobble.evaluation.crowd import Stretch, run, told
 from hobble.runtime.options import Runtime
 
 
 def test_a_figure_walks_the_same_alone_and_among_others(hurtable) -> None:
-    links = list(hurtable.links[:5])
-    hurt = severities(hurtable, [{link: 2.0 * i} for i, link in enumerate(links)])
+    links = list(hurtable.channels["injury"][:5])
+    hurt = told(hurtable, "injury", [{link: 2.0 * i} for i, link in enumerate(links)])
     gaits = ["walk", "jog", "walk", "jog", "walk"]
     together = run(hurtable, [Stretch(20, gaits, hurt), Stretch(20, gaits, hurt)], Runtime())
     for i, gait in enumerate(gaits):
-        own = hurt[i : i + 1]
+        own = {"injury": hurt["injury"][i : i + 1]}
         alone = run(hurtable, [Stretch(20, [gait], own), Stretch(20, [gait], own)], Runtime())
         for name in ("local", "contacts", "phase", "root", "acceleration"):
             np.testing.assert_array_equal(getattr(alone, name)[:, 0], getattr(together, name)[:, i], name)

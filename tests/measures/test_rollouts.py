@@ -213,7 +213,7 @@ def save(path: Path, network: Network) -> None:
     meta = {
         "layout": network.layout.to_dict(),
         "skeleton": network.skeleton.to_dict(),
-        "channels": {"injury": list(network.links)},
+        "channels": {"injury": list(network.channels["injury"])},
         "gaits": list(network.gaits),
     }
     np.savez(path, **arrays, meta=np.array(json.dumps(meta)))

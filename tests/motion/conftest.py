@@ -110,7 +110,7 @@ def make(root: Path, options: dict[str, Any]):
 
     def run(path: Path, skeleton: str = "holden31", **changed: Any):
         folder = root / "config" / "skeletons"
-        file, keys = folder / f"{skeleton}.yaml", ClipMotion(**(options | changed))
+        file, keys = folder / f"{skeleton}.yaml", ClipMotion().model_copy(update=options | changed)
         return make_clip(path, file, folder, path.stem, skeleton, keys)
 
     return run

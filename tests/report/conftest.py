@@ -73,7 +73,7 @@ def material(inputs: dict[str, Any]) -> Material:
 
 @pytest.fixture(scope="session")
 def play(inputs: dict[str, Any], material: Material) -> dict[str, Any]:
-    return scenes(inputs["scenarios"], material.network["skeleton"], material.network["links"])
+    return scenes(inputs["scenarios"], material.network["skeleton"], material.network["channels"])
 
 
 @pytest.fixture(scope="session")

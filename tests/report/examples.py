@@ -80,8 +80,8 @@ def scenarios(path: Path, skeleton: Skeleton, hurt: bool = True) -> None:
         made = walker(skeleton, frames, speed, 0.8 if link else 0.0)
         for key, value in made.items():
             arrays[f"{name}/{key}"] = value.astype(np.float32)
-        arrays[f"{name}/severity"] = (10 * np.arange(frames) / frames * bool(link)).astype(np.float32)
-        arrays[f"{name}/hurt"] = np.array(link)
+        arrays[f"{name}/told"] = (10 * np.arange(frames) / frames * bool(link)).astype(np.float32)
+        arrays[f"{name}/swept"] = np.array(("injury", link) if link else ("", ""))
         arrays[f"{name}/gait"] = np.array(["walk"] * frames)
     save_npz(
         path,

@@ -195,7 +195,7 @@ def test_two_figures_take_the_same_wishes(tab: Any) -> None:
     tab.send("Input.dispatchKeyEvent", type="keyUp", key="w", code="KeyW")
     assert first[0] * second[0] + first[1] * second[1] > 0
     tab.run("[...document.querySelectorAll('#play-presets button')][0].click()")
-    hurt = "Math.max(0, ...Hobble.player.actors[{0}].character.severity)"
+    hurt = "Math.max(0, ...Hobble.player.actors[{0}].character.told)"
     assert tab.until(f"{hurt.format(0)} > .1")
     assert tab.run(hurt.format(1)) == 0
     assert "holden" in tab.run("document.getElementById('play-panel').textContent")

@@ -55,7 +55,7 @@ def hostile(
     save_npz(rows, **{**arrays, "clip": np.array(HOSTILE)})
     text = render(
         material,
-        scenes(folder / "scenarios.npz", material.network["skeleton"], material.network["links"]),
+        scenes(folder / "scenarios.npz", material.network["skeleton"], material.network["channels"]),
         playable(network, examples.RUNTIME),
         comparisons(network, [rows], {HOSTILE: "train", "jog": "train"}),
         script,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hobble.report import limp_picture
-from hobble.report.limp_picture import beside
+from hobble.channels.injury import limp_picture
+from hobble.channels.injury.limp_picture import beside
 
 
 def loop(length: int, shade: int) -> list[np.ndarray]:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
+from hobble.channels.injury.shown import PARTS, body_parts
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.figure.mesh import body
@@ -22,8 +23,7 @@ from hobble.models.network import Network
 from hobble.motion.decode import decode, frame_rate
 from hobble.motion.read import read_bvh
 from hobble.report.formats import embedded
-from hobble.report.playable import body_parts, playable
-from hobble.report.words import PARTS
+from hobble.report.playable import playable
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import jointed
 
@@ -104,7 +104,7 @@ def test_the_page_moves_as_python_does(
         expected.append(
             (pose.positions, pose.phase, pose.told["injury"], pose.rotations, places[0], world[0])
         )
-    links = network.links
+    links = network.channels["injury"]
     script = f"""(() => {{
       const spec = Hobble.material.playable.example, c = Hobble.character(spec), rig = Hobble.rig(spec);
       const hills = (x, z) => 14 * Math.sin(x / 170) * Math.cos(z / 140) + 8 * Math.sin((x + z) / 260);
@@ -115,7 +115,7 @@ def test_the_page_moves_as_python_does(
         }}
         c.frame(velocity, facing, gait, hills);
         rig.take(c.pose, c.turns);
-        const made = [c.pose, c.phase, c.severity, c.turns, rig.places, rig.turns];
+        const made = [c.pose, c.phase, c.told, c.turns, rig.places, rig.turns];
         return made.map((v) => (v.length ? Array.from(v) : v));
       }});
     }})()"""
@@ -184,7 +184,7 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
       const [p, q] = [at(knee), at(heel)];
       return [box.x + (p[0] + q[0]) / 2, box.y + (p[1] + q[1]) / 2];
     })()"""
-    shin = "Hobble.player.injuries.severity.get('LeftLeg-LeftFoot')"
+    shin = "Hobble.player.told.values.get('injury/LeftLeg-LeftFoot')"
     for modifiers, severity in ((0, 2), (0, 4), (8, 2)):
         tab.run("new Promise(requestAnimationFrame)")
         tab.run("Hobble.player.chase.touch()")
@@ -195,8 +195,8 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
                 type=kind, x=x, y=y, button="left", clickCount=1, modifiers=modifiers,
             )  # fmt: skip
         assert tab.until(f"{shin} === {severity}"), severity
-    index = "Hobble.player.actors[0].spec.links.indexOf('LeftLeg-LeftFoot')"
-    assert tab.until(f"Hobble.player.actors[0].character.severity[{index}] > .1")
+    index = "Hobble.player.actors[0].spec.channels[0].columns.indexOf('LeftLeg-LeftFoot')"
+    assert tab.until(f"Hobble.player.actors[0].character.told[{index}] > .1")
     apart = f"""(() => {{
       const [{{ spec }}] = Hobble.player.actors;
       const hurt = Hobble.character(spec), healthy = Hobble.character(spec);
@@ -213,7 +213,7 @@ def test_presets_sliders_and_the_link_to_them(tab: Any) -> None:
         "Hurt knee", "Sprained ankle", "Bad back", "Knee and back", "Healthy",
     ]  # fmt: skip
     tab.run(f"{buttons}[2].click()")
-    back = "Hobble.player.injuries.severity.get('Hips-LowerBack')"
+    back = "Hobble.player.told.values.get('injury/Hips-LowerBack')"
     assert tab.run(back) == 8
     assert "8" in tab.run("[...document.querySelectorAll('#play-sliders output')].map((o) => o.value)")
     tab.run("Hobble.player.steering.toggle('crouch', true)")
@@ -221,7 +221,7 @@ def test_presets_sliders_and_the_link_to_them(tab: Any) -> None:
     tab.run("Object.assign(Hobble.player.view.orbit, { yaw: 1.25, distance: 333 })")
     tab.run("document.getElementById('play-share').click()")
     tab.run(f"{buttons}[4].click()")
-    assert tab.run("Math.max(...Hobble.player.injuries.severity.values())") == 0
+    assert tab.run("Math.max(...Hobble.player.told.values.values())") == 0
     tab.send("Page.reload")
     assert tab.until(
         f"typeof Hobble !== 'undefined' && Hobble.player && {back} === 8 && Hobble.player.steering.on.crouch"
@@ -295,14 +295,14 @@ def test_a_link_pasted_into_the_open_page_is_followed_and_taken_with_care(tab: A
     tab.run(
         f"location.hash = '#play?ground={ground}&camera=,,&hurt=LeftLeg-LeftFoot:3,x:9,Hips-LowerBack:-1'"
     )
-    assert tab.until("Hobble.player.injuries.severity.get('LeftLeg-LeftFoot') === 3")
+    assert tab.until("Hobble.player.told.values.get('injury/LeftLeg-LeftFoot') === 3")
     assert tab.run("document.getElementById('play-ground').value") == (
         "boxes" if ground == "boxes" else "slope"
     )
-    assert tab.run("Hobble.player.injuries.severity.get('Hips-LowerBack')") == 0
+    assert tab.run("Hobble.player.told.values.get('injury/Hips-LowerBack')") == 0
     assert tab.run("Hobble.player.view.orbit.distance") >= 140
     assert tab.run("Hobble.player.view.orbit.pitch") > 0.02
-    tab.run("Hobble.player.injuries.heal(); location.hash = ''")
+    tab.run("Hobble.player.told.set([]); location.hash = ''")
 
 
 def test_the_camera_comes_round_behind_at_any_rate_of_pictures(tab: Any) -> None:
@@ -391,6 +391,4 @@ def test_a_network_without_links_can_still_be_played(
 ) -> None:
     examples.weights(tmp_path / "weights.npz", holden31, links=False)
     spec = playable(load_network(tmp_path / "weights.npz"), examples.RUNTIME)
-    assert spec["links"] == []
-    assert spec["presets"] == []
-    assert spec["parts"] == {}
+    assert spec["channels"] == []

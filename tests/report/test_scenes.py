@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hobble.channels.injury.shown import spoken_links
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body
 from hobble.figure.pack import TURN
 from hobble.report.scenes import UNIT, pack_positions, scenes
-from hobble.report.words import spoken_links
 
 
 def unpacked(text: str, kind: str) -> np.ndarray:
@@ -35,11 +35,13 @@ def test_every_scenario_is_thinned_to_thirty_hertz(play: dict[str, Any]) -> None
     assert len(unpacked(walk["pose"], "<i2")) == 300 * play["joints"] * 3
     assert play["joints"] < 31, "joints that are not drawn need not lie in the page"
     assert len(unpacked(walk["contacts"], "u1")) == 300
-    assert "severity" not in walk
-    severity = unpacked(hurt["severity"], "u1").reshape(hurt["frames"], len(play["links"]))
-    knee = play["links"].index("LeftUpLeg-LeftLeg")
-    assert severity[-1, knee] == pytest.approx(249, abs=2)
-    assert not np.delete(severity, knee, axis=1).any()
+    assert "told" not in walk
+    told = hurt["told"]
+    assert (told["spoken"], told["highest"], told["placed"]) == ("left thigh", 10, True)
+    assert any(told["column"] in columns for columns in play["regions"])
+    values = unpacked(told["values"], "u1")
+    assert values.shape == (hurt["frames"],)
+    assert values[-1] == pytest.approx(249, abs=2)
 
 
 def test_bones_lie_where_rotations_put_them_and_keep_their_lengths(
@@ -68,7 +70,7 @@ def test_motion_without_rotations_is_fitted(
     """Files from before rotations were kept: bones lie where they lay, whatever their twist."""
     data = {name: value for name, value in np.load(inputs["scenarios"]).items() if "/rotations" not in name}
     np.savez(tmp_path / "old.npz", **data)
-    made = scenes(tmp_path / "old.npz", material.network["skeleton"], material.network["links"])
+    made = scenes(tmp_path / "old.npz", material.network["skeleton"], material.network["channels"])
     old, new = (unpacked(one["scenarios"][0]["pose"], "<i2").astype(int) for one in (made, play))
     apart = UNIT * np.abs(old - new)
     assert apart.max() < 5

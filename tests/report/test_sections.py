@@ -93,9 +93,9 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     assert not found["turns"]["train"].any()
     row, column = np.argwhere(found["both"] > 0)[0]
     assert (coverage._middles(coverage.TURNS)[row], coverage._middles(coverage.SPEEDS)[column]) == (30.0, 1.3)
-    assert list(found["hurt"]) == ["LeftUpLeg-LeftLeg"]
-    assert found["hurt"]["LeftUpLeg-LeftLeg"][6] == pytest.approx(hurt, abs=1 / 60 + 1e-9)
-    chart = coverage.severity_chart(found)
+    assert list(found["told"]["injury"]) == ["LeftUpLeg-LeftLeg"]
+    assert found["told"]["injury"]["LeftUpLeg-LeftLeg"][6] == pytest.approx(hurt, abs=1 / 60 + 1e-9)
+    (chart,) = coverage.told_charts(found)
     assert chart is not None
     assert chart.traces[0]["z"][0][6] == pytest.approx(hurt, abs=0.02)
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from hobble.channels.injury import shown as injury_shown
 from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
@@ -39,12 +40,12 @@ def standing(holden31: Skeleton) -> np.ndarray:
 
 
 def test_thirteen_are_asked_about_and_each_preset_is_shown(network: Network) -> None:
-    wanted = stimuli.wanted(network)
-    assert len(stimuli.STUDY) == 13
-    assert [shown for *_, shown in wanted] == [False] * 13 + [True] * 4
-    hurt = [tuple(sorted(links)) for _, links, shown in wanted if not shown]
+    wanted = [loop for *_, loop in stimuli.all_loops(network)]
+    assert len(injury_shown.STUDY) == 13
+    assert [loop.coloured for loop in wanted] == [False] * 13 + [True] * 4
+    hurt = [tuple(sorted(loop.told)) for loop in wanted if not loop.coloured]
     assert len(set(hurt)) == 13, "no two are the same"
-    assert dict(wanted[1][1]) == {"LeftUpLeg-LeftLeg": stimuli.SEVERITY}
+    assert dict(wanted[1].told) == {"LeftUpLeg-LeftLeg": injury_shown.SEVERITY}
 
 
 def test_the_body_stands_where_the_camera_says(studio: Studio, standing: np.ndarray) -> None:
@@ -65,7 +66,7 @@ def test_the_body_stands_where_the_camera_says(studio: Studio, standing: np.ndar
 def test_what_hurts_is_coloured_where_asked(studio: Studio, standing: np.ndarray, holden31: Skeleton) -> None:
     camera = Camera(np.array([0.0, 82.0, 0.0]), yaw=0.0, pitch=0.1, size=200)
     severity = np.zeros(len(holden31.link_names))
-    severity[holden31.link_names.index("LeftLeg-LeftFoot")] = 10
+    severity[holden31.link_names.index("LeftLeg-LeftFoot")] = 1
     plain, shown = (
         studio.draw(standing, UPRIGHT, camera).astype(int),
         studio.draw(standing, UPRIGHT, camera, severity).astype(int),
@@ -117,9 +118,9 @@ def test_stimuli_in_which_nothing_hurts_are_told() -> None:
     def row(name: str, hurt: str, never: str, cm: float) -> dict:
         return {
             "name": name,
-            "severities": dict.fromkeys(hurt.split(), 8.0),
-            "never_hurt": never.split(),
-            "from_healthy_cm": cm,
+            "told": dict.fromkeys(hurt.split(), 8.0),
+            "never_told": never.split(),
+            "from_plain_cm": cm,
         }
 
     fine = [row("healthy", "", "", 0.0), row("left-foot", "A", "", 1.5)]
@@ -127,16 +128,16 @@ def test_stimuli_in_which_nothing_hurts_are_told() -> None:
     same, part, never = stimuli.doubts(
         [*fine, row("left-arm", "B", "B", 0.0), row("weak", "A", "", 0.05), row("both", "A C", "C", 1.5)]
     )
-    assert same.startswith("left-arm, weak: no different from the healthy walk")
+    assert same.startswith("left-arm, weak: no different from the plain walk")
     assert part.startswith("both: not all")
-    assert never.startswith("Never hurt in training: B, C.")
+    assert never.startswith("Never told in training: B, C.")
 
 
 def test_files_of_a_loop(network: Network, examples: ModuleType, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(stimuli, "STUDY", {"healthy": (), "left-foot": ("left foot",)})
-    monkeypatch.setattr(stimuli, "PRESETS", {"Bad back": {"lower back": 8}})
+    monkeypatch.setattr(injury_shown, "STUDY", {"healthy": (), "left-foot": ("left foot",)})
+    monkeypatch.setattr(injury_shown, "PRESETS", {"Bad back": {"lower back": 8}})
     x_mean = network.x_mean.copy()
-    x_mean[network.layout.x_channel("injury")][network.links.index("LeftFoot-LeftToeBase")] = 0.5
+    x_mean[network.layout.x_channel("injury")][network.channels["injury"].index("LeftFoot-LeftToeBase")] = 0.5
     network = replace(network, x_mean=x_mean)  # a network that learnt from a hurt left foot, and nothing else
     stimuli.write_stimuli(network, tmp_path / "a", examples.RUNTIME, size=64)
     names = {"healthy", "left-foot", "preset-bad-back"}
@@ -145,9 +146,8 @@ def test_files_of_a_loop(network: Network, examples: ModuleType, tmp_path: Path,
     }
     listed = json.loads((tmp_path / "a/stimuli.json").read_text())["stimuli"]
     assert [row["name"] for row in listed] == ["healthy", "left-foot", "preset-bad-back"]
-    assert [row["hurt_in_training"] for row in listed] == [True, True, False]
-    assert [row["never_hurt"] for row in listed] == [[], [], ["Hips-LowerBack"]]
-    assert listed[0]["from_healthy_cm"] == 0 != listed[1]["from_healthy_cm"]
+    assert [row["never_told"] for row in listed] == [[], [], ["Hips-LowerBack"]]
+    assert listed[0]["from_plain_cm"] == 0 != listed[1]["from_plain_cm"]
     with Image.open(tmp_path / "a/left-foot.webp") as image:
         frames = len(read_bvh(tmp_path / "a/left-foot.bvh"))
         assert image.n_frames == frames // stimuli.STRIDE
@@ -160,6 +160,6 @@ def test_a_network_that_cannot_be_hurt_says_which_can(
     examples: ModuleType, holden31: Skeleton, tmp_path: Path
 ) -> None:
     examples.weights(tmp_path / "weights.npz", holden31, links=False)
-    with pytest.raises(HobbleError, match="`injured`"):
+    with pytest.raises(HobbleError, match="`channels`"):
         stimuli.write_stimuli(load_network(tmp_path / "weights.npz"), tmp_path / "out", examples.RUNTIME)
     assert not (tmp_path / "out").exists()

@@ -201,7 +201,7 @@ def test_gait_blends_slowly_into_the_future(network) -> None:
 
 def test_severities_come_on_at_their_rate_and_are_scaled(hurtable) -> None:
     character = ProceduralAnimation(hurtable, rates={"injury": 5.0}, scales={"injury": 2.0})
-    index = hurtable.links.index(KNEE)
+    index = hurtable.channels["injury"].index(KNEE)
     on = [p.told["injury"][index] for p in walk(character, 120, injury={KNEE: 10})]
     np.testing.assert_allclose(on[:60], 5.0 / 60 * np.arange(1, 61))
     assert on[-1] == pytest.approx(5.0)

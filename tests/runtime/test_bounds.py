@@ -116,7 +116,7 @@ def test_bounds_are_what_was_seen_and_a_little_more(hurtable) -> None:
 def test_a_state_that_is_no_number_is_made_anew_and_said_once(hurtable, part: str, value: float) -> None:
     character = ProceduralAnimation(hurtable, characters=2)
     for _ in range(30):
-        healthy = character.next_pose((0, 2.0), injury={hurtable.links[0]: 4.0})
+        healthy = character.next_pose((0, 2.0), injury={hurtable.channels["injury"][0]: 4.0})
     getattr(character.state, part)[1] = value
     with pytest.warns(RuntimeWarning, match="was not finite for 1 characters") as told:
         poses = [character.next_pose((0, 2.0), terrain=lambda x, z: 0.1 * z) for _ in range(30)]

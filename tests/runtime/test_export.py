@@ -16,7 +16,7 @@ from hobble.runtime import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton, motion_clip
 from hobble.runtime.feet import leg_joints
 from hobble.runtime.options import Runtime
-from hobble.runtime.scenarios import generate, hurt_links, scenarios
+from hobble.runtime.scenarios import generate, scenarios, swept
 
 
 def motion(skeleton, frames: int = 20) -> tuple[np.ndarray, np.ndarray]:
@@ -110,26 +110,28 @@ def test_scenarios_are_written(tmp_path: Path, hurtable) -> None:
         assert positions.shape == (scenario.frames, 31, 3)
         assert positions.dtype == np.float32
         assert len(data[f"{scenario.name}/gait"]) == scenario.frames
-    knee = data["left_knee/severity"]
+    knee = data["left_knee/told"]
     assert (knee[0], knee[-1]) == (0, 10)
     assert np.all(np.diff(knee) > 0)
-    assert str(data["left_knee/hurt"]) == "LeftUpLeg-LeftLeg"
-    assert not data["walk/severity"].any()
-    assert str(data["walk/hurt"]) == ""
+    assert data["left_knee/swept"].tolist() == ["injury", "LeftUpLeg-LeftLeg"]
+    assert not data["walk/told"].any()
+    assert data["walk/swept"].tolist() == ["", ""]
 
 
 def test_which_link_each_scenario_hurts(hurtable, network) -> None:
-    assert hurt_links(hurtable) == {
+    assert {name: link for name, (_, link) in swept(hurtable).items()} == {
         "left_knee": "LeftUpLeg-LeftLeg",
         "right_knee": "RightUpLeg-RightLeg",
         "left_ankle": "LeftLeg-LeftFoot",
         "lower_back": "Hips-LowerBack",
         "left_arm": "LeftArm-LeftForeArm",
     }
-    assert hurt_links(network) == {}
+    assert swept(network) == {}
     mean = np.zeros_like(hurtable.x_mean)
-    mean[hurtable.layout.x_channel("injury").start + hurtable.links.index("LowerBack-Spine")] = 0.1
-    trained = hurt_links(replace(hurtable, x_mean=mean))
+    mean[hurtable.layout.x_channel("injury").start + hurtable.channels["injury"].index("LowerBack-Spine")] = (
+        0.1
+    )
+    trained = {name: link for name, (_, link) in swept(replace(hurtable, x_mean=mean)).items()}
     assert trained["lower_back"] == "LowerBack-Spine"
     assert trained["left_knee"] == "LeftUpLeg-LeftLeg"
     assert len(scenarios(hurtable)) == len(scenarios(network)) + 5

@@ -24,7 +24,7 @@ def limited(make_network) -> Network:
     network = make_network(links=30, scale=0.0)
     speeds = np.full((6, 30, 2), UNLIMITED)
     speeds[WALK], speeds[JOG] = 2.0, 7.0
-    knee, arm = (network.links.index(link) for link in (KNEE, ARM))
+    knee, arm = (network.channels["injury"].index(link) for link in (KNEE, ARM))
     speeds[WALK, knee, 1], speeds[JOG, knee, 1] = 1.0, 3.0
     speeds[WALK, arm, 1], speeds[JOG, arm, 1] = 1.8, 6.3
     return replace(network, limits={"injury": Limits(np.array([0.0, 10.0]), speeds)})
@@ -91,7 +91,7 @@ def test_a_network_file_keeps_its_limits(limited: Network, tmp_path) -> None:
         meta = {
             "layout": limited.layout.to_dict(),
             "skeleton": limited.skeleton.to_dict(),
-            "channels": {"injury": list(limited.links)},
+            "channels": {"injury": list(limited.channels["injury"])},
             "limits": limits,
         }
         np.savez(tmp_path / "weights.npz", **arrays, meta=np.array(json.dumps(meta)))

@@ -156,14 +156,14 @@ def test_weights_file_round_trip(tmp_path: Path, hurtable: Network, holden31) ->
     meta = {
         "layout": hurtable.layout.to_dict(),
         "skeleton": holden31.to_dict(),
-        "channels": {"injury": list(hurtable.links)},
+        "channels": {"injury": list(hurtable.channels["injury"])},
         "gaits": list(hurtable.gaits),
     }
     np.savez(tmp_path / "weights.npz", **arrays(hurtable), meta=np.array(json.dumps(meta)))
     for path in (tmp_path, tmp_path / "weights.npz"):
         back = load_network(path)
         assert back.layout == hurtable.layout
-        assert back.links == hurtable.links == holden31.link_names
+        assert back.channels["injury"] == hurtable.channels["injury"] == holden31.link_names
         assert back.skeleton is not None
         assert back.skeleton.joints == holden31.joints
         assert back.sizes == hurtable.sizes
@@ -175,14 +175,14 @@ def test_a_file_without_meta_tells_its_layout(tmp_path: Path, hurtable: Network,
     np.savez(tmp_path / "weights.npz", **arrays(hurtable))
     back = load_network(tmp_path, holden31)
     assert back.layout == hurtable.layout
-    assert back.links == holden31.link_names
+    assert back.channels["injury"] == holden31.link_names
 
 
 def test_hurt_links_are_those_of_training(make_network) -> None:
     network = make_network(links=30)
-    assert network.hurt_links == network.links
+    assert network.trained("injury") == network.channels["injury"]
     network.x_mean[network.layout.x_channel("injury").start + 3] = 0.2
-    assert network.hurt_links == network.links[3:4]
+    assert network.trained("injury") == network.channels["injury"][3:4]
 
 
 @pytest.mark.parametrize(

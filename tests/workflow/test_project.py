@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from hobble.core.errors import HobbleError
 from hobble.motion.options import ClipMotion
 from hobble.workflow import targets
 from hobble.workflow.project import Project
-from hobble.workflow.targets import check
+from hobble.workflow.targets import check, notes
 
 DATASET = """
 skeleton: s
@@ -122,8 +123,8 @@ def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
 @pytest.mark.parametrize(
     ("target", "message"),
     [
-        ("results/one/stimuli", "configuration one is not told injury.*Ask for results/injured/stimuli"),
-        ("results/eyes/stimuli/", "configuration one is not told injury"),
+        ("results/one/stimuli", "configuration one is told nothing.*has `channels`"),
+        ("results/eyes/stimuli/", "configuration one is told nothing"),
         ("results/hurt/export/cubik.onnx", "export/cubik.onnx: there are constant, linear, cubic"),
     ],
 )
@@ -195,6 +196,19 @@ def test_what_a_clip_names_wrongly_is_told_before_anything_runs(
     (complete / "config/datasets/mine.yaml").write_text(text)
     with pytest.raises(HobbleError, match=f"data set mine: .*{message}"):
         check(Project(complete, {}), ["results/one/report.html"])
+
+
+def test_one_file_on_both_sides_of_the_split_is_refused_before_anything_runs(complete: Path) -> None:
+    for name, text in (("a", "one motion"), ("b", "one motion"), ("c", "one m0tion")):
+        (complete / f"data/mine/{name}.bvh").write_text(text)
+    message = r'data set mine: b and a are the same file: the first .* Add to held_out: \["a"\]'
+    with pytest.raises(HobbleError, match=message):
+        check(Project(complete, {}), ["results/one/report.html"])
+    check(Project(complete, {}), ["results/datasets/mine/look.html"])
+    data = complete / "config/datasets/mine.yaml"
+    data.write_text(DATASET.replace("[b]", "[a, b]").replace("mirror: true", ""))
+    (complete / "data/mine/a_mirror.bvh").unlink()
+    check(Project(complete, {}), ["results/hurt/report.html"])
 
 
 def test_a_skeleton_without_a_mirror_image_is_told_before_anything_runs(complete: Path) -> None:
@@ -313,14 +327,27 @@ def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path)
 
 
 @pytest.mark.parametrize("mirror", [True, False])
-def test_a_mirror_is_left_out_only_where_it_is_made_anew(base: Path, mirror: bool) -> None:
+def test_a_mirror_beside_its_original_is_left_out_and_made_anew_or_told(base: Path, mirror: bool) -> None:
     text = DATASET.replace("mirror: true", f"mirror: {str(mirror).lower()}")
     (base / "config/datasets/mine.yaml").write_text(text)
-    if mirror:
-        assert list(Project(base, {}).clips.of("mine")) == ["a", "b", "c"]
-        (base / "data/mine/a_mirror.bvh").rename(base / "data/mine/z_mirror.bvh")
-    with pytest.raises(HobbleError, match="_mirror: only a mirror is called so, which `mirror: true` makes"):
+    (base / "data/mine/a_mirror_footsteps.txt").write_text("1 2\n")
+    clips = Project(base, {}).clips
+    assert list(clips.of("mine")) == ["a", "b", "c"]
+    said = (
+        [] if mirror else ["1 files in .* are mirrors of clips beside them .a_mirror.bvh, .*`mirror: true` m"]
+    )
+    assert all(re.search(wanted, note) for wanted, note in zip(said, clips.notes("mine"), strict=True))
+    (base / "data/mine/a_mirror.bvh").rename(base / "data/mine/z_mirror.bvh")
+    with pytest.raises(HobbleError, match="z_mirror: only a mirror is called so, which `mirror: true` makes"):
         Project(base, {}).clips.of("mine")
+
+
+def test_a_status_file_of_no_clip_is_told_with_the_nearest_name(base: Path) -> None:
+    (base / "data/mine/orphan.bvh").write_text("")
+    (base / "data/mine/orphn_injuries.txt").write_text("frames:9\n1-9 LeftLeg-LeftFoot[4];\n")
+    (note,) = notes(Project(base, {}), ["results/one/report.html", "results/hurt/report.html"])
+    assert note.startswith("data set mine: ")
+    assert "orphn_injuries.txt belongs to no clip and is not read: is it that of orphan?" in note
 
 
 def test_two_files_of_one_clip_are_refused_with_both(base: Path) -> None:

@@ -39,6 +39,15 @@ rule database_merge:
             f"results/datasets/{w.dataset}/database/clips/{{clip}}.npz",
             clip=datasets.selected(w.dataset, told_by(w.told)),
         ),
+        # No motion may lie on both sides of the split.
+        compared=lambda w: expand(
+            f"results/datasets/{w.dataset}/motion/{{clip}}.npz",
+            clip=datasets.compared(w.dataset, told_by(w.told)),
+        ),
+        reports=lambda w: expand(
+            f"results/datasets/{w.dataset}/motion/{{clip}}.json",
+            clip=datasets.compared(w.dataset, told_by(w.told)),
+        ),
     output:
         database=directory("results/datasets/{dataset}/database/{told}"),
     log:
@@ -52,6 +61,7 @@ rule database_merge:
             w.dataset, 0.1, attempt, least=5
         ),
     params:
+        dataset=lambda w: w.dataset,
         splits=lambda w: datasets.selected(w.dataset, told_by(w.told)),
         channels=lambda w: told_by(w.told),
         sources=lambda w: datasets.sources(w.dataset, told_by(w.told)),

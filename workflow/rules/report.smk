@@ -124,7 +124,7 @@ rule report:
         splits=lambda w: configurations.splits(w.configuration),
         title=lambda w: catalogue.configuration(w.configuration).report.title,
         code=lambda w: package.code(
-            "report", configurations.kind(w.configuration), *modules("page")
+            "report", configurations.kind(w.configuration), *modules("page"), *shown_modules()
         ),
     script:
         "../scripts/report.py"
@@ -155,7 +155,7 @@ rule report_compare:
 
 
 rule stimuli:
-    """Short loops of the character walking hurt: the thirteen of a questionnaire, and the page's presets."""
+    """Short loops of the character walking as each channel shows it, for a questionnaire or a README."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
@@ -169,7 +169,7 @@ rule stimuli:
         runtime=15,
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code("stimuli", configurations.kind(w.configuration)),
+        code=lambda w: package.code("stimuli", configurations.kind(w.configuration), *shown_modules()),
     script:
         "../scripts/stimuli.py"
 

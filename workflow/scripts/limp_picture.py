@@ -1,7 +1,7 @@
 """Creates results/<configuration>/limp.webp: the healthy and the hurt walk side by side, going round."""
 
+from hobble.channels.injury.limp_picture import write_limp_picture
 from hobble.models.load import load_network
-from hobble.report.limp_picture import write_limp_picture
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 

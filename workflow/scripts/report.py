@@ -31,7 +31,7 @@ with job(snakemake):
         rows=given.rows,
     )
     network = material.network
-    play = scenes(given.scenarios, network["skeleton"], network["links"])
+    play = scenes(given.scenarios, network["skeleton"], network["channels"])
     trained = load_network(given.weights)
     character = playable(trained, Runtime.model_validate(material.resolved["configuration"]["runtime"]))
     compared = comparisons(trained, given.rows, asked.splits)

@@ -1,4 +1,5 @@
-"""Creates results/<configuration>/stimuli/: loops of the hurt character as animated images and BVH files."""
+"""Creates results/<configuration>/stimuli/: loops of the character, as it is told, as animated images
+and BVH files."""
 
 from hobble.models.load import load_network
 from hobble.report.stimuli import doubts, write_stimuli

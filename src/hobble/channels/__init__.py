@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import functools
 import importlib
+import importlib.util
 from collections.abc import Iterable
 
 from hobble.channels.channel import Channel, Source
 
-__all__ = ["NAMES", "Channel", "Source", "channel", "every", "formerly", "modules_of"]
+__all__ = ["NAMES", "Channel", "Source", "channel", "every", "formerly", "modules_of", "shown_modules"]
 
 # Every channel that there is: the folder NAME beside this file, whose package has the channel as CHANNEL.
-NAMES = ("injury", "mood")
+NAMES = ("injury", "mood", "diagnosis")
 
 
 @functools.cache
@@ -36,6 +37,12 @@ def every() -> tuple[Channel, ...]:
 def modules_of(names: Iterable[str]) -> list[str]:
     """Full names of the modules of channels: what a job that is told their names depends on."""
     return [f"{__name__}.{name}" for name in names]
+
+
+def shown_modules() -> list[str]:
+    """Full names of the modules in which channels say how they are shown."""
+    found = (f"{__name__}.{name}.shown" for name in NAMES)
+    return [module for module in found if importlib.util.find_spec(module) is not None]
 
 
 def formerly(key: str) -> str:

@@ -49,7 +49,7 @@ class ClipEntry(s.Section):
     gait: s.Gait | None = Field(None, description="the gait it mostly shows, for automatic labels")
     ground: s.Ground = "flat"
     channels: dict[ChannelName, Any] = Field(
-        {}, description='what the body is told all the while: {injury: "RightLeg-RightFoot[4];..."}'
+        {}, description="what the body is told all the while: channel -> what that channel reads"
     )
     injured: Link | None = Field(None, description="synthetic: the link hurt, at severities 3, 5, 7 and 10")
     recipe: str | None = Field(None, description="synthetic: which plan the walker follows")

@@ -42,7 +42,7 @@ class Skeleton:
     parents: J indices, -1 for the root.
     offsets: (J, 3) in centimetres, from the parent, with every rotation at identity (the rest pose).
     roles: what a joint is for ("hips", "left_heel", ...) -> its name; see config/skeletons/README.md.
-    links: pairs (parent-side joint, child-side joint) that can carry an injury severity, in column order.
+    links: pairs (parent-side joint, child-side joint) that can be told something each, in column order.
     unseen: joints that the network predicts but does not get as input (their weight is 1e-10).
     """
 
@@ -133,7 +133,7 @@ class Skeleton:
     def mirror_links(self) -> np.ndarray:
         """(L,) index of each link's counterpart on the other side.
 
-        Raises HobbleError like `mirror_joints`, and for a link without a counterpart, whose injury would stay
+        Raises HobbleError like `mirror_joints`, and for a link without a counterpart, whose value would stay
         where it is while the body is mirrored.
         """
         swap = self.mirror_joints

@@ -1,1 +1,1 @@
-"""The `database` stage: rows of X, Y and P from clips, labels, injuries and terrain fits."""
+"""The `database` stage: rows of X, Y and P from clips, labels, channels and terrain fits."""

@@ -1,4 +1,5 @@
-"""Many figures at once, each walking by a script of its own: speed, gait and severities, step by step."""
+"""Many figures at once, each walking by a script of its own: speed, gait and what it is told, step by
+step."""
 
 from __future__ import annotations
 
@@ -13,22 +14,21 @@ from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
-INJURY = "injury"  # the channel
 FPS = 60
 SPEEDS = {"walk": 2.5, "jog": 7.0}  # cm a frame asked for
-SETTLING = 0.25  # share of a stretch that is not measured: severity and gait are still on their way
+SETTLING = 0.25  # share of a stretch that is not measured: what is told and gait are still on their way
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """`frames` in which C figures are asked for the same: gait (C,) names, severity (C, L).
+    """`frames` in which C figures are asked for the same: gait (C,) names, told: channel -> (C, columns).
 
     speed: (C,) cm a frame; by default the gait's.
     """
 
     frames: int
     gait: Sequence[str]
-    severity: Array = field(repr=False)
+    told: Mapping[str, Array] = field(default_factory=dict, repr=False)
     speed: Sequence[float] | None = None
 
 
@@ -75,10 +75,9 @@ def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
     for stretch in script:
         velocity = np.zeros((count, 2))
         velocity[:, 1] = [SPEEDS[name] for name in stretch.gait] if stretch.speed is None else stretch.speed
-        told = {INJURY: stretch.severity} if network.links else {}
         shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
         for _ in range(stretch.frames):
-            pose = animation.next_pose(velocity, gait=shares, **told)
+            pose = animation.next_pose(velocity, gait=shares, **stretch.told)
             # One figure alone has no axis of its own.
             positions = pose.positions.reshape(count, -1, 3)
             root[f], phase[f], contacts[f] = pose.root, pose.phase, pose.contacts
@@ -92,10 +91,15 @@ def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
     return Walks(local, contacts, phase, root, rough, starts)
 
 
-def severities(network: Network, each: Sequence[Mapping[str, float]]) -> Array:
-    """(C, L) severities of figures given as link -> severity."""
-    out = np.zeros((len(each), len(network.links)))
-    for row, hurt in zip(out, each, strict=True):
-        for link, severity in hurt.items():
-            row[network.links.index(link)] = severity
-    return out
+def told(network: Network, name: str, each: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+    """What a stretch tells its figures by channel `name`, given as column -> value; {} where the
+    network is not
+    told that channel."""
+    columns = network.channels.get(name)
+    if columns is None:
+        return {}
+    out = np.zeros((len(each), len(columns)))
+    for row, values in zip(out, each, strict=True):
+        for column, value in values.items():
+            row[columns.index(column)] = value
+    return {name: out}

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from hobble.core.section import Section
 
+TELLS = "injury"  # the channel that hurt versions are told
 Severity = Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)]
 Link = Annotated[str, Field(min_length=3)]
 

@@ -74,6 +74,8 @@ def read_gait(path: Path, time: SourceTime, frames: int) -> Array:
 def read_footsteps(path: Path, time: SourceTime) -> Array:
     """(N, 3) footsteps (see `Labels`) of a file with lines `right left [*]`; the last may hold `right` alone.
 
+    Such a last line counts as marked with `*`: the original makes no rows of the cycle that ends in it. Its
+    landing still gives the phase before it.
     Raises InputError with the line where frames are not numbers, do not rise, or lie past the clip.
     """
     steps: list[tuple[float, float, float]] = []
@@ -95,7 +97,7 @@ def read_footsteps(path: Path, time: SourceTime) -> Array:
                 )
             last = landing
         right, left = (time.to_clip(x) for x in (*landings, math.nan)[:2])
-        steps.append((right, left, float(dropped)))
+        steps.append((right, left, float(dropped or ended)))
     return np.array(steps, float).reshape(-1, 3)
 
 

@@ -82,16 +82,6 @@ class Network(ABC):
         means = self.x_mean[self.layout.x_channel(channel)] if labels else ()
         return tuple(label for label, mean in zip(labels, means, strict=True) if mean > 0) or labels
 
-    @property
-    def links(self) -> tuple[str, ...]:
-        """Labels of the injury channel."""
-        return self.channels.get("injury", ())
-
-    @property
-    def hurt_links(self) -> tuple[str, ...]:
-        """Links that were hurt in training; see `trained`."""
-        return self.trained("injury")
-
     @classmethod
     def mode(cls, wanted: str | None) -> str:
         """Which of `modes` runs where `wanted` is asked for: the exact one by default.

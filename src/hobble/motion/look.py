@@ -15,29 +15,28 @@ from typing import Any
 import numpy as np
 
 from hobble.core.clip import Clip
-from hobble.core.clip_files import find_clips, the_file
+from hobble.core.clip_files import find_clips, orphan_notes, the_file
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.motion.check import worst
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.rig import leg_length
+from hobble.motion.same import Likeness, likeness, same_pairs
 
 SLOWEST, FASTEST = 40.0, 260.0  # steps a minute of somebody who walks or runs
 RATES = (24, 25, 30, 60, 120, 240)  # frames a second at which most files are, whatever they say
 STILL = 3.0  # cm a second at which the hips of somebody stand
 STANDING = 0.5  # seconds that it takes to tell a stand
 STRIDE = 0.25  # of the leg: how far ankles must part for a step
-NEAR = 1.0  # cm of mean difference up to which two clips are one motion
-SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt", "_injuries.txt", "_injuries")
-GRAVITY = 981.0  # cm a second squared
+ENOUGH = {"mirrors of each other": "hold both out or neither"}
 
 
 @dataclass(frozen=True)
 class Look:
     """One clip as it looks. `stands`: seconds in which nobody moves. `steps`: ankles passing each other.
 
-    print: a digest of the file. poses: (K, J, 3) some of its frames, seen from its own root, for likeness.
+    like: what it is compared with others by.
     """
 
     name: str
@@ -52,8 +51,7 @@ class Look:
     stands: float = 0.0
     off: tuple[str, float] | None = None
     warnings: tuple[str, ...] = ()
-    print: str = ""
-    poses: Array = field(default_factory=lambda: np.zeros((0, 0, 3)), repr=False)
+    like: Likeness | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True)
@@ -103,8 +101,7 @@ def seen(clip: Clip, report: Mapping[str, Any]) -> Look:
         stands=stands,
         off=worst(report["retarget"]) if report.get("retarget") else None,
         warnings=(*rate_warnings(steps, moving, float(path.sum()), clip, report), *_first(report)),
-        print=report["sha256"],
-        poses=_poses(clip),
+        like=likeness(clip, report["sha256"]),
     )
 
 
@@ -157,33 +154,10 @@ def rate_warnings(steps: int, moving: float, way: float, clip: Clip, report: Map
     ]
 
 
-def _poses(clip: Clip) -> Array:
-    """(12, J, 3) frames evenly over the clip, above the ground below the hips."""
-    at = np.linspace(0, len(clip) - 1, 12).round().astype(int)
-    return clip.positions[at] - clip.positions[at][:, :1] * [1.0, 0.0, 1.0]
-
-
-def same_pairs(clips: Sequence[Look]) -> list[tuple[str, str, str]]:
-    """Pairs of clips that are one motion: name, name, and "the same file" or "the same motion"."""
-    out = []
-    whole = [clip for clip in clips if not clip.refused]
-    for i, a in enumerate(whole):
-        for b in whole[i + 1 :]:
-            if a.print == b.print:
-                out.append((a.name, b.name, "the same file"))
-            elif _alike(a, b):
-                out.append((a.name, b.name, "the same motion"))
-    return out
-
-
-def _alike(a: Look, b: Look) -> bool:
-    long = abs(a.seconds - b.seconds) < 0.02 * a.seconds and a.poses.shape == b.poses.shape
-    return long and bool(np.linalg.norm(a.poses - b.poses, axis=-1).mean() < NEAR)
-
-
 def same_notes(clips: Sequence[Look]) -> list[str]:
     """Sentences on clips that are there twice."""
-    return [f"{a} and {b} are {what}: one of them is enough." for a, b, what in same_pairs(clips)]
+    pairs = same_pairs([clip.like for clip in clips if clip.like is not None])
+    return [f"{a} and {b} are {what}: {ENOUGH.get(what, 'one of them is enough')}." for a, b, what in pairs]
 
 
 def standing_notes(clips: Sequence[Look]) -> list[str]:
@@ -194,23 +168,6 @@ def standing_notes(clips: Sequence[Look]) -> list[str]:
         "Nobody stands in these clips: the character will not have learned to stand, to start or to stop. "
         "Add a clip of somebody who stands, starts and stops."
     ]
-
-
-def orphan_notes(folder: Path, clips: Sequence[str]) -> list[str]:
-    """Sentences on files beside clips that belong to none of them."""
-    out = []
-    for file in sorted(folder.rglob("*")):
-        suffix = next((s for s in sorted(SUFFIXES, key=len, reverse=True) if file.name.endswith(s)), None)
-        if suffix and file.is_file() and file.name.removesuffix(suffix) not in clips:
-            near = _nearest(file.name.removesuffix(suffix), clips)
-            out.append(f"{file.name} belongs to no clip{f': is it that of {near}?' if near else '.'}")
-    return out
-
-
-def _nearest(name: str, clips: Sequence[str]) -> str | None:
-    from difflib import get_close_matches
-
-    return next(iter(get_close_matches(name, clips, 1, 0.75)), None)
 
 
 def table(folder: Folder) -> str:

@@ -10,6 +10,7 @@ from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
 from hobble.report import measured, side_by_side
 from hobble.report.formats import embedded
+from hobble.report.hero import placed
 from hobble.report.playable import skeleton_of
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
@@ -48,7 +49,7 @@ def render_compared(
         embedded=embedded(data),
         playable=list(kept),
         left_out=left_out,
-        hurts=any(spec["parts"] for spec in kept.values()),
+        hurts=any(placed(spec) for spec in kept.values()),
         style=style(),
         bundle=trusted("the bundle", bundle),
         provenance={"commit": commit(FOLDER), "machine": machine(), "versions": versions()},

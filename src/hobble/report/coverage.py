@@ -1,4 +1,5 @@
-"""What the network learns from, counted over the rows of the database: seconds of speed, turn, severity."""
+"""What the network learns from, counted over the rows of the database: seconds of speed, turn, and
+what is told."""
 
 from __future__ import annotations
 
@@ -8,27 +9,28 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels import channel
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.report.charts import Chart, Trace, axis
 from hobble.rows.clip_rows import load_clip_rows
 
-INJURY = "injury"  # the channel
 FPS = 60.0
 SPEEDS = np.arange(0, 6.01, 0.2)  # metres a second
 TURNS = np.arange(-220, 221, 20.0)  # degrees a second, to the left positive
-LEVELS = np.arange(0.5, 11.0)  # edges of the severities 1 to 10
+LEVELS = np.arange(1, 11)  # tenths of the highest value of a channel
 SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
 
 
 def counted(paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str, Any]:
     """Seconds over the rows in `database/clips/<clip>.npz`, each frame counted once.
 
-    `turns`: for each split, of each turn; `both`: of each turn and speed; `hurt`: link -> of each severity.
+    `turns`: for each split, of each turn; `both`: of each turn and speed; `told`: channel -> column -> of
+    each tenth of its highest value.
     """
     turns = {split: np.zeros(len(TURNS) - 1) for split, *_ in SPLITS}
     both = np.zeros((len(TURNS) - 1, len(SPEEDS) - 1))
-    hurt: dict[str, Array] = {}
+    told: dict[str, dict[str, Array]] = {}
     for path in paths:
         rows = load_clip_rows(path)
         once = np.unique(rows.frame, return_index=True)[1]
@@ -39,11 +41,13 @@ def counted(paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str,
         turns[splits.get(rows.clip, "train")] += np.histogram(turn, TURNS)[0] / FPS
         both += np.histogram2d(turn, speed, (TURNS, SPEEDS))[0] / FPS
         skeleton = Skeleton.from_dict(rows.skeleton)
-        for link, values in zip(skeleton.link_names, rows.channels[INJURY][once].T, strict=True):
-            if values.any():
-                found = np.histogram(values, LEVELS)[0] / FPS
-                hurt[link] = hurt.get(link, 0) + found
-    return {"turns": turns, "both": both, "hurt": hurt}
+        for name, table in rows.channels.items():
+            one, seconds = channel(name), told.setdefault(name, {})
+            for column, values in zip(one.columns(skeleton), table[once].T, strict=True):
+                if values.any():
+                    found = np.histogram(10 * values / one.highest, np.arange(0.5, 11))[0] / FPS
+                    seconds[column] = seconds.get(column, 0) + found
+    return {"turns": turns, "both": both, "told": told}
 
 
 def turn_chart(found: Mapping[str, Any]) -> Chart | None:
@@ -96,31 +100,36 @@ def both_chart(found: Mapping[str, Any]) -> Chart | None:
     return Chart("speed-turn", "Speed and turn together", caption, [trace], layout, 300)
 
 
-def severity_chart(found: Mapping[str, Any], say: Callable[[str], str] = str) -> Chart | None:
-    """Seconds at each severity of each link; say: what a reader calls it."""
-    hurt: Mapping[str, Array] = found["hurt"]
-    if not hurt:
-        return None
-    links = list(hurt)[::-1]
+def told_charts(found: Mapping[str, Any], say: Callable[[str], str] = str) -> list[Chart]:
+    """Seconds at each value of each column, a chart for each channel that tells any clip something.
+
+    say: what a reader calls a column.
+    """
+    return [_told_chart(name, seconds, say) for name, seconds in found["told"].items() if seconds]
+
+
+def _told_chart(name: str, seconds: Mapping[str, Array], say: Callable[[str], str]) -> Chart:
+    one, columns = channel(name), list(seconds)[::-1]
+    tenth = one.highest / 10
     trace = {
         "type": "heatmap",
-        "x": list(range(1, 11)),
-        "y": [say(link) for link in links],
-        "z": [[round(float(v), 3) or None for v in hurt[link]] for link in links],
+        "x": np.round(LEVELS * tenth, 6).tolist(),
+        "y": [say(column) for column in columns],
+        "z": [[round(float(v), 3) or None for v in seconds[column]] for column in columns],
         "colorscale": [[0, "@hurt-low"], [1, "@hurt-high"]],
         "xgap": 3,
         "ygap": 3,
         "colorbar": {"title": {"text": "s"}, "thickness": 10, "outlinewidth": 0},
         "hovertemplate": "%{y} at %{x}: %{z:.1f} s<extra></extra>",
     }
-    layout = {"xaxis": axis("severity", dtick=1, range=[0.4, 10.6]), "yaxis": {"automargin": True}}
+    across = axis(one.value, dtick=tenth, range=[0.4 * tenth, 10.6 * tenth])
     caption = (
-        "Seconds of rows at each severity of each link, mirrors counted. Where there is no cell the network "
-        "has seen nothing and can only interpolate."
+        f"Seconds of rows at each {one.value} of each column, mirrors counted. Where there is no cell the "
+        "network has seen nothing and can only interpolate."
     )
-    return Chart(
-        "injury-coverage", "What is hurt, and how much", caption, [trace], layout, 120 + 24 * len(links)
-    )
+    title, height = f"{one.title}: what, and how much", 120 + 24 * len(columns)
+    layout = {"xaxis": across, "yaxis": {"automargin": True}}
+    return Chart(f"{name}-coverage", title, caption, [trace], layout, height)
 
 
 def _middles(edges: Array) -> list[float]:

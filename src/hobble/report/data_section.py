@@ -1,4 +1,4 @@
-"""The data: which clips, how much of each gait and of each injury, what was repaired, where it came from."""
+"""The data: which clips, how much of each gait, what they are told, what was repaired, where it came from."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels.shown import speaker
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.formats import size
 from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
-from hobble.report.words import speaker
 
 GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
 SPLIT_NAMES = {"train": "training", "held_out": "held out"}
@@ -140,7 +140,9 @@ def strips(material: Material) -> list[dict[str, Any]]:
     """The label strip of each clip that has one, with what it was told; mirrors would say it twice."""
     told: dict[str, dict[str, Any]] = {}
     for report in material.told:
-        told.setdefault(report["clip"], {}).update(report["told"])
+        highest = {"highest": report.get("highest", 10.0)}
+        found = {label: (value, highest) for label, value in report["told"].items()}
+        told.setdefault(report["clip"], {}).update(found)
     say = speaker(material.network["skeleton"])
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
     known = {report["clip"] for report in material.labels}
@@ -152,8 +154,8 @@ def strips(material: Material) -> list[dict[str, Any]]:
             continue
         length = lengths.get(clip) or strip["seconds"][-1]
         status = [
-            {"name": say(label), "spans": value.get("spells") or [[0, length, value["highest"]]]}
-            for label, value in told.get(clip, {}).items()
+            {"name": say(label), "spans": value.get("spells") or [[0, length, value["highest"]]], **highest}
+            for label, (value, highest) in told.get(clip, {}).items()
         ]
         out.append({**strip, "clip": clip, "length": length, "status": status})
     return out

@@ -124,7 +124,7 @@ def _cell(path: str | Path, key: str, text: str | None) -> float | None:
 
 
 def describe_network(path: str | Path) -> dict[str, Any]:
-    """What the page says of a network: what it is, its sizes and parameters, its skeleton and links."""
+    """What the page says of a network: what it is, its sizes and parameters, its skeleton and channels."""
     network = load_network(path)
     return {
         "described": network.described,
@@ -132,5 +132,5 @@ def describe_network(path: str | Path) -> dict[str, Any]:
         "parameters": network.parameters,
         "bytes": Path(path).stat().st_size,
         "skeleton": network.meta.get("skeleton") or {},
-        "links": list(network.links),
+        "channels": {name: list(columns) for name, columns in network.channels.items()},
     }

@@ -7,6 +7,7 @@ from typing import Any
 
 import yaml
 
+from hobble.channels.shown import speaker
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import key
 from hobble.figure.pack import packed_body
@@ -22,10 +23,9 @@ from hobble.report import (
 from hobble.report.formats import embedded, plain
 from hobble.report.gather import Material
 from hobble.report.ground_pictures import ground_pictures
-from hobble.report.hero import opening
+from hobble.report.hero import opening, placed
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
-from hobble.report.words import speaker
 
 
 def render(
@@ -75,7 +75,7 @@ def render(
         embedded=embedded(data),
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable={material.name: playable} if playable else {},
-        hurts=bool((playable or {}).get("parts")),
+        hurts=placed(playable or {}) is not None,
         compared=[clip["name"] for clip in (compared or {}).get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],
@@ -107,7 +107,7 @@ def _sections(material: Material) -> dict[str, dict[str, Any]]:
             "speeds": data.speed_chart(material),
             "turns": coverage.turn_chart(found),
             "both": coverage.both_chart(found),
-            "hurt": coverage.severity_chart(found, speaker(material.network["skeleton"])),
+            "told": coverage.told_charts(found, speaker(material.network["skeleton"])),
             "clips": data.clip_table(material),
             "remarks": data.remarks_table(material),
         },

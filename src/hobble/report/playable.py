@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hobble.channels import channel
+from hobble.channels.shown import shown, words
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body, key
-from hobble.figure.pack import regions
 from hobble.models.network import Network, inverse
 from hobble.models.packing import packed
-from hobble.report.words import PARTS, spoken_links, way
 from hobble.rows.layout import RowLayout
 from hobble.runtime import animation, controller, feet, trajectory
 from hobble.runtime.bounds import Bounds
@@ -22,12 +22,6 @@ from hobble.runtime.limits import LAME_BELOW
 from hobble.runtime.options import Runtime
 
 UNSEEN = 1e-7  # an input that is scaled by less than this says nothing
-PRESETS = {
-    "Hurt knee": {"left thigh": 7, "left shank": 7},
-    "Sprained ankle": {"right shank": 6, "right foot": 8},
-    "Bad back": {"lower back": 8},
-    "Knee and back": {"left thigh": 7, "left shank": 7, "lower back": 7},
-}
 
 
 def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
@@ -44,10 +38,6 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     rows, scale = _rows(layout, turning), inverse(network.x_std)
     seen = np.flatnonzero(scale > UNSEEN)
     legs = feet.leg_joints(skeleton)
-    felt = network.hurt_links  # hurting another would change nothing
-    parts = {
-        label: i for label, i in body_parts(skeleton, network.links, felt).items() if network.links[i] in felt
-    }
     sole = feet.sole_heights(network, legs).tolist()
     return {
         "network": {"kind": network.kind, **network.page(seen, rows)},
@@ -69,29 +59,55 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "x": {name: block.start for name, block in layout.blocks("x").items()} | {"size": layout.x_size},
         "y": {name: block.start for name, block in layout.blocks("y").items()},
         "gaits": list(network.gaits),
-        "links": list(network.links),
-        "trained": list(network.hurt_links),
+        "channels": shown_channels(network, runtime),
         "legs": legs.tolist(),
         "carried": [np.flatnonzero(row).tolist() for row in feet.carried(skeleton, legs)],
         "sole": sole,
         "body": key(skeleton),
-        "regions": regions(skeleton, network.links),
-        "spoken": spoken_links(skeleton, network.links),
-        "severityStep": runtime.rates.get("injury", 10.0) / 60,
-        "severityScale": runtime.scales.get("injury", 1.0),
         "footLocking": runtime.foot_locking,
         "steering": runtime.steering,
-        "limits": network.limits["injury"].to_dict()
-        if runtime.limits and "injury" in network.limits
-        else None,
-        "parts": parts,
-        "presets": [
-            {"name": name, "severities": [[parts[label], value] for label, value in values.items()]}
-            for name, values in PRESETS.items()
-            if all(label in parts for label in values)
-        ],
         "constants": {**_constants(), "side": network.terrain_side},
     }
+
+
+def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
+    """What the page shows of each channel, columns by index; `first`: where its columns begin among all.
+
+    `rate`: most that a value may change in a frame; `scale`: what values are divided by.
+    """
+    skeleton, out, first = network.skeleton, [], 0
+    assert skeleton is not None
+    for name, columns in network.channels.items():
+        one, said, at = channel(name), words(name), list(columns).index
+        limits = network.limits.get(name)
+        face = shown(name, skeleton, columns, network.trained(name))
+        presets = [
+            {"name": preset, "values": [[at(column), value] for column, value in values.items()]}
+            for preset, values in face.presets.items()
+        ]
+        out.append(
+            {
+                "name": name,
+                "title": one.title,
+                "key": said.key or name,
+                "first": first,
+                "columns": list(columns),
+                "trained": list(network.trained(name)),
+                "spoken": list(face.spoken),
+                "sliders": {label: at(column) for label, column in face.sliders.items()},
+                "presets": presets,
+                "regions": [list(some) for some in face.regions],
+                "highest": one.highest,
+                "sliderStep": said.step,
+                "rest": said.rest,
+                "never": said.never,
+                "rate": runtime.rates.get(name, one.rate) / 60,
+                "scale": runtime.scales.get(name, 1.0),
+                "limits": limits.to_dict() if runtime.limits and limits is not None else None,
+            }
+        )
+        first += len(columns)
+    return out
 
 
 def turning_joints(skeleton: Skeleton) -> list[int]:
@@ -115,21 +131,6 @@ def skeleton_of(spec: Mapping[str, Any]) -> Skeleton:
     """The skeleton of a character that `playable` packed, as far as its body needs it."""
     joints, parents = tuple(spec["names"]), tuple(spec["parents"])
     return Skeleton("", joints, parents, np.array(spec["offsets"]), spec["roles"])
-
-
-def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] = ()) -> dict[str, int]:
-    """Label -> index of the link that the part is, for those that the network knows.
-
-    Of the links between the part's two ends it is the uppermost of those that were `hurt` in training, or the
-    uppermost of all where none was: hurting another would change nothing.
-    """
-    found = {}
-    for label, upper, lower in PARTS:
-        known = [name for name in way(skeleton, upper, lower) if name in links]
-        if known:
-            best = next((name for name in known if name in hurt), known[0])
-            found[label] = list(links).index(best)
-    return found
 
 
 def _bounds(network: Network, rows: NDArray[np.int64]) -> dict[str, Any]:

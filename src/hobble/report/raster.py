@@ -58,17 +58,17 @@ class Camera:
 
 
 class Studio:
-    """Draws one body in any pose; `regions`: for each of its bones the links that colour it."""
+    """Draws one body in any pose; `regions`: for each of its bones the columns that colour it."""
 
     def __init__(self, body: Mesh, regions: Sequence[Sequence[int]] = ()) -> None:
         self._body, self._faces = body, body.faces
-        self._regions = [list(links) for links in regions] or [[] for _ in body.bones]
+        self._regions = [list(columns) for columns in regions] or [[] for _ in body.bones]
 
     def draw(
-        self, places: Array, turns: Array, camera: Camera, severity: Array | None = None
+        self, places: Array, turns: Array, camera: Camera, told: Array | None = None
     ) -> NDArray[np.uint8]:
-        """An RGB picture (size, size, 3). places (B, 3), cm, and turns (B, 4) of the bones; severity:
-        (links,), as colours."""
+        """An RGB picture (size, size, 3). places (B, 3), cm, and turns (B, 4) of the bones; told:
+        (columns,) from 0 to 1, as colours."""
         corners = self._body.posed(places, turns)
         key = np.array([0.55 * np.sin(camera.yaw - 0.85), 0.78, 0.55 * np.cos(camera.yaw - 0.85)])
         key /= np.linalg.norm(key)
@@ -85,18 +85,18 @@ class Studio:
             + 0.58 * np.maximum(normals @ key, 0)
             + 0.16 * np.maximum(normals @ rim, 0) ** 2
         )
-        colours = self._colours(severity) * tone[:, None]
+        colours = self._colours(told) * tone[:, None]
         picture, depth = np.zeros((fine, fine, 3)), np.full((fine, fine), np.inf)
         _shade(camera.project(corners, FINE), colours, self._faces, picture, depth)
         share = _coarse(np.isfinite(depth).astype(float))[..., None]
         return np.clip(np.round(255 * (_coarse(picture) + (1 - share) * ground)), 0, 255).astype(np.uint8)
 
-    def _colours(self, severity: Array | None) -> Array:
-        """RGB of every corner: grey where healthy, over amber to red where hurt."""
+    def _colours(self, told: Array | None) -> Array:
+        """RGB of every corner: grey where it is told nothing, over amber to red where it is told the most."""
         bones = np.tile(BODY, (len(self._body.bones), 1))
-        if severity is not None:
-            for i, links in enumerate(self._regions):
-                t = max((float(severity[link]) for link in links), default=0.0) / 10
+        if told is not None:
+            for i, columns in enumerate(self._regions):
+                t = max((float(told[column]) for column in columns), default=0.0)
                 if t:
                     low = BODY + (HURT_LOW - BODY) * min(1.0, 0.35 + 1.3 * t)
                     bones[i] = low if t < 0.5 else HURT_LOW + (HURT_HIGH - HURT_LOW) * (2 * t - 1)

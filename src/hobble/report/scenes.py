@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from hobble.channels import channel
+from hobble.channels.shown import Shown, shown, words
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.fit import fitted_rotations
 from hobble.figure.mesh import body, key
-from hobble.figure.pack import packed_turns, regions
+from hobble.figure.pack import packed_turns
 from hobble.models.packing import packed
-from hobble.report.words import spoken, spoken_links
 from hobble.runtime.export import jointed
 
 FPS = 30
@@ -34,16 +35,19 @@ WORDS = {
 }
 
 
-def scenes(path: str | Path, skeleton: Mapping[str, Any], links: Sequence[str] = ()) -> dict[str, Any]:
+def scenes(
+    path: str | Path, skeleton: Mapping[str, Any], channels: Mapping[str, Sequence[str]] | None = None
+) -> dict[str, Any]:
     """What the page's figure plays, from `runtime/scenarios.npz`.
 
-    skeleton: as the network's file carries it. links: names of all links, for colours. Places of bones are
+    skeleton: as the network's file carries it. channels: name -> columns of each channel. Places of bones are
     kept at 30 Hz, relative to the root joint, in 16-bit steps of 0.1 mm, their rotations in 16 bits too.
     """
     data = load_npz(path)
     if not skeleton:
         return {}
     figure = Skeleton.from_dict({"name": "", **skeleton})
+    faces = {name: shown(name, figure, columns, columns) for name, columns in (channels or {}).items()}
     stride = max(1, round(float(data["fps"]) / FPS))
     names = [str(name) for name in data["names"]]
     keep = body(figure).bones.tolist()
@@ -52,12 +56,10 @@ def scenes(path: str | Path, skeleton: Mapping[str, Any], links: Sequence[str] =
         "fps": float(data["fps"]) / stride,
         "joints": len(keep),
         "unit": UNIT,
-        "links": list(links),
-        "spoken": spoken_links(figure, links),
         "feet": [keep.index(j) for j in at] if all(j in keep for j in at) else [],
         "body": key(figure),
-        "regions": regions(figure, links),
-        "scenarios": [_scenario(data, name, stride, links, figure, keep) for name in names],
+        "regions": next((list(face.regions) for face in faces.values() if face.regions), []),
+        "scenarios": [_scenario(data, name, stride, channels or {}, faces, figure, keep) for name in names],
     }
 
 
@@ -65,7 +67,8 @@ def _scenario(
     data: Mapping[str, Array],
     name: str,
     stride: int,
-    links: Sequence[str],
+    channels: Mapping[str, Sequence[str]],
+    faces: Mapping[str, Shown],
     figure: Skeleton,
     keep: list[int],
 ) -> dict[str, Any]:
@@ -86,13 +89,18 @@ def _scenario(
         out["contacts"] = packed(bits.astype(np.uint8))
     if phase is not None:
         out["phase"] = packed(np.round(255 * (np.asarray(phase)[::stride] % 1.0)).astype(np.uint8))
-    hurt = str(data.get(f"{name}/hurt", ""))
-    if hurt in links:
-        severity = np.asarray(data[f"{name}/severity"])[::stride]
-        table = np.zeros((len(positions), len(links)), np.uint8)
-        table[:, list(links).index(hurt)] = np.clip(np.round(25 * severity), 0, 250)
-        out["severity"] = packed(table)
-        out["description"] = f"Walks while the {spoken(figure, hurt)} hurts more and more"
+    one, column = (str(v) for v in data.get(f"{name}/swept", ("", "")))
+    if column in channels.get(one, ()):
+        at, highest = list(channels[one]).index(column), channel(one).highest
+        share = np.asarray(data[f"{name}/told"])[::stride] / highest
+        out["told"] = {
+            "column": at,
+            "spoken": faces[one].spoken[at],
+            "highest": highest,
+            "placed": bool(faces[one].regions),
+            "values": packed(np.clip(np.round(250 * share), 0, 250).astype(np.uint8)),
+        }
+        out["description"] = words(one).grows.format(faces[one].spoken[at])
     return out
 
 

@@ -1,4 +1,5 @@
-"""Short loops of the character walking hurt, for a questionnaire or a README: images and BVH files."""
+"""Short loops of the character walking as it is told, for a questionnaire or a README: images and BVH
+files."""
 
 from __future__ import annotations
 
@@ -11,44 +12,28 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from hobble.channels import channel
+from hobble.channels.shown import Loop as Wanted
+from hobble.channels.shown import loops, shown
 from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_json
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import body
-from hobble.figure.pack import regions
 from hobble.models.network import Network
-from hobble.report.playable import PRESETS, body_parts
 from hobble.report.raster import GRID, Camera, Studio
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton, jointed
 from hobble.runtime.options import Runtime
 
-SEVERITY = 8.0
-# The study of Quentin Ferre (2019) showed thirteen walks, and asked which part is hurt; nothing is coloured.
-STUDY: dict[str, tuple[str, ...]] = {
-    "healthy": (),
-    "left-thigh": ("left thigh",),
-    "left-shank": ("left shank",),
-    "left-foot": ("left foot",),
-    "right-thigh": ("right thigh",),
-    "right-shank": ("right shank",),
-    "right-foot": ("right foot",),
-    "lower-back": ("lower back",),
-    "left-arm": ("left upper arm",),
-    "right-arm": ("right upper arm",),
-    "left-leg": ("left thigh", "left shank", "left foot"),
-    "right-leg": ("right thigh", "right shank", "right foot"),
-    "thigh-and-back": ("left thigh", "lower back"),
-}
 SPEED = 2.5  # cm a frame, asked for
-SETTLED = 6 * 60  # frames until the gait is the hurt one
+SETTLED = 6 * 60  # frames until the gait is what it was told
 SHORTEST, LONGEST = 150, 300  # frames of a loop
 BLEND = 12  # frames over which the end of a loop passes into its beginning
 STRIDE = 2  # frames of the motion to one of the image
 QUALITY = 80
-FELT = 0.1  # cm; a loop nearer to the healthy one shows nothing of what hurts
+FELT = 0.1  # cm; a loop nearer to the plain one shows nothing of what it is told
 
 
 @dataclass(frozen=True)
@@ -65,50 +50,67 @@ class Loop:
 def write_stimuli(
     network: Network, folder: str | Path, runtime: Runtime, size: int = 400
 ) -> list[dict[str, Any]]:
-    """Write <name>.webp and <name>.bvh of each stimulus and preset into a folder, and stimuli.json.
+    """Write <name>.webp and <name>.bvh of each walk of each channel into a folder, and stimuli.json.
 
-    The thirteen of the study are grey; `preset-<name>` shows the severities as colours. Links that were
-    never hurt in training, and how far each walk is from the healthy one, are listed: see `doubts`. Raises
-    HobbleError for a network without severities.
+    Those of a channel after the first are called <channel>-<name>. Columns that were told nothing in
+    training,
+    and how far each walk is from the plain one, are listed: see `doubts`. Raises HobbleError for a
+    network that
+    is told nothing.
     """
-    if network.skeleton is None or not network.links:
-        raise HobbleError("this network has no severities among its inputs; make the stimuli of `injured`")
+    if network.skeleton is None or not network.channels:
+        raise HobbleError("this network is told nothing; make the stimuli of one that has `channels`")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     skeleton = network.skeleton
-    figure, rows = body(skeleton), []
-    studio = Studio(figure, regions(skeleton, network.links))
-    healthy, trained = walk(network, {}, runtime), hurt_in_training(network)
-    for name, hurt, shown in wanted(network):
-        loop = walk(network, hurt, runtime) if hurt else healthy
+    plain, rows = walk(network, {}, runtime), []
+    for name, one, wanted in all_loops(network):
+        columns, trained = network.channels[one], told_in_training(network, one)
+        studio = Studio(body(skeleton), shown(one, skeleton, columns, trained).regions)
+        loop = walk(network, {one: dict(wanted.told)}, runtime) if wanted.told else plain
         own = skeleton
         if "skeleton" not in network.meta:
             own = fitted_skeleton(skeleton, loop.positions, loop.rotations)
         export_bvh(folder / f"{name}.bvh", name, own, loop.positions, loop.rotations)
-        severity = np.array([hurt.get(link, 0.0) for link in network.links]) if shown else None
-        save_loop(folder / f"{name}.webp", frames(studio, skeleton, loop, severity, size))
+        colours = None
+        if wanted.coloured:
+            colours = np.array([wanted.told.get(column, 0.0) for column in columns]) / channel(one).highest
+        save_loop(folder / f"{name}.webp", frames(studio, skeleton, loop, colours, size))
         seconds = len(loop.positions) / 60
         rows.append(
             {
                 "name": name,
-                "severities": hurt,
-                "coloured": shown,
-                "hurt_in_training": all(link in trained for link in hurt),
-                "never_hurt": [link for link in hurt if link not in trained],
-                "from_healthy_cm": round(apart(loop, healthy), 2),
+                "channel": one,
+                "told": dict(wanted.told),
+                "coloured": wanted.coloured,
+                "never_told": [column for column in wanted.told if column not in trained],
+                "from_plain_cm": round(apart(loop, plain), 2),
                 "seconds": seconds,
                 "metres_a_second": round(float(np.linalg.norm(loop.way)) / 100 / seconds, 3),
                 "gap_cm": round(loop.gap, 2),
             }
         )
-    write_json(folder / "stimuli.json", {"severity": SEVERITY, "stimuli": rows})
+    write_json(folder / "stimuli.json", {"stimuli": rows})
     return rows
 
 
-def hurt_in_training(network: Network) -> set[str]:
-    """Links whose severity was above 0 somewhere in training, as the mean of the input tells."""
-    means = network.x_mean[network.layout.x_channel("injury")]
-    return {link for link, mean in zip(network.links, means, strict=True) if mean > 0}
+def all_loops(network: Network) -> list[tuple[str, str, Wanted]]:
+    """The name, channel and walk of each loop; what tells nothing is there once."""
+    assert network.skeleton is not None
+    out: list[tuple[str, str, Wanted]] = []
+    for one, columns in network.channels.items():
+        for loop in loops(one, network.skeleton, columns, network.trained(one)):
+            if not out or out[0][1] == one:
+                out.append((loop.name, one, loop))
+            elif loop.told:
+                out.append((f"{one}-{loop.name}", one, loop))
+    return out
+
+
+def told_in_training(network: Network, name: str) -> set[str]:
+    """Columns of a channel that were above 0 somewhere in training, as the mean of the input tells."""
+    means = network.x_mean[network.layout.x_channel(name)]
+    return {column for column, mean in zip(network.channels[name], means, strict=True) if mean > 0}
 
 
 def apart(loop: Loop, other: Loop) -> float:
@@ -121,43 +123,27 @@ def apart(loop: Loop, other: Loop) -> float:
 
 
 def doubts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What whoever shows the stimuli has to know of them: those that hurt nobody sees. rows: of the above."""
-    same = [row for row in rows if row["severities"] and row["from_healthy_cm"] < FELT]
-    part = [row for row in rows if row["never_hurt"] and row not in same]
+    """What whoever shows the loops has to know of them: those that nobody tells apart. rows: of the above."""
+    same = [row for row in rows if row["told"] and row["from_plain_cm"] < FELT]
+    part = [row for row in rows if row["never_told"] and row not in same]
     out = []
     if same:
         names = ", ".join(row["name"] for row in same)
         out.append(
-            f"{names}: no different from the healthy walk (less than {FELT} cm); not for a questionnaire."
+            f"{names}: no different from the plain walk (less than {FELT} cm); not for a questionnaire."
         )
     if part:
-        out.append(f"{', '.join(row['name'] for row in part)}: not all that is hurt there shows.")
-    if never := sorted({link for row in [*same, *part] for link in row["never_hurt"]}):
-        out.append(f"Never hurt in training: {', '.join(never)}. Train on clips in which they are.")
+        out.append(f"{', '.join(row['name'] for row in part)}: not all that is told there shows.")
+    if never := sorted({column for row in [*same, *part] for column in row["never_told"]}):
+        out.append(f"Never told in training: {', '.join(never)}. Train on clips in which they are.")
     return out
 
 
-def wanted(network: Network) -> list[tuple[str, dict[str, float], bool]]:
-    """Name, severities by link, and whether they are shown as colours, of each image."""
-    assert network.skeleton is not None
-    parts = body_parts(network.skeleton, network.links, network.hurt_links)
-    out = []
-    for name, labels in STUDY.items():
-        out.append((name, {network.links[parts[label]]: SEVERITY for label in labels}, False))
-    for title, values in PRESETS.items():
-        hurt = {network.links[parts[label]]: float(value) for label, value in values.items()}
-        out.append((f"preset-{title.lower().replace(' ', '-')}", hurt, True))
-    return out
-
-
-def walk(network: Network, injury: Mapping[str, float], runtime: Runtime) -> Loop:
+def walk(network: Network, told: Mapping[str, Mapping[str, float]], runtime: Runtime) -> Loop:
     """The character walking straight on, cut where a later moment is most like an earlier one."""
     animation = ProceduralAnimation(network, **dict(runtime))
     ahead = np.array([0.0, SPEED])
-    poses = [
-        animation.next_pose(ahead, None, "walk", injury=dict(injury) or None)
-        for _ in range(SETTLED + 60 + LONGEST + BLEND)
-    ]
+    poses = [animation.next_pose(ahead, None, "walk", **told) for _ in range(SETTLED + 60 + LONGEST + BLEND)]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
     first, last, gap = cut(positions)
     kept, turned = positions[first:last].copy(), rotations[first:last].copy()
@@ -190,7 +176,7 @@ def cut(positions: Array) -> tuple[int, int, float]:
 
 
 def frames(
-    studio: Studio, skeleton: Skeleton, loop: Loop, severity: Array | None, size: int
+    studio: Studio, skeleton: Skeleton, loop: Loop, told: Array | None, size: int
 ) -> list[NDArray[np.uint8]]:
     """The pictures of a loop. The camera goes along evenly, and the grid under it by whole meshes a round."""
     count, keep = len(loop.positions), body(skeleton).bones
@@ -208,7 +194,7 @@ def frames(
         points[:, 1] = places[f, keep, 1]
         travelled = np.array([0.0, 0.0, length * f / count * even])
         camera = Camera(np.array([0.0, 82.0, 0.0]) + travelled, size=size)
-        out.append(studio.draw(points + travelled, turns[f], camera, severity))
+        out.append(studio.draw(points + travelled, turns[f], camera, told))
     return out
 
 

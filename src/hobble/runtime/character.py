@@ -1,4 +1,4 @@
-"""What a character is between two frames: pose, trajectory, phase, wishes, severities, feet."""
+"""What a character is between two frames: pose, trajectory, phase, wishes, what it is told, feet."""
 
 from __future__ import annotations
 

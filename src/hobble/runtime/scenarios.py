@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hobble.channels import channel
+from hobble.channels.shown import sweeps
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.models.network import Network
@@ -19,34 +20,24 @@ from hobble.runtime.options import Runtime
 
 Wish = tuple[Array, Array | None, str]  # velocity, facing, gait
 
-HURTS = "injury"  # the channel that they sweep
-# The hurt of the injury scenarios: name -> links, by the roles of their ends.
-HURT = {
-    "left_knee": ("left_hip", "left_knee"),
-    "right_knee": ("right_hip", "right_knee"),
-    "left_ankle": ("left_knee", "left_heel"),
-    "lower_back": ("hips", "spine"),
-    "left_arm": ("left_shoulder", "left_elbow"),
-}
-
 
 @dataclass(frozen=True)
 class Scenario:
     """`frames` of wishes: wish(frame) gives velocity (2,) cm a frame, facing (2,) or None, and gait.
 
-    hurt: the link whose severity climbs from 0 to 10 over the walk, or None.
+    swept: the channel and its column that is told from 0 to the highest over the walk, or None.
     """
 
     name: str
     frames: int
     wish: Callable[[int], Wish] = field(repr=False)
-    hurt: str | None = None
+    swept: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)
 class Track:
     """What came of a scenario: positions (F, J, 3), rotations (F, J, 4), contacts (F, 4), phase (F,), target
-    (F, 2), root (F, 3), gait (F,) names, severity (F,) of the hurt link."""
+    (F, 2), root (F, 3), gait (F,) names, told (F,) of the swept column."""
 
     scenario: Scenario
     positions: Array
@@ -56,7 +47,7 @@ class Track:
     target: Array
     root: Array
     gait: Array
-    severity: Array
+    told: Array
 
 
 def _ahead(speed: float, degrees: float = 0.0) -> Array:
@@ -64,7 +55,7 @@ def _ahead(speed: float, degrees: float = 0.0) -> Array:
 
 
 def scenarios(network: Network) -> list[Scenario]:
-    """The scenarios of a network; injuries for those that know severities."""
+    """The scenarios of a network; a walk for each column that its channels sweep."""
     facing = _ahead(1.0)
     out = [
         Scenario("walk", 900, lambda f: (_ahead(2.5, max(0, f - 300) * 0.5), None, "walk")),
@@ -75,40 +66,36 @@ def scenarios(network: Network) -> list[Scenario]:
         Scenario("stop_and_go", 720, lambda f: (_ahead(2.5 if f % 240 < 150 else 0.0), None, "walk")),
         Scenario("turn_in_place", 600, lambda f: (_ahead(0.0), _ahead(1.0, 90 * (f // 120)), "walk")),
     ]
-    for name, link in hurt_links(network).items():
-        out.append(Scenario(name, 720, lambda f: (_ahead(2.5), None, "walk"), link))
+    taken = {one.name for one in out}
+    for name, column in swept(network).items():
+        free = name if name not in taken else "_".join((column[0], name))
+        out.append(Scenario(free, 720, lambda f: (_ahead(2.5), None, "walk"), column))
     return out
 
 
-def hurt_links(network: Network) -> dict[str, str]:
-    """Which links the injury scenarios hurt: name -> link; empty for a network without severities."""
-    skeleton = network.skeleton
-    if skeleton is None or not network.links:
+def swept(network: Network) -> dict[str, tuple[str, str]]:
+    """What the scenarios sweep: name -> the channel and its column; empty for a network that is told
+    nothing."""
+    if network.skeleton is None:
         return {}
-    out = {}
-    for name, (upper, lower) in HURT.items():
-        child, top = skeleton.role(lower), skeleton.role(upper)
-        path = [child]
-        while path[-1] != top and skeleton.parents[path[-1]] >= 0:
-            path.append(skeleton.parents[path[-1]])
-        # The link nearest the upper joint, of those that were hurt in training if any.
-        pairs = [f"{skeleton.joints[p]}-{skeleton.joints[c]}" for c, p in pairwise(path)]
-        for links in (network.hurt_links, network.links):
-            if name not in out and (known := [pair for pair in reversed(pairs) if pair in links]):
-                out[name] = known[0]
-    return out
+    return {
+        name: (one, column)
+        for one, columns in network.channels.items()
+        for name, column in sweeps(one, network.skeleton, columns, network.trained(one)).items()
+    }
 
 
 def run_scenario(network: Network, scenario: Scenario, options: Runtime) -> Track:
     """Generate one scenario on flat ground."""
     animation = ProceduralAnimation(network, **dict(options))
-    poses, targets, gaits, severity = [], [], [], np.zeros(scenario.frames, np.float32)
+    poses, targets, gaits, values = [], [], [], np.zeros(scenario.frames, np.float32)
     for f in range(scenario.frames):
         velocity, facing, gait = scenario.wish(f)
         told = {}
-        if scenario.hurt:
-            severity[f] = 10.0 * f / max(1, scenario.frames - 1)
-            told = {HURTS: {scenario.hurt: float(severity[f])}}
+        if scenario.swept:
+            name, column = scenario.swept
+            values[f] = channel(name).highest * f / max(1, scenario.frames - 1)
+            told = {name: {column: float(values[f])}}
         poses.append(animation.next_pose(velocity, facing, gait, **told))
         targets.append(velocity)
         gaits.append(gait)
@@ -121,7 +108,7 @@ def run_scenario(network: Network, scenario: Scenario, options: Runtime) -> Trac
         np.array(targets),
         np.array([p.root for p in poses]),
         np.array(gaits),
-        severity,
+        values,
     )
 
 
@@ -143,8 +130,8 @@ def generate(network: Network, npz: str | Path, bvh: str | Path, options: Runtim
 
     npz: names (N,), joints (J,), parents (J,), fps; for scenario <name>: <name>/positions (F, J, 3) float32
     cm, <name>/rotations (F, J, 4) world, w first, <name>/contacts (F, 4), <name>/phase (F,), <name>/gait (F,)
-    str, <name>/target (F, 2), <name>/root (F, 3), <name>/severity (F,) float32, <name>/hurt: the hurt link or
-    "".
+    str, <name>/target (F, 2), <name>/root (F, 3), <name>/told (F,) float32 of the column that is swept,
+    <name>/swept (2,): its channel and its name, both "" where none is.
     """
     assert network.skeleton is not None
     arrays: dict[str, Any] = {}
@@ -152,10 +139,10 @@ def generate(network: Network, npz: str | Path, bvh: str | Path, options: Runtim
     for track in write_motions(network, bvh, options):
         name = track.scenario.name
         names.append(name)
-        for key in ("positions", "rotations", "contacts", "phase", "target", "root", "severity"):
+        for key in ("positions", "rotations", "contacts", "phase", "target", "root", "told"):
             arrays[f"{name}/{key}"] = getattr(track, key).astype(np.float32)
         arrays[f"{name}/gait"] = track.gait
-        arrays[f"{name}/hurt"] = np.array(track.scenario.hurt or "")
+        arrays[f"{name}/swept"] = np.array(track.scenario.swept or ("", ""))
     save_npz(
         npz,
         names=np.array(names),

@@ -11,9 +11,10 @@ from urllib.parse import quote
 
 from hobble.config.load import Catalogue
 from hobble.config.models import ClipEntry
-from hobble.core.clip_files import NAMES, can_be_called, find_clips, the_file
+from hobble.core.clip_files import NAMES, can_be_called, find_clips, orphan_notes, the_file
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular
+from hobble.hurt.options import TELLS
 from hobble.synthetic.links import WRITES
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 from hobble.workflow.told import Told
@@ -21,7 +22,7 @@ from hobble.workflow.told import Told
 DATASETS = "results/datasets"
 MIRROR = "_mirror"
 HURT = re.compile(r"_hurt([1-9])$")  # at the end of a hurt version's name
-HURTS = "injury"  # the channel that hurt versions are told
+MOST_NOTES = 10
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 
 
@@ -53,8 +54,8 @@ class Clips:
         if odd := [name for name in listed if name.endswith(MIRROR)]:
             raise HobbleError(
                 f"data set {dataset}: {', '.join(odd)}: only a mirror is called so, which `mirror: true` "
-                "makes from its original. Set `mirror: true`, which accepts such files beside originals, "
-                "or take it out, or rename its file."
+                "makes from its original. Put the original beside it and list neither or the original alone, "
+                "or rename its file."
             )
         if odd := [name for name in listed if HURT.search(name)]:
             raise HobbleError(
@@ -63,7 +64,7 @@ class Clips:
             )
         return {name: entry or ClipEntry() for name, entry in listed.items()}
 
-    versions_of = HURTS
+    versions_of = TELLS  # the channel that hurt versions are told
 
     @staticmethod
     def original(clip: str) -> str:
@@ -80,7 +81,7 @@ class Clips:
         """The hurt versions of the healthy clips by name, and which turn each has among them, from 0."""
         options = self.catalogue.dataset(dataset).hurt
         healthy = (
-            [clip for clip in self.own(dataset) if self.told.neutral(dataset, clip, HURTS)] if options else []
+            [clip for clip in self.own(dataset) if self.told.neutral(dataset, clip, TELLS)] if options else []
         )
         many = options.versions if options else 0
         names = [f"{clip}_hurt{version + 1}" for version in range(many) for clip in healthy]
@@ -198,7 +199,7 @@ class Clips:
         return self.catalogue.dataset(dataset).labels.files
 
     def _scanned(self, dataset: str) -> list[str]:
-        """The clips in the user's folder, but for mirrors that are made anew from originals beside them."""
+        """The clips in the user's folder, but for mirrors of others that lie beside their originals."""
         folder, files = self.folder(dataset), self._files(dataset)
         for name in sorted(files):
             if not can_be_called(name):
@@ -206,8 +207,29 @@ class Clips:
             the_file(name, files[name])
         if not files:
             raise InputError(folder, "no .bvh files here", fix="Put clips there.")
-        made = {name + MIRROR for name in files} if self.catalogue.dataset(dataset).mirror else set()
-        return sorted(set(files) - made)
+        return sorted(set(files) - set(self._mirrors(dataset)))
+
+    def _mirrors(self, dataset: str) -> list[str]:
+        """The files that are mirrors of others beside them: they are made anew, or left out."""
+        files = self._files(dataset)
+        return sorted(name + MIRROR for name in files if name + MIRROR in files)
+
+    def notes(self, dataset: str) -> list[str]:
+        """Sentences on files of the user's folder that no clip reads, and why."""
+        model = self.catalogue.dataset(dataset)
+        if model.synthetic is not None or not (folder := self.folder(dataset)).is_dir():
+            return []
+        said = orphan_notes(folder, {*self._files(dataset), *self._checksums(dataset)})
+        mirrors = [] if model.clips or model.mirror else self._mirrors(dataset)
+        if mirrors:
+            said.insert(
+                0,
+                f"{len(mirrors)} files in {folder} are mirrors of clips beside them ({mirrors[0]}.bvh, ...) "
+                "and were left out: `mirror: true` makes them anew, labels too, on the same side of the "
+                "split as their originals.",
+            )
+        more = len(said) - MOST_NOTES
+        return [*said[:MOST_NOTES], *([f"{more} more files belong to no clip."] if more > 0 else [])]
 
     def _manifest(self, dataset: str) -> Path:
         options = self.catalogue.dataset(dataset).download

@@ -67,6 +67,14 @@ class Datasets:
             raise HobbleError(f"data set {dataset}: no clip{only} is left to train on")
         return splits
 
+    def compared(self, dataset: str, channels: Sequence[str]) -> list[str]:
+        """The clips of which no two may be one motion: those that are files, where some are held out."""
+        if self.catalogue.dataset(dataset).synthetic is not None:
+            return []
+        splits = self.selected(dataset, channels)
+        both = len(set(splits.values())) > 1
+        return [clip for clip in splits if both and clip == original(clip)]
+
     def sources(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
         """Hurt version -> the healthy clip that it is made from, of the clips that are selected."""
         chosen = self.selected(dataset, channels)

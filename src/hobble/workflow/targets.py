@@ -10,12 +10,12 @@ from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
 from hobble.synthetic.links import check_link
 from hobble.workflow.comparison import COMPARE
+from hobble.workflow.copies import refuse_copies
 from hobble.workflow.project import Project
 
 if TYPE_CHECKING:
     from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 
-HURTS = "injury"  # the channel that stimuli show
 PAGE = "page"  # under results/: what all reports share
 
 
@@ -36,6 +36,20 @@ def check(project: Project, targets: Iterable[str]) -> None:
             _asked(project, name, folder, file)
 
 
+def notes(project: Project, targets: Iterable[str]) -> list[str]:
+    """What a person should know of the folders of the data sets that the targets need, each once."""
+    names = []
+    for target in list(targets) or ["results/holden/report.html"]:
+        _, name, folder, *_ = (*Path(target).parts, "", "")
+        if name == "datasets":
+            names.append(folder)
+        elif name == COMPARE:
+            names += [project.catalogue.configuration(one).dataset for one in project.comparison.names()]
+        elif name and name != PAGE:
+            names.append(project.catalogue.configuration(name).dataset)
+    return [f"data set {name}: {note}" for name in dict.fromkeys(names) for note in project.clips.notes(name)]
+
+
 def _configuration(project: Project, name: str) -> None:
     model = project.catalogue.configuration(name)
     for other in filter(None, (model.network_of, model.training.continues)):
@@ -46,6 +60,7 @@ def _configuration(project: Project, name: str) -> None:
         _goes_on(name, model, project.catalogue.configuration(model.training.continues))
     _dataset(project, model.dataset)
     project.datasets.selected(model.dataset, model.channels)
+    refuse_copies(project.clips, project.datasets, model.dataset, tuple(model.channels))
 
 
 def _goes_on(name: str, model: Configuration, start: Configuration) -> None:
@@ -123,11 +138,10 @@ def _mirrored(name: str, skeleton: SkeletonFile) -> None:
 def _asked(project: Project, name: str, folder: str, file: str) -> None:
     """What no network of this configuration could give, though it were trained."""
     owner = project.catalogue.configuration(name).network_of or name
-    if folder == "stimuli" and HURTS not in project.catalogue.configuration(owner).channels:
+    if folder == "stimuli" and not project.catalogue.configuration(owner).channels:
         raise HobbleError(
-            f"results/{name}/stimuli: the network of configuration {owner} is not told {HURTS}, so nothing "
-            "can hurt its character. Ask for results/injured/stimuli, or for those of a configuration of "
-            "your own with `extends: injured`."
+            f"results/{name}/stimuli: the network of configuration {owner} is told nothing, so that there is "
+            "one walk to show. Ask for those of a configuration that has `channels`."
         )
     stem, _, suffix = file.rpartition(".")
     if folder == "export" and suffix == "onnx" and stem not in get_args(PhaseMode):

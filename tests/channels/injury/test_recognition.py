@@ -42,9 +42,9 @@ def clip(network, name: str, link: str | None, severity: float, seed: int, frame
     skeleton = network.skeleton
     hurt = severity / 10
     local = figure(skeleton, frames, hurt * (link == KNEE), 1.2 * hurt * (link == ARM), seed)
-    severities = np.zeros((frames, len(network.links)))
+    severities = np.zeros((frames, len(network.channels["injury"])))
     if link:
-        severities[:, network.links.index(link)] = severity
+        severities[:, network.channels["injury"].index(link)] = severity
     gait = np.zeros((frames, 6))
     gait[:, network.gaits.index("walk")] = 1
     contacts = np.zeros((frames, 4))
@@ -156,7 +156,7 @@ def test_windows_are_of_one_hurt_walking_ahead(hurtable) -> None:
     healed = walking_windows(replace(good, told={"injury": severity}), hurtable)
     assert [w.hurt for w in healed] == [KNEE] * 3 + [HEALTHY] * 6
     severity = good.told["injury"].copy()
-    severity[:, hurtable.links.index(ARM)] = 2
+    severity[:, hurtable.channels["injury"].index(ARM)] = 2
     both = walking_windows(replace(good, told={"injury": severity}), hurtable)
     assert {(w.hurt, w.severity) for w in both} == {(f"{KNEE} and {ARM}", 5.0)}
     assert module.WINDOW == 60

@@ -15,8 +15,9 @@ from scipy.stats import spearmanr
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
 from hobble.channels.injury.response.run import GAITS, injury_response, largest_accelerations
 from hobble.channels.injury.response.sweep import SEVERITIES, Sweep
+from hobble.channels.injury.walks import severities
 from hobble.evaluation.captured import Captured
-from hobble.evaluation.crowd import SPEEDS, Stretch, run, severities
+from hobble.evaluation.crowd import SPEEDS, Stretch, run
 from hobble.evaluation.pose_distance import mean_cycle, settling
 from hobble.evaluation.spearman import spearman
 from hobble.runtime.options import Runtime
@@ -34,7 +35,7 @@ def slowing(hurtable, links: tuple[str, ...] = (KNEE,)):
     weights = [np.zeros_like(w) for w in hurtable.weights]
     biases = [np.zeros_like(b) for b in hurtable.biases]
     for link in links:
-        weights[0][:, 0, layout.x_channel("injury").start + hurtable.links.index(link)] = (
+        weights[0][:, 0, layout.x_channel("injury").start + hurtable.channels["injury"].index(link)] = (
             2.0  # the inputs are over 20
         )
     biases[0][:, 0] = 1.0
@@ -109,14 +110,14 @@ def test_every_link_is_swept_and_those_never_hurt_are_marked(hurtable) -> None:
     seen[start + 7] = seen[start + 2] = 0.1
     result = response(replace(hurtable, x_mean=seen), links=None, seconds=0.2)
     hurt = ["LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg"]
-    assert result["links"] == list(hurtable.links)
+    assert result["links"] == list(hurtable.channels["injury"])
     assert len(result["links"]) == 30
     assert result["trained"] == hurt
     assert len(result["rows"]) == 2 * 30 * 11
     assert len(result["back"]) == 2 * 30 * 10
     assert [r["link"] for r in result["responses"] if r["trained"]] == 2 * hurt
     assert {(r["first"], r["second"]) for r in result["second"]} == {tuple(hurt), tuple(hurt[::-1])}
-    assert {r["link"] for r in result["into_a_jog"]} == {None, *hurtable.links}
+    assert {r["link"] for r in result["into_a_jog"]} == {None, *hurtable.channels["injury"]}
     assert set(result["summary"]) == set(result["summary_untrained"]) == set(GAITS)
 
 
@@ -214,7 +215,7 @@ def test_largest_accelerations_are_of_the_gait_and_the_hurt_link(hurtable) -> No
     gait = np.zeros((6, 6))
     gait[:4, hurtable.gaits.index("walk")] = gait[4:, hurtable.gaits.index("jog")] = 1
     severity = np.zeros((6, 30))
-    severity[2:, hurtable.links.index(KNEE)] = 3
+    severity[2:, hurtable.channels["injury"].index(KNEE)] = 3
     rough = np.array([9.0, 8, 2, 1, 5, 6])
     clip = Captured(
         "a",

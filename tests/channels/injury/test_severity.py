@@ -118,12 +118,13 @@ def test_a_status_file_at_its_own_rate(clip, tmp_path):
     assert warnings == []
 
 
-def test_one_frame_more_or_less_is_forgiven_and_two_are_not(clip, tmp_path):
+def test_one_frame_more_or_less_is_a_warning_and_two_are_refused(clip, tmp_path):
     path = tmp_path / "walk_injuries.txt"
     for frames in (599, 601):
         path.write_text(f"frames:{frames}\n1-{frames} {THIGH}[8];\n")
-        severity, _ = clip_severity(clip, path, None, motion())
+        severity, (warning,) = clip_severity(clip, path, None, motion())
         assert (severity[:, column(clip.skeleton, THIGH)] == 8).all()
+        assert f"walk_injuries.txt, line 1: counts {frames} frames, but walk.bvh has 600" in warning
     path.write_text(f"frames:602\n1-602 {THIGH}[8];\n")
     with pytest.raises(InputError, match=r"line 1: counts 602 frames, but walk.bvh has 600"):
         clip_severity(clip, path, None, motion())

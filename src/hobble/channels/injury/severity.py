@@ -69,7 +69,8 @@ def clip_severity(
 
     status_file: the file beside the clip. status: instead of it, what hurts in all frames ("A-B[4];C-D[8]").
     motion: the report of the motion stage, for `source_frames` and `source_fps`.
-    Raises InputError where either cannot be read or the file counts other frames than the clip's.
+    Raises InputError where either cannot be read or the file counts other frames than the clip's; one more or
+    less is a warning.
     """
     links = clip.skeleton.link_names
     if status is not None:
@@ -86,8 +87,15 @@ def clip_severity(
             line=1,
             fix="Count the frames of the file, at its own rate, and check the ranges.",
         )
+    said = odd_ranges(read, status_file)
+    if read.frames != motion["source_frames"]:
+        said.insert(
+            0,
+            f"{Path(status_file).name}, line 1: counts {read.frames} frames, but {motion['source']} has "
+            f"{motion['source_frames']}; the ranges were taken as they stand. Is it the file of this clip?",
+        )
     rows = severity_matrix(read, links)
-    return rows[source_rows(len(clip), read.frames, motion)], odd_ranges(read, status_file)
+    return rows[source_rows(len(clip), read.frames, motion)], said
 
 
 def source_rows(frames: int, rows: int, motion: Mapping[str, Any]) -> Array:

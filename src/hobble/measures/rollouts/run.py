@@ -2,7 +2,7 @@
 
 A roll-out starts at a captured frame and goes on for n frames as the runtime does: the joints of the input
 are those it made itself, positions meet half way between where velocities carry them and where they are
-predicted, and the phase advances by what is predicted. Trajectory, gait, ground and severities are the
+predicted, and the phase advances by what is predicted. Trajectory, gait, ground and what is told are the
 clip's own. All starts of a stretch go through the network side by side.
 """
 

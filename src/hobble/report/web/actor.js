@@ -1,14 +1,15 @@
 // One character that is played: the controller, its body and figure, what it leaves on the ground, and its last seconds.
 import { createCharacter } from "./character.js";
 import { createFigure } from "./figure.js";
-import { severityColour } from "./paint.js";
 import { createLab } from "./lab.js";
+import { toldColour } from "./paint.js";
 import { createRig } from "./rig.js";
+import { keyed, placed } from "./told.js";
 
 const KEPT = 1200; // frames that can be saved as motion
 
 export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = false } = {}) => {
-  const figure = createFigure(view, spec.body, spec.regions, { ghost }), rig = createRig(spec), stood = [false, false];
+  const figure = createFigure(view, spec.body, placed(spec)?.regions || [], { ghost }), rig = createRig(spec), stood = [false, false];
   const lab = createLab(spec.legs), actor = { spec, figure, rig, lab, place, falls: 0, milliseconds: 0, frames: [] };
   let trail = [], floor = () => 0;
 
@@ -21,9 +22,10 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
   };
   const sole = (j) => { const [x, z] = [rig.places[3 * j], rig.places[3 * j + 2]]; return [x, floor(x, z), z]; };
 
-  actor.frame = ({ velocity, ahead, gait }, severity) => {
+  // told: a value for each column of a channel, by `keyed`; what is not there is 0.
+  actor.frame = ({ velocity, ahead, gait }, told) => {
     const c = actor.character, before = performance.now();
-    spec.links.forEach((link, l) => { c.wished[l] = (severity.get(link) || 0) / spec.severityScale; });
+    spec.channels.forEach((one) => one.columns.forEach((column, l) => { c.wished[one.first + l] = (told.get(keyed(one, column)) || 0) / one.scale; }));
     c.frame(velocity, ahead, gait, floor);
     rig.take(c.pose, c.turns);
     actor.milliseconds += .05 * (performance.now() - before - actor.milliseconds);
@@ -51,18 +53,18 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
   };
   // way: whether the path that the network was and is about to take is drawn on the ground; null: nothing is, no prints either.
   actor.draw = (way = true) => {
-    const c = actor.character, { paint } = view, healthy = tint ? paint[tint] : paint.body;
+    const c = actor.character, { paint } = view, plain = tint ? paint[tint] : paint.body, one = placed(spec);
     drawGround(way);
     figure.take(rig);
-    figure.pose((links) => {
-      const most = Math.max(0, ...links.map((l) => c.severity[l])) * spec.severityScale;
-      return severityColour(paint, most, healthy);
+    figure.pose((columns) => {
+      const most = one ? Math.max(0, ...columns.map((l) => c.told[one.first + l])) * one.scale / one.highest : 0;
+      return toldColour(paint, most, plain);
     });
   };
-  // What is under a point of the screen: {links, by name, that were hurt in training; deep}; null where nothing is.
+  // What is under a point of the screen: {columns, by name, of the channel that lies in the body; deep}; null where nothing is.
   actor.under = (x, y) => {
     const found = figure.under(x, y);
-    return found && { deep: found.deep, links: found.links.map((l) => spec.links[l]) };
+    return found && { deep: found.deep, columns: found.links.map((l) => placed(spec).columns[l]) };
   };
   return actor;
 };

@@ -14,8 +14,8 @@ export const camera = (text, { nearest = 140, furthest = 1500 } = {}) => {
     yaw: yaw % (2 * Math.PI), pitch: Math.min(1.45, Math.max(.02, pitch)), distance: Math.min(furthest, Math.max(nearest, distance)),
   };
 };
-// "link:severity,link:severity" as pairs; what is no number from 0 to 10 is left out.
-export const hurts = (text) => (text || "").split(",").flatMap((pair) => {
+// "column:value,column:value" as pairs; what is no number from 0 to the highest is left out.
+export const pairs = (text, highest) => (text || "").split(",").flatMap((pair) => {
   const cut = pair.lastIndexOf(":"), much = pair.slice(cut + 1);
-  return cut > 0 && /^\d+(\.\d+)?$/.test(much) && Number(much) <= 10 ? [[pair.slice(0, cut), Number(much)]] : [];
+  return cut > 0 && /^\d+(\.\d+)?$/.test(much) && Number(much) <= highest ? [[pair.slice(0, cut), Number(much)]] : [];
 });

@@ -6,16 +6,18 @@ import { at4, between, multiply, rotate } from "./turns.js";
 
 export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const { joints: J, step, x: X, y: Y, gaits, constants: k } = spec, T = 2 * spec.window, M = spec.window;
-  const S = T / step, F = M / step, G = gaits.length, L = spec.links.length, predict = networks[spec.network.kind](spec);
+  const S = T / step, F = M / step, G = gaits.length, predict = networks[spec.network.kind](spec);
   const { atan2, sin, cos, hypot, floor, min, max, abs, sqrt, PI } = Math;
   const wrap = (angle) => angle - 2 * PI * floor((angle + PI) / (2 * PI));
+  // What the body is told, channel after channel: where each column lies in X, and how far it may go in a frame.
+  const columns = spec.channels.flatMap((one) => one.columns.map((_, l) => ({ at: X[one.name] + l, rate: one.rate }))), L = columns.length;
   const x = new Float32Array(X.size);
   const filled = (n, value) => new Float64Array(n).fill(value);
 
   const c = {
     px: filled(T, place[0]), pz: filled(T, place[1]), dx: filled(T, sin(heading)), dz: filled(T, cos(heading)),
     gait: filled(T * G, 0), ground: filled(S * 3, 0), height: 0, phase: 0, joints: filled(3 * J, 0),
-    velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), severity: filled(L, 0), wished: filled(L, 0),
+    velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), told: filled(L, 0), wished: filled(L, 0),
     velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, owed: [0, 0], lock: [0, 0],
     hold: [[0, 0], [0, 0]], lift: [0, 0], added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
   };
@@ -82,21 +84,24 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   // A hurt body is asked for what it can do, as `hobble.runtime.limits` holds it to: at most so much a frame, and who
   // cannot run any more walks.
 
+  const limited = spec.channels.filter((one) => one.limits);
   const allowed = (g) => {
     let most = Infinity;
-    const { levels, speeds } = spec.limits;
-    for (let l = 0; l < L; l++) {
-      const v = c.severity[l];
-      if (!(v > 0)) continue;
-      let i = 0;
-      while (i < levels.length - 2 && levels[i + 1] <= v) i++;
-      const [low, high] = [speeds[g][l][i], speeds[g][l][i + 1]];
-      most = min(most, low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low));
+    for (const { first, limits } of limited) {
+      const { levels, speeds } = limits;
+      for (let l = 0; l < speeds[g].length; l++) {
+        const v = c.told[first + l];
+        if (!(v > 0)) continue;
+        let i = 0;
+        while (i < levels.length - 2 && levels[i + 1] <= v) i++;
+        const [low, high] = [speeds[g][l][i], speeds[g][l][i + 1]];
+        most = min(most, low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low));
+      }
     }
     return most;
   };
   const hold = (velocity, gait) => {
-    if (!spec.limits || !c.severity.some((v) => v > 0)) return velocity;
+    if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.told[first + l] > 0))) return velocity;
     const each = gaits.map((_, g) => allowed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");
     if (each[jog] < k.lameBelow) {
       gait[walk] += gait[jog];
@@ -170,9 +175,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       c.ground[3 * s + 2] = ground(c.px[i] - a, c.pz[i] + b);
       c.height += c.ground[3 * s + 1] / S;
     }
-    for (let l = 0; l < L; l++) {
-      c.severity[l] += min(max(c.wished[l] - c.severity[l], -spec.severityStep), spec.severityStep);
-    }
+    columns.forEach(({ rate }, l) => { c.told[l] += min(max(c.wished[l] - c.told[l], -rate), rate); });
   };
   const input = () => {
     let [px, pz, co, si] = [c.px[M], c.pz[M], c.dz[M], c.dx[M]];
@@ -195,7 +198,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       x[v + 1] = c.velocities[j + 1];
       x[v + 2] = c.velocities[j] * si + c.velocities[j + 2] * co;
     }
-    for (let l = 0; l < L; l++) x[X.injury + l] = c.severity[l];
+    columns.forEach(({ at }, l) => { x[at] = c.told[l]; });
   };
   const output = (y, ground) => {
     const si = c.dx[M], co = c.dz[M];

@@ -2,6 +2,7 @@
 import { createActor } from "./actor.js";
 import { find, material } from "./base.js";
 import { createDial } from "./dial.js";
+import { keyed, placed } from "./told.js";
 import { createView } from "./view.js";
 
 const BESIDE = -84; // cm from the hurt figure to its ghost, to its left
@@ -12,10 +13,10 @@ const SPEED = 2.5; // cm a frame
 
 const createHero = (spec, asked) => {
   const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), still = find("hero-walk");
-  const link = (label) => spec.links[spec.parts[label]], labels = Object.keys(spec.parts), hurts = labels.length > 0;
-  const severity = new Map(), healthy = new Map(), flat = () => 0, hero = { frames: 0 };
+  const one = placed(spec), labels = one ? Object.keys(one.sliders) : [], hurts = labels.length > 0;
+  const told = new Map(), healthy = new Map(), flat = () => 0, hero = { frames: 0 };
   let part = hurts ? (labels.includes(asked.part) ? asked.part : labels[0]) : null;
-  let last = null, owed = 0, told = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  let last = null, owed = 0, shown = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
   // Both are asked to go the same way, which bends gently.
   const heading = () => .5 * Math.sin(hero.frames / 700);
@@ -31,7 +32,7 @@ const createHero = (spec, asked) => {
 
   const step = () => {
     hero.frames++;
-    main.frame(wish(), severity);
+    main.frame(wish(), told);
     if (!ghost) return;
     ghost.frame(wish(), healthy);
     const [sin, cos] = [Math.sin(heading()), Math.cos(heading())], [a, b] = [main.character.root, ghost.character.root];
@@ -68,7 +69,7 @@ const createHero = (spec, asked) => {
     main.draw(false);
     if (ghost) { ghost.draw(null); ghost.figure.show(fade > .01, fade); }
     view.land.under(main.figure.balls(view.balls));
-    if (now - told > 250) { told = now; tell(); }
+    if (now - shown > 250) { shown = now; tell(); }
   };
   const pace = ({ character: c }) => {
     const M = spec.window;
@@ -83,14 +84,14 @@ const createHero = (spec, asked) => {
     const words = { part: document.createElement("b"), much: document.createElement("b") };
     const say = () => {
       words.part.textContent = part;
-      words.much.textContent = `${dial.value} of 10`;
+      words.much.textContent = `${dial.value} of ${one.highest}`;
       if (dial.value) line.replaceChildren("One network, one wish: walk on. The solid figure is told that its ", words.part, " hurts, ", words.much, "; its ghost is told nothing.");
       else line.replaceChildren("One network, one wish: walk on. Nothing hurts, and both figures walk alike.");
       chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
     };
     const hurt = () => {
-      severity.clear();
-      severity.set(link(part), dial.value);
+      told.clear();
+      told.set(keyed(one, one.columns[one.sliders[part]]), dial.value);
       say();
       view.ask();
     };
@@ -100,13 +101,13 @@ const createHero = (spec, asked) => {
       chip.textContent = label;
       chip.addEventListener("click", () => {
         part = label;
-        if (!dial.value) dial.set(asked.severity);
+        if (!dial.value) dial.set(asked.value);
         hurt();
       });
       find("hero-parts").append(chip);
       return chip;
     });
-    const dial = createDial(find("hero-dial"), { value: asked.severity, changed: hurt });
+    const dial = createDial(find("hero-dial"), { value: asked.value, changed: hurt });
     Object.assign(hero, { dial, chips });
     hurt();
   }
@@ -118,7 +119,7 @@ const createHero = (spec, asked) => {
   rest();
 
   for (const actor of [main, ghost]) actor?.start(flat);
-  const warm = severity.size ? new Map(severity) : severity;
+  const warm = new Map(told);
   for (let f = 0; f < WARM; f++) { hero.frames++; main.frame(wish(), f > 40 ? warm : healthy); ghost?.frame(wish(), healthy); }
   glide(1);
   tell();

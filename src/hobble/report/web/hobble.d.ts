@@ -18,10 +18,10 @@ export interface Wish {
 export interface Character {
   readonly joints: string[];
   readonly gaits: string[];
-  /** Links that can be hurt. */
-  readonly links: string[];
-  /** Part of the body ("left thigh") to its link. */
-  readonly parts: Record<string, string>;
+  /** What it can be told: columns by channel, and the highest value of each; 0 tells nothing. */
+  readonly channels: Record<string, { columns: string[]; highest: number }>;
+  /** What a reader calls a column ("left thigh") to where it is told. */
+  readonly parts: Record<string, { channel: string; column: string }>;
   /** Where all joints are, three numbers each, and their rotations in the world, four each; the next step writes over them. */
   readonly places: Float64Array;
   readonly turns: Float64Array;
@@ -29,8 +29,8 @@ export interface Character {
   readonly contacts: number[];
   readonly phase: number;
   readonly root: [number, number, number];
-  /** Severities 0 to 10 by link; those that are not named heal. Throws RangeError for what is wrong. */
-  hurt(severities?: Record<string, number>): void;
+  /** Values by column of a channel; columns that are not named go back to 0. Throws RangeError for what is wrong. */
+  tell(channel: string, values?: Record<string, number>): void;
   /** One frame of a sixtieth of a second. */
   step(wish?: Wish): Character;
 }

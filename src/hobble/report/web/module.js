@@ -8,19 +8,24 @@ const FLAT = () => 0;
 // data: of character.json. place [x, z] in cm and heading in radians: where and how it stands.
 export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
   const { spec } = data, c = controller(spec, place, heading), rig = createRig(spec);
-  const character = { spec, joints: spec.names, gaits: spec.gaits, links: spec.trained, parts: {}, places: rig.places, turns: rig.turns };
-  for (const [label, link] of Object.entries(spec.parts)) character.parts[label] = spec.links[link];
+  const character = { spec, joints: spec.names, gaits: spec.gaits, channels: {}, parts: {}, places: rig.places, turns: rig.turns };
+  for (const one of spec.channels) {
+    character.channels[one.name] = { columns: one.trained, highest: one.highest };
+    for (const [label, l] of Object.entries(one.sliders)) character.parts[label] = { channel: one.name, column: one.columns[l] };
+  }
   const read = () => Object.assign(character, { contacts: [...c.contacts], phase: c.phase, root: [...c.root] });
   rig.take(c.pose, c.turns);
   read();
 
-  // Severities 0 to 10 by link; those that are not named heal.
-  character.hurt = (severities = {}) => {
-    for (const [link, much] of Object.entries(severities)) {
-      if (!spec.trained.includes(link)) throw new RangeError(`no link ${link} that was hurt in training; there are: ${spec.trained.join(", ") || "none"}`);
-      if (!(much >= 0 && much <= 10)) throw new RangeError(`the severity of ${link} is ${much}, but it is a number from 0 to 10`);
+  // Values by column of a channel; columns that are not named go back to 0.
+  character.tell = (name, values = {}) => {
+    const one = spec.channels.find((channel) => channel.name === name);
+    if (!one) throw new RangeError(`no channel ${name}; there are: ${spec.channels.map((channel) => channel.name).join(", ") || "none"}`);
+    for (const [column, much] of Object.entries(values)) {
+      if (!one.trained.includes(column)) throw new RangeError(`${name}: no ${column} that was told in training; there are: ${one.trained.join(", ")}`);
+      if (!(much >= 0 && much <= one.highest)) throw new RangeError(`${name}: ${column} is ${much}, but it is a number from 0 to ${one.highest}`);
     }
-    spec.links.forEach((link, l) => { c.wished[l] = (severities[link] || 0) / spec.severityScale; });
+    one.columns.forEach((column, l) => { c.wished[one.first + l] = (values[column] || 0) / one.scale; });
   };
   // One frame of a sixtieth of a second.
   character.step = ({ velocity = [0, 0], facing = null, gait = null, ground = FLAT } = {}) => {

@@ -13,11 +13,10 @@ export const palette = () => {
   };
 };
 
-// Body: grey where healthy, over amber to red where hurt.
-export const severityColour = (paint, severity, healthy = paint.body) => {
-  const t = severity / 10;
-  if (!severity) return healthy;
-  return t < .5 ? mix(healthy, paint.low, .35 + 1.3 * t) : mix(paint.low, paint.high, 2 * t - 1);
+// Body: grey where it is told nothing, over amber to red where it is told the most; t: 0 to 1.
+export const toldColour = (paint, t, plain = paint.body) => {
+  if (!t) return plain;
+  return t < .5 ? mix(plain, paint.low, .35 + 1.3 * t) : mix(paint.low, paint.high, 2 * t - 1);
 };
 
 // A colour [r, g, b], 0 to 255, as light is reckoned with.

@@ -1,14 +1,14 @@
 // Play: the networks run here. One figure in a report of one configuration, two in the same world where two are compared.
 import { createActor } from "./actor.js";
-import { camera, hurts, read } from "./address.js";
+import { camera, pairs, read } from "./address.js";
 import { bvh } from "./bvh.js";
 import { find, material, save } from "./base.js";
 import { createChase } from "./chase.js";
 import { film } from "./film.js";
 import { GROUNDS } from "./grounds.js";
-import { createInjuries } from "./injuries.js";
 import { createPanel } from "./panel.js";
 import { createSteering } from "./steering.js";
+import { createTold, placed } from "./told.js";
 import { createView } from "./view.js";
 
 const START = { yaw: 3.9, pitch: .2, distance: 430 };
@@ -17,7 +17,7 @@ const SIDE = 95; // cm between two figures
 const createPlay = (stage, playables) => {
   const canvas = find("play-view"), ground = find("play-ground"), chosen = [find("play-first"), find("play-second")];
   const names = Object.keys(playables), player = { actors: [] };
-  let panels = [], injuries, last = null, owed = 0, told = 0, ready = false, wish = null;
+  let panels = [], told, last = null, owed = 0, shown = 0, ready = false, wish = null;
   const land = () => GROUNDS.get(ground.value), floor = (x, z) => land().height(x, z);
 
   const view = createView(canvas, START, (now) => {
@@ -29,7 +29,7 @@ const createPlay = (stage, playables) => {
     view.land.around(eye, land(), ground.value);
     player.actors.forEach((actor) => actor.draw());
     view.land.under(player.actors.flatMap(({ figure }) => figure.balls(view.balls / player.actors.length)));
-    if (now - told > 100) { told = now; panels.forEach((panel) => panel.tell(view.milliseconds)); }
+    if (now - shown > 100) { shown = now; panels.forEach((panel) => panel.tell(view.milliseconds)); }
     view.ask();
   });
   const steering = createSteering(stage, view.orbit), chase = createChase(view.orbit, canvas);
@@ -38,7 +38,7 @@ const createPlay = (stage, playables) => {
     last = now;
     for (; owed >= 1; owed--) {
       wish = steering.wish();
-      player.actors.forEach((actor) => actor.frame(wish, injuries.severity));
+      player.actors.forEach((actor) => actor.frame(wish, told.values));
     }
   };
   view.onHidden = () => { last = null; chase.rest(); steering.release(); };
@@ -59,12 +59,11 @@ const createPlay = (stage, playables) => {
     view.ask();
   };
 
-  // State that a link carries: who is played, the ground, what hurts, how it goes, where the camera is.
+  // State that a link carries: who is played, the ground, what it is told, how it goes, where the camera is.
 
   const address = () => {
-    const hurt = [...injuries.severity].filter(([, s]) => s > 0).map(([link, s]) => `${link}:${s}`).join(",");
     const { yaw, pitch, distance } = view.orbit, state = { ground: ground.value };
-    if (hurt) state.hurt = hurt;
+    Object.assign(state, told.state());
     for (const name of ["crouch", "jog", "strafe"]) if (steering.on[name]) state[name] = 1;
     if (chosen[0]) state.of = chosen.map((select) => select.value).join(",");
     state.camera = [yaw.toFixed(2), pitch.toFixed(2), Math.round(distance)].join(",");
@@ -80,7 +79,7 @@ const createPlay = (stage, playables) => {
     for (const name of ["crouch", "jog", "strafe"]) steering.toggle(name, state.get(name) === "1");
     const eye = camera(state.get("camera"));
     if (eye) { Object.assign(view.orbit, eye); chase.touch(); }
-    injuries.set(hurts(state.get("hurt")));
+    told.set(told.channels.flatMap((one) => pairs(state.get(one.key), one.highest).map(([column, value]) => [one, column, value])));
     return true;
   };
 
@@ -97,9 +96,11 @@ const createPlay = (stage, playables) => {
     const hits = player.actors.map((actor) => ({ actor, found: actor.under(event.offsetX, event.offsetY) })).filter(({ found }) => found);
     if (!hits.length) return;
     const { actor, found } = hits.reduce((best, hit) => (hit.found.deep < best.found.deep ? hit : best));
-    const felt = found.links.filter((link) => actor.spec.trained.includes(link)); // another would change nothing
-    if (felt.length) injuries.worse(felt.at(-1), event.shiftKey || heals ? -2 : 2);
-    else if (injuries.links.length) injuries.say(`${found.links.length ? injuries.word(found.links.at(-1)) : "this part"}: never hurt in training, so hurting it would change nothing`);
+    const one = placed(actor.spec);
+    if (!one) return;
+    const felt = found.columns.filter((column) => one.trained.includes(column)); // another would change nothing
+    if (felt.length) told.more(one, felt.at(-1), event.shiftKey || heals ? -1 : 1);
+    else told.say(`${found.columns.length ? told.word(one, found.columns.at(-1)) : "this part"}: ${one.never}`);
   });
 
   // Buttons
@@ -119,8 +120,8 @@ const createPlay = (stage, playables) => {
   find("play-picture").addEventListener("click", () => canvas.toBlob((blob) => save(blob, `${named(0)}.png`)));
   film(find("play-film"), canvas, () => named(0));
 
-  steering.listen((event) => injuries.key(event));
-  injuries = createInjuries(Object.values(playables), () => { if (ready) view.ask(); });
+  steering.listen((event) => told.key(event));
+  told = createTold(Object.values(playables), () => { if (ready) view.ask(); });
   const asked = restore();
   ready = true;
   cast();
@@ -130,7 +131,7 @@ const createPlay = (stage, playables) => {
     cast();
     find("play").scrollIntoView();
   });
-  return Object.assign(player, { chase, injuries, steering, view, start });
+  return Object.assign(player, { chase, told, steering, view, start });
 };
 
 const stage = find("play-stage");

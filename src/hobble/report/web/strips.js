@@ -68,7 +68,7 @@ import { colour, material, onTheme } from "./base.js";
       y += 4;
       label(row.name.length > 15 ? `…${row.name.slice(-14)}` : row.name, y + 10, 10);
       add(svg, "title", {}, row.name);
-      row.spans.forEach(([a, b, severity]) => bar(a, b, y, colour("hurt-high"), .15 + .085 * severity));
+      row.spans.forEach(([a, b, much]) => bar(a, b, y, colour("hurt-high"), .15 + .85 * much / row.highest));
       y += 13;
     });
     y += 6;

@@ -3,21 +3,21 @@ import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
 import { createMotion } from "./motion.js";
 import { bytes } from "./numbers.js";
-import { severityColour } from "./paint.js";
+import { toldColour } from "./paint.js";
 import { createView } from "./view.js";
 
 (() => {
   const scenes = material.scenes, stage = document.getElementById("stage");
   if (!stage || !scenes.scenarios || !scenes.scenarios.length) return;
   const slider = find("time"), clock = find("clock"), reading = find("reading"), choice = find("scenario");
-  const J = scenes.joints, fps = scenes.fps, L = scenes.links.length, unpacked = new Map();
+  const J = scenes.joints, fps = scenes.fps, unpacked = new Map();
 
   const unpack = (index) => {
     if (!unpacked.has(index)) {
       const s = scenes.scenarios[index], octets = (text) => text && new Uint8Array(bytes(text));
       const scene = {
         ...s, motion: createMotion(s, J, scenes.unit),
-        contacts: octets(s.contacts), phase: octets(s.phase), severity: octets(s.severity),
+        contacts: octets(s.contacts), phase: octets(s.phase), values: octets(s.told?.values),
       };
       scene.focus = followed(scene);
       scene.prints = footprints(scene);
@@ -51,10 +51,8 @@ import { createView } from "./view.js";
     return out;
   };
   const flat = ([x, , z]) => [x, 0, z];
-  const severity = (s, frame, links) => {
-    if (!s.severity) return 0;
-    return Math.max(0, ...links.map((l) => s.severity[frame * L + l])) / 25;
-  };
+  // The share of the highest that a scenario's column has.
+  const share = (s, frame) => (s.values ? s.values[frame] / 250 : 0);
 
   // Drawing
 
@@ -86,7 +84,7 @@ import { createView } from "./view.js";
     view.land.around(focus);
     if (trails) { drawPath(s, focus, at); drawPrints(s, focus, at); }
     s.motion.show(figure, at);
-    figure.pose((links) => severityColour(view.paint, severity(s, frame, links)));
+    figure.pose((columns) => toldColour(view.paint, s.told?.placed && columns.includes(s.told.column) ? share(s, frame) : 0));
     view.land.under(figure.balls(view.balls));
     tell(s, frame);
   };
@@ -101,8 +99,7 @@ import { createView } from "./view.js";
     if (s.phase) moment.push(`phase ${(s.phase[frame] / 255).toFixed(2)}`);
     const lines = [moment.join(" · ")];
     if (s.contacts) lines.push(FEET.filter((_, i) => s.contacts[frame] >> i & 1).join(", ") || "no foot on the ground");
-    const hurt = scenes.spoken.map((name, l) => [name, severity(s, frame, [l])]).filter(([, much]) => much > 0);
-    hurt.slice(0, 4).forEach(([name, much]) => lines.push(`${name}: ${much.toFixed(1)} of 10`));
+    if (share(s, frame) > 0) lines.push(`${s.told.spoken}: ${(share(s, frame) * s.told.highest).toFixed(s.told.highest < 5 ? 2 : 1)} of ${s.told.highest}`);
     const title = document.createElement("b");
     title.textContent = s.description || s.name;
     reading.replaceChildren(title, ...lines.flatMap((text) => [document.createElement("br"), text]));
@@ -124,7 +121,7 @@ import { createView } from "./view.js";
     choice.selectedIndex = index;
     time = 0;
     slider.max = scene.frames - 1;
-    find("legend").hidden = !(scene.severity && scene.severity.some((s) => s > 0));
+    find("legend").hidden = !(scene.values && scene.told.placed);
     view.ask();
   };
   const seek = (to) => { play(false); time = Math.min(scene.frames - 1, Math.max(0, to)); view.ask(); };

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from hobble.channels.injury.walks import INJURY
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import captured, turned
-from hobble.evaluation.crowd import FPS, INJURY
+from hobble.evaluation.crowd import FPS
 from hobble.gait.cycles import Walk, joined, measure
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile

@@ -15,6 +15,8 @@ import numpy as np
 from hobble.channels.injury.limp import Options
 from hobble.channels.injury.limp.captured import Limp, Told, healthy_of, limps
 from hobble.channels.injury.limp.walks import Shown, shown
+from hobble.channels.injury.walks import hurt_links
+from hobble.channels.injury.walks import links as links_of
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.spearman import spearman
@@ -61,9 +63,9 @@ def limp(
     `second_injuries`.
     """
     head: dict[str, Any] = {"configuration": configuration}
-    if not network.links or network.skeleton is None:
+    if not links_of(network) or network.skeleton is None:
         return {**head, "applies": False, "reason": REASON}
-    links = list(links or network.links)
+    links = list(links or links_of(network))
     rows: list[dict[str, Any]] = []
     for gait, asked in ASKED.items():
         cases = [(link, s) for link in links for s in SEVERITIES]
@@ -83,7 +85,7 @@ def limp(
         "asked_cm_per_second": {gait: 60 * speed for gait, speed in ASKED.items()},
         "seconds": seconds,
         "effects": EFFECTS,
-        "trained": [link for link in links if link in network.hurt_links],
+        "trained": [link for link in links if link in hurt_links(network)],
         "told_seconds": {"captured": told.captured, "made": told.made},
         "sizes": rows,
         "steady": _steady(rows),
@@ -255,7 +257,7 @@ def run(given: Given, options: Options) -> Outcome:
     network = load_network(given.weights)
     if network.skeleton is None:
         raise HobbleError(f"{given.weights} carries no skeleton")
-    every, told = limps(given.clips.values(), given.splits, network.links, network.skeleton)
+    every, told = limps(given.clips.values(), given.splits, links_of(network), network.skeleton)
     result = limp(
         network,
         every,

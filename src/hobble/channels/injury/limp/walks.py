@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hobble.channels.injury.walks import severities
 from hobble.core.quat import Array
-from hobble.evaluation.crowd import FPS, INJURY, severities
+from hobble.evaluation.crowd import FPS
 from hobble.gait.cycles import Walk, measure
 from hobble.gait.profile import Profile, profile
 from hobble.models.network import Network
@@ -43,7 +44,7 @@ def shown(
     animation = ProceduralAnimation(network, characters=count, **dict(runtime))
     velocity = np.zeros((count, 2))
     velocity[:, 1] = speeds
-    told = {INJURY: severities(network, each)} if network.links else {}
+    told = severities(network, each)
     shares = np.tile([float(name == gait) for name in network.gaits], (count, 1))
     places = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
     for frame in range(-BEGIN, frames):

@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 
 from hobble.channels.injury.limp.captured import VERSION
+from hobble.channels.injury.walks import links as links_of
+from hobble.channels.injury.walks import severities
 from hobble.core.quat import Array
 from hobble.core.section import Section
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured, captured_clips
-from hobble.evaluation.crowd import FPS, Stretch, severities
+from hobble.evaluation.crowd import FPS, Stretch
 from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
@@ -71,7 +73,7 @@ def recognition(
     hurt -> named. `applies` is false, with a `reason`, for networks and clips with which it cannot be tried.
     """
     head: dict[str, Any] = {"configuration": configuration, "people": people}
-    if not network.links or network.skeleton is None:
+    if not links_of(network) or network.skeleton is None:
         return {**head, "applies": False, "reason": REASON}
     windows = [w for clip in motion for w in walking_windows(clip, network)]
     known = [w for w in windows if splits[w.clip] == "train"]
@@ -109,7 +111,7 @@ def walking_windows(clip: Captured, network: Network) -> list[Window]:
         ahead = clip.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST
         same = np.all(hurts[span] == hurts[first])
         if walk[span].mean() > 0.5 and ahead and same:
-            names = [network.links[i] for i in np.flatnonzero(hurts[first])]
+            names = [links_of(network)[i] for i in np.flatnonzero(hurts[first])]
             values = _values(network.skeleton, clip.local, clip.contacts, clip.root, span)
             severity = float(clip.told[INJURY][span].max())
             out.append(Window(clip.clip, " and ".join(names) or HEALTHY, severity, values, part))

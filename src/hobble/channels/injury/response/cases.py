@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from hobble.channels.injury.response.sweep import WALK_IN
+from hobble.channels.injury.walks import severities
 from hobble.core.quat import Array
-from hobble.evaluation.crowd import FPS, Stretch, Walks, run, severities
+from hobble.evaluation.crowd import FPS, Stretch, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import apart, mean_cycle
 from hobble.evaluation.spearman import spearman
@@ -57,7 +58,7 @@ def second_injuries(
     pairs = [(a, b) for a, b in product([None, *links], links) if a != b]
     gait = ["walk"] * len(pairs)
 
-    def hurt(second: float) -> Array:
+    def hurt(second: float) -> dict[str, Array]:
         each = [{**({a: FIRST} if a else {}), b: second} for a, b in pairs]
         return severities(network, each)
 

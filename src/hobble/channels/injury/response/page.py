@@ -9,13 +9,13 @@ from markupsafe import Markup
 
 from hobble.channels.injury.response import page_cases as cases
 from hobble.channels.injury.response.hints import injury_hints
+from hobble.channels.shown import speaker
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, Family, Trace, axis, line
 from hobble.report.gather import Material
 from hobble.report.parts import Pair, Part, Section, Words
 from hobble.report.summary import Hint, placed
 from hobble.report.tables import Column, Table
-from hobble.report.words import speaker
 
 NOTHING = Markup(
     "This network has no severities among its inputs, so nothing can hurt it. The configuration "

@@ -10,6 +10,8 @@ import numpy as np
 from hobble.channels.injury.response import Options
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
 from hobble.channels.injury.response.sweep import SEVERITIES, Sweep
+from hobble.channels.injury.walks import hurt_links
+from hobble.channels.injury.walks import links as links_of
 from hobble.evaluation.captured import Captured, captured_clips
 from hobble.evaluation.crowd import SPEEDS
 from hobble.measures.given import Given, Outcome
@@ -49,10 +51,10 @@ def injury_response(
     `summary`: means over the links that were hurt in training (`trained`) and, apart, over those that were
     not. `applies` is false for a network without severities.
     """
-    if not network.links:
+    if not links_of(network):
         return {"configuration": configuration, "applies": False, "reason": REASON}
-    links = list(links or network.links)
-    trained = [link for link in links if link in network.hurt_links]
+    links = list(links or links_of(network))
+    trained = [link for link in links if link in hurt_links(network)]
     largest = largest_accelerations(motion, network)
     rows: list[dict[str, Any]] = []
     back: list[dict[str, Any]] = []
@@ -107,7 +109,9 @@ def largest_accelerations(
         for gait in GAITS:
             going = clip.gait[:, network.gaits.index(gait)] > 0.5
             hurt: list[tuple[str | None, Any]] = [(None, going)]
-            hurt += [(link, going & (clip.told[INJURY][:, i] > 0)) for i, link in enumerate(network.links)]
+            hurt += [
+                (link, going & (clip.told[INJURY][:, i] > 0)) for i, link in enumerate(links_of(network))
+            ]
             for link, chosen in hurt:
                 if np.any(chosen):
                     found = round(float(clip.acceleration[chosen].max()), 5)

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from hobble.evaluation.crowd import FPS, Stretch, Walks, run, severities
+from hobble.channels.injury.walks import severities
+from hobble.evaluation.crowd import FPS, Stretch, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import apart, mean_cycle, period, settling
 from hobble.evaluation.spearman import spearman

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from hobble.channels.injury.shown import body_parts
+from hobble.channels.injury.walks import hurt_links, links
 from hobble.core.errors import HobbleError
 from hobble.core.files import atomic_path
 from hobble.figure.mesh import body
 from hobble.figure.pack import regions
 from hobble.models.network import Network
-from hobble.report.playable import body_parts
 from hobble.report.raster import Studio
 from hobble.report.stimuli import STRIDE, frames, walk
 from hobble.runtime.options import Runtime
@@ -34,15 +35,17 @@ def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> 
     Both halves are asked for the same speed. Raises HobbleError for a network that is not told what hurts,
     and where no quality makes the picture small enough.
     """
-    if network.skeleton is None or not network.links:
+    known = links(network)
+    if network.skeleton is None or not known:
         raise HobbleError("this network is not told what hurts; make the picture of a configuration that is")
-    parts = body_parts(network.skeleton, network.links, network.hurt_links)
-    hurt = {network.links[parts[label]]: value for label, value in HURT.items()}
-    studio = Studio(body(network.skeleton), regions(network.skeleton, network.links))
+    parts = body_parts(network.skeleton, known, hurt_links(network))
+    hurt = {known[parts[label]]: value for label, value in HURT.items()}
+    studio = Studio(body(network.skeleton), regions(network.skeleton, known))
     halves = []
     for injury in ({}, hurt):
-        severity = np.array([injury.get(link, 0.0) for link in network.links])
-        halves.append(frames(studio, network.skeleton, walk(network, injury, runtime), severity, SIZE))
+        share = np.array([injury.get(link, 0.0) for link in known]) / 10
+        loop = walk(network, {"injury": injury}, runtime)
+        halves.append(frames(studio, network.skeleton, loop, share, SIZE))
     return _save(Path(path), beside(*halves))
 
 

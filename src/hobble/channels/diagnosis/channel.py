@@ -1,0 +1,116 @@
+"""The channel: three groups of diagnoses from 0 to 1; who has none of them is healthy."""
+
+from __future__ import annotations
+
+import csv
+import functools
+import io
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+from pydantic import Field
+
+from hobble.channels.channel import Channel, Rig, Source
+from hobble.core.errors import InputError
+from hobble.core.section import Inside, Section
+from hobble.core.untrusted import MOST_TEXT, printable, read_bytes
+
+if TYPE_CHECKING:
+    from hobble.core.clip import Clip
+    from hobble.core.quat import Array
+
+# The groups that Rueangsirarak et al. (2018) tell apart by gait.
+DIAGNOSES = ("joint problem", "muscle weakness", "neurological defect")
+HEALTHY = "healthy"
+COLUMNS = ("file", "diagnosis")  # of the table; others are not read
+
+
+class Table(Section):
+    """Who has what."""
+
+    table: Inside = Field(
+        description="a CSV in the mocap folder, with `file` (a BVH file) and `diagnosis` of each recording"
+    )
+
+
+class Diagnosis(Channel):
+    """What the walker of a clip has, all through it."""
+
+    name = "diagnosis"
+    title = "Diagnosis"
+    value = "amount"
+    highest = 1.0
+    rate = 1.0
+    Options = Table
+
+    def columns(self, rig: Rig) -> tuple[str, ...]:
+        """The diagnoses."""
+        return DIAGNOSES
+
+    def tables(self, options: Mapping[str, Any]) -> tuple[str, ...]:
+        """The one that the data set names."""
+        return (options["table"],) if options else ()
+
+    def is_neutral(self, source: Source) -> bool:
+        """Whether the clip's walker is healthy, or nothing says what they have."""
+        return _of(source) in (HEALTHY, None)
+
+    def check(self, source: Source, rig: Rig) -> None:
+        """The entry of a clip is a diagnosis that there is."""
+        if source.value is not None and source.value not in (*DIAGNOSES, HEALTHY):
+            where = f"{source.clip}.channels.{self.name}"
+            raise InputError(where, f"cannot be {source.value!r:.80}", fix=f"Write one of {_known()}.")
+
+    def read(self, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
+        """1 for the walker's diagnosis in every frame; a warning where the table has no such clip."""
+        import numpy as np
+
+        found = _of(source)
+        row = [float(diagnosis == found) for diagnosis in DIAGNOSES]
+        warnings = [] if found else [f"{source.clip} is not in the table; its walker is taken to be healthy."]
+        return np.tile(np.array(row, np.float32), (len(clip), 1)), warnings
+
+
+def _of(source: Source) -> str | None:
+    """What the walker of a clip has, or HEALTHY; None where neither the entry nor the table says."""
+    if source.value is not None:
+        return str(source.value)
+    found: str | None = None
+    for file in source.files:
+        found = read_table(str(file)).get(source.clip, found)
+    return found
+
+
+@functools.cache  # the table is one file for all clips of a data set
+def read_table(path: str) -> dict[str, str]:
+    """Clip -> diagnosis.
+
+    Raises InputError, naming the line, for a table without its columns, a diagnosis that there is not, or a
+    clip that is there twice with different ones.
+    """
+    reader = csv.DictReader(
+        io.StringIO(read_bytes(path, MOST_TEXT).decode("utf-8-sig", "replace"), newline="")
+    )
+    if missing := [name for name in COLUMNS if name not in (reader.fieldnames or ())]:
+        fix = f"Its first line has to name them: {','.join(COLUMNS)}."
+        raise InputError(path, f"has no column {' and no '.join(missing)}", line=1, fix=fix)
+    out: dict[str, str] = {}
+    for row in reader:
+        clip, said = PurePosixPath(row["file"] or "").stem, (row["diagnosis"] or "").strip()
+        if said not in (*DIAGNOSES, HEALTHY):
+            problem = f"{printable(clip)} has {printable(said, 80)!r}"
+            raise InputError(path, problem, line=reader.line_num, fix=f"Write one of {_known()}.")
+        if out.setdefault(clip, said) != said:
+            problem = f"{printable(clip)} is {said} here and {out[clip]} above"
+            raise InputError(
+                path, problem, line=reader.line_num, fix=f"Leave one of them in {Path(path).name}."
+            )
+    return out
+
+
+def _known() -> str:
+    return ", ".join((*DIAGNOSES, HEALTHY))
+
+
+CHANNEL = Diagnosis()

@@ -1,0 +1,172 @@
+"""How injuries are shown: the parts of the body in words, with sliders, colours and presets."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from itertools import pairwise
+
+from hobble.channels.shown import Loop, Shown, Words
+from hobble.core.skeleton import Skeleton
+from hobble.figure.pack import link_ends, regions
+
+WORDS = Words(
+    rest="Healthy",
+    step=1,
+    key="hurt",
+    grows="Walks while the {} hurts more and more",
+    never="never hurt in training, so hurting it would change nothing",
+)
+# Parts of the body that have a slider and a key of their own: label, roles of the ends.
+PARTS = (
+    ("left thigh", "left_hip", "left_knee"),
+    ("left shank", "left_knee", "left_heel"),
+    ("left foot", "left_heel", "left_toe"),
+    ("right thigh", "right_hip", "right_knee"),
+    ("right shank", "right_knee", "right_heel"),
+    ("right foot", "right_heel", "right_toe"),
+    ("lower back", "hips", "spine"),
+    ("left upper arm", "left_shoulder", "left_elbow"),
+    ("right upper arm", "right_shoulder", "right_elbow"),
+)
+# Parts without a slider of their own, which still have a name.
+OTHERS = (
+    ("left forearm", "left_elbow", "left_wrist"),
+    ("right forearm", "right_elbow", "right_wrist"),
+    ("upper back", "spine", "chest"),
+    ("neck", "chest", "neck"),
+    ("head", "neck", "head"),
+    ("left hip", "hips", "left_hip"),
+    ("right hip", "hips", "right_hip"),
+    ("left shoulder", "chest", "left_shoulder"),
+    ("right shoulder", "chest", "right_shoulder"),
+)
+PRESETS = {
+    "Hurt knee": {"left thigh": 7, "left shank": 7},
+    "Sprained ankle": {"right shank": 6, "right foot": 8},
+    "Bad back": {"lower back": 8},
+    "Knee and back": {"left thigh": 7, "left shank": 7, "lower back": 7},
+}
+SEVERITY = 8.0  # of the loops of a questionnaire
+# The study of Quentin Ferre (2019) showed thirteen walks, and asked which part is hurt; nothing is coloured.
+STUDY: dict[str, tuple[str, ...]] = {
+    "healthy": (),
+    "left-thigh": ("left thigh",),
+    "left-shank": ("left shank",),
+    "left-foot": ("left foot",),
+    "right-thigh": ("right thigh",),
+    "right-shank": ("right shank",),
+    "right-foot": ("right foot",),
+    "lower-back": ("lower back",),
+    "left-arm": ("left upper arm",),
+    "right-arm": ("right upper arm",),
+    "left-leg": ("left thigh", "left shank", "left foot"),
+    "right-leg": ("right thigh", "right shank", "right foot"),
+    "thigh-and-back": ("left thigh", "lower back"),
+}
+# What the scenarios hurt: name -> roles of the ends.
+HURT = {
+    "left_knee": ("left_hip", "left_knee"),
+    "right_knee": ("right_hip", "right_knee"),
+    "left_ankle": ("left_knee", "left_heel"),
+    "lower_back": ("hips", "spine"),
+    "left_arm": ("left_shoulder", "left_elbow"),
+}
+
+
+def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> Shown:
+    """Sliders of the parts that were hurt in training, presets of them, and where each link lies."""
+    parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
+    felt = {label: link for label, link in parts.items() if link in trained}
+    presets = {
+        name: {felt[label]: float(value) for label, value in values.items()}
+        for name, values in PRESETS.items()
+        if all(label in felt for label in values)
+    }
+    return Shown(tuple(spoken_links(skeleton, links)), felt, presets, regions(skeleton, links))
+
+
+def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> list[Loop]:
+    """The thirteen walks of the study, and the presets in colours."""
+    parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
+    out = [Loop(name, {parts[label]: SEVERITY for label in labels}, False) for name, labels in STUDY.items()]
+    for title, values in PRESETS.items():
+        hurt = {parts[label]: float(value) for label, value in values.items()}
+        out.append(Loop(f"preset-{title.lower().replace(' ', '-')}", hurt, True))
+    return out
+
+
+def sweeps(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> dict[str, str]:
+    """Which links the scenarios hurt: name -> link, the one nearest the upper joint of those that were
+    hurt in
+    training if any."""
+    out = {}
+    for name, (upper, lower) in HURT.items():
+        child, top = skeleton.role(lower), skeleton.role(upper)
+        path = [child]
+        while path[-1] != top and skeleton.parents[path[-1]] >= 0:
+            path.append(skeleton.parents[path[-1]])
+        pairs = [f"{skeleton.joints[p]}-{skeleton.joints[c]}" for c, p in pairwise(path)]
+        for known in (trained, links):
+            if name not in out and (there := [pair for pair in reversed(pairs) if pair in known]):
+                out[name] = there[0]
+    return out
+
+
+def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] = ()) -> dict[str, int]:
+    """Label -> index of the link that the part is, for those that the network knows.
+
+    Of the links between the part's two ends it is the uppermost of those that were `hurt` in training, or the
+    uppermost of all where none was: hurting another would change nothing.
+    """
+    found = {}
+    for label, upper, lower in PARTS:
+        known = [name for name in way(skeleton, upper, lower) if name in links]
+        if known:
+            best = next((name for name in known if name in hurt), known[0])
+            found[label] = list(links).index(best)
+    return found
+
+
+def way(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
+    """Links from the joint of one role down to that of another, uppermost first; [] where there is no way."""
+    if any(skeleton.roles.get(role) not in skeleton.joints for role in (upper, lower)):
+        return []
+    joint, top, out = skeleton.role(lower), skeleton.role(upper), []
+    while joint != top:
+        parent = skeleton.parents[joint]
+        if parent < 0:
+            return []
+        out.append(f"{skeleton.joints[parent]}-{skeleton.joints[joint]}")
+        joint = parent
+    return out[::-1]
+
+
+def spoken(skeleton: Skeleton, link: str) -> str:
+    """What a link is called: "left thigh"; its own name where the body has no word for it."""
+    for label, upper, lower in (*PARTS, *OTHERS):
+        if link in way(skeleton, upper, lower):
+            return label
+    ends = link_ends(skeleton.joints, [link])[0]
+    for side in ("left", "right"):
+        for role, word in (("wrist", "hand"), ("toe", "toes")):
+            if ends and skeleton.roles.get(f"{side}_{role}") in _above(skeleton, ends[0]):
+                return f"{side} {word}"
+    return link
+
+
+def spoken_links(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
+    """A name for each link; where several have the same one, all but the first keep their own beside it."""
+    out: list[str] = []
+    for link in links:
+        word = spoken(skeleton, link)
+        out.append(word if word not in out or word == link else f"{word} ({link})")
+    return out
+
+
+def _above(skeleton: Skeleton, joint: int) -> list[str]:
+    """Names of the joint and of all above it."""
+    names = [skeleton.joints[joint]]
+    while skeleton.parents[joint] >= 0:
+        joint = skeleton.parents[joint]
+        names.append(skeleton.joints[joint])
+    return names

@@ -1,0 +1,47 @@
+"""Whether moods can be seen: a section of the report."""
+
+from __future__ import annotations
+
+from hobble.channels.mood.response.run import EFFECTS
+from hobble.measures.given import Json
+from hobble.report.charts import Chart
+from hobble.report.gather import Material
+from hobble.report.parts import Part, Section, Words
+
+UNITS = {"speed": "m/s", "stride": "cm", "trunk": "° forward", "arms": "° of swing", "head": "° forward"}
+
+
+def section(found: Json, material: Material) -> Section:
+    """How often each mood is named, and how much it changes the walk; empty for a network without moods."""
+    if not found.get("applies"):
+        return Section("mood", [])
+    captured = found["captured"]
+    words = (
+        """How often each mood is named, how much it changes the walk; empty for a network without moods."""
+        "generated walks in one mood at 1; of captured clips that were left out whole, "
+        f"{100 * (captured['right'] or 0):.0f} %. All figures are asked for the same three speeds about "
+        f"{found['speed_asked']:.2f} m/s."
+    )
+    charts = [effect_chart(found, effect) for effect in EFFECTS]
+    parts = [Part(0, Words(words)), *(Part(10 + i, chart) for i, chart in enumerate(charts))]
+    return Section("mood", parts, title="Moods", at=21)
+
+
+def effect_chart(found: Json, effect: str) -> Chart:
+    """One size of all moods, captured and generated."""
+    rows = [row for row in found["effects"] if row["effect"] == effect]
+    of = (("captured", "captured", "@muted"), ("generated", "generated at 1", "@accent"))
+    traces = [
+        {
+            "type": "bar",
+            "name": label,
+            "x": [row["mood"] for row in rows],
+            "y": [row[key] for row in rows],
+            "marker": {"color": colour},
+        }
+        for key, label, colour in (*of, ("generated_at_half", "generated at .5", "@predicted"))
+    ]
+    caption = f"What each mood adds to {effect} ({UNITS[effect]}), beside the walk in no mood."
+    return Chart(
+        f"mood-{effect}", effect.capitalize(), caption, traces, {"yaxis": {"title": UNITS[effect]}}, 260
+    )

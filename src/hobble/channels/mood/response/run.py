@@ -1,0 +1,248 @@
+"""Each mood of a generated walk named by what knows captured ones, and its size beside the captured one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.core.section import Section
+from hobble.core.skeleton import Skeleton
+from hobble.evaluation.captured import Captured, captured_clips
+from hobble.evaluation.crowd import FPS, Stretch, told
+from hobble.evaluation.crowd import run as run_walks
+from hobble.evaluation.gait_features import features
+from hobble.gait.discriminant import Discriminant, learn
+from hobble.measures.given import Given, Outcome
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.runtime.options import Runtime
+
+MOOD = "mood"  # the channel
+NONE = "none"
+WINDOW, STEP = 60, 15  # frames: about a cycle
+AHEAD, LEAST = (
+    0.9,
+    0.5,
+)  # share of the speed that goes forward in a window; its least, cm a frame
+WALKED_IN, SHOWN = 4 * FPS, 6 * FPS  # frames of a generated walk that are left out, and that are looked at
+PACES = (0.85, 1.0, 1.15)  # of the middle speed of the captured walks, asked of every mood alike
+VALUES = (0.5, 1.0)
+# cm a frame, at which people run: a Froude number of .5 with a leg of .9 m. The label of a happy walk,
+# which bounces, may say otherwise.
+FASTEST = 3.5
+MIRROR = "_mirror"
+REASON = "this network is told no moods"
+TOO_FEW = "the clips walk in fewer than two moods"
+EFFECTS = ("speed", "stride", "trunk", "arms", "head")
+
+
+@dataclass(frozen=True)
+class Window:
+    """A stretch of going straight on: whose, in which mood (or NONE), its features, and whether it walks."""
+
+    clip: str
+    mood: str
+    values: Mapping[str, float] = field(repr=False)
+    effects: Mapping[str, float] = field(repr=False)
+    walks: bool = True
+
+
+def response(
+    network: Network, motion: Iterable[Captured], splits: Mapping[str, str], runtime: Runtime
+) -> dict[str, Any]:
+    """mood.json; `applies` is false, with a `reason`, where it cannot be tried.
+
+    captured: how many windows of clips that were left out whole, each with its mirror in turn, are named
+    right by what was learnt from the others. generated: for each mood and value the share of `windows` named
+    so by what was learnt from all; of two moods together the share named one of them, and how far the walk is
+    `between` that of each alone. effects: of each mood, captured and generated, less no mood's:
+    speed (m/s), stride (cm), trunk and head (degrees forward), arms (degrees of swing, standard deviation).
+    """
+    if MOOD not in network.channels or network.skeleton is None:
+        return {"applies": False, "reason": REASON}
+    windows = [w for clip in motion if splits[clip.clip] == "train" for w in captured_windows(clip, network)]
+    known = sorted({w.mood for w in windows if w.walks} - {NONE})
+    if len(known) < 2:
+        return {"applies": False, "reason": TOO_FEW}
+    windows = [w for w in windows if w.mood in (*known, NONE) and w.walks]
+    judge = learn(_table(windows), [w.mood for w in windows])
+    speed = float(np.median([w.values["speed"] for w in windows])) / FPS
+    figures = [
+        {},
+        *({mood: v} for v in VALUES for mood in known),
+        *(dict.fromkeys(p, 1.0) for p in combinations(known, 2)),
+    ]
+    walks = generated(network, figures, speed, runtime)
+    alone = {mood: _mean(walks[1 + len(known) + i]) for i, mood in enumerate(known)}
+    rows = [_named(judge, figure, some) for figure, some in zip(figures, walks, strict=True)]
+    for row, figure, some in zip(rows, figures, walks, strict=True):
+        if len(figure) == 2:
+            row["between"] = _between(_mean(some), *(alone[mood] for mood in figure))
+    full = {mood: walks[1 + len(known) + i] for i, mood in enumerate(known)}
+    half = {mood: walks[1 + i] for i, mood in enumerate(known)}
+    return {
+        "applies": True,
+        "moods": known,
+        "speed_asked": round(speed * FPS / 100, 5),
+        "captured": left_out(windows),
+        "generated": rows,
+        "right_at_1": _share([n for row in rows if row["value"] == 1.0 for n in row["right"]]),
+        "effects": [
+            {
+                "mood": mood,
+                "effect": effect,
+                **_sizes(effect, mood, windows, walks[0], half[mood], full[mood]),
+            }
+            for mood in known
+            for effect in EFFECTS
+        ],
+    }
+
+
+def captured_windows(clip: Captured, network: Network) -> list[Window]:
+    """The windows of a captured stretch that go straight on in one mood, told at its highest, or in none."""
+    assert network.skeleton is not None
+    columns = network.channels[MOOD]
+    out = []
+    for start in range(0, len(clip) - WINDOW + 1, STEP):
+        span = slice(start, start + WINDOW)
+        speed = np.hypot(*clip.velocity[span].mean(axis=0))
+        moods = [columns[i] for i in np.flatnonzero(clip.told[MOOD][start])]
+        if clip.velocity[span, 1].mean() < AHEAD * speed or speed < LEAST or len(moods) > 1:
+            continue
+        mood = moods[0] if moods else NONE
+        walks = bool(speed < FASTEST)
+        out.append(
+            _window(
+                network.skeleton,
+                clip.clip,
+                mood,
+                clip.local[span],
+                clip.contacts[span],
+                clip.root[span],
+                walks,
+            )
+        )
+    return out
+
+
+def generated(
+    network: Network, figures: Sequence[Mapping[str, float]], speed: float, runtime: Runtime
+) -> list[list[Window]]:
+    """The windows of each figure's walks straight ahead at all PACES; figures: mood -> value."""
+    assert network.skeleton is not None
+    asked = [(i, figure, pace) for i, figure in enumerate(figures) for pace in PACES]
+    values = told(network, MOOD, [figure for _, figure, _ in asked])
+    script = Stretch(WALKED_IN + SHOWN, ["walk"] * len(asked), values, [speed * pace for *_, pace in asked])
+    walks = run_walks(network, [script], runtime)
+    out: list[list[Window]] = [[] for _ in figures]
+    for c, (i, figure, _) in enumerate(asked):
+        for start in range(WALKED_IN, WALKED_IN + SHOWN - WINDOW + 1, STEP):
+            span = slice(start, start + WINDOW)
+            parts = walks.local[span, c], walks.contacts[span, c], walks.root[span, c]
+            out[i].append(_window(network.skeleton, "", " and ".join(figure) or NONE, *parts))
+    return out
+
+
+def left_out(windows: Sequence[Window]) -> dict[str, Any]:
+    """Windows of each clip, and its mirror, named by what was learnt from the other clips."""
+    right: dict[str, list[bool]] = {}
+    for clip in sorted({_original(w.clip) for w in windows}):
+        rest = [w for w in windows if _original(w.clip) != clip]
+        mine = [w for w in windows if _original(w.clip) == clip]
+        if len({w.mood for w in rest}) > 1:
+            names = learn(_table(rest), [w.mood for w in rest]).names(_table(mine))
+            for w, name in zip(mine, names, strict=True):
+                right.setdefault(w.mood, []).append(w.mood == name)
+    return {
+        "clips": len({_original(w.clip) for w in windows}),
+        "windows": sum(map(len, right.values())),
+        "right": _share([r for some in right.values() for r in some]),
+        "by_mood": {mood: _share(some) for mood, some in right.items()},
+    }
+
+
+def run(given: Given, options: Section) -> Outcome:
+    """mood.json, and the effects as a table."""
+    motion = captured_clips(given.clips.values())
+    result = response(load_network(given.weights), motion, given.splits, given.runtime)
+    says = f"moods named right: {result['right_at_1']}" if result["applies"] else result["reason"]
+    return Outcome(_plain(result), {"effects": result.get("effects", [])}, says)
+
+
+def _window(
+    skeleton: Skeleton, clip: str, mood: str, local: Array, contacts: Array, root: Array, walks: bool = True
+) -> Window:
+    values = features(skeleton, local, contacts, root)
+    head, neck = (local[:, skeleton.role(part)].astype(float) for part in ("head", "neck"))
+    up = (head - neck).mean(axis=0)
+    effects = {
+        "speed": values["speed"] / 100,
+        "stride": values["step_left"] + values["step_right"],
+        "trunk": -values["trunk_forward_mean"],  # that one is of the way down
+        "arms": (values["upper_arm_left_sd"] + values["upper_arm_right_sd"]) / 2,
+        "head": float(np.degrees(np.arctan2(up[2], up[1]))),
+    }
+    return Window(clip, mood, {**values, "head": effects["head"]}, effects, walks)
+
+
+def _named(judge: Discriminant, figure: Mapping[str, float], windows: Sequence[Window]) -> dict[str, Any]:
+    names = judge.names(_table(windows))
+    wanted = set(figure) or {NONE}
+    return {
+        "moods": list(figure),
+        "value": next(iter(figure.values()), 0.0) if len(figure) < 2 else None,
+        "windows": len(names),
+        "right": [name in wanted for name in names],
+        "share": _share([name in wanted for name in names]),
+        "named": {name: names.count(name) for name in sorted(set(names))},
+    }
+
+
+def _sizes(
+    effect: str,
+    mood: str,
+    windows: Sequence[Window],
+    plain: Sequence[Window],
+    half: Sequence[Window],
+    full: Sequence[Window],
+) -> dict[str, float]:
+    def mean(some: Iterable[Window]) -> float:
+        return float(np.mean([w.effects[effect] for w in some]))
+
+    captured = mean(w for w in windows if w.mood == mood) - mean(w for w in windows if w.mood == NONE)
+    base = mean(plain)
+    sizes = {"captured": captured, "generated": mean(full) - base, "generated_at_half": mean(half) - base}
+    return {name: round(size, 4) for name, size in sizes.items()}
+
+
+def _between(both: Array, first: Array, second: Array) -> float:
+    """Where the mean features of both lie on the way from the first's, 0, to the second's, 1."""
+    way = second - first
+    return round(float((both - first) @ way / max(float(way @ way), 1e-9)), 4)
+
+
+def _mean(windows: Sequence[Window]) -> Array:
+    return _table(windows).mean(axis=0)
+
+
+def _table(windows: Sequence[Window]) -> Array:
+    return np.array([list(w.values.values()) for w in windows])
+
+
+def _original(clip: str) -> str:
+    return clip.removesuffix(MIRROR)
+
+
+def _share(right: Sequence[bool]) -> float | None:
+    return round(sum(right) / len(right), 5) if right else None
+
+
+def _plain(result: dict[str, Any]) -> dict[str, Any]:
+    rows = [{k: v for k, v in row.items() if k != "right"} for row in result.get("generated", ())]
+    return {**result, **({"generated": rows} if rows else {})}

@@ -1,0 +1,32 @@
+"""One motion must not lie on both sides of the split: what is held out would have been learnt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from hobble.core.errors import HobbleError
+
+MOST_NAMED = 10
+
+
+def refuse_both_sides(where: str, pairs: Iterable[tuple[str, str, str]], splits: Mapping[str, str]) -> None:
+    """Raise HobbleError that names every pair of which one clip is trained on and the other held out.
+
+    where: how messages call the data set. pairs: (clip, clip, what they are: "the same file", ...).
+    splits: clip -> "train" or "held_out"; a clip that is in neither is not asked for.
+    """
+    told, lacking = [], []
+    for a, b, what in pairs:
+        if {splits.get(a), splits.get(b)} == {"train", "held_out"}:
+            held, trained = (a, b) if splits[a] == "held_out" else (b, a)
+            told.append(f"{held} and {trained} are {what}")
+            lacking.append(trained)
+    if not told:
+        return
+    more = f" and {len(told) - MOST_NAMED} more pairs" if len(told) > MOST_NAMED else ""
+    names = ", ".join(f'"{name}"' for name in dict.fromkeys(lacking))
+    raise HobbleError(
+        f"{where}: {'; '.join(told[:MOST_NAMED])}{more}: the first of each pair is held out and the second "
+        f"is trained on, so what is held out would have been learnt. Add to held_out: [{names}], or take one "
+        "of each pair out of the data set."
+    )

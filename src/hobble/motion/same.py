@@ -1,0 +1,74 @@
+"""Clips that are one motion: the same file, the same motion under another name or facing, or its mirror."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.core.errors import HobbleError
+from hobble.core.quat import Array
+from hobble.motion.root import facing
+
+NEAR = 1.0  # cm of mean difference up to which two clips are one motion
+LONGER = 0.02  # of its length: how much longer a clip may be than one of the same motion
+POSES = 12
+FLIP = np.array([-1.0, 1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """What two clips are compared by.
+
+    sha256: of the file. poses: (12, J, 3) cm, frames evenly over the clip, seen from the ground below the
+    hips and from where the first one faces. mirrored: the same in a mirror; None where the rig has none.
+    """
+
+    name: str
+    sha256: str
+    seconds: float
+    poses: Array = field(repr=False)
+    mirrored: Array | None = field(default=None, repr=False)
+
+
+def likeness(clip: Clip, sha256: str) -> Likeness:
+    """A clip, as it is compared."""
+    at = np.linspace(0, len(clip) - 1, POSES).round().astype(int)
+    moved = None if clip.translations is None else clip.translations[at]
+    few = replace(clip, rotations=clip.rotations[at], root=clip.root[at], translations=moved)
+    poses = few.positions - few.positions[:, :1] * [1.0, 0.0, 1.0]
+    ahead = facing(clip.skeleton, few.positions[:1], 0.0)[0]
+    x, z = ahead[[0, 2]] / max(float(np.hypot(ahead[0], ahead[2])), 1e-9)
+    poses = poses @ np.array([[z, 0.0, x], [0.0, 1.0, 0.0], [-x, 0.0, z]])
+    try:
+        mirrored = poses[:, clip.skeleton.mirror_joints] * FLIP
+    except HobbleError:
+        mirrored = None
+    return Likeness(clip.name, sha256, len(clip) / clip.fps, poses, mirrored)
+
+
+def same_pairs(clips: Sequence[Likeness]) -> list[tuple[str, str, str]]:
+    """Pairs of clips that are one motion: name, name, and "the same file", "the same motion" or "mirrors"."""
+    out = []
+    order = sorted(clips, key=lambda clip: clip.seconds)
+    for i, a in enumerate(order):
+        for b in order[i + 1 :]:
+            if b.seconds - a.seconds > LONGER * a.seconds:
+                break
+            if what := _same(a, b):
+                out.append((min(a.name, b.name), max(a.name, b.name), what))
+    return sorted(out)
+
+
+def _same(a: Likeness, b: Likeness) -> str:
+    if a.sha256 == b.sha256:
+        return "the same file"
+    if a.poses.shape != b.poses.shape:
+        return ""
+    if np.linalg.norm(a.poses - b.poses, axis=-1).mean() < NEAR:
+        return "the same motion"
+    if a.mirrored is not None and np.linalg.norm(a.mirrored - b.poses, axis=-1).mean() < NEAR:
+        return "mirrors of each other"
+    return ""

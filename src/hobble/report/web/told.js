@@ -1,0 +1,93 @@
+// What the body is told: a value for each column of each channel, with sliders, presets and keys.
+import { find } from "./base.js";
+
+export const keyed = (one, column) => `${one.name}/${column}`;
+// The channel whose columns lie in parts of the body, if there is one.
+export const placed = (spec) => spec.channels.find((one) => one.regions.length);
+
+// specs: of the figures that are played, which may know different channels; changed(): called after every change.
+export const createTold = (specs, changed) => {
+  const channels = [];
+  for (const one of specs.flatMap((spec) => spec.channels)) { // of several by one name, the one that was told most
+    const at = channels.findIndex(({ name }) => name === one.name);
+    if (at < 0) channels.push(one);
+    else if (one.trained.length > channels[at].trained.length) channels[at] = one;
+  }
+  // What was never told in training changes nothing, and so can not be told here.
+  const known = (name) => specs.flatMap((spec) => spec.channels.filter((one) => one.name === name).flatMap((one) => one.trained));
+  const values = new Map(channels.flatMap((one) => known(one.name).map((column) => [keyed(one, column), 0])));
+  const sliders = [], told = { values, channels }, columns = (one) => [...new Set(known(one.name))];
+  told.word = ({ name }, column) => specs.flatMap((spec) => spec.channels.filter((one) => one.name === name))
+    .map((one) => one.spoken[one.columns.indexOf(column)]).find(Boolean) || column;
+  told.say = (text) => { const note = find("play-note"); if (note) note.textContent = text; };
+
+  const add = (one, column, label) => {
+    const row = document.createElement("label"), name = document.createElement("span");
+    const input = document.createElement("input"), output = document.createElement("output"), number = sliders.length + 1;
+    name.textContent = label;
+    if (number < 10) {
+      const key = document.createElement("kbd");
+      key.textContent = number;
+      name.append(" ", key);
+    }
+    Object.assign(input, { type: "range", min: 0, max: one.highest, step: one.sliderStep, value: 0 });
+    input.dataset.channel = one.name;
+    input.addEventListener("input", () => { values.set(keyed(one, column), Number(input.value)); show(); });
+    row.append(name, input, output);
+    find("play-sliders").append(row);
+    sliders.push({ input, output, one, column });
+  };
+  const there = (one, column) => sliders.some((slider) => slider.one.name === one.name && slider.column === column);
+  const put = (one, column, value) => {
+    if (!there(one, column)) add(one, column, told.word(one, column));
+    values.set(keyed(one, column), Math.min(one.highest, Math.max(0, value)));
+  };
+  const show = () => {
+    told.say("");
+    sliders.forEach(({ input, output, one, column }) => {
+      const value = values.get(keyed(one, column));
+      input.value = value;
+      output.value = one.highest < 5 ? value.toFixed(2) : value;
+    });
+    changed();
+  };
+  // Triples of a channel, a column and its value, all else 0; `only`: all else of that channel.
+  told.set = (triples, only = null) => {
+    channels.filter((one) => !only || one === only).forEach((one) => columns(one).forEach((column) => values.set(keyed(one, column), 0)));
+    triples.forEach(([one, column, value]) => { if (values.has(keyed(one, column)) && value) put(one, column, value); });
+    show();
+  };
+  // A click or a key: a fifth of the highest more, or less.
+  told.more = (one, column, by) => {
+    if (!values.has(keyed(one, column))) return;
+    put(one, column, Math.round(1e6 * (values.get(keyed(one, column)) + by * one.highest / 5)) / 1e6);
+    show();
+  };
+  // The keys 1 to 9; true where one did something.
+  told.key = (event) => {
+    const digit = event.code.match(/^Digit([1-9])$/), slider = digit && sliders[digit[1] - 1];
+    if (slider) told.more(slider.one, slider.column, event.shiftKey ? -1 : 1);
+    return Boolean(slider);
+  };
+  // What a link carries: for each channel "column:value,column:value".
+  told.state = () => Object.fromEntries(channels.flatMap((one) => {
+    const some = columns(one).map((column) => [column, values.get(keyed(one, column))]).filter(([, value]) => value > 0);
+    return some.length ? [[one.key, some.map(([column, value]) => `${column}:${value}`).join(",")]] : [];
+  }));
+
+  const button = (text, act) => {
+    const made = document.createElement("button");
+    made.type = "button";
+    made.textContent = text;
+    made.addEventListener("click", act);
+    find("play-presets").append(made);
+  };
+  for (const one of channels) {
+    Object.entries(one.sliders).forEach(([label, index]) => add(one, one.columns[index], label));
+    one.presets.forEach(({ name, values: some }) => button(name, () => (
+      told.set(some.map(([index, value]) => [one, one.columns[index], value]), one))));
+    if (columns(one).length) button(one.rest, () => told.set([], one));
+  }
+  show();
+  return told;
+};

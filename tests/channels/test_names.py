@@ -1,0 +1,62 @@
+"""A channel is known by its name in its own folder, and nowhere else."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from hobble.channels import NAMES
+
+SRC = Path(__file__).parents[2] / "src" / "hobble"
+# The list of channels; the generators of hurt motion and the command that writes status files, which make
+# what one channel reads.
+ALLOWED = ("channels/__init__.py", "hurt/", "synthetic/", "cli/__main__.py", "cli/injury.py")
+
+
+def words(path: Path) -> Iterator[str]:
+    """All text of a script or template; of Python names and strings, but for docstrings (examples)."""
+    text = path.read_text(encoding="utf-8")
+    if path.suffix != ".py":
+        yield text
+        return
+    tree = ast.parse(text)
+    said = {
+        id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr) and isinstance(n.value, ast.Constant)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in said:
+            yield node.value
+        for field in ("id", "attr", "name", "arg", "module"):
+            if isinstance(found := getattr(node, field, None), str):
+                yield found
+
+
+def naming(name: str, folder: Path = SRC) -> list[str]:
+    """Files under a folder that name a channel outside its own."""
+    found = []
+    for path in sorted(folder.rglob("*")):
+        at = path.relative_to(folder).as_posix()
+        if path.suffix not in (".py", ".js", ".j2", ".ts") or "node_modules" in at:
+            continue
+        if at.startswith((f"channels/{name}/", *ALLOWED)):
+            continue
+        if any(re.search(rf"(?<![a-z]){name}(?![a-z])", text, re.IGNORECASE) for text in words(path)):
+            found.append(at)
+    return found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_file_outside_its_folder_names_a_channel(name: str) -> None:
+    assert naming(name) == []
+
+
+def test_one_that_does_is_found(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text('"""Of moods, as mood."""\nHURTS = "mood"\n')
+    (tmp_path / "b.py").write_text('def f(mood):\n    """x"""\n')
+    (tmp_path / "c.js").write_text("x[X.mood]")
+    (tmp_path / "d.py").write_text('"""As in mood={...}."""\n')
+    assert naming("mood", tmp_path) == ["a.py", "b.py", "c.js"]

@@ -1,0 +1,75 @@
+"""Clips that are one motion are found under any name, and never on both sides of the split."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import HobbleError
+from hobble.database.sides import refuse_both_sides
+from hobble.motion.axes import turned
+from hobble.motion.mirror import mirror_clip
+from hobble.motion.same import likeness, same_pairs
+
+
+def test_a_turned_a_shortened_and_a_mirrored_copy_are_found(walker, holden31):
+    clip = walker(holden31, 441, 60.0)
+    elsewhere = replace(turned(clip, 1.0), root=turned(clip, 1.0).root + np.array([200.0, 0.0, 50.0]))
+    short = replace(clip, rotations=clip.rotations[:440], root=clip.root[:440])
+    other = walker(holden31, 470, 60.0)
+    bent = replace(clip, root=clip.root * [1.0, 0.9, 1.0])
+    named = {
+        "a": clip,
+        "b": elsewhere,
+        "c": short,
+        "d": mirror_clip(clip, "d"),
+        "longer": other,
+        "lower": bent,
+    }
+    pairs = same_pairs([likeness(replace(one, name=name), name) for name, one in named.items()])
+    assert {pair[:2] for pair in pairs if pair[2] == "the same motion"} == {
+        ("a", "b"),
+        ("a", "c"),
+        ("b", "c"),
+    }
+    assert {pair[:2] for pair in pairs if pair[2] == "mirrors of each other"} == {
+        ("a", "d"),
+        ("b", "d"),
+        ("c", "d"),
+    }
+
+
+def test_files_with_one_digest_are_the_same_file(walker, holden31):
+    clip = walker(holden31, 120, 60.0)
+    same = [likeness(replace(clip, name=name), "aa") for name in "yx"]
+    assert same_pairs(same) == [("x", "y", "the same file")]
+
+
+def test_one_motion_on_both_sides_is_refused_with_both_names():
+    pairs = [("a", "b", "the same file"), ("c", "d", "the same motion"), ("e", "f", "the same motion")]
+    splits = {"a": "held_out", "b": "train", "c": "train", "d": "train", "e": "held_out", "f": "held_out"}
+    with pytest.raises(HobbleError) as caught:
+        refuse_both_sides("data set mine", pairs, splits)
+    assert "data set mine: a and b are the same file: the first of each pair is held out" in str(caught.value)
+    assert 'Add to held_out: ["b"]' in str(caught.value)
+    assert "c and d" not in str(caught.value)
+    refuse_both_sides("data set mine", pairs, dict.fromkeys("abcdef", "train"))
+
+
+@pytest.mark.shared
+def test_no_two_walks_of_the_patients_are_one_but_for_the_copies(root, shared):
+    from hobble.motion.make import make_clip
+    from hobble.motion.options import Motion
+
+    skeletons = root / "config/skeletons"
+    found = []
+    for subject in ("A1", "A2", "A11", "A13"):
+        for cycle in (1, 2):
+            file = shared / f"mocap/patients/Subject{subject}_Cycle{cycle}.bvh"
+            options = Motion().model_dump()
+            made = make_clip(file, skeletons / "holden31.yaml", skeletons, file.stem, "holden31", options)
+            found.append(likeness(made[0], made[1]["sha256"]))
+    assert np.isfinite([one.poses for one in found]).all()
+    assert [pair for pair in same_pairs(found) if pair[2] != "the same file"] == []
