@@ -17,9 +17,7 @@ from hobble.workflow.told import told_by
 try:
     # Relative, so that a checkout can be moved without making anything again.
     project = Project(Path(os.path.relpath(workflow.basedir)), config)
-    targets = [
-        argument for argument in sys.argv[1:] if argument.startswith("results/")
-    ]
+    targets = [argument for argument in sys.argv[1:] if argument.startswith("results/")]
     check(project, targets)
     if workflow.is_main_process:
         for note in notes(project, targets):

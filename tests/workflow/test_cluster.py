@@ -41,7 +41,7 @@ def test_thousands_of_clips_make_a_hundred_jobs(root, workflow, tmp_path) -> Non
     )
     (tmp_path / "many").mkdir()
     for number in range(CLIPS):
-        bvh(tmp_path / f"many/clip-{number:02}.bvh", 100, 100)
+        bvh(tmp_path / f"many/clip-{number:02}.bvh", 100, 100, frame_time=f"0.0100{number:02}")
     options = profile(root, "slurm")
     groups = ["--groups", *options["groups"], "--group-components", *options["group-components"]]
     plan = workflow.run("-np", *groups, "--config", f"mocap={tmp_path}", "--", "results/many/report.html")

@@ -1,3 +1,11 @@
+def of_own(dataset, file):
+    """That file of each clip that the data set lists or its folder holds."""
+    return [
+        f"results/datasets/{dataset}/{file}".format(clip=clip)
+        for clip in clips.own(dataset)
+    ]
+
+
 rule labels_clip:
     """Contacts, phase and gait of a clip, from hand-made files where there are any."""
     input:
@@ -50,3 +58,26 @@ rule labels_mirror:
         code=package.code("labels_mirror"),
     script:
         "../scripts/labels_mirror.py"
+
+
+rule look_page:
+    """What the clips of a data set say about themselves, one line a clip."""
+    input:
+        clips=lambda w: of_own(w.dataset, "motion/{clip}.npz"),
+        reports=lambda w: of_own(w.dataset, "motion/{clip}.json"),
+        labels=lambda w: of_own(w.dataset, "labels/{clip}.json"),
+        contacts=lambda w: of_own(w.dataset, "labels/{clip}.npz"),
+    output:
+        html="results/datasets/{dataset}/look.html",
+    log:
+        "results/datasets/{dataset}/logs/labels/look_page.log",
+    resources:
+        mem_mb=lambda w, attempt: demands.memory_of_longest(w.dataset, 10, 24, attempt),
+        runtime=lambda w, attempt: demands.minutes_of_all(
+            w.dataset, 0.1, attempt, least=5
+        ),
+    params:
+        dataset=lambda w: w.dataset,
+        code=package.code("look_page"),
+    script:
+        "../scripts/look_page.py"

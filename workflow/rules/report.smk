@@ -124,7 +124,10 @@ rule report:
         splits=lambda w: configurations.splits(w.configuration),
         title=lambda w: catalogue.configuration(w.configuration).report.title,
         code=lambda w: package.code(
-            "report", configurations.kind(w.configuration), *modules("page"), *shown_modules()
+            "report",
+            configurations.kind(w.configuration),
+            *modules("page"),
+            *shown_modules(),
         ),
     script:
         "../scripts/report.py"
@@ -169,7 +172,9 @@ rule stimuli:
         runtime=15,
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code("stimuli", configurations.kind(w.configuration), *shown_modules()),
+        code=lambda w: package.code(
+            "stimuli", configurations.kind(w.configuration), *shown_modules()
+        ),
     script:
         "../scripts/stimuli.py"
 
@@ -212,6 +217,8 @@ rule limp_picture:
         runtime=10,
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code("limp_picture", configurations.kind(w.configuration)),
+        code=lambda w: package.code(
+            "limp_picture", configurations.kind(w.configuration)
+        ),
     script:
         "../scripts/limp_picture.py"

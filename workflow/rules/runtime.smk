@@ -15,7 +15,9 @@ rule generate:
         runtime=10,
     params:
         runtime=lambda w: configurations.section(w.configuration, "runtime"),
-        code=lambda w: package.code("generate", configurations.kind(w.configuration), *shown_modules()),
+        code=lambda w: package.code(
+            "generate", configurations.kind(w.configuration), *shown_modules()
+        ),
     script:
         "../scripts/generate.py"
 

@@ -54,7 +54,7 @@ class Clips:
         if odd := [name for name in listed if name.endswith(MIRROR)]:
             raise HobbleError(
                 f"data set {dataset}: {', '.join(odd)}: only a mirror is called so, which `mirror: true` "
-                "makes from its original. Put the original beside it and list neither or the original alone, "
+                "that makes from its original. Put the original beside it and list neither or the original alone, "
                 "or rename its file."
             )
         if odd := [name for name in listed if HURT.search(name)]:
@@ -225,8 +225,8 @@ class Clips:
             said.insert(
                 0,
                 f"{len(mirrors)} files in {folder} are mirrors of clips beside them ({mirrors[0]}.bvh, ...) "
-                "and were left out: `mirror: true` makes them anew, labels too, on the same side of the "
-                "split as their originals.",
+                "and were left out: `mirror: true` makes them anew, labels too, on the side of the split "
+                "that their originals are on.",
             )
         more = len(said) - MOST_NOTES
         return [*said[:MOST_NOTES], *([f"{more} more files belong to no clip."] if more > 0 else [])]

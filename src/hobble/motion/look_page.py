@@ -1,0 +1,119 @@
+"""The page of a data set before anything is trained on it: a line a clip, with a small walking figure."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hobble.core.clip import Clip
+from hobble.core.quat import Array
+from hobble.motion.look import Look, same_notes, seen, standing_notes
+from hobble.motion.root import facing
+
+FRAMES, SECONDS = 40, 4.0  # of the picture: the middle of the clip
+HEAD = (
+    "clip",
+    "",
+    "rig",
+    "fps",
+    "s",
+    "hips, cm",
+    "steps/min",
+    "cycles",
+    "gait, s",
+    "foot down",
+    "furthest off",
+)
+STYLE = """body{font:14px/1.4 system-ui,sans-serif;margin:1.5em;color:#222;background:#fff}
+table{border-collapse:collapse}th,td{padding:2px 9px;text-align:left;border-bottom:1px solid #e3e3e3}
+th{position:sticky;top:0;background:#fff}td.n{text-align:right;font-variant-numeric:tabular-nums}
+.bar{display:inline-block;width:75px;height:9px;background:#eee;margin-right:6px}
+.bar i{display:block;height:100%;background:#4a7ab5}small,.said{color:#a04000}canvas{display:block}"""
+# One timer draws all figures that are in view.
+SCRIPT = """const D=JSON.parse(document.getElementById('d').textContent);
+const C=[...document.querySelectorAll('canvas')];
+const calm=matchMedia('(prefers-reduced-motion: reduce)').matches;
+function draw(t){C.forEach((c,i)=>{const r=c.getBoundingClientRect();if(r.bottom<0||r.top>innerHeight)return;
+const d=D[i],p=d.p[calm?0:Math.floor(t*d.f/1000)%d.p.length],g=c.getContext('2d');
+g.clearRect(0,0,80,80);g.strokeStyle='#ccc';g.beginPath();g.moveTo(0,76);g.lineTo(80,76);g.stroke();
+g.lineWidth=1.5;d.b.forEach(([a,b,s])=>{g.strokeStyle=['#444','#c0392b','#2471a3'][s];g.beginPath();
+g.moveTo(p[2*a],p[2*a+1]);g.lineTo(p[2*b],p[2*b+1]);g.stroke()})});if(!calm)requestAnimationFrame(draw)}
+if(calm)addEventListener('scroll',()=>draw(0));requestAnimationFrame(draw);"""
+
+
+def figure(clip: Clip) -> dict[str, Any]:
+    """A walk on the spot seen from its side, in pixels of an 80 x 80 picture.
+
+    p: for each of its frames x and y of every joint. b: bones (joint, joint, 0 middle, 1 left or 2 right).
+    f: frames a second.
+    """
+    long = min(len(clip), round(SECONDS * clip.fps))
+    first = (len(clip) - long) // 2
+    at = np.linspace(first, first + long - 1, min(FRAMES, long)).round().astype(int)
+    p = clip.positions[at]
+    ahead = facing(clip.skeleton, p, 0.0)
+    along = np.sum((p - p[:, :1]) * ahead[:, None], axis=-1)
+    tall = max(float(np.percentile(p[..., 1].max(axis=1), 90)), 1.0)
+    pixels = np.stack([40 + 68 * along / tall, 76 - 68 * p[..., 1] / tall], axis=-1)
+    bones = [(parent, j, _side(clip, j)) for j, parent in enumerate(clip.skeleton.parents) if parent >= 0]
+    flat = np.clip(pixels, 0, 80).round(1).reshape(len(at), -1)
+    return {"p": flat.tolist(), "b": bones, "f": round(len(at) * clip.fps / long, 2)}
+
+
+def _side(clip: Clip, joint: int) -> int:
+    name = clip.skeleton.joints[joint].lower()
+    return 1 if "left" in name else 2 if "right" in name else 0
+
+
+def foot_down(contacts: Array) -> float:
+    """The share of frames in which a heel or toe is down. contacts: (F, 4)."""
+    return float((np.asarray(contacts) > 0.5).any(axis=1).mean())
+
+
+def look_page(
+    name: str,
+    clips: Sequence[Clip],
+    reports: Sequence[Mapping[str, Any]],
+    labels: Sequence[Mapping[str, Any]],
+    down: Sequence[float],
+) -> str:
+    """The page of data set `name`, whole in one file.
+
+    reports, labels: `motion/<clip>.json` and `labels/<clip>.json` of each clip. down: see `foot_down`.
+    """
+    looks = [seen(clip, report) for clip, report in zip(clips, reports, strict=True)]
+    rows = [_row(*of) for of in zip(looks, reports, labels, down, strict=True)]
+    notes = [*same_notes(looks), *standing_notes(looks)]
+    seconds = sum(look.seconds for look in looks)
+    data = json.dumps([figure(clip) for clip in clips], separators=(",", ":"))
+    title = html.escape(name)
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
+        f"<h1>{title}</h1><p>{len(looks)} clips, {seconds:.0f} s. Left is red, right is blue.</p>"
+        + "".join(f'<p class="said">{html.escape(note)}</p>' for note in notes)
+        + f"<table><thead><tr>{''.join(f'<th>{head}</th>' for head in HEAD)}</tr></thead>"
+        + f"<tbody>{''.join(rows)}</tbody></table>"
+        + f'<script type="application/json" id="d">{data}</script><script>{SCRIPT}</script></html>\n'
+    )
+
+
+def _row(look: Look, report: Mapping[str, Any], labels: Mapping[str, Any], down: float) -> str:
+    gaits = ", ".join(f"{gait} {s:.1f}" for gait, s in labels["seconds"].items() if s >= 0.05)
+    off = "as it is"
+    if look.off:
+        joint, degrees = look.off
+        bar = f'<span class="bar"><i style="width:{min(100.0, degrees / 15 * 100):.0f}%"></i></span>'
+        off = f"{bar}{html.escape(joint)} {degrees:.0f}&deg;"
+    said = "; ".join([*look.warnings, *labels["warnings"]])
+    name = html.escape(look.name) + (f"<br><small>{html.escape(said)}</small>" if said else "")
+    numbers = [f"{look.fps:.4g}", f"{look.seconds:.1f}", f"{look.hips:.0f}", f"{look.cadence:.0f}"]
+    cells = "".join(f'<td class="n">{value}</td>' for value in [*numbers, str(labels["cycles"])])
+    return (
+        f'<tr><td>{name}</td><td><canvas width="80" height="80"></canvas></td>'
+        f"<td>{html.escape(look.rig)}</td>{cells}<td>{html.escape(gaits)}</td>"
+        f'<td class="n">{100 * down:.0f} %</td><td>{off}</td></tr>'
+    )
