@@ -25,6 +25,7 @@ from hobble.core.errors import HobbleError
 from hobble.labels.label import label_clip, mirror_labels
 from hobble.motion.make import make_clip
 from hobble.motion.mirror import mirror_clip
+from hobble.motion.options import ClipMotion
 from hobble.synthetic.clip import write_clip
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import heightmaps
@@ -78,7 +79,7 @@ def source(project: Project, job: Job, folder: Path) -> tuple[Path, list[Path]]:
     name = project.catalogue.dataset(job.dataset).skeleton
     files = {part: folder / f"{job.clip}_{part}.txt" for part in ("footsteps", "gait", "status")}
     bvh, frames = folder / f"{job.clip}.bvh", project.datasets.frames(job.dataset, job.clip)
-    options = project.datasets.options(job.dataset, "synthetic")
+    options = project.catalogue.dataset(job.dataset).synthetic
     write_clip(
         job.clip, {"name": name, **skeleton}, frames, entry.recipe, entry.injured, options, bvh=bvh, **files
     )
@@ -95,7 +96,7 @@ def made(project: Project, job: Job, folder: Path) -> Iterator[tuple[Clip, dict]
         str(BASE / "config/skeletons"),
         clip=job.clip,
         skeleton_name=dataset.skeleton,
-        options=project.datasets.motion_options(job.dataset, job.clip),
+        options=ClipMotion(**project.datasets.motion_options(job.dataset, job.clip)),
     )
     options = dataset.labels
     labels, told = label_clip(clip, files, report, entry.gait, entry.ground, options)

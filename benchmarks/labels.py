@@ -14,13 +14,14 @@ from pathlib import Path
 
 import yaml
 
-from hobble.config.sections import Labels, Motion, Synthetic
+from hobble.config.sections import Labels, Synthetic
 from hobble.core.clip import Clip, load_clip
 from hobble.labels.contacts import contacts, stance
 from hobble.labels.footfall import find_swings, landings
 from hobble.labels.gait import automatic_gait
 from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
+from hobble.motion.options import ClipMotion
 from hobble.synthetic.clip import write_clip
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -32,9 +33,9 @@ def synthetic_minute() -> Clip:
     with tempfile.TemporaryDirectory() as name:
         bvh, *others = (Path(name, f) for f in ("c.bvh", "c_footsteps.txt", "c_gait.txt", "c_injuries.txt"))
         keys = dict(zip(("footsteps", "gait", "status"), others, strict=True))
-        options = Synthetic().model_dump(mode="json")
+        options = Synthetic()
         write_clip("c", data, 3600, None, "RightUpLeg-RightLeg", options, bvh=bvh, **keys)
-        options = Motion().model_dump(mode="json")
+        options = ClipMotion()
         return make_clip(bvh, skeleton, skeleton.parent, clip="c", skeleton_name="holden31", options=options)[
             0
         ]

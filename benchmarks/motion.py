@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hobble.config.sections import Motion
 from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.motion.make import make_clip
+from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.retarget import plan, retarget_pose
 from hobble.motion.rig import joint_pairs, load_skeleton
@@ -64,7 +64,7 @@ def main() -> None:
     parser.add_argument("folder", nargs="?", type=Path)
     parser.add_argument("--megabytes", type=float, default=4.0)
     arguments = parser.parse_args()
-    options = Motion().model_dump(mode="json")
+    options = ClipMotion()
     with tempfile.TemporaryDirectory() as temporary:
         files = sorted(arguments.folder.rglob("*.bvh")) if arguments.folder else []
         files = files or [made(Path(temporary), arguments.megabytes)]

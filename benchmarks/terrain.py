@@ -23,13 +23,14 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from hobble.config.sections import Database, Labels, Motion, Synthetic, Terrain
+from hobble.config.sections import Database, Labels, Synthetic, Terrain
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.labels.label import label_clip, mirror_labels
 from hobble.labels.model import Labels as ClipLabels
 from hobble.motion.make import make_clip
 from hobble.motion.mirror import mirror_clip
+from hobble.motion.options import ClipMotion
 from hobble.motion.rig import load_skeleton
 from hobble.synthetic.clip import write_clip
 from hobble.terrain import search
@@ -46,7 +47,7 @@ Labelled = tuple[Clip, ClipLabels]
 
 def made(bvh: Path, ground: str) -> list[Labelled]:
     """The clip of a BVH file and its mirror, labelled; none where it holds no cycle."""
-    motion = Motion().model_dump(mode="json")
+    motion = ClipMotion()
     skeleton = SKELETONS / "holden31.yaml"
     try:
         clip, report = make_clip(
@@ -66,7 +67,7 @@ def synthetic() -> list[Labelled]:
     with tempfile.TemporaryDirectory() as name:
         bvh = Path(name, "slopes.bvh")
         files = {n: Path(name, f"slopes_{n}.txt") for n in ("footsteps", "gait", "status")}
-        options = Synthetic().model_dump(mode="json")
+        options = Synthetic()
         write_clip("slopes", skeleton, 3600, "slopes", None, options, bvh=bvh, **files)
         return made(bvh, "rocky")
 

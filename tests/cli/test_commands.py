@@ -27,7 +27,7 @@ def folder(tmp_path_factory, root: Path) -> Path:
             400,
             "walk",
             None,
-            Synthetic().model_dump(mode="json"),
+            Synthetic(),
             bvh=out / f"{name}.bvh",
             **others,
         )

@@ -8,6 +8,7 @@ import pytest
 
 from hobble.core.skeleton import Skeleton
 from hobble.synthetic.clip import write_clip
+from hobble.synthetic.options import Synthetic
 
 from .texts import base_bvh
 
@@ -18,5 +19,5 @@ def tiny_bvh(holden31: Skeleton, tmp_path_factory: pytest.TempPathFactory) -> st
     folder = tmp_path_factory.mktemp("walk")
     names = {"bvh": "a.bvh", "footsteps": "f.txt", "gait": "g.txt", "status": "s.txt"}
     paths = {key: folder / name for key, name in names.items()}
-    write_clip("walk", holden31.to_dict(), 600, None, None, {"fps": 120, "seed": 1}, **paths)
+    write_clip("walk", holden31.to_dict(), 600, None, None, Synthetic(fps=120, seed=1), **paths)
     return base_bvh(Path(paths["bvh"]))

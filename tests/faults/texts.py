@@ -12,9 +12,9 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 
 from hobble.channels.injury.severity import odd_ranges, severity_matrix
 from hobble.channels.injury.status import read_status
-from hobble.config.sections import Motion
 from hobble.core.errors import InputError
 from hobble.motion.make import make_clip
+from hobble.motion.options import ClipMotion
 from hobble.motion.rig import load_skeleton
 
 from . import bvh_grammar, status_grammar
@@ -22,7 +22,7 @@ from .grammar import Case, cases
 from .lab import ROOT
 
 SKELETON = ROOT / "config/skeletons/holden31.yaml"
-OPTIONS = Motion().model_dump()
+OPTIONS = ClipMotion()
 
 Arrays = dict[str, np.ndarray]
 Reader = Callable[[Path], Arrays]

@@ -17,7 +17,7 @@ from hobble.labels.label import label_clip
 from hobble.labels.model import Labels
 from hobble.labels.options import Labels as LabelOptions
 from hobble.motion.make import make_clip
-from hobble.motion.options import Motion
+from hobble.motion.options import ClipMotion
 from hobble.synthetic.clip import walk
 from hobble.synthetic.recipes import Segment
 
@@ -70,7 +70,7 @@ def captured(shared: Path, root: Path) -> Callable[[str], Healthy]:
     @functools.cache
     def make(name: str) -> Healthy:
         gait, ground = CAPTURED[name]
-        options = {**Motion().model_dump(mode="json"), "ground": ground}
+        options = ClipMotion(ground=ground)
         file = shared / "mocap/cmu" / f"{name}.bvh"
         clip, _ = make_clip(
             file, skeletons / "holden31.yaml", skeletons, clip=name, skeleton_name="holden31", options=options

@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 import yaml
 
-from hobble.config.sections import Motion, Synthetic
+from hobble.config.sections import Synthetic
 from hobble.core.clip import Clip
 from hobble.labels.label import label_clip
 from hobble.labels.model import Labels
 from hobble.labels.options import Labels as Options
 from hobble.motion.make import make_clip
+from hobble.motion.options import ClipMotion
 from hobble.synthetic.clip import write_clip
 
 SUFFIXES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
@@ -28,7 +29,7 @@ WALK, JOG = 1, 2
 @pytest.fixture(scope="module")
 def read(root: Path) -> Callable[[Path], tuple[Clip, dict[str, Any]]]:
     """Reads a BVH file with its own proportions."""
-    options = Motion(proportions="clip").model_dump(mode="json")
+    options = ClipMotion(proportions="clip")
     folder = root / "config/skeletons"
 
     @cache
@@ -199,7 +200,7 @@ def test_automatic_labels_of_made_walks_are_exact(root: Path, read, options, tmp
     skeleton = yaml.safe_load((root / "config/skeletons/holden31.yaml").read_text())
     paths = {"bvh": "c.bvh", "footsteps": "c_footsteps.txt", "gait": "c_gait.txt", "status": "c_injuries.txt"}
     paths = {key: tmp_path / name for key, name in paths.items()}
-    settings = Synthetic().model_dump(mode="json")
+    settings = Synthetic()
     write_clip("c", {"name": "holden31", **skeleton}, 600, recipe, injured, settings, **paths)
     by_hand, automatic, _ = both_ways(read, paths["bvh"], options)
     assert phase_difference(by_hand, automatic) < 0.04

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.config.sections import Motion
 from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
 from hobble.core.ik import aim, two_bone_knee
 from hobble.core.skeleton import Skeleton, local_rotations
+from hobble.motion.options import ClipMotion
 
-OPTIONS: dict[str, Any] = Motion().model_dump()
+OPTIONS: dict[str, Any] = ClipMotion().model_dump()
 
 
 def make_walk(skeleton: Skeleton, frames: int, fps: float, name: str = "walk") -> Clip:
@@ -110,7 +110,8 @@ def make(root: Path, options: dict[str, Any]):
 
     def run(path: Path, skeleton: str = "holden31", **changed: Any):
         folder = root / "config" / "skeletons"
-        return make_clip(path, folder / f"{skeleton}.yaml", folder, path.stem, skeleton, options | changed)
+        file, keys = folder / f"{skeleton}.yaml", ClipMotion().model_copy(update=options | changed)
+        return make_clip(path, file, folder, path.stem, skeleton, keys)
 
     return run
 

@@ -20,6 +20,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton, local_rotations
+from hobble.motion.options import ClipMotion
 
 Array = np.ndarray
 SIDES = (("Left", "L"), ("Right", "R"))
@@ -453,7 +454,6 @@ def outcome(file: Path, seed: int, folder: Path, frames: int | None = None) -> O
 
     frames: how many of the clip's first frames are taken.
     """
-    from hobble.config.sections import Motion
     from hobble.core.bvh import write_bvh
     from hobble.core.errors import HobbleError
     from hobble.motion.make import make_clip
@@ -462,7 +462,7 @@ def outcome(file: Path, seed: int, folder: Path, frames: int | None = None) -> O
     from hobble.motion.source import load_source
 
     maps = Path(__file__).parents[2] / "config" / "skeletons"
-    options, how, target = Motion().model_dump(), Scramble.drawn(seed), maps / "holden31.yaml"
+    options, how, target = ClipMotion(), Scramble.drawn(seed), maps / "holden31.yaml"
     clip = load_source(read_bvh(file), load_skeleton(target), maps, options).clip
     part = slice(0, frames)
     clip = stretched(replace(clip, rotations=clip.rotations[part], root=clip.root[part]), how)

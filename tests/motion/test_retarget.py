@@ -11,6 +11,7 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.motion.make import load_source, resample
+from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.retarget import plan, retarget_clip, retarget_pose
 from hobble.motion.rig import joint_pairs, load_skeleton
@@ -227,7 +228,8 @@ SLIDING = (
 @pytest.mark.parametrize("file", SLIDING)
 def test_feet_of_real_clips_slide_no_more_than_before_in_every_direction(shared, root, rigs, options, file):
     target = rigs["holden31"]
-    source = load_source(read_bvh(shared / f"mocap/{file}.bvh"), target, root / "config/skeletons", options)
+    bvh, keys = read_bvh(shared / f"mocap/{file}.bvh"), ClipMotion(**options)
+    source = load_source(bvh, target, root / "config/skeletons", keys)
     clip = resample(source.clip, 60.0)
     for end in NAMES:
         pairs = joint_pairs(rigs[source.match.rig], rigs[end])
@@ -244,7 +246,8 @@ def test_feet_of_real_clips_slide_no_more_than_before_in_every_direction(shared,
 def test_a_real_walk_keeps_its_look(shared, root, rigs, options):
     """Knee bend, trunk lean and stride over leg length stay those of the source."""
     target = rigs["holden31"]
-    source = load_source(read_bvh(shared / "mocap/cmu/02_01.bvh"), target, root / "config/skeletons", options)
+    bvh, keys = read_bvh(shared / "mocap/cmu/02_01.bvh"), ClipMotion(**options)
+    source = load_source(bvh, target, root / "config/skeletons", keys)
     clip = resample(source.clip, 60.0)
     made = retarget_clip(clip, plan(clip.skeleton, target.skeleton, source.match.sources))
 

@@ -16,6 +16,7 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
+from hobble.motion.options import ClipMotion
 from hobble.rows.build import clip_rows, cycle_frames, cycle_phase, phase_change
 from hobble.rows.clip_rows import ClipRows, expanded
 from hobble.rows.layout import GAITS, RowLayout
@@ -72,7 +73,12 @@ def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrai
     skeletons = root / "config" / "skeletons"
     folder = shared / "mocap" / "pfnn"
     clip, report = make_clip(
-        folder / f"{NAME}.bvh", skeletons / "holden31.yaml", skeletons, NAME, "holden31", options("motion")
+        folder / f"{NAME}.bvh",
+        skeletons / "holden31.yaml",
+        skeletons,
+        NAME,
+        "holden31",
+        ClipMotion(**options("motion")),
     )
     files = [folder / f"{NAME}{end}" for end in (".phase", ".gait", "_footsteps.txt", "_gait.txt")]
     labelling = sections.Labels.model_validate(options("labels", margins=margins))

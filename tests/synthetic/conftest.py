@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from hobble.core.skeleton import Skeleton
 from hobble.synthetic.clip import write_clip
+from hobble.synthetic.options import Synthetic
 
 Array = np.ndarray
 CONTACT = 0.02  # cm2 per 60 Hz frame
@@ -148,7 +149,7 @@ def written(tmp_path_factory: pytest.TempPathFactory, holden31: Skeleton) -> Cal
         paths: dict[str, Any] = {"bvh": here / f"{name}.bvh"}
         endings = {"footsteps": "footsteps", "gait": "gait", "status": "injuries"}
         paths |= {key: here / f"{name}_{ending}.txt" for key, ending in endings.items()}
-        write_clip(name, holden31.to_dict(), frames, recipe, injured, {"fps": fps, "seed": seed}, **paths)
+        write_clip(name, holden31.to_dict(), frames, recipe, injured, Synthetic(fps=fps, seed=seed), **paths)
         return Files(here, name)
 
     return write

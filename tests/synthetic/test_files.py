@@ -15,6 +15,7 @@ from hobble.core.errors import HobbleError
 from hobble.synthetic.clip import ENOUGH, SHORTEST, write_clip
 from hobble.synthetic.files import footsteps_text, gait_text, status_text
 from hobble.synthetic.links import LINKS
+from hobble.synthetic.options import Synthetic
 from hobble.synthetic.path import gait_keys
 from hobble.synthetic.recipes import Segment
 
@@ -57,7 +58,7 @@ def test_same_arguments_same_bytes_and_another_seed_or_name_another_walk(written
     def write(name, seed):
         paths = {key: tmp_path / f"{name}{seed}{key}" for key in ("bvh", "footsteps", "gait", "status")}
         write_clip(
-            name, holden31.to_dict(), 240, "uneven", "LowerBack-Spine", {"fps": 120, "seed": seed}, **paths
+            name, holden31.to_dict(), 240, "uneven", "LowerBack-Spine", Synthetic(fps=120, seed=seed), **paths
         )
         return [path.read_bytes() for path in paths.values()]
 
@@ -159,7 +160,7 @@ def test_the_shortest_clip_that_hurts_has_a_status_file_that_can_be_read(written
 
 def test_a_clip_too_short_for_a_step_says_how_many_frames_are_enough(holden31, tmp_path):
     paths = {key: tmp_path / key for key in ("bvh", "footsteps", "gait", "status")}
-    options = {"frames": 600, "fps": 120, "seed": 1}
+    options = Synthetic(frames=600, fps=120, seed=1)
     said = r"clip a: 16 frames at 60 Hz are too short for a step. Set synthetic.frames to 4875 or more"
     with pytest.raises(HobbleError, match=said):
         write_clip("a", holden31.to_dict(), 16, "walk", None, options, **paths)

@@ -11,6 +11,7 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
+from hobble.motion.options import ClipMotion
 from hobble.motion.root import RootFrames, root_frames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
 from hobble.terrain.feet import HEEL, Feet, feet_of, heel_above_toe, held_up
@@ -292,7 +293,7 @@ def test_so_is_the_originals_heightmap(shared: Path, made: SimpleNamespace) -> N
 @pytest.mark.shared
 def test_real_clips_are_honest_too(shared: Path, root: Path, made: SimpleNamespace) -> None:
     """Uneven ground, a limp, and the original's own flat clip, whose ground stays at zero."""
-    from hobble.config.sections import Labels, Motion, Terrain
+    from hobble.config.sections import Labels, Terrain
     from hobble.labels.label import label_clip
     from hobble.motion.make import make_clip
 
@@ -312,7 +313,7 @@ def test_real_clips_are_honest_too(shared: Path, root: Path, made: SimpleNamespa
             str(skeletons),
             clip=bvh.stem,
             skeleton_name="holden31",
-            options=Motion().model_dump(mode="json"),
+            options=ClipMotion(),
         )
         beside = [p for s in (".phase", "_footsteps.txt") if (p := bvh.with_name(bvh.stem + s)).is_file()]
         labels, _ = label_clip(clip, beside, report, "walk", kind, Labels())

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from hobble.core.errors import HobbleError
+from hobble.motion.options import ClipMotion
 from hobble.workflow import targets
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check, notes
@@ -452,14 +453,13 @@ def test_a_clip_depends_on_the_skeleton_that_it_is_retargeted_from(complete: Pat
 
 @pytest.mark.shared
 def test_the_plan_and_the_job_agree_on_the_rig(root: Path, shared: Path) -> None:
-    from hobble.config.sections import Motion
     from hobble.motion.make import load_source
     from hobble.motion.read import read_bvh
     from hobble.motion.rig import load_skeleton
 
     project = Project(root, {"mocap": str(shared / "mocap")})
     target = load_skeleton(root / "config/skeletons/holden31.yaml")
-    options = Motion().model_dump(mode="json")
+    options = ClipMotion()
     for clip in ("Injured_Ilde", "Injured_Walk_LLL", "Injured_Run_LLL_extended_converted"):
         file = read_bvh(project.clips.source("ferre", clip))
         rig = load_source(file, target, root / "config/skeletons", options).match.rig

@@ -3,12 +3,13 @@
 from hobble.channels.files import load_values
 from hobble.core.clip import load_clip
 from hobble.core.files import load_npz
+from hobble.database.options import Rows
 from hobble.rows.build import clip_rows
 from hobble.rows.clip_rows import save_clip_rows
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
-    options = snakemake.params.options
+    options = Rows.model_validate(snakemake.params.options)
     rows = clip_rows(
         snakemake.params.clip,
         load_clip(snakemake.input.clip),
@@ -18,9 +19,9 @@ with job(snakemake) as log:
             for name, file in zip(snakemake.params.channels, snakemake.input.get("channels", []), strict=True)
         },
         load_npz(snakemake.input.terrain),
-        window=options["window"],
-        step=options["step"],
-        facing_sigma=options["facing_sigma"],
+        window=options.window,
+        step=options.step,
+        facing_sigma=options.facing_sigma,
     )
     save_clip_rows(snakemake.output.rows, rows)
     log.info("%d rows, %d fits", len(rows), rows.fits.sum())

@@ -5,12 +5,13 @@ from pathlib import Path
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.database.merge import write_database
+from hobble.database.options import Merging
 from hobble.database.sides import refuse_both_sides
 from hobble.motion.same import likeness, same_pairs
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
-    options = snakemake.params.options
+    options = Merging.model_validate(snakemake.params.options)
     files = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
     like = [likeness(load_clip(clip), read_json(report)["sha256"]) for clip, report in files]
     refuse_both_sides(f"data set {snakemake.params.dataset}", same_pairs(like), snakemake.params.splits)
@@ -20,9 +21,9 @@ with job(snakemake) as log:
         snakemake.params.splits,
         channels=snakemake.params.channels,
         sources=snakemake.params.sources,
-        joint_weight=options["joint_weight"],
-        dtype=options["dtype"],
-        seed=options["seed"],
+        joint_weight=options.joint_weight,
+        dtype=options.dtype,
+        seed=options.seed,
     )
     part = manifest.bytes / manifest.original_bytes
     rows = {split: manifest.rows(split) for split in manifest.chunks}

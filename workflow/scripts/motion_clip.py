@@ -3,6 +3,7 @@
 from hobble.core.clip import save_clip
 from hobble.core.files import write_json
 from hobble.motion.make import make_clip
+from hobble.motion.options import ClipMotion
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
@@ -12,7 +13,7 @@ with job(snakemake) as log:
         snakemake.params.maps,
         clip=snakemake.params.clip,
         skeleton_name=snakemake.params.skeleton_name,
-        options=snakemake.params.options,
+        options=ClipMotion.model_validate(snakemake.params.options),
     )
     for sentence in report["repairs"]:
         log.info("%s", sentence)

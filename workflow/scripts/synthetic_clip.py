@@ -4,6 +4,7 @@ from pathlib import Path
 
 from hobble.core.untrusted import read_yaml
 from hobble.synthetic.clip import write_clip
+from hobble.synthetic.options import Synthetic
 from hobble.workflow.job import job
 
 with job(snakemake):
@@ -14,7 +15,7 @@ with job(snakemake):
         snakemake.params.frames,
         snakemake.params.recipe,
         snakemake.params.injured,
-        snakemake.params.options,
+        Synthetic.model_validate(snakemake.params.options),
         bvh=snakemake.output.bvh,
         footsteps=snakemake.output.footsteps,
         gait=snakemake.output.gait,

@@ -141,13 +141,13 @@ class Pace:
         speeds = np.repeat(top[:, None, None], labels, axis=1).repeat(LEVELS, axis=2)
         for label in range(labels):
             of = _of_label(label, values, self.across)
-            s, r, g = (
+            s, r, gaits = (
                 np.concatenate(part) for part in zip(*((v, share[i], gait[i]) for i, v in of), strict=True)
             )
             fall = float(s @ (1 - r) / (s @ s)) if len(s) else 0.0
             expected = _fitted(levels, s, r, np.maximum(1 - fall * levels, SLOWEST))
             for k in np.flatnonzero(top < UNLIMITED):
-                own = _fitted(levels, s[g == k], r[g == k], expected)
+                own = _fitted(levels, s[gaits == k], r[gaits == k], expected)
                 speeds[k, label] = top[k] * own
         return Limits(levels, speeds)
 

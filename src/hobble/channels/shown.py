@@ -93,7 +93,8 @@ def speaker(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
     """
     if not skeleton:
         return str
-    figure, said = Skeleton.from_dict({"name": "", **skeleton}), {}
+    figure = Skeleton.from_dict({"name": "", **skeleton})
+    said: dict[str, str] = {}
     for one in every():
         columns = one.columns(figure)
         said |= dict(zip(columns, shown(one.name, figure, columns, columns).spoken, strict=True))

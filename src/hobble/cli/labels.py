@@ -22,7 +22,7 @@ from hobble.labels.model import GAITS
 from hobble.labels.options import Labels
 from hobble.labels.write_files import write_label_files
 from hobble.motion.make import make_clip
-from hobble.motion.options import Motion
+from hobble.motion.options import ClipMotion
 
 ON = "holden31"  # the skeleton on which a clip is looked at; its labels hold for any
 
@@ -65,7 +65,7 @@ def write_labels(
         batch.skeleton_folder(),
         clip=name,
         skeleton_name=ON,
-        options=Motion(source_fps=source_fps).model_dump(mode="json"),
+        options=ClipMotion(source_fps=source_fps),
     )
     labels, told = label_clip(clip, [], report, gait, "rocky", Labels())
     time = SourceTime(report["source_frames"], report["source_fps"], report["source_start"])

@@ -20,7 +20,7 @@ from hobble.core.clip import Clip
 from hobble.motion.loop import loop_clip
 from hobble.motion.make import make_clip, resample
 from hobble.motion.mirror import mirror_clip
-from hobble.motion.options import Motion
+from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.source import load_source
 
@@ -61,14 +61,13 @@ def run(options: argparse.Namespace) -> int:
 def converted(name: str, file: Path, options: argparse.Namespace) -> tuple[Clip, list[str]]:
     """The clip of a file as asked for, and what was repaired or noted. Raises InputError for a bad file."""
     defects: Literal["repair", "refuse"] = "refuse" if options.refuse else "repair"
-    keys = Motion(source_fps=options.source_fps, defects=defects, loops=options.loops)
+    keys = ClipMotion(source_fps=options.source_fps, defects=defects, loops=options.loops)
     folder = batch.skeleton_folder()
     if options.skeleton:
         target = batch.skeleton_file(options.skeleton)
-        values = keys.model_dump(mode="json")
-        clip, report = make_clip(file, target, folder, clip=name, skeleton_name=target.stem, options=values)
+        clip, report = make_clip(file, target, folder, clip=name, skeleton_name=target.stem, options=keys)
         return resample(clip, options.fps), report["repairs"] + report["notes"]
-    source = load_source(read_bvh(file), batch.skeleton(ROLES_FROM), folder, keys.model_dump(mode="json"))
+    source = load_source(read_bvh(file), batch.skeleton(ROLES_FROM), folder, keys)
     clip = resample(source.clip, options.fps)
     if options.loops > 1:
         clip = loop_clip(clip, options.loops, None)

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
+from hobble.channels.channel import Channel
 from hobble.channels.limits import Pace
+from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.compose import body_layout
@@ -22,9 +24,17 @@ def paces_of(layout: RowLayout, skeleton: Mapping[str, Any]) -> dict[str, Pace]:
         return {}
     rig = Skeleton.from_dict(skeleton)
     return {
-        one.name: Pace(one.highest, one.mirror(np.arange(columns)[None], rig)[0], len(GAITS))
-        for one, columns in slowing
+        one.name: Pace(one.highest, _other_side(one, columns, rig), len(GAITS)) for one, columns in slowing
     }
+
+
+def _other_side(one: Channel, columns: int, rig: Skeleton) -> np.ndarray:
+    """(columns,) the column of the other side for each; itself where the rig has no two sides to compare."""
+    own = np.arange(columns, dtype=float)
+    try:
+        return one.mirror(own[None], rig)[0].astype(int)
+    except HobbleError:  # a rig whose names do not pair left and right: each side is learnt on its own
+        return own.astype(int)
 
 
 def gather(paces: Mapping[str, Pace], rows: ClipRows, source: str | None) -> None:

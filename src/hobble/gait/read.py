@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hobble.core.clip import Clip
 from hobble.motion.make import load_source, resample
-from hobble.motion.options import Motion
+from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
 
@@ -18,6 +18,6 @@ def read_clip(path: str | Path, skeletons: str | Path = SKELETONS) -> Clip:
 
     Raises InputError for a file that cannot be read and for an unknown rig.
     """
-    options = Motion().model_dump()
+    options = ClipMotion()
     target = load_skeleton(Path(skeletons) / "holden31.yaml")
-    return resample(load_source(read_bvh(path), target, skeletons, options).clip, options["fps"])
+    return resample(load_source(read_bvh(path), target, skeletons, options).clip, options.fps)

@@ -20,7 +20,7 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.motion.check import worst
 from hobble.motion.make import make_clip
-from hobble.motion.options import Motion
+from hobble.motion.options import ClipMotion
 from hobble.motion.rig import leg_length
 from hobble.motion.same import Likeness, likeness, same_pairs
 
@@ -74,7 +74,7 @@ def look(folder: Path, skeleton: Path, maps: Path) -> Folder:
 
 def _one(file: Path, skeleton: Path, maps: Path) -> Look:
     try:
-        clip, report = make_clip(file, skeleton, maps, file.stem, skeleton.stem, Motion().model_dump())
+        clip, report = make_clip(file, skeleton, maps, file.stem, skeleton.stem, ClipMotion())
     except HobbleError as error:
         return Look(file.stem, refused=str(error).split("\n")[0])
     return seen(clip, report)

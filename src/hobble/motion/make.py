@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from hobble.motion.axes import turned
 from hobble.motion.body import body_by_roles
 from hobble.motion.check import check, compare
 from hobble.motion.loop import loop_clip
+from hobble.motion.options import ClipMotion
 from hobble.motion.read import MOST_POSES, Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.retarget import plan, retarget_clip
@@ -37,13 +37,12 @@ def make_clip(
     maps: str | Path,
     clip: str,
     skeleton_name: str,
-    options: Mapping[str, Any],
+    options: ClipMotion,
 ) -> tuple[Clip, dict[str, Any]]:
     """Read a BVH file, check it, and put it on the skeleton at the frame rate of `options`.
 
     skeleton: the target's file. maps: the folder of the skeleton files. clip: the name of the clip made.
-    options: the `motion` section of a data set (fps, source_fps, unit, up, handedness, facing,
-    proportions, defects, loops, heading), and the clip's `ground`, flat where it is not there.
+    options: the `motion` section of the data set, with what the clip's entry overrules.
     Returns the clip and its report: `motion/<clip>.json` of docs/artefacts.md.
     Raises InputError for a file that cannot be read, for another skeleton, and for what is broken beyond
     repair or, with defects: refuse, broken at all.
@@ -52,16 +51,16 @@ def make_clip(
     file = read_bvh(bvh)
     source = load_source(file, target, maps, options)
     _check_length(file, source.clip, target.skeleton, options)
-    resampled = resample(source.clip, options["fps"])
-    fitted = fit_skeleton(resampled, source, target.skeleton, options["proportions"])
+    resampled = resample(source.clip, options.fps)
+    fitted = fit_skeleton(resampled, source, target.skeleton, options.proportions)
     if fitted.figures is not None:
         check(file.path, fitted.figures, source.match.rig)
-    made, said, loops = fitted.clip, source.repairs + fitted.repairs, options["loops"]
+    made, said, loops = fitted.clip, source.repairs + fitted.repairs, options.loops
     if loops > 1:
-        made = loop_clip(made, loops, options["heading"])
+        made = loop_clip(made, loops, options.heading)
         said.append(f"The cycle was repeated {loops} times, each {len(made) // loops} frames, seams blended.")
-    if options["facing"] is not None:
-        made = turned(made, np.radians(options["facing"]) - first_facing(made))
+    if options.facing is not None:
+        made = turned(made, np.radians(options.facing) - first_facing(made))
     made = replace(made, name=clip)
     _check_finite(file, made)
     extra: dict[str, Any] = {
@@ -73,13 +72,13 @@ def make_clip(
     return made, _report(file, source, made) | extra | {"repairs": said, "notes": source.notes}
 
 
-def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: Mapping[str, Any]) -> None:
+def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) -> None:
     """Refuse a clip that at the frame rate asked for would take more memory than any real one."""
-    frames = len(clip) / clip.fps * options["fps"] * options["loops"]
+    frames = len(clip) / clip.fps * options.fps * options.loops
     if frames * max(len(clip.skeleton.joints), len(target.joints)) > MOST_POSES:
         raise InputError(
             file.path,
-            f"{len(clip)} frames at {clip.fps:g} a second become {frames:.0f} at {options['fps']:g}: more "
+            f"{len(clip)} frames at {clip.fps:g} a second become {frames:.0f} at {options.fps:g}: more "
             f"than {MOST_POSES} poses of a joint",
             fix="Cut it into shorter clips, or give its source_fps.",
         )

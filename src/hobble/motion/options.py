@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from hobble.core.section import Finite, Inside, Positive, PositiveFloat, Section
+from hobble.core.section import Finite, Ground, Inside, Positive, PositiveFloat, Section
 
 
 def _sixty(fps: float) -> float:
@@ -76,3 +76,9 @@ class Motion(Section):
     heading: Finite | None = Field(
         None, description="where a looped clip leads, degrees from +Z towards +X; as in the file by default"
     )
+
+
+class ClipMotion(Motion):
+    """The section for one clip: what its entry in the data set says overrules the section."""
+
+    ground: Ground = Field("flat", description="what the clip walks on; a flat floor is put at height 0")

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +19,7 @@ from hobble.motion.draft import refusal
 from hobble.motion.find_body import Doubt, Found, find_body
 from hobble.motion.floor import on_floor
 from hobble.motion.fold import below_hips, decode_below
+from hobble.motion.options import ClipMotion
 from hobble.motion.read import Bvh
 from hobble.motion.rig import (
     Match,
@@ -59,14 +58,14 @@ class Source:
     told: bool
 
 
-def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[str, Any]) -> Source:
+def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion) -> Source:
     """A file's motion, checked and where allowed repaired.
 
     maps: the folder of the skeleton files. A rig that one of them describes, in a rest pose like its own, is
     taken as that; of any other the parts of the body are found, and a rest pose that stands.
     Raises InputError for a file in which no body can be told, and for what is broken beyond repair.
     """
-    repairs = _frame_count(file, options["defects"])
+    repairs = _frame_count(file, options.defects)
     hips = find_hips(clean_names(file.names), target, maps)
     known = match_rig(rig_of(below_hips(file, hips)), target, maps)
     if known is not None and known.sources:
@@ -74,15 +73,15 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: Mapping[st
     return _unknown(file, target, known, repairs, options)
 
 
-def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: Mapping[str, Any]) -> Source:
+def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: ClipMotion) -> Source:
     """The source of a file on a rig that a skeleton file describes."""
     rig = replace(rig_of(below_hips(file, hips)), roles=match.roles)
-    unit, unit_name = _unit(file.path, leg_length(rig), options["unit"])
+    unit, unit_name = _unit(file.path, leg_length(rig), options.unit)
     decoded = decode_below(file, hips, STILL / unit)
     clip = _scaled(file, rig, decoded, unit, options)
     if bone := missing_bone(clip.skeleton):
         raise _boneless(file, bone)
-    clip, axes, unsure = straighten(clip, options["up"], options["handedness"])
+    clip, axes, unsure = straighten(clip, options.up, options.handedness)
     moving = decoded.translations is not None
     notes = decoded.notes + unsure
     return _mended(
@@ -101,7 +100,7 @@ def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: Mapp
 
 
 def _unknown(
-    file: Bvh, target: Target, known: Match | None, repairs: list[str], options: Mapping[str, Any]
+    file: Bvh, target: Target, known: Match | None, repairs: list[str], options: ClipMotion
 ) -> Source:
     """The source of a file on any other rig: its parts are found, and a rest pose that stands."""
     rig = rig_of(file)
@@ -112,11 +111,11 @@ def _unknown(
     for a, b in (pair for leg in body.legs.values() for pair in pairwise(leg[:3])):
         if np.median(np.linalg.norm(raw.positions[:, b] - raw.positions[:, a], axis=-1)) < 1e-6:
             raise _boneless(file, f"{rig.joints[a]} to {rig.joints[b]}")
-    unit, unit_name = _unit(file.path, _leg(raw, body), options["unit"])
+    unit, unit_name = _unit(file.path, _leg(raw, body), options.unit)
     rig = replace(rig, roles=body.roles(rig.joints))
     clip = _scaled(file, rig, decoded, unit, options)
     standing = stands(body, rest_positions(rig)) is None
-    clip, axes, unsure = straighten(clip, options["up"], options["handedness"], standing)
+    clip, axes, unsure = straighten(clip, options.up, options.handedness, standing)
     axes = axes if standing else replace(axes, facing="+Z")
     theirs = body_by_roles(target.skeleton)
     told = upright(clip, body, Spine.of(target.skeleton, theirs))
@@ -143,7 +142,7 @@ def _unknown(
     )
 
 
-def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: Mapping[str, Any]) -> Found:
+def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: ClipMotion) -> Found:
     if known is not None:
         return Found(body_by_roles(replace(rig, roles=known.roles)), True)
     try:
@@ -151,7 +150,7 @@ def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: Ma
     except Doubt as doubt:
         raise refusal(file, rig, doubt) from None
     found = replace(found, body=with_fingers(found.body, rig))
-    if not found.sided and options["handedness"] == "left":
+    if not found.sided and options.handedness == "left":
         body = found.body
         arms = {a: body.arms[b] for a, b in (SIDES, SIDES[::-1])}
         legs = {a: body.legs[b] for a, b in (SIDES, SIDES[::-1])}
@@ -181,15 +180,15 @@ def _mended(
     stance: str,
     moving: bool,
     told: bool,
-    options: Mapping[str, Any],
+    options: ClipMotion,
 ) -> Source:
     """The source, without what is broken in it, its floor at height zero."""
-    leave = options["defects"] == "leave"
+    leave = options.defects == "leave"
     repaired = Repaired(clip, 0, []) if leave else repair(clip)
-    flat = options.get("ground", "flat") == "flat" and not leave
+    flat = options.ground == "flat" and not leave
     clip, moved, uneven = on_floor(repaired.clip) if flat else (repaired.clip, [], [])
     mended = repaired.sentences + moved
-    if mended and options["defects"] == "refuse":
+    if mended and options.defects == "refuse":
         raise InputError(file.path, mended[0], fix="Set motion.defects: repair to mend it so.")
     notes = notes + uneven + flips(clip, repaired.first)
     return Source(clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving, told)
@@ -260,8 +259,8 @@ def _unit(path: Path, leg: float, unit: str | float) -> tuple[float, str]:
     return found
 
 
-def _scaled(file: Bvh, rig: Skeleton, decoded: Decoded, unit: float, options: Mapping[str, Any]) -> Clip:
-    fps = options["source_fps"] or frame_rate(file.frame_time, file.frame_time_text)
+def _scaled(file: Bvh, rig: Skeleton, decoded: Decoded, unit: float, options: ClipMotion) -> Clip:
+    fps = options.source_fps or frame_rate(file.frame_time, file.frame_time_text)
     offsets = decoded.offsets * unit
     offsets[0] = 0.0
     ends = {joint: (x * unit, y * unit, z * unit) for joint, (x, y, z) in rig.end_sites.items()}

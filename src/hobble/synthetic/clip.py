@@ -20,6 +20,7 @@ from hobble.synthetic.footsteps import landings, phase_curve, stances
 from hobble.synthetic.gait import Style, healthy_style
 from hobble.synthetic.ground import Ground, make_ground
 from hobble.synthetic.links import LEFT, RIGHT, check_link
+from hobble.synthetic.options import Synthetic
 from hobble.synthetic.path import Path, gait_keys, margin, walk_path
 from hobble.synthetic.pose import pose
 from hobble.synthetic.recipes import GROUND, INJURED, Segment, generator, plan
@@ -118,7 +119,7 @@ def write_clip(
     frames: int,
     recipe: str | None,
     injured: str | None,
-    options: dict[str, Any],
+    options: Synthetic,
     *,
     bvh: str | pathlib.Path,
     footsteps: str | pathlib.Path,
@@ -130,13 +131,13 @@ def write_clip(
     options: the section `synthetic`. Raises HobbleError for what cannot be walked, and for too few frames.
     """
     if frames < SHORTEST:
-        enough = math.ceil(options["frames"] * ENOUGH / max(frames, 1))
+        enough = math.ceil(options.frames * ENOUGH / max(frames, 1))
         raise HobbleError(
             f"clip {clip}: {frames} frames at 60 Hz are too short for a step. "
             f"Set synthetic.frames to {enough} or more, or give the clip a larger share."
         )
     rig = Skeleton.from_dict(skeleton)
-    walk = generate(clip, rig, frames, recipe, injured, options["fps"], options["seed"])
+    walk = generate(clip, rig, frames, recipe, injured, options.fps, options.seed)
     write_bvh(bvh, walk.clip)
     write_text(footsteps, files.footsteps_text(walk.right, walk.left))
     write_text(gait, files.gait_text(walk.gait))

@@ -58,7 +58,7 @@ def second_injuries(
     pairs = [(a, b) for a, b in product([None, *links], links) if a != b]
     gait = ["walk"] * len(pairs)
 
-    def hurt(second: float) -> Array:
+    def hurt(second: float) -> dict[str, Array]:
         each = [{**({a: FIRST} if a else {}), b: second} for a, b in pairs]
         return severities(network, each)
 
