@@ -206,7 +206,7 @@ def test_another_configuration_is_chosen_and_linked_to(tab: Any) -> None:
         "(() => { const s = document.getElementById('play-first'); s.value = 'ava';"
         " s.dispatchEvent(new Event('change')); })()"
     )
-    assert tab.run("Hobble.player.actors.map(({ spec }) => spec.links.length)") == [0, 0]
+    assert tab.run("Hobble.player.actors.map(({ spec }) => spec.channels.length)") == [0, 0]
     tab.run("document.getElementById('play-share').click()")
     assert "of=ava%2Cava" in tab.run("location.hash")
 

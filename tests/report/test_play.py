@@ -275,7 +275,7 @@ LEFT_LEG = """(() => {{
   const at = (j) => [places[3 * j], places[3 * j + 1], places[3 * j + 2]], [a, b] = [at(hip), at(knee)];
   return [.2, .35, .5, .65, .8].map((t) => {{
     const [x, y] = view.project(a.map((v, i) => v + t * (b[i] - v)));
-    return actor.under(x, y)?.links ?? null;
+    return actor.under(x, y)?.columns ?? null;
   }});
 }})()"""
 
@@ -286,7 +286,7 @@ def test_every_point_along_the_left_thigh_takes_a_click(tab: Any) -> None:
     tab.run("Hobble.player.start()")
     tab.run("new Promise(requestAnimationFrame)")
     found = tab.run(LEFT_LEG.format())
-    assert [links and links[-1] for links in found] == ["LeftUpLeg-LeftLeg"] * 5
+    assert [columns and columns[-1] for columns in found] == ["LeftUpLeg-LeftLeg"] * 5
 
 
 @pytest.mark.parametrize("ground", ["constructor", "toString", "__proto__", "nowhere", "boxes"])

@@ -151,7 +151,6 @@ export const createView = (canvas, home, draw) => {
   };
   onTheme.push(recolour);
   recolour();
-  views.push(() => paint(performance.now()));
   const fit = () => {
     drawnFor = level;
     view.W = canvas.clientWidth;
@@ -161,10 +160,19 @@ export const createView = (canvas, home, draw) => {
     lights.fine(LEVELS[level].shadow);
     view.balls = LEVELS[level].balls;
   };
+  const fits = () => drawnFor >= 0 && view.W === canvas.clientWidth && view.H === canvas.clientHeight;
+  // A canvas loses its picture with its size. For printing it takes its size before it is drawn, and where the observer
+  // hears of that size afterwards the picture stays.
+  views.push(() => {
+    shared();
+    if (!fits()) fit();
+    paint(performance.now());
+  });
   new ResizeObserver(() => {
     shared();
+    if (fits()) return;
     fit();
-    if (seen) paint(performance.now()); // at once: a canvas loses its picture with its size
+    if (seen) paint(performance.now()); // at once
   }).observe(canvas);
   new IntersectionObserver((entries) => { seen = entries.at(-1).isIntersecting; if (!seen) view.onHidden(); view.ask(); }).observe(canvas);
   return view;
