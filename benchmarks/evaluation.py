@@ -35,14 +35,15 @@ def seconds(work: Callable[[], object]) -> float:
 
 def sweep(network: Network) -> tuple[float, float]:
     """CPU microseconds of a figure's frame: a figure for each link at once, and one after another."""
-    links = network.links or ("",) * 30
+    links = network.channels.get("injury") or ("",) * 30
     hurt = severities(network, [{link: 5.0} if link else {} for link in links])
 
-    def walk(rows: np.ndarray) -> None:
-        run(network, [Stretch(FRAMES, ["walk"] * len(rows), rows)], RUNTIME)
+    def walk(which: slice) -> None:
+        told = {name: rows[which] for name, rows in hurt.items()}
+        run(network, [Stretch(FRAMES, ["walk"] * len(links[which]), told)], RUNTIME)
 
     per = 1e6 / FRAMES / len(links)
-    return per * seconds(lambda: walk(hurt)), per * seconds(lambda: [walk(row[None]) for row in hurt])
+    return per * seconds(lambda: walk(slice(None))), per * seconds(lambda: [walk(slice(i, i + 1)) for i in range(len(links))])
 
 
 def roll_outs(network: Network) -> tuple[float, float]:

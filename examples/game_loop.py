@@ -12,7 +12,7 @@ from hobble.runtime.axes import Axes
 
 # Unity's convention; Axes("left", "Z") is Unreal's, Axes("right", "Z", "m") Blender's.
 character = ProceduralAnimation.load(sys.argv[1], axes=Axes("left", "Y", "m"), mode="cubic")
-hurts = bool(character.network.links)
+hurts = "injury" in character.network.channels
 
 
 def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:

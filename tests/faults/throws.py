@@ -184,7 +184,7 @@ def _judged(bench: Bench, what: str, target: Path, rng: Random) -> Throw:
     if wrong := refusal(end, bench.job, named):
         return Throw(what, at, FAULT, f"{bench.job.name}, {target.name}: {wrong}")
     if rng.random() < 0.2:  # with the whole input back, all is well
-        shutil.rmtree(bench.folder)
+        shutil.rmtree(bench.folder / "results")
         bench.fill()
         return _again(bench, what, at, REFUSED)
     return Throw(what, at, REFUSED)

@@ -61,15 +61,16 @@ def test_one_motion_on_both_sides_is_refused_with_both_names():
 @pytest.mark.shared
 def test_no_two_walks_of_the_patients_are_one_but_for_the_copies(root, shared):
     from hobble.motion.make import make_clip
-    from hobble.motion.options import Motion
+    from hobble.motion.options import ClipMotion
 
     skeletons = root / "config/skeletons"
     found = []
     for subject in ("A1", "A2", "A11", "A13"):
         for cycle in (1, 2):
             file = shared / f"mocap/patients/Subject{subject}_Cycle{cycle}.bvh"
-            options = Motion().model_dump()
-            made = make_clip(file, skeletons / "holden31.yaml", skeletons, file.stem, "holden31", options)
+            made = make_clip(
+                file, skeletons / "holden31.yaml", skeletons, file.stem, "holden31", ClipMotion()
+            )
             found.append(likeness(made[0], made[1]["sha256"]))
     assert np.isfinite([one.poses for one in found]).all()
     assert [pair for pair in same_pairs(found) if pair[2] != "the same file"] == []

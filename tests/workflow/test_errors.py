@@ -53,7 +53,8 @@ def make(workflow, *targets: str, ok: bool) -> str:
 def refused(workflow, stage: str, *pieces: str) -> None:
     """The bad clip's job ends with one message that holds `pieces`; the good clip's job is done."""
     text = make(workflow, f"{stage}/{workflow.clip}.npz", f"{stage}/{workflow.other}.npz", ok=False)
-    message = [line for line in text.splitlines() if line.startswith(f"{stage}_clip: ")]
+    rule = "channel_clip" if stage.startswith("channels/") else f"{stage}_clip"
+    message = [line for line in text.splitlines() if line.startswith(f"{rule}: ")]
     assert len(message) == 1, text
     for piece in pieces:
         assert piece in message[0], message[0]
@@ -108,7 +109,7 @@ def test_a_bad_status_file(mine, line: str, pieces: tuple[str, ...]) -> None:
     path: Path = mine.mine / f"{mine.clip}_injuries.txt"
     first = path.read_text().splitlines()[0]
     path.write_text(f"{line}\n" if line.startswith("frames") else f"{first}\n{line}\n")
-    refused(mine, "injury", path.name, *pieces)
+    refused(mine, "channels/injury", path.name, *pieces)
 
 
 def test_a_data_folder_that_is_not_there(mine) -> None:

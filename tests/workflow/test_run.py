@@ -51,7 +51,7 @@ def test_the_report_and_everything_beside_it_is_made(finished) -> None:
     assert len(history) == 1 + 2 * 10
     pipeline = json.loads((results / "pipeline.json").read_text())
     stages = {stage["stage"]: stage for stage in pipeline["stages"]}
-    assert set(stages) >= {"synthetic", "motion", "labels", "injury", "terrain", "database", "training"}
+    assert set(stages) >= {"synthetic", "motion", "labels", "channels", "terrain", "database", "training"}
     assert all(stage["seconds"] > 0 and stage["bytes"] > 0 for stage in stages.values())
     assert pipeline["database"]["bytes"] < 0.27 * pipeline["database"]["original_bytes"]
     injury = json.loads((results / "evaluation/injury.json").read_text())

@@ -93,14 +93,14 @@ def test_a_training_ends_soon_after_the_snakemake_that_was_killed(finished, copi
 
 def test_killed_in_the_merge_the_plain_command_goes_on(finished, copied) -> None:
     shutil.rmtree(copied.folder / DATABASE)
-    there = copied.folder / DATABASE / "all"
-    process = started(copied, "-c2", f"{DATABASE}/all", until=there.exists)
+    there = copied.folder / DATABASE / "injury"
+    process = started(copied, "-c2", f"{DATABASE}/injury", until=there.exists)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
     assert list(copied.folder.glob(".snakemake/incomplete/*"))
     assert list(copied.folder.glob(".snakemake/locks/*.lock"))
-    copied.run("-c2", f"{DATABASE}/all")
-    manifests = [(w.folder / DATABASE / "all/manifest.json").read_bytes() for w in (finished, copied)]
+    copied.run("-c2", f"{DATABASE}/injury")
+    manifests = [(w.folder / DATABASE / "injury/manifest.json").read_bytes() for w in (finished, copied)]
     assert manifests[0] == manifests[1]
 
 

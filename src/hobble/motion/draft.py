@@ -14,18 +14,27 @@ from hobble.motion.read import Bvh
 LIMBS = ("shoulder", "elbow", "wrist", "hip", "knee", "heel", "toe")
 ROLES = ("hips", "spine", "chest", "neck", "head", *(f"{side}_{part}" for side in SIDES for part in LIMBS))
 OPTIONAL = ("spine", "chest", "neck", "left_toe", "right_toe")
+MOST_SHOWN = 80  # joints in a message: the usual rigs with all their fingers are shown whole
 
 
 def refusal(file: Bvh, rig: Skeleton, doubt: Doubt) -> InputError:
-    """The one message that asks what cannot be told, with a draft to correct."""
+    """The one message that asks what cannot be told, with a draft to correct, or how a long one begins."""
     roles = guessed(rig) | {role: rig.joints[j] for role, j in doubt.roles.items()}
-    text = draft(rig, roles)
-    return InputError(
-        file.path,
-        f"what is what on this rig is in doubt: {doubt}",
-        fix="Put the right joints into this draft, save it as config/skeletons/<name>.yaml, and run again "
-        f"(`python -m hobble.motion rig {file.path.name}` writes it):\n\n{text}",
-    )
+    text, name, more = draft(rig, roles), file.path.name, len(rig.joints) - MOST_SHOWN
+    if more > 0:
+        shown = "\n".join(text.rstrip("\n").split("\n")[:-more])
+        text = f"{shown}\n  ... ({more} more; python -m hobble.motion rig {name} writes all)\n"
+        fix = (
+            f"Write a draft with `python -m hobble.motion rig {name} --to config/skeletons/<name>.yaml`, put "
+            "the right joints into it, and run again. It begins:"
+        )
+    else:
+        fix = (
+            "Put the right joints into this draft, save it as config/skeletons/<name>.yaml, and run again "
+            f"(`python -m hobble.motion rig {name}` writes it):"
+        )
+    problem = f"what is what on this rig is in doubt: {doubt}"
+    return InputError(file.path, problem, fix=f"{fix}\n\n{text}")
 
 
 def draft(rig: Skeleton, roles: Mapping[str, str]) -> str:

@@ -191,14 +191,16 @@ def test_figures_of_a_crowd_do_not_mind_each_other(hurtable) -> None:
     hurt = severities(hurtable, [{}, {KNEE: 4.0}, {KNEE: 10.0}])
     together = run(hurtable, [Stretch(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
     for figure, gait in enumerate(("walk", "jog", "walk")):
-        alone = run(hurtable, [Stretch(30, [gait], hurt[figure : figure + 1])], RUNTIME)
+        own = {name: each[figure : figure + 1] for name, each in hurt.items()}
+        alone = run(hurtable, [Stretch(30, [gait], own)], RUNTIME)
         np.testing.assert_allclose(together.local[:, figure], alone.local[:, 0], atol=2e-3)
         np.testing.assert_allclose(together.root[:, figure], alone.root[:, 0], atol=2e-3)
     assert SPEEDS["jog"] > SPEEDS["walk"]
 
 
 def test_whole_cycles_are_measured(hurtable) -> None:
-    walks = run(hurtable, [Stretch(n, ["walk"], np.zeros((1, 30))) for n in (20, 400, 10)], RUNTIME)
+    unhurt = severities(hurtable, [{}])
+    walks = run(hurtable, [Stretch(n, ["walk"], unhurt) for n in (20, 400, 10)], RUNTIME)
     phase = np.zeros((430, 1))
     phase[:, 0] = np.mod(0.013 * np.arange(430), 1)
     known = replace(walks, phase=phase)
