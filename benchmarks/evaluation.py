@@ -42,8 +42,8 @@ def sweep(network: Network) -> tuple[float, float]:
         told = {name: rows[which] for name, rows in hurt.items()}
         run(network, [Stretch(FRAMES, ["walk"] * len(links[which]), told)], RUNTIME)
 
-    per = 1e6 / FRAMES / len(links)
-    return per * seconds(lambda: walk(slice(None))), per * seconds(lambda: [walk(slice(i, i + 1)) for i in range(len(links))])
+    per, alone = 1e6 / FRAMES / len(links), [slice(i, i + 1) for i in range(len(links))]
+    return per * seconds(lambda: walk(slice(None))), per * seconds(lambda: [walk(one) for one in alone])
 
 
 def roll_outs(network: Network) -> tuple[float, float]:

@@ -47,8 +47,9 @@ class Toy(Network):
         self.mode(mode)
         return Predictor(self)
 
-    def page(self, outputs):
-        return {"layers": [packed_rows(self.weights[None, :outputs], self.biases[None, :outputs])]}
+    def page(self, inputs, outputs):
+        weights, biases = self.weights[outputs][:, inputs], self.biases[outputs]
+        return {"layers": [packed_rows(weights[None], biases[None])]}
 
 
 class Predictor:
