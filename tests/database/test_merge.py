@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import random
+import shutil
 import signal
 import time
 import tracemalloc
@@ -172,6 +173,15 @@ def test_a_build_killed_at_any_moment_leaves_the_old_database_or_the_new_one(row
     assert killed >= 5
     write_database(path, new, splits, **OPTIONS)
     assert contents(path) == contents(tmp_path / "timed")  # and nothing is left lying about
+
+
+def test_a_build_whose_removal_was_killed_half_way_is_made_whole(rows_of, tmp_path):
+    rows, splits = {"a": rows_of("a", 60)}, {"a": "train"}
+    manifest = write_database(tmp_path / "db", rows, splits, **OPTIONS)
+    before = contents(tmp_path / "db")
+    shutil.rmtree(tmp_path / "db" / manifest.folder / "train")
+    write_database(tmp_path / "db", rows, splits, **OPTIONS)
+    assert contents(tmp_path / "db") == before
 
 
 def test_a_full_disk_is_said_and_the_database_before_stays(rows_of, tmp_path, monkeypatch):

@@ -251,7 +251,9 @@ def _publish(path: Path, work: Path, manifest: Manifest) -> None:
     final = path / manifest.folder
     if final.exists():  # the same rows were built before: put each file in its place, whole or damaged
         for file in sorted(p for p in work.rglob("*") if p.is_file()):
-            os.replace(file, final / file.relative_to(work))
+            place = final / file.relative_to(work)
+            place.parent.mkdir(parents=True, exist_ok=True)  # a kill may have left half a removed build
+            os.replace(file, place)
         sync_folder(final)
     else:
         os.rename(work, final)
