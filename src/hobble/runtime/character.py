@@ -20,7 +20,8 @@ class Character:
     joint_rotation: (C, J, 4) world: the network's own copy. phase: (C,). told, told_target: (C, K) every
     channel's columns side by side.
     target_velocity, target_direction: (C, 2); strafe: (C,); owed: (C, 2) of `trajectory.follow_wish`.
-    foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2), foot_added (C, 2, 2, 4): of `feet`.
+    foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2), foot_added (C, 2, 2, 4): of `feet`. memory: (C,
+    M) what the network keeps of it, of `Network.memory`.
     """
 
     position: Array
@@ -42,6 +43,7 @@ class Character:
     foot_hold: Array
     foot_lift: Array
     foot_added: Array
+    memory: Array
 
 
 class Kept:
@@ -95,6 +97,7 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         foot_hold=np.zeros((count, 2, 2)),
         foot_lift=np.zeros((count, 2)),
         foot_added=np.tile([1.0, 0.0, 0.0, 0.0], (count, 2, 2, 1)),
+        memory=np.zeros((count, network.memory)),
     )
 
 

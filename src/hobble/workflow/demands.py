@@ -16,6 +16,7 @@ from pathlib import Path
 from hobble.channels import channel
 from hobble.measures.registry import measure
 from hobble.models import model
+from hobble.models.model import Trained
 from hobble.rows.layout import RowLayout
 from hobble.workflow.clips import original
 from hobble.workflow.project import Project
@@ -75,8 +76,15 @@ class Demands:
         return self.minutes_of_all(dataset, each, attempt, least)
 
     def training_memory(self, configuration: str, attempt: int = 1) -> int:
-        """Megabytes for a training: PyTorch, the part of the database it holds, weights and their moments."""
+        """Megabytes for a training: PyTorch, the part of the database it holds, weights and their moments.
+
+        What is built instead has every row of the clips in memory, three times at its most.
+        """
         training = self.project.configurations.section(configuration, "training")
+        if self.project.configurations.is_built(configuration):
+            layout, dataset = self.layout(configuration), self.project.configurations.dataset(configuration)
+            rows = 3 * 4e-3 * (layout.x_size + layout.y_size) * self.all_thousands(dataset)
+            return _megabytes(500 + training["memory_mb"] + rows, attempt)
         return _megabytes(500 + training["memory_mb"] + 32e-6 * self.weights(configuration), attempt)
 
     def training_minutes(self, configuration: str, attempt: int = 1) -> int:
@@ -103,7 +111,10 @@ class Demands:
     def weights(self, configuration: str) -> float:
         """Numbers that are trained, by the columns of the configuration's rows."""
         chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
-        return model(chosen.network.kind).parameters(chosen.network, layout.x_size, layout.y_size)
+        kind = model(chosen.network.kind)
+        return (
+            kind.parameters(chosen.network, layout.x_size, layout.y_size) if isinstance(kind, Trained) else 0
+        )
 
     def layout(self, configuration: str) -> RowLayout:
         """The columns of a configuration's rows."""

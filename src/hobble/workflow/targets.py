@@ -57,15 +57,19 @@ def _configuration(project: Project, name: str) -> None:
             raise HobbleError(f"configuration {name} cannot go on from itself")
         project.catalogue.configuration(other)
     if model.training.continues:
-        _goes_on(name, model, project.catalogue.configuration(model.training.continues))
+        _goes_on(project, name, model)
     _dataset(project, model.dataset)
     project.datasets.selected(model.dataset, model.channels)
     refuse_copies(project.clips, project.datasets, model.dataset, tuple(model.channels))
 
 
-def _goes_on(name: str, model: Configuration, start: Configuration) -> None:
+def _goes_on(project: Project, name: str, model: Configuration) -> None:
     """A training goes on with a network of the same shape, and counts its passes in sections."""
     begun = model.training.continues
+    if project.configurations.is_built(name):
+        raise HobbleError(f"configuration {name} is built at once, so it cannot go on from {begun}")
+    assert begun is not None
+    start = project.catalogue.configuration(begun)
     for key, mine, of_start in (
         ("channels", list(model.channels), list(start.channels)),
         ("network", model.network.model_dump(), start.network.model_dump()),

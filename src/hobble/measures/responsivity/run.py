@@ -66,7 +66,7 @@ def responsivity(
                 sum(np.hypot(*(np.subtract(a.position, b.position))) for a, b in _closed(track)) / 100, 3
             ),
         },
-        "parameters": parameter_counts(network.sizes),
+        "parameters": parameter_counts(network.sizes) if network.sizes else None,
         "laps_beside": beside,
         **found[own],
         "modes": list(found.values()),

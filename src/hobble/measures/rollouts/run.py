@@ -126,6 +126,7 @@ def roll_out(
     place = x[:, layout.x_joint_position].reshape(joints).astype(float)
     phase = asked.phase[starts].copy()
     speed = np.zeros(joints)
+    memory = np.zeros((len(starts), predictor.network.memory))
     made = []
     for age in range(length):
         alive = int(np.searchsorted(starts, len(asked.x) - age))
@@ -139,7 +140,8 @@ def roll_out(
             lower[..., 1] += (asked.mean[at - 1] - asked.mean[at])[:, None]
             row[:, layout.x_joint_position] = lower.reshape(alive, -1)
             row[:, layout.x_joint_velocity] = speed[:alive].reshape(alive, -1)
-        y = predictor.predict(row, phase[:alive])
+        kept = {"memory": memory[:alive]} if predictor.network.memory else {}
+        y = predictor.predict(row, phase[:alive], **kept)
         before = row[:, layout.x_joint_position].reshape(alive, -1, 3).astype(float)
         speed[:alive] = y[:, layout.y_joint_velocity].reshape(alive, -1, 3)
         guess = y[:, layout.y_joint_position].reshape(alive, -1, 3)
