@@ -114,6 +114,10 @@ class Network(ABC):
     def parameters(self) -> int:
         """Numbers that one prediction goes through: the weights and biases of one phase."""
 
+    def stored(self, mode: str) -> int:
+        """Numbers that it keeps in memory to run in a mode, one of `modes`."""
+        return self.parameters
+
     @property
     @abstractmethod
     def described(self) -> str:

@@ -180,6 +180,16 @@ def test_the_page_matches_as_python_does(made: Made, tmp_path: Path) -> None:
     assert transitions > 4
 
 
+def test_a_page_of_many_rows_has_the_first_part_of_each_run(made: Made) -> None:
+    _, _, network = made
+    assert network.shortened(1000) is network
+    short = network.shortened(80)  # of 70 and 90 rows, half
+    np.testing.assert_array_equal(short.left, [*range(34, -1, -1), *range(44, -1, -1)])
+    np.testing.assert_array_equal(short.frames[35:], network.frames[70:115])
+    np.testing.assert_array_equal(short.features[:35], network.features[:35])
+    assert short.starts.max() < 80 - 20
+
+
 def test_a_character_goes(made: Made) -> None:
     animation = ProceduralAnimation(made[2], characters=2)
     for _ in range(12):

@@ -67,6 +67,8 @@ def responsivity(
             ),
         },
         "parameters": parameter_counts(network.sizes) if network.sizes else None,
+        "stored": {mode: network.stored(mode) for mode in network.modes},
+        "exact": network.mode(None),
         "laps_beside": beside,
         **found[own],
         "modes": list(found.values()),

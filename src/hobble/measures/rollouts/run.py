@@ -62,8 +62,11 @@ class Strayed:
             self.last + other.last,
         )
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data; None where there was no frame, or no roll-out that came to its end."""
+    def to_dict(self, phase: bool = True) -> dict[str, Any]:
+        """Plain data; None where there was no frame, or no roll-out that came to its end.
+
+        phase: whether the network goes by the phase; of one that does not, how far it is off says nothing.
+        """
         known, ended = self.frames > 0, self.last.weight > 0
         return {
             "frames": self.frames,
@@ -72,7 +75,7 @@ class Strayed:
             "position_error_cm": float(self.moments.mean[1]) if known else None,
             "ended": int(self.last.weight),
             "last_cm": float(self.last.mean[0]) if ended else None,
-            "last_phase": float(self.last.mean[1]) if ended else None,
+            "last_phase": float(self.last.mean[1]) if ended and phase else None,
         }
 
 
@@ -227,7 +230,7 @@ def measure_roll_outs(
         check_layout(clips[name], rows, network)
         for length, found in clip_roll_outs(predictor, rows, joints, lengths).items():
             total[length][splits[name]] += found
-            entries[length].append({"clip": name, "split": splits[name], **found.to_dict()})
+            entries[length].append({"clip": name, "split": splits[name], **found.to_dict(network.phase)})
         log.info("%s: %s", name, entries[lengths[-1]][-1])
     return {
         "configuration": configuration,
@@ -236,7 +239,7 @@ def measure_roll_outs(
         "lengths": [
             {
                 "length": length,
-                **{split: total[length][split].to_dict() for split in SPLITS},
+                **{split: total[length][split].to_dict(network.phase) for split in SPLITS},
                 "clips": entries[length],
             }
             for length in lengths

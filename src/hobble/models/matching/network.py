@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -24,6 +24,7 @@ MOST_ROWS = 1 << 24  # more would not be told apart by the page's float32
 MOST_WEIGHT = 1e9
 LONGEST = 1_000_000  # frames
 FEWEST_LEFT = 20  # frames that have to follow a row for a run to begin there
+MOST_ON_PAGE = 8000  # rows, about 8 MB of text; a page of several characters is to stay below 20 MB
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,25 @@ class Matching(Network):
             every=checks.whole(path, "every", meta.get("every"), 1, LONGEST),
             halflife=checks.length(path, "halflife", meta.get("halflife"), LONGEST),
             **common,
+        )
+
+    def shortened(self, most: int) -> Matching:
+        """The same with the first part of each run, as long as leaves `most` rows or a few more in all."""
+        rows = len(self.left)
+        if rows <= most:
+            return self
+        begins = np.flatnonzero(np.r_[True, self.left[:-1] == 0])
+        lengths = self.left[begins] + 1
+        kept = np.ceil(lengths * (most / rows)).astype(np.int64)
+        within = np.arange(rows) - np.repeat(begins, lengths)
+        left = np.repeat(kept, lengths) - 1 - within
+        some = left >= 0
+        return replace(
+            self,
+            features=self.features[some],
+            frames=self.frames[some],
+            phases=self.phases[some],
+            left=left[some],
         )
 
     @cached_property
@@ -141,7 +161,10 @@ class Matching(Network):
 
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`: frames as integers with a factor for each column; features are as they are, so
-        that the page finds the same rows."""
+        that the page finds the same rows. Of many rows only MOST_ON_PAGE are there, of each run the first."""
+        return self.shortened(MOST_ON_PAGE)._packed(inputs, outputs)
+
+    def _packed(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         place = {int(column): i for i, column in enumerate(inputs)}
         there = [i for i, column in enumerate(self.columns) if int(column) in place]
         used, layout = self.columns[there], self.layout
