@@ -29,7 +29,12 @@ GRACE = 2.0  # seconds that a job has for tidying up after SIGTERM
 
 def announce() -> None:
     """Say in the environment, which jobs inherit, which process the run is."""
-    os.environ[RUN] = f"{os.getpid()} {_began(os.getpid())}"
+    os.environ[RUN] = this_process()
+
+
+def this_process() -> str:
+    """This process as `RUN` names one: its number, and when it began."""
+    return f"{os.getpid()} {_began(os.getpid())}"
 
 
 def own_lock(locks: Path = LOCKS) -> None:
