@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hobble.config.load import Catalogue, layers, merge, read_yaml, validate
+from hobble.config.load import Catalogue, merge, read_layers, read_yaml, validate
 from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 from hobble.core.errors import HobbleError
 
@@ -80,7 +80,7 @@ def test_a_name_that_yaml_takes_for_a_number_belongs_in_quotes(tmp_path: Path, t
 def test_a_circle_of_extends_is_told(folder: Path) -> None:
     (folder / "base.yaml").write_text("extends: child\n")
     with pytest.raises(HobbleError, match=r"child\.yaml: extends itself by way of child -> base"):
-        layers(folder, "child")
+        read_layers(folder, "child")
 
 
 @pytest.mark.parametrize(

@@ -102,7 +102,7 @@ def rows(shared: Path, root: Path) -> ClipRows:
 @pytest.mark.shared
 def test_the_original_rows_column_by_column(rows, original):
     layout = replace(rows.layout, channels=())
-    (pairs,) = expanded(rows, rows.layout.told(()))
+    (pairs,) = expanded(rows, rows.layout.with_channels(()))
     np.testing.assert_array_equal(np.bincount(rows.cycle), original["cycle_length"])
     np.testing.assert_allclose(pairs.p, original["P"], atol=1e-6)
     differing = []
@@ -237,7 +237,8 @@ def test_fits_of_a_row_share_its_frame_and_differ_in_the_ground(walk, labels, te
     rows = clip_rows("walk", walk, labels, {"injury": np.zeros((300, 2))}, hilly, **OPTIONS)
     layout = rows.layout
     x, y = (
-        np.concatenate(parts) for parts in list(zip(*expanded(rows, rows.layout.told(())), strict=True))[:2]
+        np.concatenate(parts)
+        for parts in list(zip(*expanded(rows, rows.layout.with_channels(())), strict=True))[:2]
     )
     centre = hilly["heights"][:, 12:24].mean(axis=1)
     np.testing.assert_allclose(x[:, layout.x_terrain], hilly["heights"] - centre[:, None], atol=1e-4)

@@ -31,7 +31,7 @@ def locks(tmp_path: Path) -> Path:
     folder = tmp_path / ".snakemake/locks"
     folder.mkdir(parents=True)
     (folder / "0.output.lock").write_text("results/a\n")
-    lifetime.own_lock(folder)
+    lifetime.record_lock_owner(folder)
     return folder
 
 

@@ -13,7 +13,7 @@ from hobble.core.quat import Array
 from hobble.core.section import Section
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured, captured_clips
-from hobble.evaluation.crowd import FPS, Stretch, told
+from hobble.evaluation.crowd import FPS, Stretch, channel_values
 from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
@@ -137,7 +137,7 @@ def generated(
     """The windows of each figure's walks straight ahead at all PACES; figures: mood -> value."""
     assert network.skeleton is not None
     asked = [(i, figure, pace) for i, figure in enumerate(figures) for pace in PACES]
-    values = told(network, MOOD, [figure for _, figure, _ in asked])
+    values = channel_values(network, MOOD, [figure for _, figure, _ in asked])
     script = Stretch(WALKED_IN + SHOWN, ["walk"] * len(asked), values, [speed * pace for *_, pace in asked])
     walks = run_walks(network, [script], runtime)
     out: list[list[Window]] = [[] for _ in figures]
