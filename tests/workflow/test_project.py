@@ -134,7 +134,7 @@ def test_what_no_network_could_give_is_told_before_it_is_trained(
     base: Path, monkeypatch: pytest.MonkeyPatch, target: str, message: str
 ) -> None:
     (base / "config/eyes.yaml").write_text("extends: hurt\nnetwork_of: one\n")
-    monkeypatch.setattr(targets, "_dataset", lambda *_: None)
+    monkeypatch.setattr(targets, "_check_dataset", lambda *_: None)
     with pytest.raises(HobbleError, match=message):
         check(Project(base, {}), [target])
     fine = ("results/hurt/stimuli", "results/one/export/pfnn", "results/one/export/cubic.onnx")
@@ -349,13 +349,15 @@ def test_a_status_file_of_no_clip_is_told_with_the_nearest_name(base: Path) -> N
     (base / "data/mine/orphn_injuries.txt").write_text("frames:9\n1-9 LeftLeg-LeftFoot[4];\n")
     (note,) = notes(Project(base, {}), ["results/one/report.html", "results/hurt/report.html"])
     assert note.startswith("data set mine: ")
-    assert "orphn_injuries.txt belongs to no clip and is not read: is it that of orphan?" in note
+    assert (
+        "orphn_injuries.txt belongs to no clip and is not read. If it belongs to orphan, rename it." in note
+    )
 
 
 def test_two_files_of_one_clip_are_refused_with_both(base: Path) -> None:
     (base / "data/mine/old").mkdir()
     (base / "data/mine/old/a.BVH").write_text("")
-    with pytest.raises(HobbleError, match=r"old/a\.BVH: a second file of clip a, beside .*mine/a\.bvh"):
+    with pytest.raises(HobbleError, match=r"old/a\.BVH: a second file of clip a; the first is .*mine/a\.bvh"):
         Project(base, {}).clips.of("mine")
     (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , c: }\n")
     with pytest.raises(HobbleError, match="a second file of clip a"):
