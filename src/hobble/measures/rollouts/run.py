@@ -35,7 +35,7 @@ from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
 from hobble.rows.layout import GAITS, RowLayout
 
 LENGTHS = (1, 10, 60, 300)  # frames
-OVERLAP = 10  # roll-outs of one length that every frame lies in
+OVERLAP = 4  # roll-outs of one length that every frame lies in
 BATCH = 1024  # roll-outs side by side
 
 log = logging.getLogger("hobble")
