@@ -101,7 +101,7 @@ def soak(
 ) -> dict[str, Any]:
     """The worst of characters x frames; options: of ProceduralAnimation.
 
-    `finite`; `hips_lowest_cm` and `hips_highest_cm` above the path's mean ground; `network_turn_degrees`, the
+    `finite`; `hips_lowest_cm` and `hips_highest_cm` above the ground under them; `network_turn_degrees`, the
     most that the network turned a joint in a frame, `turn_degrees` that of the pose, `added_turn_degrees`
     the most by which the pose turned further than the network in the same joint and frame; `slide_cm` a
     stance, mean; `toes_cm` and `knees_cm`, the most that these moved in a frame.
@@ -123,7 +123,8 @@ def soak(
         wishes.renew(rng)
         pose = animation.next_pose(wishes.velocity, wishes.facing, wishes.gait, terrain=ground, **wishes.told)
         finite = finite and bool(np.isfinite(pose.positions).all() and np.isfinite(pose.rotations).all())
-        height = pose.positions[:, hips, 1] - pose.root[:, 1]
+        at = pose.positions[:, hips]
+        height = at[:, 1] - ground(at[:, 0], at[:, 2])
         low, high = min(low, float(height.min())), max(high, float(height.max()))
         now = pose.positions, pose.rotations, animation.state.joint_rotation.copy()
         if old is not None:

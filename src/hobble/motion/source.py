@@ -31,7 +31,9 @@ from hobble.motion.rig import (
     missing_bone,
     unit_of,
 )
-from hobble.motion.stance import Spine, stands, upright
+from hobble.motion.spine import Spine
+from hobble.motion.stance import upright
+from hobble.motion.standing import stands
 
 STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
 FOUND = "found"  # what a report calls a rig that no skeleton file describes
