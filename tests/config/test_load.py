@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -226,3 +227,13 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
     assert catalogue.configuration("injured").channels == ("injury",)
     assert catalogue.dataset("synthetic").terrain.fits == 10
     assert catalogue.dataset("synthetic").synthetic.frames == 11_412
+
+
+def test_the_release_has_its_forty_clips_on_their_ground(root: Path) -> None:
+    """As the generator of the original database has them: 40 clips, and the mirrors of all."""
+    release = Catalogue(root / "config").dataset("pfnn")
+    grounds = Counter(entry.ground if entry else "flat" for entry in release.clips.values())
+    assert grounds == {"flat": 19, "rocky": 15, "jumpy": 5, "beam": 1}
+    assert release.mirror
+    assert release.held_out == ()
+    assert len(release.terrain.heightmaps) == 13

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hobble.config import sections
+from hobble.config.load import Catalogue
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
@@ -27,20 +28,8 @@ from hobble.terrain.patches import draw_patches
 
 NAME = "LocomotionFlat09_000"
 OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0}
-# A data set as the original made it: what differs from the defaults, as a configuration would say it.
-ORIGINAL = {
-    "motion": {"proportions": "clip", "defects": "refuse"},
-    "labels": {"margins": "drop", "contacts": "original"},
-    "terrain": {
-        "flat_level": "feet",
-        "heel_height": 5.0,
-        "toe_height": 4.0,
-        "held_up": None,
-        "deepest": None,
-        "bend_flat": False,
-    },
-    "database": {},
-}
+# The data set of the original release, whose sections are to make the original's rows.
+RELEASE = Catalogue(Path(__file__).parents[2] / "config").dataset("pfnn")
 IN_CENTIMETRES = ("position", "joint_position")
 
 
@@ -65,7 +54,7 @@ def original(shared: Path) -> dict[str, np.ndarray]:
 def options(section: str, **changed: object) -> dict[str, Any]:
     """A section of the original's data set, as its stage gets it."""
     model = getattr(sections, section.capitalize())
-    return model(**ORIGINAL[section] | changed).model_dump(mode="json")
+    return model(**getattr(RELEASE, section).model_dump() | changed).model_dump(mode="json")
 
 
 def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrain: object) -> ClipRows:
