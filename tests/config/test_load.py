@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hobble.config.load import Catalogue, layers, merge, read_yaml, validate
+from hobble.config.load import Catalogue, merge, read_layers, read_yaml, validate
 from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 from hobble.core.errors import HobbleError
 
@@ -80,7 +81,7 @@ def test_a_name_that_yaml_takes_for_a_number_belongs_in_quotes(tmp_path: Path, t
 def test_a_circle_of_extends_is_told(folder: Path) -> None:
     (folder / "base.yaml").write_text("extends: child\n")
     with pytest.raises(HobbleError, match=r"child\.yaml: extends itself by way of child -> base"):
-        layers(folder, "child")
+        read_layers(folder, "child")
 
 
 @pytest.mark.parametrize(
@@ -226,3 +227,13 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
     assert catalogue.configuration("injured").channels == ("injury",)
     assert catalogue.dataset("synthetic").terrain.fits == 10
     assert catalogue.dataset("synthetic").synthetic.frames == 11_412
+
+
+def test_the_release_has_its_forty_clips_on_their_ground(root: Path) -> None:
+    """As the generator of the original database has them: 40 clips, and the mirrors of all."""
+    release = Catalogue(root / "config").dataset("pfnn")
+    grounds = Counter(entry.ground if entry else "flat" for entry in release.clips.values())
+    assert grounds == {"flat": 19, "rocky": 15, "jumpy": 5, "beam": 1}
+    assert release.mirror
+    assert release.held_out == ()
+    assert len(release.terrain.heightmaps) == 13

@@ -18,9 +18,9 @@ from hobble.models import DEFAULT, MODELS
 
 Model = TypeVar("Model", bound=BaseModel)
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")  # so that no name leads out of its folder
-NOT_TEXT = (bool, int, float, date)  # what YAML reads words like 02_01, 1e5, 2020-01-01 and on as
-QUOTES = 'Put the name in quotes, as in "02_01": without them YAML takes it for something else.'
-NAMES = "Names are made of letters, digits, dots, dashes and underscores."
+NOT_STRINGS = (bool, int, float, date)  # what YAML reads words like 02_01, 1e5, 2020-01-01 and on as
+QUOTES_HINT = 'Put the name in quotes, as in "02_01": without them YAML takes it for something else.'
+NAME_HINT = "Names are made of letters, digits, dots, dashes and underscores."
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return data
 
 
-def layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[dict[str, Any], list[Path]]:
+def read_layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[dict[str, Any], list[Path]]:
     """The values of `<folder>/<name>.yaml` over those of what it `extends`, and the files read.
 
     within: names whose files this one is read for.
@@ -65,7 +65,8 @@ def layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[dict[
     next_name: str | None = name
     while next_name is not None:
         if not isinstance(next_name, str) or not NAME.fullmatch(next_name):
-            raise InputError(files[-1] if files else folder, f"{next_name!r:.80} is not a name", fix=NAMES)
+            where = files[-1] if files else folder
+            raise InputError(where, f"{next_name!r:.80} is not a name", fix=NAME_HINT)
         path = folder / f"{next_name}.yaml"
         if path in files:
             raise InputError(path, f"extends itself by way of {' -> '.join(p.stem for p in files)}")
@@ -85,7 +86,7 @@ def with_training(folder: Path, values: dict[str, Any], within: tuple[str, ...] 
         return values
     if name in within:
         raise InputError(folder / f"{name}.yaml", f"`training: {name}` leads back to itself")
-    return {**values, "training": layers(folder, name, within)[0].get("training", {})}
+    return {**values, "training": read_layers(folder, name, within)[0].get("training", {})}
 
 
 def validate(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
@@ -107,8 +108,8 @@ def _problem(item: Any, model: type[BaseModel]) -> str:
     if item["type"] == "value_error" and of_a_section:  # the message says it all
         return f"{key}: {message}." if item["loc"] else f"{message}."
     text = f"{key}: {message[0].lower()}{message[1:]}, not {item['input']!r:.80}."
-    if item["type"] == "string_type" and isinstance(item["input"], NOT_TEXT):
-        text += f" {QUOTES}"
+    if item["type"] == "string_type" and isinstance(item["input"], NOT_STRINGS):
+        text += f" {QUOTES_HINT}"
     return text
 
 
@@ -143,7 +144,7 @@ class Catalogue:
         return self._get("configuration", name, self.folder, Configuration, self.overrides)
 
     @staticmethod
-    def _typed(model: type[Model], values: Mapping[str, Any], where: str) -> type[Model]:
+    def _model_for(model: type[Model], values: Mapping[str, Any], where: str) -> type[Model]:
         """A configuration's type, which depends on the kind of its network."""
         network = values.get("network")
         if model is not Configuration or not isinstance(network, Mapping):
@@ -163,9 +164,9 @@ class Catalogue:
 
     def _get(self, kind: str, name: str, folder: Path, model: type[Model], over: Mapping[str, Any]) -> Model:
         if (kind, name) not in self._cache:
-            values, files = layers(folder, name)
+            values, files = read_layers(folder, name)
             where = " < ".join(str(path) for path in files)
             if over:
                 values, where = with_training(folder, merge(values, over)), f"{where} < --config"
-            self._cache[kind, name] = validate(self._typed(model, values, where), values, where)
+            self._cache[kind, name] = validate(self._model_for(model, values, where), values, where)
         return self._cache[kind, name]

@@ -10,22 +10,22 @@ from pydantic import AfterValidator, Field, create_model, field_validator, model
 from hobble.channels import NAMES as NAMES_OF_CHANNELS
 from hobble.channels import channel, every
 from hobble.config import sections as s
-from hobble.core.clip_files import NAMES, can_be_called
+from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
 from hobble.models import DEFAULT, model
 from hobble.models.options import Options
 
 
 def _clip_name(name: str) -> str:
-    if not can_be_called(name):
-        raise ValueError(f"a clip's name has {NAMES}")
+    if not is_valid_clip_name(name):
+        raise ValueError(f"a clip's name has {CLIP_NAME_RULE}")
     return name
 
 
-def _renamed(values: Any, model: type[s.Section], how: str) -> Any:
+def _refuse_old_keys(values: Any, model: type[s.Section], how: str) -> Any:
     """Refuse a key that there was before channels; how: what to write instead of it, for channel {}."""
     for key in values if isinstance(values, dict) else ():
-        if key not in model.model_fields and isinstance(key, str) and key in FORMER:
-            raise ValueError(f"`{key}` is now `{how.format(FORMER[key])}`")
+        if key not in model.model_fields and isinstance(key, str) and key in OLD_KEYS:
+            raise ValueError(f"`{key}` is now `{how.format(OLD_KEYS[key])}`")
     return values
 
 
@@ -39,8 +39,8 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 ClipName = Annotated[str, AfterValidator(_clip_name)]
 Link = Annotated[str, Field(min_length=3)]
 ChannelName = Annotated[str, AfterValidator(_channel)]
-FORMER = {key: one.name for one in every() for key in one.former}
-SYNTHETIC = ("injured", "recipe", "share")  # keys of a clip that only the walker reads
+OLD_KEYS = {key: one.name for one in every() for key in one.former}
+WALKER_KEYS = ("injured", "recipe", "share")  # keys of a clip that only the walker reads
 
 
 class ClipEntry(s.Section):
@@ -60,8 +60,8 @@ class ClipEntry(s.Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _not_renamed(cls, values: Any) -> Any:
-        return _renamed(values, cls, "channels: {{{}: ...}}")
+    def _no_old_keys(cls, values: Any) -> Any:
+        return _refuse_old_keys(values, cls, "channels: {{{}: ...}}")
 
 
 class Dataset(s.Section):
@@ -107,15 +107,15 @@ class Dataset(s.Section):
         if self.download is not None and not (self.folder and self.clips):
             raise ValueError("a data set that downloads its clips lists them and names a `folder`")
         if self.synthetic is None:
-            self._without_the_walker()
+            self._no_walker_keys()
         unknown = [c for c in self.held_out if self.clips and c not in self.clips]
         if unknown:
             raise ValueError(f"held_out names clips that are not in `clips`: {', '.join(unknown)}")
         return self
 
-    def _without_the_walker(self) -> None:
+    def _no_walker_keys(self) -> None:
         for clip, entry in self.clips.items():
-            for key in SYNTHETIC:
+            for key in WALKER_KEYS:
                 if entry and getattr(entry, key) != ClipEntry.model_fields[key].default:
                     hint = "; use `channels`" if key == "injured" else ""
                     raise ValueError(
@@ -140,8 +140,8 @@ class Configuration(s.Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _not_renamed(cls, values: Any) -> Any:
-        return _renamed(values, cls, "channels: [{}]")
+    def _no_old_keys(cls, values: Any) -> Any:
+        return _refuse_old_keys(values, cls, "channels: [{}]")
 
     @field_validator("channels")
     @classmethod
@@ -177,7 +177,7 @@ class SkeletonFile(s.Section):
     )
 
     @model_validator(mode="after")
-    def _hangs_together(self) -> SkeletonFile:
+    def _joints_are_consistent(self) -> SkeletonFile:
         seen: set[str] = set()
         for name, joint in self.joints.items():
             if joint.parent is None and seen:

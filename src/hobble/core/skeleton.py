@@ -13,11 +13,11 @@ from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 
-SIDES = (("Left", "Right"), ("left", "right"), ("LEFT", "RIGHT"))
+SIDE_WORDS = (("Left", "Right"), ("left", "right"), ("LEFT", "RIGHT"))
 # L_Leg, leg.r and Bip01 L Leg; LLeg and rLeg
-LETTER = re.compile(r"(?<![^_. -])[LRlr](?![^_. -])|^[LRlr](?=[A-Z])")
-ACROSS = str.maketrans("LRlr", "RLrl")
-NAMED = "alike but for Left and Right, or L and R, as in LeftLeg, L_Leg, Leg.L, LLeg"
+SIDE_LETTER = re.compile(r"(?<![^_. -])[LRlr](?![^_. -])|^[LRlr](?=[A-Z])")
+OTHER_LETTER = str.maketrans("LRlr", "RLrl")
+PAIRED_NAMES = "alike but for Left and Right, or L and R, as in LeftLeg, L_Leg, Leg.L, LLeg"
 
 
 def other_side(name: str) -> str:
@@ -26,12 +26,12 @@ def other_side(name: str) -> str:
     >>> other_side("LeftUpLeg"), other_side("LHipJoint"), other_side("Neck1"), other_side("Hand_R")
     ('RightUpLeg', 'RHipJoint', 'Neck1', 'Hand_L')
     """
-    for left, right in SIDES:
+    for left, right in SIDE_WORDS:
         if left in name:
             return name.replace(left, right)
         if right in name:
             return name.replace(right, left)
-    return LETTER.sub(lambda match: match[0].translate(ACROSS), name, count=1)
+    return SIDE_LETTER.sub(lambda match: match[0].translate(OTHER_LETTER), name, count=1)
 
 
 @dataclass(frozen=True)
@@ -123,9 +123,9 @@ class Skeleton:
         for role, left in self.roles.items():
             right = self.roles.get(role.replace("left_", "right_", 1))
             if right not in (None, left) and self.joints[swap[self.index(left)]] != right:
-                raise self._lopsided(
+                raise self._mirror_error(
                     f"{left} is the {role.replace('_', ' ')} and {right} the right one, but their names do "
-                    f"not say so. Name the joints of both sides {NAMED}."
+                    f"not say so. Name the joints of both sides {PAIRED_NAMES}."
                 )
         return swap
 
@@ -140,12 +140,12 @@ class Skeleton:
         across = [tuple(self.joints[swap[self.index(joint)]] for joint in link) for link in self.links]
         for link, other in zip(self.links, across, strict=True):
             if other not in self.links:
-                raise self._lopsided(
+                raise self._mirror_error(
                     f"its links hold {'-'.join(link)} and not {'-'.join(other)}. Add that link."
                 )
         return np.array([self.links.index(other) for other in across], int)
 
-    def _lopsided(self, why: str) -> HobbleError:
+    def _mirror_error(self, why: str) -> HobbleError:
         return HobbleError(f"skeleton {self.name} cannot be mirrored: {why}")
 
     def _counterpart(self, name: str) -> int:

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     import yaml
 
 MB = 1 << 20
-MOST_TEXT = 64 * MB  # labels and status: 1 kB a frame of a clip of ten minutes at 100 Hz
-MOST_YAML = 4 * MB  # a data set that lists 20,000 clips with five keys each
-DEEPEST_YAML = 100
-MOST_NODES = 1_000_000  # of a YAML file with its aliases written out: some 100 MB as Python objects
+MAX_TEXT_BYTES = 64 * MB  # labels and status: 1 kB a frame of a clip of ten minutes at 100 Hz
+MAX_YAML_BYTES = 4 * MB  # a data set that lists 20,000 clips with five keys each
+MAX_YAML_DEPTH = 100
+MAX_YAML_NODES = 1_000_000  # of a YAML file with its aliases written out: some 100 MB as Python objects
 
 
 def check_regular(path: str | Path) -> os.stat_result:
@@ -60,7 +60,7 @@ def read_bytes(path: str | Path, most: int) -> bytes:
     return data
 
 
-def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
+def read_text(path: str | Path, most: int = MAX_TEXT_BYTES) -> str:
     """A text file as UTF-8, without a byte order mark; raises InputError where it is none or too large."""
     try:
         return read_bytes(path, most).decode("utf-8-sig")
@@ -75,7 +75,7 @@ def read_yaml(path: str | Path) -> Any:
     """
     import yaml  # not needed by most jobs, which are many and short
 
-    text = read_text(path, MOST_YAML)
+    text = read_text(path, MAX_YAML_BYTES)
     kind = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     loader = kind(text)
     try:
@@ -83,8 +83,8 @@ def read_yaml(path: str | Path) -> Any:
         node = loader.get_single_node()
         if node is None:
             return None
-        if _written_out(node, {}, set()) > MOST_NODES:
-            raise InputError(path, f"its aliases stand for more than {MOST_NODES} values")
+        if _size_without_aliases(node, {}, set()) > MAX_YAML_NODES:
+            raise InputError(path, f"its aliases stand for more than {MAX_YAML_NODES} values")
         _check_keys(path, node)
         return loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
@@ -105,7 +105,7 @@ def _check_depth(events: Iterable[yaml.Event]) -> None:
     depth = 0
     for event in events:
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > DEEPEST_YAML:
+        if depth > MAX_YAML_DEPTH:
             raise RecursionError
 
 
@@ -135,7 +135,7 @@ def _children(node: yaml.Node) -> list[yaml.Node]:
     return [part for pair in pairs for part in pair]
 
 
-def _written_out(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
+def _size_without_aliases(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
     """Values that a node stands for when every alias is replaced by what it names."""
     if not isinstance(node.value, list):
         return 1
@@ -143,6 +143,6 @@ def _written_out(node: yaml.Node, known: dict[int, int], above: set[int]) -> int
         raise RecursionError
     if id(node) not in known:
         above.add(id(node))
-        known[id(node)] = 1 + sum(_written_out(child, known, above) for child in _children(node))
+        known[id(node)] = 1 + sum(_size_without_aliases(child, known, above) for child in _children(node))
         above.remove(id(node))
     return known[id(node)]

@@ -13,11 +13,11 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
-from hobble.rows.compose import body_columns, compose, of_frame
+from hobble.rows.compose import body_columns, compose, frame_inputs
 from hobble.rows.layout import RowLayout
 
-CHANNEL = "channel_"  # before the names of the channels' arrays in a file
-HINT = "Delete it; the next run makes it again."
+CHANNEL_PREFIX = "channel_"  # before the names of the channels' arrays in a file
+DELETE_IT = "Delete it; the next run makes it again."
 
 
 @dataclass(frozen=True)
@@ -68,12 +68,14 @@ class ClipRows:
             "mean": (fits,),
         }
         if set(self.channels) != set(dict(layout.channels)):
-            raise InputError(where, "it has other channels than its layout says", fix=HINT)
+            raise InputError(where, "it has other channels than its layout says", fix=DELETE_IT)
         tables = {name: getattr(self, name) for name in expected} | dict(self.channels)
         expected |= {name: (rows, columns) for name, columns in layout.channels}
         for name, shape in expected.items():
             if tables[name].shape != shape:
-                raise InputError(where, f"{name} is {tables[name].shape} where {shape} belongs", fix=HINT)
+                raise InputError(
+                    where, f"{name} is {tables[name].shape} where {shape} belongs", fix=DELETE_IT
+                )
         if rows and np.min(self.fits) < 1:
             frame = int(self.frame[np.argmin(self.fits)])
             raise InputError(where, "a row has no terrain fit", frame=frame)
@@ -119,14 +121,14 @@ def pairs(rows: ClipRows, layout: RowLayout, row: np.ndarray, fit: np.ndarray) -
     x = np.empty((len(row), layout.x_size), np.float32)
     y = rows.y[row].astype(np.float32)
     told = {name: rows.channels[name][row] for name, _ in layout.channels}
-    compose(layout, of_frame(layout, rows.x[row], told), rows.heights[fit], rows.mean[fit, None], x, y)
+    compose(layout, frame_inputs(layout, rows.x[row], told), rows.heights[fit], rows.mean[fit, None], x, y)
     return Pairs(x, y, rows.p[row], row, 1.0 / rows.fits[row])
 
 
 def save_clip_rows(path: str | Path, rows: ClipRows) -> None:
     """Write rows as one npz, floats as float32."""
     floats = {n: getattr(rows, n).astype(np.float32) for n in ("x", "y", "p", "heights", "mean")}
-    floats |= {CHANNEL + name: values.astype(np.float32) for name, values in rows.channels.items()}
+    floats |= {CHANNEL_PREFIX + name: values.astype(np.float32) for name, values in rows.channels.items()}
     integers = {n: getattr(rows, n).astype(np.int32) for n in ("frame", "cycle", "fits")}
     save_npz(
         path,
@@ -157,7 +159,7 @@ def outline(source: ClipRows | str | Path) -> Outline:
         layout = RowLayout.from_dict(json.loads(str(data["layout"])))
         return Outline(layout, json.loads(str(data["skeleton"])), data["fits"], int(data["visits"]))
     except (TypeError, ValueError) as error:
-        raise InputError(source, f"not a file of rows ({error})", fix=HINT) from error
+        raise InputError(source, f"not a file of rows ({error})", fix=DELETE_IT) from error
 
 
 def load_clip_rows(path: str | Path) -> ClipRows:
@@ -168,10 +170,10 @@ def load_clip_rows(path: str | Path) -> ClipRows:
         data["layout"] = RowLayout.from_dict(json.loads(str(data["layout"])))
         data["skeleton"] = json.loads(str(data["skeleton"]))
         data["visits"] = int(data["visits"])
-        named = [key for key in data if key.startswith(CHANNEL)]
-        data["channels"] = {key.removeprefix(CHANNEL): data.pop(key) for key in named}
+        named = [key for key in data if key.startswith(CHANNEL_PREFIX)]
+        data["channels"] = {key.removeprefix(CHANNEL_PREFIX): data.pop(key) for key in named}
         rows = ClipRows(**data)
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError(path, f"not a file of rows ({error})", fix=HINT) from error
+        raise InputError(path, f"not a file of rows ({error})", fix=DELETE_IT) from error
     rows.check(path)
     return rows

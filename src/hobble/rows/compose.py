@@ -43,7 +43,7 @@ def joint_heights(joints: slice) -> slice:
     return slice(joints.start + 1, joints.stop, 3)
 
 
-def of_frame(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> Array:
+def frame_inputs(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> Array:
     """(n, X without the terrain) in the layout's order.
 
     body: (n, body columns), the blocks of X but for terrain and channels, in the order of BODY. channels:
@@ -87,11 +87,11 @@ def compose(
     x[:, terrain.stop :] = frames[:, terrain.start :]
     x[:, terrain] = ground
     if lift is not None:
-        lower(x, layout.x_joint_position, lift, x_std)
-        lower(y, layout.y_joint_position, lift, y_std)
+        lower_joints(x, layout.x_joint_position, lift, x_std)
+        lower_joints(y, layout.y_joint_position, lift, y_std)
 
 
-def lower(values: Any, joints: slice, by: Any, std: Any = None) -> None:
+def lower_joints(values: Any, joints: slice, by: Any, std: Any = None) -> None:
     """Take `by` (n, 1) cm from the heights in the block `joints` of values (n, columns)."""
     heights = joint_heights(joints)
     values[:, heights] -= by if std is None else by / std[heights]

@@ -54,7 +54,7 @@ class RowLayout:
         sizes = {"joints": self.joints, "window": self.window, "step": self.step}
         return {**sizes, "channels": [list(pair) for pair in self.channels], **own}
 
-    def told(self, names: Iterable[str]) -> RowLayout:
+    def with_channels(self, names: Iterable[str]) -> RowLayout:
         """The same layout with those of its channels alone, in the order of `names`.
 
         Raises KeyError for a channel that it does not have.

@@ -15,7 +15,7 @@ from hobble.workflow.datasets import Datasets
 def same_files(clips: Clips, dataset: str) -> list[tuple[str, str, str]]:
     """Pairs of clips with equal files: name, name, "the same file". Only files of one size are read."""
     sizes: dict[int, list[tuple[str, Path]]] = defaultdict(list)
-    for clip in clips.own(dataset):
+    for clip in clips.listed(dataset):
         path = Path(clips.source(dataset, clip))
         if path.is_file() and (size := path.stat().st_size):
             sizes[size].append((clip, path))
