@@ -127,7 +127,7 @@ def _unknown(
         False,
         pairs(told.clip.skeleton, told.body, target.skeleton, theirs),
     )
-    notes = decoded.notes + unsure + ([] if known else _said(rig, found))
+    notes = decoded.notes + unsure + told.notes + ([] if known else _said(rig, found))
     moving = _moving(decoded, body, unit)
     return _mended(
         file,

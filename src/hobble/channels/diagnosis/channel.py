@@ -42,6 +42,7 @@ class Diagnosis(Channel):
     value = "amount"
     highest = 1.0
     rate = 1.0
+    slows = True
     Options = Table
 
     def columns(self, rig: Rig) -> tuple[str, ...]:
