@@ -224,4 +224,4 @@ def test_machines_that_make_no_sense_are_refused(
 def test_a_lifetime_names_this_process() -> None:
     pid, _, began = lifetime.this_process().partition(" ")
     assert int(pid) == os.getpid()
-    assert lifetime._lives(int(pid), began)
+    assert lifetime._is_alive(int(pid), began)

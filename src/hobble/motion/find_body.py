@@ -14,8 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.motion.body import SIDES, Body, above, common, path
+from hobble.motion.body import SIDES, Body
 from hobble.motion.names import is_end, limb_parts, part_of, side_of
+from hobble.motion.tree import above, common, path
 
 SAMPLES = 150
 ALIKE = 0.15  # by how much of its length a bone may differ from the one across the body

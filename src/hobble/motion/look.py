@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.clip import Clip
-from hobble.core.clip_files import find_clips, orphan_notes, the_file
+from hobble.core.clip_files import find_clips, only_file, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.motion.check import worst
@@ -64,11 +64,11 @@ class Folder:
 
 def look(folder: Path, skeleton: Path, maps: Path) -> Folder:
     """Look at each clip of a folder, or at one file. Raises HobbleError where there are none."""
-    files = [folder] if folder.is_file() else [the_file(n, f) for n, f in sorted(find_clips(folder).items())]
+    files = [folder] if folder.is_file() else [only_file(n, f) for n, f in sorted(find_clips(folder).items())]
     if not files:
         raise InputError(folder, "no .bvh files here")
     clips = tuple(_one(file, skeleton, maps) for file in files)
-    orphans = () if folder.is_file() else tuple(orphan_notes(folder, [file.stem for file in files]))
+    orphans = () if folder.is_file() else tuple(unused_file_notes(folder, [file.stem for file in files]))
     return Folder(clips, (*same_notes(clips), *standing_notes(clips), *orphans))
 
 

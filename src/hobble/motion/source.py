@@ -31,7 +31,9 @@ from hobble.motion.rig import (
     missing_bone,
     unit_of,
 )
-from hobble.motion.stance import Spine, stands, upright
+from hobble.motion.spine import Spine
+from hobble.motion.stance import upright
+from hobble.motion.standing import stands
 
 STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
 FOUND = "found"  # what a report calls a rig that no skeleton file describes
@@ -125,7 +127,7 @@ def _unknown(
         False,
         pairs(told.clip.skeleton, told.body, target.skeleton, theirs),
     )
-    notes = decoded.notes + unsure + ([] if known else _said(rig, found))
+    notes = decoded.notes + unsure + told.notes + ([] if known else _said(rig, found))
     moving = _moving(decoded, body, unit)
     return _mended(
         file,

@@ -12,12 +12,12 @@ import torch
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import Arrays, load_npz
+from hobble.core.processors import cores, multiplies_bfloat16
 from hobble.core.skeleton import Skeleton
 from hobble.database.manifest import FILE
 from hobble.database.reader import Database
 from hobble.models import model
 from hobble.models.options import Options
-from hobble.models.products import bfloat16_is_fast
 from hobble.models.trainable import Step, Trainable
 from hobble.training.checkpoint import State, unpack
 from hobble.training.optimiser import Adam
@@ -34,8 +34,9 @@ HALF_FROM = 256  # batch from which the products take most of the time
 
 
 def use_threads(threads: int) -> None:
-    """Use as many threads in PyTorch and numba, and only algorithms that give the same bits again."""
-    threads = max(1, min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
+    """Use as many threads in PyTorch and numba, at most one a core, and only algorithms that give the same
+    bits again."""
+    threads = max(1, min(threads, cores(), numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
     torch.set_num_threads(threads)
     numba.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)
@@ -181,7 +182,7 @@ def step_for(network: Trainable, training: Training) -> Step:
     precision = training.precision
     half = precision == "bfloat16"
     if precision == "auto" and training.batch >= HALF_FROM:
-        half = bfloat16_is_fast() if on_cpu else torch.cuda.is_bf16_supported(including_emulation=False)
+        half = multiplies_bfloat16() if on_cpu else torch.cuda.is_bf16_supported(including_emulation=False)
     torch.backends.cuda.matmul.allow_tf32 = precision in ("auto", "tf32")
     torch.backends.cuda.matmul.allow_bf16_reduced_precision_reduction = False
     return network.step(training.dropout, half)

@@ -114,9 +114,9 @@ def _environment(machines: Machines, threads: int) -> dict[str, str]:
     found = {**os.environ, "OMP_NUM_THREADS": str(threads)}
     found["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     if machines.nodes == 1:
-        found[lifetime.RUN] = lifetime.this_process()
+        found[lifetime.RUN_VARIABLE] = lifetime.this_process()
     else:
-        found.pop(lifetime.RUN, None)
+        found.pop(lifetime.RUN_VARIABLE, None)
     return found
 
 
