@@ -275,9 +275,9 @@ MERGES = "a0: &a0 {k: v}\n" + "".join(
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (LAUGHS, "aliases stand for more"),
-        (MERGES, "aliases stand for more"),
-        ("a: &a [*a]\n", "holds itself"),
+        (LAUGHS, "aliases expand to more"),
+        (MERGES, "aliases expand to more"),
+        ("a: &a [*a]\n", "contains itself"),
         ("a: " + "[" * 100_000, "a.yaml"),
         ("- " * 50_000 + "x", "a.yaml"),
         ("x" * (5 * MB), "larger than 4 MB"),

@@ -59,7 +59,7 @@ def clip_fits(
     """Fit the ground under every cycle of a clip.
 
     labels: `contacts` (F, 4) and `cycles` (C, 2). ground: "flat", "rocky", "jumpy" or "beam".
-    Raises InputError where the labels do not belong to the clip.
+    Raises InputError if the labels do not belong to the clip.
     """
     cycles, contacts = np.asarray(labels["cycles"], int), np.asarray(labels["contacts"], bool)
     window = sampling.window

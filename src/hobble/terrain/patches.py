@@ -134,7 +134,7 @@ def save_patches(path: str | Path, patches: Patches) -> None:
 
 
 def load_patches(path: str | Path) -> Patches:
-    """Read what `save_patches` wrote; raises InputError where it is damaged."""
+    """Read what `save_patches` wrote. Raises InputError if it is damaged."""
     data = load_npz(path)
     try:
         cell, size = float(data.pop("cell")), int(data.pop("size"))

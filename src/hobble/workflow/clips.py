@@ -48,7 +48,7 @@ class Clips:
     def of(self, dataset: str) -> dict[str, ClipEntry]:
         """The clips of a data set by name, hurt versions among them, without mirrors.
 
-        Raises HobbleError where there are none.
+        Raises HobbleError if there are none.
         """
         own = self.listed(dataset)
         return {**own, **{version: own[original(version)] for version in self.hurt_versions(dataset)}}
@@ -106,7 +106,7 @@ class Clips:
     def folder(self, dataset: str) -> Path:
         """Where the data set's own source files lie.
 
-        Raises InputError where a user's folder is missing, unless its clips can be downloaded.
+        Raises InputError if a user's folder is missing, unless its clips can be downloaded.
         """
         model = self.catalogue.dataset(dataset)
         if model.synthetic is not None:

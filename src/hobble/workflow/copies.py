@@ -28,7 +28,7 @@ def same_files(clips: Clips, dataset: str) -> list[tuple[str, str, str]]:
 
 
 def refuse_copies(clips: Clips, datasets: Datasets, dataset: str, channels: tuple[str, ...]) -> None:
-    """Raise HobbleError where one file is trained on under one name and held out under another."""
+    """Raise HobbleError if one file is trained on under one name and held out under another."""
     model = datasets.catalogue.dataset(dataset)
     if model.synthetic is None and model.held_out:
         splits = {original(name): side for name, side in datasets.selected(dataset, channels).items()}

@@ -42,7 +42,7 @@ class Datasets:
     def selected(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
         """Clip -> "train" or "held_out", of the clips that no other channel tells anything.
 
-        channels: those that the network is told. Mirrors go with originals. Raises HobbleError where the data
+        channels: those that the network is told. Mirrors go with originals. Raises HobbleError if the data
         set lacks one of `channels`, or no clip is left to train on.
         """
         there = self.channel_sources.channels(dataset)
