@@ -1,7 +1,7 @@
 rule page_packages:
     """What the page takes from the npm registry, as its lock file says; fetched once."""
     input:
-        kept(package.web(".json")),
+        keep_local(package.web(".json")),
     output:
         "results/page/node_modules/.package-lock.json",
     log:
@@ -20,7 +20,7 @@ rule page_bundle:
     """The page's scripts in one, shared by every report."""
     input:
         packages=rules.page_packages.output,
-        scripts=kept(package.web(".js")),
+        scripts=keep_local(package.web(".js")),
     output:
         js="results/page/bundle.js",
     log:
@@ -90,7 +90,7 @@ rule report:
         ),
         told=lambda w: [
             file
-            for channel in datasets.told.channels(
+            for channel in datasets.channel_sources.channels(
                 configurations.dataset(w.configuration)
             )
             for file in configurations.of_dataset(
@@ -103,7 +103,7 @@ rule report:
         terrain=lambda w: configurations.of_dataset(
             w.configuration, "terrain/clips/{clip}.npz"
         ),
-        template=kept(package.templates()),
+        template=keep_local(package.templates()),
         bundle=rules.page_bundle.output.js,
     output:
         html="results/{configuration}/report.html",
@@ -137,11 +137,11 @@ rule report_compare:
     """Configurations side by side, and two of them in the same world."""
     input:
         compared=rules.compare.output.json,
-        configuration=lambda w: comparison.measured()["configuration"],
+        configuration=lambda w: comparison.input_files()["configuration"],
         weights=lambda w: [
             configurations.network(name, "weights.npz") for name in comparison.names()
         ],
-        template=kept(package.templates()),
+        template=keep_local(package.templates()),
         bundle=rules.page_bundle.output.js,
     output:
         html="results/compare/report.html",
@@ -209,7 +209,7 @@ rule export_web:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         packages=rules.page_packages.output,
         scripts=rules.page_bundle.input.scripts,
-        files=kept([*package.web(".ts"), *package.web(".html")]),
+        files=keep_local([*package.web(".ts"), *package.web(".html")]),
     output:
         folder=directory("results/{configuration}/export/web"),
     log:

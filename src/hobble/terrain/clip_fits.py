@@ -15,11 +15,11 @@ from hobble.core.errors import InputError
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import RootFrames, continued, root_frames
-from hobble.terrain.feet import Feet, Mask, feet_of, held_up
 from hobble.terrain.ground import Ground, fit_cycle, flat_ground
 from hobble.terrain.options import Fitting, Sampling
 from hobble.terrain.patches import Patches
 from hobble.terrain.picture import Picture, picture_cycles, picture_of
+from hobble.terrain.soles import Feet, Mask, find_soles, held_above_other
 
 log = logging.getLogger("hobble.terrain")
 
@@ -59,7 +59,7 @@ def clip_fits(
     """Fit the ground under every cycle of a clip.
 
     labels: `contacts` (F, 4) and `cycles` (C, 2). ground: "flat", "rocky", "jumpy" or "beam".
-    Raises InputError where the labels do not belong to the clip.
+    Raises InputError if the labels do not belong to the clip.
     """
     cycles, contacts = np.asarray(labels["cycles"], int), np.asarray(labels["contacts"], bool)
     window = sampling.window
@@ -71,14 +71,14 @@ def clip_fits(
         )
     root = continued(root_frames(clip, sampling.facing_sigma), window)
     samples = sample_points(root, sampling.terrain_side)
-    feet = _feet(clip, contacts, cycles, window, ground == "flat", options)
+    feet = _standing_feet(clip, contacts, cycles, window, ground == "flat", options)
     offsets = np.arange(-window, window, sampling.step)
     heights: list[Array] = [np.zeros((0, 3 * len(offsets)))]
     fitted, pictures = [], []
     shown = picture_cycles(len(cycles))
     for c, (start, end) in enumerate(cycles):
-        around = _around(start, end, window, len(clip))
-        fit = _ground(feet, around, samples[:, window:-window], patches, ground, options)
+        around = _fitted_frames(start, end, window, len(clip))
+        fit = _fit_ground(feet, around, samples[:, window:-window], patches, ground, options)
         heights.append(heights_under(fit, samples, start + window, end + window, offsets))
         fitted.append((fit, feet.soles[around], feet.contacts[around]))
         if c in shown and np.any(heights[-1]):
@@ -89,16 +89,16 @@ def clip_fits(
         cycle=cycle,
         fits=np.array([len(fit.chosen) for fit, _, _ in fitted], np.int32)[cycle],
         heights=np.concatenate(heights).astype(np.float32),
-        **_accounts(fitted, options.fits),
+        **_fit_statistics(fitted, options.fits),
         heel_height=feet.heel_height,
         toe_height=feet.toe_height,
         pictures=tuple(pictures),
     )
-    _warn(clip.name, fits, options.deepest)
+    _warn_if_off_ground(clip.name, fits, options.deepest)
     return fits
 
 
-def _warn(name: str, fits: ClipFits, deepest: float | None) -> None:
+def _warn_if_off_ground(name: str, fits: ClipFits, deepest: float | None) -> None:
     """Say it where the ground is not where the feet are."""
     if deepest is None or not len(fits.patch):
         return
@@ -108,7 +108,9 @@ def _warn(name: str, fits: ClipFits, deepest: float | None) -> None:
         log.warning(text, name, mean, below)
 
 
-def _feet(clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: Fitting) -> Feet:
+def _standing_feet(
+    clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: Fitting
+) -> Feet:
     """Soles, and contacts that are on the ground.
 
     On flat ground a heel that is held up, still, over its standing toe may not be. Where no foot stands all
@@ -116,8 +118,8 @@ def _feet(clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: boo
     """
     counted = np.zeros(len(clip), bool)
     for start, end in cycles:
-        counted[_around(start, end, window, len(clip))] = True
-    feet = feet_of(
+        counted[_fitted_frames(start, end, window, len(clip))] = True
+    feet = find_soles(
         clip,
         contacts,
         np.flatnonzero(counted),
@@ -129,9 +131,9 @@ def _feet(clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: boo
     )
     contacts = feet.contacts.copy()
     if flat and options.held_up is not None:
-        contacts &= ~held_up(feet, options.held_up)
+        contacts &= ~held_above_other(feet, options.held_up)
     for start, end in cycles:
-        around = _around(start, end, window, len(clip))
+        around = _fitted_frames(start, end, window, len(clip))
         if not contacts[around].any():
             log.warning("%s: no foot stands in frames %d to %d; the lowest count", clip.name, start, end)
             height = feet.soles[around][..., 1]
@@ -139,13 +141,13 @@ def _feet(clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: boo
     return replace(feet, contacts=contacts)
 
 
-def _around(start: int, end: int, window: int, frames: int) -> slice:
+def _fitted_frames(start: int, end: int, window: int, frames: int) -> slice:
     """The frames that a cycle is fitted over: its own, both ends included, and a window to each side, of
     those that the clip has."""
     return slice(max(start - window, 0), min(end + window + 1, frames))
 
 
-def _ground(
+def _fit_ground(
     feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: Fitting
 ) -> Ground:
     """The fits of the cycle that, with its window, takes the frames `around`."""
@@ -171,7 +173,7 @@ def _ground(
     )
 
 
-def _accounts(fitted: Sequence[tuple[Ground, Array, Mask]], fits: int) -> dict[str, Any]:
+def _fit_statistics(fitted: Sequence[tuple[Ground, Array, Mask]], fits: int) -> dict[str, Any]:
     """What is told of every fit of every cycle; a single fit is told as often as the others' `fits`."""
     patch, error = np.zeros((len(fitted), fits), np.int32), np.zeros((len(fitted), fits), np.float32)
     foot_error, foot_below = np.zeros((*error.shape, 2), np.float32), np.zeros_like(error)

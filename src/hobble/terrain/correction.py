@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.terrain.feet import Mask
+from hobble.terrain.soles import Mask
 
-STEEPNESS = 2.0  # cm of height per cm: the walls of what is dug out
-LESS_SMOOTH = 8  # times, by a quarter each, a surface is made anew that leaves too much
+WALL_STEEPNESS = 2.0  # cm of height per cm: the walls of what is dug out
+MAX_REFITS = 8  # times, by a quarter each, a surface is made anew that leaves too much
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Stances:
     count: Array = field(repr=False)
 
 
-def stances(soles: Array, contacts: Mask, longest: int) -> Stances:
+def gather_stances(soles: Array, contacts: Mask, longest: int) -> Stances:
     """Gather the runs of each joint in which `contacts` is true, cut into pieces of at most `longest` frames.
 
     soles: (T, 4, 3). contacts: (T, 4) bool.
@@ -49,7 +49,7 @@ def stances(soles: Array, contacts: Mask, longest: int) -> Stances:
     return Stances(np.stack([mean[0], mean[2]], axis=1), mean[1], count.astype(float))
 
 
-def together(a: Stances, b: Stances) -> Stances:
+def joined(a: Stances, b: Stances) -> Stances:
     """The points of both."""
     return Stances(
         np.concatenate([a.place, b.place]),
@@ -59,7 +59,7 @@ def together(a: Stances, b: Stances) -> Stances:
 
 
 @dataclass(frozen=True)
-class Bend:
+class Surface:
     """A surface of radial basis functions phi(r) = r / spread about N places.
 
     places: (N, 2) x and z. weights: (N,). spread: the mean distance of the places, cm.
@@ -76,9 +76,9 @@ class Bend:
         return distance_sum(*_columns(points), *_columns(self.places), self.weights / self.spread)
 
 
-def bends(
+def fit_surfaces(
     points: Stances, residual: Array, smoothing: float, most: float | None = None, standing: int | None = None
-) -> list[Bend]:
+) -> list[Surface]:
     """The surfaces through each row of `residual` (K, N) at N points, regularised by `smoothing`.
 
     A point that counts m times has a diagonal of smoothing / m, and weighs m in the mean distance: that is
@@ -89,19 +89,19 @@ def bends(
     apart = distances(points.place, points.place)
     spread = float(points.count @ apart @ points.count / points.count.sum() ** 2)
     if spread < 1e-6:
-        return [Bend(points.place[:1], np.zeros(1), 1.0)] * len(residual)
+        return [Surface(points.place[:1], np.zeros(1), 1.0)] * len(residual)
     diagonal = smoothing / points.count
     weights = np.linalg.solve(apart / spread - np.diag(diagonal), residual.T).T
     share = points.count[:standing] / points.count[:standing].sum()
     rough = np.arange(len(residual)) if most is not None else np.zeros(0, int)
-    for _ in range(LESS_SMOOTH):
+    for _ in range(MAX_REFITS):
         left = np.sum(np.abs(weights[rough] * diagonal)[:, :standing] * share, axis=1)  # of the residual
         rough = rough[left > (most or 0.0)]
         if not len(rough):
             break
         diagonal = diagonal / 4
         weights[rough] = np.linalg.solve(apart / spread - np.diag(diagonal), residual[rough].T).T
-    return [Bend(points.place, w, spread) for w in weights]
+    return [Surface(points.place, w, spread) for w in weights]
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Pits:
         return np.minimum(ground, cones)
 
 
-def pits(soles: Array, standing: Stances, depth: float) -> Pits:
+def dig_pits(soles: Array, standing: Stances, depth: float) -> Pits:
     """What lets soles (N, 3) be no more than `depth` cm below the ground.
 
     As steep as they must be to leave alone the ground under feet that stand beside them, on a step say.
@@ -130,7 +130,7 @@ def pits(soles: Array, standing: Stances, depth: float) -> Pits:
     places, heights = soles[:, [0, 2]], soles[:, 1] + depth
     apart = np.maximum(distances(places, standing.place), 1e-3)
     needed = ((standing.height - heights[:, None]) / apart).max(axis=1)
-    return Pits(places, heights, np.maximum(needed, STEEPNESS))
+    return Pits(places, heights, np.maximum(needed, WALL_STEEPNESS))
 
 
 def distances(a: Array, b: Array) -> Array:

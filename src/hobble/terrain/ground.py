@@ -8,14 +8,23 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.terrain.correction import Bend, Pits, Stances, bends, distances, pits, stances, together
-from hobble.terrain.feet import Mask
+from hobble.terrain.correction import (
+    Pits,
+    Stances,
+    Surface,
+    dig_pits,
+    distances,
+    fit_surfaces,
+    gather_stances,
+    joined,
+)
 from hobble.terrain.patches import Patches
+from hobble.terrain.soles import Mask
 
-PIECE = 8  # frames of a stance that are one point
-FINE_PIECE = 4  # likewise of a foot that is below the ground
-BESIDE = (35.0, 50.0)  # cm from the path, to each side
-NEAREST = 25.0  # cm that these keep from the rest of the path
+STANCE_PIECE = 8  # frames of a stance that are one point
+COVERED_PIECE = 4  # likewise of a foot that is below the ground
+BESIDE_CM = (35.0, 50.0)  # cm from the path, to each side
+PATH_CLEARANCE_CM = 25.0  # cm that these keep from the rest of the path
 
 
 @dataclass(frozen=True)
@@ -32,7 +41,7 @@ class Ground:
     error: Array
     centre: Array = field(repr=False)
     level: Array = field(repr=False)
-    surfaces: Sequence[Bend] = field(default=(), repr=False)
+    surfaces: Sequence[Surface] = field(default=(), repr=False)
     dug: Sequence[Pits] = field(default=(), repr=False)
 
     def at(self, points: Array) -> Array:
@@ -105,7 +114,7 @@ def flat_ground(
         return plain
     if np.abs(heights[contacts] - zero).mean() > deepest:
         return meet_feet(plain, soles, contacts, smoothing, deepest)
-    return replace(plain, dug=_dug(plain, soles, stances(soles, contacts, PIECE), deepest))
+    return replace(plain, dug=_dug(plain, soles, gather_stances(soles, contacts, STANCE_PIECE), deepest))
 
 
 def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None) -> Ground:
@@ -115,14 +124,14 @@ def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, dee
     Feet that are then below the ground (by more than half of `deepest`) join those points, and the surface is
     made again; where it still covers a foot by more than `deepest` it is dug out.
     """
-    standing = stances(soles, contacts, PIECE)
+    standing = gather_stances(soles, contacts, STANCE_PIECE)
     residual = standing.height - plain.at(standing.place)
     most = None if deepest is None else deepest / 2
-    ground = replace(plain, surfaces=bends(standing, residual, smoothing, most))
+    ground = replace(plain, surfaces=fit_surfaces(standing, residual, smoothing, most))
     if deepest is None:
         return ground
     surfaces = [
-        _joined(plain, k, standing, stances(soles, c & ~contacts, FINE_PIECE), smoothing, most)
+        _refitted(plain, k, standing, gather_stances(soles, c & ~contacts, COVERED_PIECE), smoothing, most)
         if c.any()
         else same
         for k, (c, same) in enumerate(zip(ground.above(soles) > deepest / 2, ground.surfaces, strict=True))
@@ -133,21 +142,21 @@ def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, dee
 
 def _dug(ground: Ground, soles: Array, standing: Stances, deepest: float) -> list[Pits]:
     """For each fit what lets through the feet that are further below it than `deepest`, to half of that."""
-    return [pits(soles[covered], standing, deepest / 2) for covered in ground.above(soles) > deepest]
+    return [dig_pits(soles[covered], standing, deepest / 2) for covered in ground.above(soles) > deepest]
 
 
-def _joined(
+def _refitted(
     plain: Ground, k: int, standing: Stances, covered: Stances, smoothing: float, most: float | None
-) -> Bend:
+) -> Surface:
     """The surface of fit k through the feet in contact and through those that it covered."""
-    points = together(standing, covered)
+    points = joined(standing, covered)
     residual = points.height - plain.at(points.place)[k]
-    return bends(points, residual[None], smoothing, most, len(standing.count))[0]
+    return fit_surfaces(points, residual[None], smoothing, most, len(standing.count))[0]
 
 
 def beside_path(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:
     """(N, 4) cells of points beside the path, where a beam has no ground, and of their points on the path."""
-    off = np.concatenate([path + sign * d * sides for d in BESIDE for sign in (1, -1)])
-    on = np.tile(path, (2 * len(BESIDE), 1))
-    free = distances(off, path).min(axis=1) > NEAREST
+    off = np.concatenate([path + sign * d * sides for d in BESIDE_CM for sign in (1, -1)])
+    on = np.tile(path, (2 * len(BESIDE_CM), 1))
+    free = distances(off, path).min(axis=1) > PATH_CLEARANCE_CM
     return np.concatenate([patches.cells(off[free], centre), patches.cells(on[free], centre)], axis=1)

@@ -15,8 +15,8 @@ from hobble.core.untrusted import read_text
 from hobble.terrain import options
 from hobble.terrain.generate import generate
 
-MOST_CELLS = 1 << 26  # of a map: 8192 squared, half a gigabyte; 322 m a side at 3.9 cm a cell
-MOST_TEXT = 1 << 28  # of a map as text, which takes some eight times that while it is read
+MAX_CELLS = 1 << 26  # of a map: 8192 squared, half a gigabyte; 322 m a side at 3.9 cm a cell
+MAX_TEXT_BYTES = 1 << 28  # of a map as text, which takes some eight times that while it is read
 
 
 ESRI_HEADER = {
@@ -29,7 +29,11 @@ ESRI_HEADER = {
     "cellsize",
     "nodata_value",
 }
-IMAGES = {".png": ("PNG",), ".tif": ("TIFF",), ".tiff": ("TIFF",)}  # a suffix, and what the file must be
+IMAGE_FORMATS = {
+    ".png": ("PNG",),
+    ".tif": ("TIFF",),
+    ".tiff": ("TIFF",),
+}  # a suffix, and what the file must be
 GDAL_NODATA = 42113  # the tag of a TIFF in which GDAL says, as text, what stands for no data
 
 
@@ -99,7 +103,7 @@ def read_heights(path: str | Path) -> Array:
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no such heightmap", fix="See terrain.heightmaps of the data set.")
-    readers = {".npz": _npz, ".npy": _npy, **dict.fromkeys(IMAGES, _image)}
+    readers = {".npz": _npz, ".npy": _npy, **dict.fromkeys(IMAGE_FORMATS, _image)}
     heights = np.asarray(readers.get(path.suffix.lower(), _text)(path))
     if heights.ndim != 2 or min(heights.shape) < 2:
         raise InputError(path, f"a heightmap has rows and columns, this has shape {heights.shape}")
@@ -114,7 +118,7 @@ def read_heights(path: str | Path) -> Array:
 def _text(path: Path) -> Array:
     rows: list[list[float]] = []
     header: dict[str, float] = {}
-    for number, line in enumerate(read_text(path, MOST_TEXT).splitlines(), 1):
+    for number, line in enumerate(read_text(path, MAX_TEXT_BYTES).splitlines(), 1):
         words = line.split("#")[0].replace(",", " ").replace(";", " ").split()
         if not words:
             continue
@@ -140,8 +144,8 @@ def _npy(path: Path) -> Array:
     try:
         # Mapped, so that a header that promises more than the file holds takes no memory.
         heights = np.lib.format.open_memmap(path, mode="r")  # never a pickle or an archive
-        if heights.size > MOST_CELLS:
-            raise InputError(path, f"{heights.size} heights, more than {MOST_CELLS}")
+        if heights.size > MAX_CELLS:
+            raise InputError(path, f"{heights.size} heights, more than {MAX_CELLS}")
         return np.array(heights)
     except (ValueError, OSError, EOFError, AttributeError, TypeError) as error:
         raise InputError(path, f"not an array file ({error})") from error
@@ -164,9 +168,9 @@ def _image(path: Path) -> Array:
 
     try:
         # Of the other formats some run programs: Ghostscript for what begins as PostScript does.
-        with Image.open(path, formats=IMAGES[path.suffix.lower()]) as image:
-            if image.width * image.height > MOST_CELLS:
-                raise InputError(path, f"{image.width} x {image.height} cells, more than {MOST_CELLS}")
+        with Image.open(path, formats=IMAGE_FORMATS[path.suffix.lower()]) as image:
+            if image.width * image.height > MAX_CELLS:
+                raise InputError(path, f"{image.width} x {image.height} cells, more than {MAX_CELLS}")
             grey = image if image.mode in ("L", "I", "F", "I;16", "I;16B", "1") else image.convert("L")
             heights = np.asarray(grey, float)
             nothing = getattr(image, "tag_v2", {}).get(GDAL_NODATA)

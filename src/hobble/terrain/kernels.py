@@ -185,15 +185,15 @@ def _beside_sum(heights, rows, columns, a, points):
 @njit(forceinline=True, cache=False)
 def _error(heights, rows, columns, a, tables, jumps, limit):
     """The error of one patch, or infinity as soon as it is known to lie above `limit`."""
-    down, up_head, up_rest, beside = tables
+    down, up_first, up_rest, beside = tables
     first, offset, squares = _down_means(heights, rows, columns, a, down)
     error = DOWN_WEIGHT * max(squares - offset * offset, 0.0)
     if error > limit:
         return np.inf
     offset = np.float32(first + offset)
-    count = len(up_head[0]) + len(up_rest[0])
+    count = len(up_first[0]) + len(up_rest[0])
     if count:
-        squares = _up_sum(heights, rows, columns, a, offset, up_head, jumps)
+        squares = _up_sum(heights, rows, columns, a, offset, up_first, jumps)
         if error + squares / count > limit:
             return np.inf
         squares += _up_sum(heights, rows, columns, a, offset, up_rest, jumps)
@@ -204,7 +204,7 @@ def _error(heights, rows, columns, a, tables, jumps, limit):
 
 
 @njit(inline="always", cache=False)
-def _terms(a):
+def _map_to_cells(a):
     return (a[0, 0], a[0, 1], a[0, 2]), (a[1, 0], a[1, 1], a[1, 2])
 
 
@@ -214,7 +214,7 @@ def view_errors(heights, starts, shapes, which, affine, tables, jumps):
     out = np.empty(len(which))
     for p in range(len(which)):
         cells, rows, columns = map_of(heights, starts, shapes, which[p])
-        out[p] = _error(cells, rows, columns, _terms(affine[p]), tables, jumps, np.inf)
+        out[p] = _error(cells, rows, columns, _map_to_cells(affine[p]), tables, jumps, np.inf)
     return out
 
 
@@ -225,7 +225,7 @@ def search_views(heights, starts, shapes, which, affine, tables, jumps, count):
     errors = np.full(count, np.inf)
     for p in range(len(which)):
         cells, rows, columns = map_of(heights, starts, shapes, which[p])
-        error = _error(cells, rows, columns, _terms(affine[p]), tables, jumps, errors[-1])
+        error = _error(cells, rows, columns, _map_to_cells(affine[p]), tables, jumps, errors[-1])
         if error < errors[-1]:
             k = count - 1
             while k > 0 and errors[k - 1] > error:

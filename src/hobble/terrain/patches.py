@@ -17,9 +17,9 @@ from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
 from hobble.terrain.heightmaps import Heightmap
 
-BATCH = 1_000
-HOLE = 1e9
-FEWEST = 1 / 1_000  # of the crops of a map have to pass
+VIEWS_PER_DRAW = 1_000
+HOLE_HEIGHT = 1e9
+FEWEST_PASSING = 1 / 1_000  # of the crops of a map have to pass
 
 
 @dataclass(frozen=True)
@@ -116,8 +116,8 @@ def _draw_from(
         affines.append(affine[keep])
         means.append(mean[keep])
         found += len(keep)
-        drawn += BATCH
-        if found < share and found < FEWEST * drawn:
+        drawn += VIEWS_PER_DRAW
+        if found < share and found < FEWEST_PASSING * drawn:
             passed = f"{found} of {drawn} crops" if found else f"none of {drawn} crops"
             raise InputError(
                 heightmap.name,
@@ -134,7 +134,7 @@ def save_patches(path: str | Path, patches: Patches) -> None:
 
 
 def load_patches(path: str | Path) -> Patches:
-    """Read what `save_patches` wrote; raises InputError where it is damaged."""
+    """Read what `save_patches` wrote. Raises InputError if it is damaged."""
     data = load_npz(path)
     try:
         cell, size = float(data.pop("cell")), int(data.pop("size"))
@@ -154,7 +154,7 @@ def _with_holes_marked(heightmap: Heightmap, cell: float) -> Array:
     from scipy.ndimage import maximum_filter
 
     reach = 1 + int(np.ceil(cell / heightmap.cell))
-    return np.where(maximum_filter(holes, 2 * reach + 1), HOLE, heightmap.heights)
+    return np.where(maximum_filter(holes, 2 * reach + 1), HOLE_HEIGHT, heightmap.heights)
 
 
 def _starts(shapes: np.ndarray) -> np.ndarray:
@@ -163,13 +163,13 @@ def _starts(shapes: np.ndarray) -> np.ndarray:
 
 
 def _views(rng: np.random.Generator, heightmap: Heightmap, cell: float, size: int) -> Array:
-    """BATCH views (BATCH, 2, 3) of a map, every cell inside it."""
+    """VIEWS_PER_DRAW views (VIEWS_PER_DRAW, 2, 3) of a map, every cell inside it."""
     scale = cell / heightmap.cell
     half = size // 2
     corners = np.array([[a, b] for a in (-half, size - 1 - half) for b in (-half, size - 1 - half)])
-    angle = rng.uniform(-np.pi / 2, np.pi / 2, BATCH)
-    flips = rng.choice([-1.0, 1.0], (BATCH, 2))
-    place = rng.uniform(size=(BATCH, 2))
+    angle = rng.uniform(-np.pi / 2, np.pi / 2, VIEWS_PER_DRAW)
+    flips = rng.choice([-1.0, 1.0], (VIEWS_PER_DRAW, 2))
+    place = rng.uniform(size=(VIEWS_PER_DRAW, 2))
     c, s = np.cos(angle), np.sin(angle)
     turn = scale * np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2) * flips[:, None]
     reach = np.einsum("nij,kj->nki", turn, corners)

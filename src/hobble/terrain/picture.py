@@ -8,11 +8,11 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.terrain.feet import Feet, Mask
 from hobble.terrain.ground import Ground
+from hobble.terrain.soles import Feet, Mask
 
-GRID = 24
-MARGIN = 60.0
+GRID_POINTS = 24
+MARGIN_CM = 60.0
 MOST = 2
 
 
@@ -42,10 +42,13 @@ def picture_cycles(cycles: int) -> set[int]:
 def picture_of(clip: Clip, cycle: int, ground: Ground, feet: Feet, around: slice) -> Picture:
     """The best fit of a cycle, whose frames with the window on either side are `around`."""
     soles = feet.soles[around]
-    low, high = soles[..., [0, 2]].min(axis=(0, 1)) - MARGIN, soles[..., [0, 2]].max(axis=(0, 1)) + MARGIN
-    x, z = np.linspace(low[0], high[0], GRID), np.linspace(low[1], high[1], GRID)
+    low, high = (
+        soles[..., [0, 2]].min(axis=(0, 1)) - MARGIN_CM,
+        soles[..., [0, 2]].max(axis=(0, 1)) + MARGIN_CM,
+    )
+    x, z = np.linspace(low[0], high[0], GRID_POINTS), np.linspace(low[1], high[1], GRID_POINTS)
     points = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-    heights = ground.at(points)[0].reshape(GRID, GRID)
+    heights = ground.at(points)[0].reshape(GRID_POINTS, GRID_POINTS)
     frames = np.linspace(around.start, around.stop - 1, 5).astype(int)[1:4]
     return Picture(
         cycle,

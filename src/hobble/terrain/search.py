@@ -15,8 +15,8 @@ from hobble.core.quat import Array
 from hobble.terrain.kernels import search_views, view_errors
 from hobble.terrain.patches import Patches
 
-HEAD = 128  # points after which most patches can be given up
-GOLDEN = 0.6180339887498949
+FIRST_POINTS = 128  # points after which most patches can be given up
+GOLDEN_RATIO = 0.6180339887498949
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,9 @@ def patch_errors(patches: Patches, footing: Footing) -> Array:
 
 
 def _columns(footing: Footing) -> tuple[tuple[Array, ...], ...]:
-    """The columns of the points in contact, of the first HEAD that are up, of the rest, of those beside."""
-    spread = (np.arange(len(footing.up)) * GOLDEN) % 1.0  # so that the first few stand for all
+    """Columns of four tables: in contact, the first FIRST_POINTS in the air, the rest in the air, beside."""
+    spread = (np.arange(len(footing.up)) * GOLDEN_RATIO) % 1.0  # so that the first few stand for all
     order = np.argsort(spread, kind="stable")
     up = footing.up[order]
-    tables = footing.down, up[:HEAD], up[HEAD:], footing.beside
+    tables = footing.down, up[:FIRST_POINTS], up[FIRST_POINTS:], footing.beside
     return tuple(tuple(np.ascontiguousarray(column, np.float32) for column in t.T) for t in tables)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from hobble.channels.channel import Channel, Rig, Source
-from hobble.core.untrusted import MOST_TEXT, read_bytes
+from hobble.core.untrusted import MAX_TEXT_BYTES, read_bytes
 
 if TYPE_CHECKING:
     from hobble.core.clip import Clip
@@ -43,7 +43,7 @@ class Injury(Channel):
             return not hurts(str(source.value))
         if source.entry.get("injured"):  # the embedded walker is asked to limp, and writes the file itself
             return False
-        return not any(hurts(read_bytes(file, MOST_TEXT).decode("latin-1")) for file in source.files)
+        return not any(hurts(read_bytes(file, MAX_TEXT_BYTES).decode("latin-1")) for file in source.files)
 
     def check(self, source: Source, rig: Rig) -> None:
         """The status of an entry has to follow the grammar of a status file.

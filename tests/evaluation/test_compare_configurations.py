@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
-from hobble.evaluation.compare import compare
+from hobble.evaluation.compare_configurations import compare
 from hobble.evaluation.compare_tables import tables
-from hobble.evaluation.measured import read_measured
+from hobble.evaluation.configuration_results import read_results
 from hobble.evaluation.series import difference, line
 from hobble.evaluation.tables import write_csv
 from hobble.measures.responsivity.run import parameter_counts
@@ -100,7 +100,7 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
 @pytest.fixture
 def compared(tmp_path: Path, published: dict[str, Any]) -> dict[str, Any]:
     clips = {"holden": {"a": 0.04, "b": 0.02}, "holden-xl": {"a": 0.03, "b": 0.02}, "ava": {"b": 0.05}}
-    found = [read_measured(n, left_behind(tmp_path, n, clips[n], s)) for n, s in SIZES.items()]
+    found = [read_results(n, left_behind(tmp_path, n, clips[n], s)) for n, s in SIZES.items()]
     return compare(found, published)
 
 
@@ -222,7 +222,7 @@ def test_tables_hold_the_same_whatever_columns_each_has(compared, tmp_path) -> N
 
 def test_published_clips_stand_beside_ours_of_the_same_name(tmp_path, published) -> None:
     clips = {"LocomotionFlat04_000": 0.03, "LocomotionFlat04_000_mirror": 0.07, "walk": 0.05}
-    found = compare([read_measured("a", left_behind(tmp_path, "a", clips, SIZES["holden"]))], published)
+    found = compare([read_results("a", left_behind(tmp_path, "a", clips, SIZES["holden"]))], published)
     rows = [r for r in found["beside"] if "LocomotionFlat04" in r["measure"]]
     assert [(r["source"], r["published"], r["ours"]) for r in rows] == [
         ("segerstedt", 0.0448, 0.03),
@@ -244,7 +244,7 @@ def test_published_times_and_sizes_stand_beside_what_they_are_of(compared) -> No
 
 def test_one_configuration_alone(tmp_path, published) -> None:
     found = compare(
-        [read_measured("holden", left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"]))], published
+        [read_results("holden", left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"]))], published
     )
     assert found["difference"] == []
     assert found["milliseconds"]["fit"][0]["slope"] is None
@@ -255,7 +255,7 @@ def test_a_damaged_history_is_named(tmp_path) -> None:
     files = left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"])
     files["history"].write_text("pass,train_mse\n1,half\n")
     with pytest.raises(InputError, match=r"history\.csv"):
-        read_measured("holden", files)
+        read_results("holden", files)
 
 
 NUMBER = st.floats(-1e3, 1e3)

@@ -13,8 +13,8 @@ from hobble.core.skeleton import Skeleton
 
 Mask = NDArray[np.bool_]
 
-ROLES = ("left_heel", "left_toe", "right_heel", "right_toe")
-HEEL = np.array([True, False, True, False])
+FOOT_ROLES = ("left_heel", "left_toe", "right_heel", "right_toe")
+IS_HEEL = np.array([True, False, True, False])
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Feet:
     toe_height: float
 
 
-def feet_of(
+def find_soles(
     clip: Clip,
     contacts: Mask,
     frames: np.ndarray,
@@ -49,21 +49,21 @@ def feet_of(
     below the ground. Elsewhere the toe joint is `sole` cm above the ground, and the heel as much higher as in
     the skeleton's rest pose.
     """
-    joints = clip.positions[:, [clip.skeleton.role(role) for role in ROLES]].copy()
+    joints = clip.positions[:, [clip.skeleton.role(role) for role in FOOT_ROLES]].copy()
     found: list[float] = []
-    for wanted, columns in ((heel_height, HEEL), (toe_height, ~HEEL)):
+    for wanted, columns in ((heel_height, IS_HEEL), (toe_height, ~IS_HEEL)):
         heights, down = joints[frames][:, columns, 1], contacts[frames][:, columns]
         if wanted != "auto":
             found.append(float(wanted))
         elif flat and down.any():
             found.append(_flat_height(heights, down, deepest))
         else:
-            found.append(sole + (heel_above_toe(clip.skeleton) if columns is HEEL else 0.0))
-    joints[..., 1] -= np.where(HEEL, *found)
+            found.append(sole + (heel_above_toe(clip.skeleton) if columns is IS_HEEL else 0.0))
+    joints[..., 1] -= np.where(IS_HEEL, *found)
     return Feet(joints, contacts, *found)
 
 
-def held_up(feet: Feet, least: float) -> Mask:
+def held_above_other(feet: Feet, least: float) -> Mask:
     """(F, 4) whether a joint is more than `least` cm above the other of its foot, which is in contact."""
     other = [1, 0, 3, 2]
     height = feet.soles[..., 1]
@@ -84,5 +84,5 @@ def heel_above_toe(skeleton: Skeleton) -> float:
     rest = np.zeros((1, len(skeleton.joints), 4))
     rest[..., 0] = 1
     _, positions = forward_kinematics(skeleton, rest, np.zeros((1, 3)))
-    heights = positions[0, [skeleton.role(role) for role in ROLES], 1]
-    return float(heights[HEEL].mean() - heights[~HEEL].mean())
+    heights = positions[0, [skeleton.role(role) for role in FOOT_ROLES], 1]
+    return float(heights[IS_HEEL].mean() - heights[~IS_HEEL].mean())
