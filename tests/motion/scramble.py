@@ -15,7 +15,7 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -144,7 +144,7 @@ class Scramble:
             float(rng.choice(RATES)),
             "".join(rng.permutation(list("XYZ"))),
             bool(rng.random() < 0.4),
-            bool(rng.random() < 0.25) and style != "words",  # nothing tells a mirrored figure without names
+            bool(rng.random() < 0.25),
             bool(rng.random() < 0.35),
             str(rng.choice(["", "", "still", "moving", "second hips"])),
             bool(rng.random() < 0.35),
@@ -481,14 +481,17 @@ def outcome(file: Path, seed: int, folder: Path, frames: int | None = None) -> O
     write_bvh(other, told, how.order, decimals=8)
     try:
         first, one = make_clip(plain, target, maps, "plain", "holden31", options)
-        second, two = make_clip(other, target, maps, "other", "holden31", options)
+        # Nothing but names tells a figure from its mirror image: of words, it has to be said.
+        hand: Literal["auto", "right", "left"] = "left" if how.left_handed else "right"
+        said = ClipMotion(handedness=hand) if how.style == "words" else options
+        second, two = make_clip(other, target, maps, "other", "holden31", said)
     except HobbleError as error:
         return Outcome(how, names, None, str(error))
     lowered = floor_of(two) - floor_of(one)
     if abs(lowered) <= NEAR:
         second = replace(second, root=second.root + np.array([0.0, lowered, 0.0]))
-    said = next((note for note in two["notes"] if note.startswith(UNSURE)), "")
-    return Outcome(how, names, compare(first, second, names), said=said)
+    unsure = next((note for note in two["notes"] if note.startswith(UNSURE)), "")
+    return Outcome(how, names, compare(first, second, names), said=unsure)
 
 
 def floor_of(report: Mapping[str, Any]) -> float:
