@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from hobble.models import options
+from hobble.models import network_options
 from hobble.training.options import Training
 from hobble.training.run import run
 from hobble.workflow.job import job
@@ -11,7 +11,7 @@ with job(snakemake):
     run(
         Path(snakemake.input.database),
         configuration=snakemake.params.configuration,
-        network=options(snakemake.params.network),
+        network=network_options(snakemake.params.network),
         training=Training.model_validate(snakemake.params.training),
         checkpoints=Path(snakemake.params.checkpoints),
         threads=snakemake.threads,

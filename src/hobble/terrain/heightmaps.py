@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,15 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz
+from hobble.core.files import load_npy, load_npz
 from hobble.core.quat import Array
-from hobble.core.untrusted import read_text
+from hobble.core.untrusted import printable, read_text
 from hobble.terrain import options
 from hobble.terrain.generate import generate
 
 MOST_CELLS = 1 << 26  # of a map: 8192 squared, half a gigabyte; 322 m a side at 3.9 cm a cell
-MOST_TEXT = 1 << 28  # of a map as text, which takes some eight times that while it is read
-
+MOST_TEXT = 1 << 28  # of a map as text
+LONGEST_LINE = 1 << 20  # of it
+HIGHEST = 1e7  # cm, 100 km, as of the ground of a character
 
 ESRI_HEADER = {
     "ncols",
@@ -59,6 +61,12 @@ def heightmaps(
         if entry.kind == "file":
             path = next(given)
             heights = read_heights(path) * (scale or height_scale)
+            if (highest := float(np.nanmax(np.abs(heights)))) > HIGHEST:
+                raise InputError(
+                    path,
+                    f"a height of {highest:.4g} cm; {HIGHEST:g} at most",
+                    fix="Set height_scale of this map, or say in the file what stands for no data.",
+                )
             out.append(Heightmap(str(path), heights, width))
         elif entry.kind == "elevation":
             out.append(Heightmap("elevation", elevation(width) * (scale or 1.0), width))
@@ -99,12 +107,14 @@ def read_heights(path: str | Path) -> Array:
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no such heightmap", fix="See terrain.heightmaps of the data set.")
-    readers = {".npz": _npz, ".npy": _npy, **dict.fromkeys(IMAGES, _image)}
+    readers = {".npz": _npz, ".npy": load_npy, **dict.fromkeys(IMAGES, _image)}
     heights = np.asarray(readers.get(path.suffix.lower(), _text)(path))
     if heights.ndim != 2 or min(heights.shape) < 2:
         raise InputError(path, f"a heightmap has rows and columns, this has shape {heights.shape}")
     if heights.dtype.kind not in "fiub":
         raise InputError(path, f"heights are numbers, not {heights.dtype}")
+    if heights.size > MOST_CELLS:
+        raise InputError(path, f"{heights.size} heights, more than {MOST_CELLS}")
     heights = heights.astype(float)
     if not np.isfinite(heights).any():
         raise InputError(path, "holds no finite height")
@@ -112,9 +122,12 @@ def read_heights(path: str | Path) -> Array:
 
 
 def _text(path: Path) -> Array:
-    rows: list[list[float]] = []
+    rows: list[Array] = []
     header: dict[str, float] = {}
-    for number, line in enumerate(read_text(path, MOST_TEXT).splitlines(), 1):
+    cells = 0
+    for number, line in enumerate(io.StringIO(read_text(path, MOST_TEXT), newline=None), 1):
+        if len(line) > LONGEST_LINE:
+            raise InputError(path, f"a line of more than {LONGEST_LINE} letters", line=number)
         words = line.split("#")[0].replace(",", " ").replace(";", " ").split()
         if not words:
             continue
@@ -122,7 +135,7 @@ def _text(path: Path) -> Array:
             if not rows and words[0].lower() in ESRI_HEADER:
                 header[words[0].lower()] = float(" ".join(words[1:]))
                 continue
-            rows.append([float(word) for word in words])
+            rows.append(np.array([float(word) for word in words]))
         except ValueError as error:
             raise InputError(
                 path, f"not a number: {str(error).split(':')[-1].strip()}", line=number
@@ -130,21 +143,13 @@ def _text(path: Path) -> Array:
         if len(rows[-1]) != len(rows[0]):
             problem = f"{len(rows[-1])} heights where the rows above have {len(rows[0])}"
             raise InputError(path, problem, line=number)
+        cells += len(rows[-1])
+        if cells > MOST_CELLS:
+            raise InputError(path, f"more than {MOST_CELLS} heights", line=number)
     if not rows:
         raise InputError(path, "holds no heights")
     heights, nothing = np.array(rows), header.get("nodata_value")
     return heights if nothing is None else np.where(heights == nothing, np.nan, heights)
-
-
-def _npy(path: Path) -> Array:
-    try:
-        # Mapped, so that a header that promises more than the file holds takes no memory.
-        heights = np.lib.format.open_memmap(path, mode="r")  # never a pickle or an archive
-        if heights.size > MOST_CELLS:
-            raise InputError(path, f"{heights.size} heights, more than {MOST_CELLS}")
-        return np.array(heights)
-    except (ValueError, OSError, EOFError, AttributeError, TypeError) as error:
-        raise InputError(path, f"not an array file ({error})") from error
 
 
 def _npz(path: Path) -> Array:
@@ -154,13 +159,13 @@ def _npz(path: Path) -> Array:
             return arrays[name]
     raise InputError(
         path,
-        f"which array holds the heights? There are: {', '.join(arrays) or 'none of two dimensions'}",
+        f"which array holds the heights? There are: {printable(', '.join(arrays)) or 'none with two axes'}",
         fix="Name it `heights`.",
     )
 
 
 def _image(path: Path) -> Array:
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
     try:
         # Of the other formats some run programs: Ghostscript for what begins as PostScript does.
@@ -171,7 +176,9 @@ def _image(path: Path) -> Array:
             heights = np.asarray(grey, float)
             nothing = getattr(image, "tag_v2", {}).get(GDAL_NODATA)
             return heights if nothing is None else np.where(heights == float(nothing), np.nan, heights)
-    except (UnidentifiedImageError, Image.DecompressionBombError, OSError, SyntaxError, ValueError) as error:
+    except InputError:
+        raise
+    except Exception as error:  # Pillow's decoders raise whatever a damaged file makes them trip over
         wide = "Numbers of 64 bits are not read from a TIFF; save them as 32 bits or as .npy."
         fix = wide if path.suffix.lower() in (".tif", ".tiff") else None
-        raise InputError(path, f"not an image that can be read ({error})", fix=fix) from error
+        raise InputError(path, f"not an image that can be read ({printable(error)})", fix=fix) from error
