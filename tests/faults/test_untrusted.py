@@ -301,13 +301,13 @@ def test_entries_that_share_bytes_are_not_read_as_often_as_they_are_listed(tmp_p
     record[12:16] = struct.pack("<I", 400 * len(entry))
     path.write_bytes(data[:start] + 400 * entry + record)
     for read in (load_npz, load_network, read_heights):
-        refused(lambda r=read: r(path), "a.npz: damaged", "its entries lie over each other", mb=64)
+        refused(lambda r=read: r(path), "a.npz: damaged", "its entries overlap", mb=64)
 
 
 @pytest.mark.parametrize("kind", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_arrays_are_packed_as_numpy_packs_them(tmp_path: Path, kind: int) -> None:
     path = zipped(tmp_path / "a.npz", {"heights.npy": npy((4, 4), bytes(128))}, kind)
-    refused(lambda: load_npz(path), "a.npz: damaged", "packed in a way that NumPy does not use")
+    refused(lambda: load_npz(path), "a.npz: damaged", "compressed in a way that NumPy does not use")
 
 
 POSTSCRIPT = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\n(pwned) (w) file\n%%EOF\n"
@@ -371,9 +371,9 @@ MERGES = "a0: &a0 {k: v}\n" + "".join(
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (LAUGHS, "aliases stand for more"),
-        (MERGES, "aliases stand for more"),
-        ("a: &a [*a]\n", "holds itself"),
+        (LAUGHS, "aliases expand to more"),
+        (MERGES, "aliases expand to more"),
+        ("a: &a [*a]\n", "contains itself"),
         ("a: " + "[" * 100_000, "a.yaml"),
         ("- " * 50_000 + "x", "a.yaml"),
         ("x" * (5 * MB), "larger than 4 MB"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.models.pfnn.network import Pfnn
-from hobble.rows.compose import compose, of_frame
+from hobble.rows.compose import compose, frame_inputs
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 
@@ -32,8 +32,8 @@ def test_a_row_is_composed_in_any_order(order: tuple[str, ...]) -> None:
     body = rng.normal(size=(2, layout.x_size - 3 * layout.samples - 4))
     told = {"injury": rng.uniform(0, 10, (2, 4))}
     ground, lift = rng.normal(size=(2, 3 * layout.samples)), rng.normal(size=(2, 1))
-    compose(layout, of_frame(layout, body, told), ground, lift, x, y)
-    compose(ordered, of_frame(ordered, body, told), ground, lift, other_x, other_y)
+    compose(layout, frame_inputs(layout, body, told), ground, lift, x, y)
+    compose(ordered, frame_inputs(ordered, body, told), ground, lift, other_x, other_y)
     np.testing.assert_array_equal(other_x, x[:, columns(layout, ordered)])
     np.testing.assert_array_equal(other_y, y)
 

@@ -54,13 +54,15 @@ def test_files_beside_a_clip_are_found_and_no_others(base: Path) -> None:
     project = Project(base, {})
     assert [Path(f).name for f in project.clips.label_files("mine", "b")] == ["b_gait.txt"]
     assert project.clips.label_files("mine", "c") == []
-    assert [Path(f).name for f in project.datasets.told.files("mine", "c", "injury")] == ["c_injuries.txt"]
+    assert [Path(f).name for f in project.datasets.channel_sources.files("mine", "c", "injury")] == [
+        "c_injuries.txt"
+    ]
 
 
 def test_a_status_in_the_configuration_takes_the_place_of_the_file(base: Path) -> None:
     text = DATASET + "clips: {a: , b: , c: {channels: {injury: 'LeftArm-LeftForeArm[3]'}}}\n"
     (base / "config/datasets/mine.yaml").write_text(text)
-    assert Project(base, {}).datasets.told.files("mine", "c", "injury") == []
+    assert Project(base, {}).datasets.channel_sources.files("mine", "c", "injury") == []
 
 
 def test_severities_of_0_hurt_nobody(base: Path) -> None:
@@ -70,7 +72,7 @@ def test_severities_of_0_hurt_nobody(base: Path) -> None:
     (base / "data/mine/c_injuries.txt").write_text(
         "frames:9\n1-4 LeftLeg-LeftFoot[0];\n5-9 LeftLeg-LeftFoot[.5];\n"
     )
-    assert [Project(base, {}).datasets.told.neutral("mine", clip, "injury") for clip in "abc"] == [
+    assert [Project(base, {}).datasets.channel_sources.neutral("mine", clip, "injury") for clip in "abc"] == [
         True,
         True,
         False,
@@ -81,7 +83,7 @@ def test_severities_of_0_hurt_nobody(base: Path) -> None:
         + "b: {channels: {injury: 'LeftLeg-LeftFoot[0]'}}, c: }\n"
     )
     (base / "config/datasets/mine.yaml").write_text(text)
-    assert [Project(base, {}).datasets.told.neutral("mine", clip, "injury") for clip in "abc"] == [
+    assert [Project(base, {}).datasets.channel_sources.neutral("mine", clip, "injury") for clip in "abc"] == [
         False,
         True,
         False,
@@ -125,6 +127,7 @@ def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
     [
         ("results/one/stimuli", "configuration one is told nothing.*has `channels`"),
         ("results/eyes/stimuli/", "configuration one is told nothing"),
+        ("results/one/questionnaire", r"configuration one is not told what hurts.*\[injury\]"),
         ("results/hurt/export/cubik.onnx", "export/cubik.onnx: there are constant, linear, cubic"),
     ],
 )
@@ -132,10 +135,15 @@ def test_what_no_network_could_give_is_told_before_it_is_trained(
     base: Path, monkeypatch: pytest.MonkeyPatch, target: str, message: str
 ) -> None:
     (base / "config/eyes.yaml").write_text("extends: hurt\nnetwork_of: one\n")
-    monkeypatch.setattr(targets, "_dataset", lambda *_: None)
+    monkeypatch.setattr(targets, "_check_dataset", lambda *_: None)
     with pytest.raises(HobbleError, match=message):
         check(Project(base, {}), [target])
-    fine = ("results/hurt/stimuli", "results/one/export/pfnn", "results/one/export/cubic.onnx")
+    fine = (
+        "results/hurt/stimuli",
+        "results/hurt/questionnaire",
+        "results/one/export/pfnn",
+        "results/one/export/cubic.onnx",
+    )
     check(Project(base, {}), fine)
 
 
@@ -147,7 +155,7 @@ def test_a_listed_clip_without_its_file_is_told(base: Path) -> None:
 
 def test_the_walkers_frames_are_shared_out(root: Path) -> None:
     project = Project(root, {})
-    total = sum(project.datasets.frames("synthetic", clip) for clip in project.clips.own("synthetic"))
+    total = sum(project.datasets.frames("synthetic", clip) for clip in project.clips.listed("synthetic"))
     assert abs(total - 11_412) < 20
 
 
@@ -258,12 +266,12 @@ def test_what_is_compared(complete: Path) -> None:
     base = complete
     project = Project(base, {"compare": ["one", "hurt"]})
     check(project, ["results/compare/compare.json"])
-    assert project.comparison.measured()["accuracy"] == [
+    assert project.comparison.input_files()["accuracy"] == [
         f"results/{n}/evaluation/accuracy.json" for n in ("one", "hurt")
     ]
     assert Project(base, {"compare": "one,hurt"}).comparison.names() == ["one", "hurt"]
     (base / "config/read.yaml").write_text("extends: one\nnetwork_of: one\n")
-    read = Project(base, {"compare": ["read"]}).comparison.measured()
+    read = Project(base, {"compare": ["read"]}).comparison.input_files()
     assert read["history"] == ["results/one/network/history.csv"]
     # A list of configurations is no part of any of them.
     assert project.configurations.resolved("one") == Project(base, {}).configurations.resolved("one")
@@ -305,7 +313,7 @@ def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(bas
     assert list(project.clips.of("mine")) == ["a", "b", "c", "d"]
     assert project.clips.source("mine", "d") == str(below / "d.BVH")
     assert project.clips.label_files("mine", "d") == [str(below / "d_gait.txt")]
-    assert project.datasets.told.files("mine", "d", "injury") == [str(below / "d_injuries.txt")]
+    assert project.datasets.channel_sources.files("mine", "d", "injury") == [str(below / "d_injuries.txt")]
 
 
 def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path) -> None:
@@ -321,7 +329,7 @@ def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path)
     project = Project(base, {})
     assert list(project.clips.of("mine")) == ["a", "b", "c", "d"]
     assert project.clips.source("mine", "d") == str(base / "data/mine/first/day 1/d.bvh")
-    assert project.datasets.told.files("mine", "d", "injury") == [
+    assert project.datasets.channel_sources.files("mine", "d", "injury") == [
         str(base / "data/mine/first/day 1/d_injuries.txt")
     ]
 
@@ -347,13 +355,15 @@ def test_a_status_file_of_no_clip_is_told_with_the_nearest_name(base: Path) -> N
     (base / "data/mine/orphn_injuries.txt").write_text("frames:9\n1-9 LeftLeg-LeftFoot[4];\n")
     (note,) = notes(Project(base, {}), ["results/one/report.html", "results/hurt/report.html"])
     assert note.startswith("data set mine: ")
-    assert "orphn_injuries.txt belongs to no clip and is not read: is it that of orphan?" in note
+    assert (
+        "orphn_injuries.txt belongs to no clip and is not read. If it belongs to orphan, rename it." in note
+    )
 
 
 def test_two_files_of_one_clip_are_refused_with_both(base: Path) -> None:
     (base / "data/mine/old").mkdir()
     (base / "data/mine/old/a.BVH").write_text("")
-    with pytest.raises(HobbleError, match=r"old/a\.BVH: a second file of clip a, beside .*mine/a\.bvh"):
+    with pytest.raises(HobbleError, match=r"old/a\.BVH: a second file of clip a; the first is .*mine/a\.bvh"):
         Project(base, {}).clips.of("mine")
     (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , c: }\n")
     with pytest.raises(HobbleError, match="a second file of clip a"):
@@ -374,7 +384,9 @@ def test_what_the_folder_lacks_is_downloaded(base: Path) -> None:
     project = Project(base, {})
     assert project.clips.source("far", "2_1") == str(base / "data/downloaded/far/2_1.bvh")
     assert (
-        project.clips.label_files("far", "2_1") == project.datasets.told.files("far", "2_1", "injury") == []
+        project.clips.label_files("far", "2_1")
+        == project.datasets.channel_sources.files("far", "2_1", "injury")
+        == []
     )
     assert project.clips.download("far", "2_2") == {
         "url": "https://host/002/2_2.bvh",
@@ -420,10 +432,12 @@ def test_a_manifest_that_does_not_read_is_told_with_its_line(base: Path) -> None
 def test_every_clip_of_the_cmu_set_has_a_checksum_and_an_address(root: Path) -> None:
     project = Project(root, {"mocap": "nowhere"})
     check(project, ["results/datasets/cmu/motion/02_01.npz"])
-    assert len(project.clips.own("cmu")) == 69
+    assert len(project.clips.listed("cmu")) == 69
     assert project.clips.download("cmu", "02_01")["url"].endswith("/cmu-mocap/master/data/002/02_01.bvh")
     assert project.clips.download("cmu", "105_16")["url"].endswith("/105/105_16.bvh")
-    assert all(len(project.clips.download("cmu", clip)["sha256"]) == 64 for clip in project.clips.own("cmu"))
+    assert all(
+        len(project.clips.download("cmu", clip)["sha256"]) == 64 for clip in project.clips.listed("cmu")
+    )
 
 
 @pytest.mark.shared
@@ -431,7 +445,7 @@ def test_the_checksums_are_those_of_the_files(root: Path, shared: Path) -> None:
     import hashlib
 
     project = Project(root, {})
-    for clip in project.clips.own("cmu"):
+    for clip in project.clips.listed("cmu"):
         data = (shared / f"mocap/cmu/{clip}.bvh").read_bytes()
         assert project.clips.download("cmu", clip)["sha256"] == hashlib.sha256(data).hexdigest()
 

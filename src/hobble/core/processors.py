@@ -1,4 +1,4 @@
-"""What the processors of this machine can do: how many cores they are, and whether they multiply bfloat16."""
+"""How many cores this machine has, and whether they multiply bfloat16 in hardware."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from pathlib import Path
 
 TOPOLOGY = Path("/sys/devices/system/cpu")
 CPUINFO = Path("/proc/cpuinfo")
-# A user can keep oneDNN below what the CPU has; these of its levels have no instructions for bfloat16.
+# Values of ONEDNN_MAX_CPU_ISA, which limits oneDNN's instructions, that exclude those for bfloat16.
 WITHOUT_BFLOAT16 = ("SSE41", "AVX", "AVX2", "AVX2_VNNI", "AVX512_CORE", "AVX512_CORE_VNNI")
 
 
 def cores(processors: Iterable[int] | None = None, topology: Path = TOPOLOGY) -> int:
-    """Cores among `processors` (default: those that this process may use), at least 1.
+    """Number of cores among `processors` (default: those this process may use), at least 1.
 
-    Two hardware threads of one core count once: compiled products gain nothing from the second, and on such
-    a pair one thread was 1.06 to 1.2 times faster than two. Where the system does not say which processors
-    share a core, each counts.
+    Two hardware threads of one core count once, because compiled products gain nothing from the second: on
+    such a pair one thread was 1.06 to 1.2 times faster than two. If the system does not say which processors
+    share a core, each processor counts.
     """
     if processors is None:
         processors = (
@@ -36,8 +36,8 @@ def cores(processors: Iterable[int] | None = None, topology: Path = TOPOLOGY) ->
 def multiplies_bfloat16(cpuinfo: Path = CPUINFO, environment: Mapping[str, str] = os.environ) -> bool:
     """Whether this CPU multiplies bfloat16 in hardware (AVX-512 BF16 or AMX), twice as fast as float32.
 
-    False too where ONEDNN_MAX_CPU_ISA forbids those instructions: oneDNN would imitate them, which takes
-    many times as long as float32.
+    Also False if ONEDNN_MAX_CPU_ISA forbids those instructions: oneDNN would emulate them, which takes many
+    times as long as float32.
     """
     if environment.get("ONEDNN_MAX_CPU_ISA", "").upper() in WITHOUT_BFLOAT16:
         return False

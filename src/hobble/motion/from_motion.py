@@ -9,9 +9,9 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
+from hobble.motion.flat_feet import flat_feet
 from hobble.motion.orient import frame, mean, unit
 from hobble.motion.seen import LEFT, Seen
-from hobble.motion.spine import SHORT
 
 UP, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 AGREE = np.radians(25.0)  # joints of a trunk that are turned no further from each other have one rest pose
@@ -24,7 +24,7 @@ def from_motion(seen: Seen) -> dict[int, Array]:
     for side, sign in (("left", 1.0), ("right", -1.0)):
         _arm(seen, frames, side, sign)
         _leg(seen, frames, side)
-    return frames
+    return frames | flat_feet(seen)
 
 
 def _trunk(seen: Seen, frames: dict[int, Array]) -> None:
@@ -40,7 +40,10 @@ def _trunk(seen: Seen, frames: dict[int, Array]) -> None:
         left = seen.hips_left if i == 0 else seen.chest_left if joint == body.chest else both
         following = (*chain[i + 1 :], *ends)
         bone = seen.first_long(joint, following)
-        frames[joint] = frame(bone, seen.spine.at(way[i] / max(way[-1], 1e-9)), seen.local(joint, left), LEFT)
+        axis, own = seen.spine.at(way[i] / max(way[-1], 1e-9)), seen.local(joint, left)
+        # What carries limbs is level where they begin: spines of captured rigs are bent sideways by degrees.
+        carries = joint in (body.hips, body.chest)
+        frames[joint] = frame(own, LEFT, bone, axis) if carries else frame(bone, axis, own, LEFT)
     for i, joint in enumerate(body.neck):
         bone = seen.first_long(joint, ends[i + 1 :])
         axis = seen.spine.neck if joint == body.neck[-1] else seen.spine.at(1.0)
@@ -71,18 +74,7 @@ def _arm(seen: Seen, frames: dict[int, Array], side: str, sign: float) -> None:
 
 
 def _leg(seen: Seen, frames: dict[int, Array], side: str) -> None:
-    hip, knee, heel, toe = seen.body.legs[side]
+    hip, knee, heel, _ = seen.body.legs[side]
     hinge = seen.hinge(hip, knee, heel, seen.hips_left)
     for start, end in ((hip, knee), (knee, heel)):
         frames[start] = frame(seen.bone(start, end), -UP, seen.local(start, hinge), LEFT)
-    flat = seen.flat(heel, heel if toe is None else toe)
-    if toe is not None:
-        ahead = seen.at[flat, toe] - seen.at[flat, heel]
-    elif (site := seen.ends[side]) is not None and np.linalg.norm(site) > SHORT:
-        ahead = quat.rotate(seen.turned[flat, heel], np.array(site))
-    else:
-        ahead = np.cross(seen.hips_left[flat], UP)
-    level = quat.between(AHEAD, unit(ahead * [1, 0, 1]))
-    for joint in (heel, toe):
-        if joint is not None:
-            frames[joint] = mean(quat.mul(quat.inv(seen.turned[flat, joint]), level))

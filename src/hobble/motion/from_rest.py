@@ -7,6 +7,7 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES
+from hobble.motion.flat_feet import stands
 from hobble.motion.orient import apart, frame, off, pointed, snapped, unit
 from hobble.motion.seen import LEFT, Seen
 
@@ -64,12 +65,12 @@ def add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: Seen) -> No
 
 
 def _foot(standing: Array, zero: Array, seen: Seen, side: str) -> Array:
-    """How a foot is turned: rolled as it stands, pointing as in the zero pose, where the two agree at all.
+    """How a foot is turned: as it stands, but as steep as in the zero pose, where the two agree at all.
 
-    Feet of a rig whose legs are splayed in the zero pose are rolled there; a patient's foot may never be
-    flat.
+    Feet of a rig whose legs are splayed in the zero pose are rolled and point outward there; a patient's foot
+    may never be flat.
     """
-    if not seen.stands(side):
+    if not stands(seen, side):
         return zero
     heel, toe = seen.body.legs[side][2:]
     if toe is None:
@@ -78,4 +79,8 @@ def _foot(standing: Array, zero: Array, seen: Seen, side: str) -> Array:
     if apart(standing, zero) > TRUSTED + 60:
         return standing
     wanted, found = (quat.rotate(quat.inv(frame), bone) for frame in (zero, standing))
-    return quat.mul(standing, quat.between(wanted, found)) if off(wanted, found) < TRUSTED else standing
+    if off(wanted, found) > TRUSTED:
+        return standing
+    across, level = found[0], float(np.hypot(wanted[0], wanted[2]))
+    wanted = np.array([across, wanted[1], np.sqrt(max(level**2 - across**2, 0.0))])
+    return quat.mul(standing, quat.between(wanted, found))

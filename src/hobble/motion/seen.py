@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hobble.core import quat
 from hobble.core.quat import Array
@@ -14,9 +14,7 @@ from hobble.motion.orient import pointed, robust, unit
 from hobble.motion.spine import SHORT, Spine
 
 LEFT = np.array([1.0, 0.0, 0.0])
-STEADY = 0.15  # share of frames, those in which a foot is lowest and slowest, that tell how it stands
 FLEXED = 0.05  # mean sine of the bend of a knee or an elbow from which on it tells where the front is
-UPRIGHT = 0.6  # height of the hips above a foot that stands, to the length of the leg
 
 
 class Seen:
@@ -24,6 +22,9 @@ class Seen:
 
     A joint's frame is the rotation (4,) from the axes of a figure that stands facing +Z, arms out, to the
     joint's own: its world rotation times it is how far the part is turned from that stance.
+
+    positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds: (S, J) cm a second. ends: where the
+    end site of an ankle is, if it has one. spine: where the bones of a trunk point in that stance.
     """
 
     def __init__(
@@ -31,10 +32,12 @@ class Seen:
         body: Body,
         positions: Array,
         rotations: Array,
+        speeds: Array,
         ends: Mapping[str, tuple[float, float, float] | None],
         spine: Spine,
     ) -> None:
-        self.body, self.at, self.turned, self.ends, self.spine = body, positions, rotations, ends, spine
+        self.body, self.at, self.turned, self.speeds = body, positions, rotations, speeds
+        self.ends, self.spine = ends, spine
         self.hips_left = self.line(body.legs["right"][0], body.legs["left"][0])
         self.chest_left = self.line(body.arms["right"][1], body.arms["left"][1])
 
@@ -51,6 +54,11 @@ class Seen:
         """(3,) the bone to `end` as `start` has it."""
         return self.local(start, self.at[:, end] - self.at[:, start])
 
+    def length(self, *joints: int) -> float:
+        """Of the way from joint to joint."""
+        ways = (self.at[:, b] - self.at[:, a] for a, b in pairwise(joints))
+        return sum(float(np.median(np.linalg.norm(way, axis=-1))) for way in ways)
+
     def first_long(self, joint: int, following: Sequence[int]) -> Array:
         """(3,) the bone to the first of the following joints that is not in the same place."""
         bones = [self.bone(joint, end) for end in following]
@@ -63,28 +71,6 @@ class Seen:
         if np.linalg.norm(own) < FLEXED:
             return otherwise
         return quat.rotate(self.turned[:, start], np.broadcast_to(unit(own), axis.shape))
-
-    def stands(self, side: str) -> bool:
-        """Whether the body stands up while that foot is lowest and slowest."""
-        hip, knee, heel, toe = self.body.legs[side]
-        flat = self.flat(heel, heel if toe is None else toe)
-        leg = sum(
-            float(np.median(np.linalg.norm(self.at[:, b] - self.at[:, a], axis=-1)))
-            for a, b in ((hip, knee), (knee, heel))
-        )
-        return bool(np.median(self.at[flat, hip, 1] - self.at[flat, heel, 1]) > UPRIGHT * leg)
-
-    def flat(self, heel: int, toe: int) -> NDArray[np.integer]:
-        """The frames in which the whole foot stands: it is lowest and slowest then."""
-        feet = self.at[:, [heel, toe]]
-        speed = (
-            np.linalg.norm(np.gradient(feet, axis=0), axis=-1).sum(axis=1)
-            if len(feet) > 1
-            else np.zeros(len(feet))
-        )
-        height = feet[..., 1].sum(axis=1)
-        order = np.argsort(np.argsort(speed)) + np.argsort(np.argsort(height))
-        return np.argsort(order)[: max(3, round(STEADY * len(feet)))]
 
     def hand(self, side: str, straight: Array, sign: float) -> Array:
         """The frame of a hand: as its forearm's, but pointing where its fingers are."""

@@ -18,7 +18,8 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import rest_positions
-from hobble.motion.body import Body, above
+from hobble.motion.body import Body
+from hobble.motion.flat_feet import doubt
 from hobble.motion.from_motion import from_motion
 from hobble.motion.from_rest import TRUSTED, add_rest, from_rest
 from hobble.motion.orient import apart, mean, pointed
@@ -26,6 +27,7 @@ from hobble.motion.seen import LEFT, Seen
 from hobble.motion.spine import SHORT, Spine
 from hobble.motion.standing import stands
 from hobble.motion.tell_anew import told_anew, with_balls
+from hobble.motion.tree import above
 
 SAMPLES = 400
 
@@ -34,12 +36,14 @@ SAMPLES = 400
 class Upright:
     """A clip whose rest pose stands, facing +Z with the arms out; its joints are those of the body.
 
-    rest: where the stance is from, in words. body: the parts by their new indices.
+    rest: where the stance is from, in words. body: the parts by their new indices. notes: sentences on what
+    is uncertain.
     """
 
     clip: Clip = field(repr=False)
     body: Body
     rest: str
+    notes: list[str] = field(default_factory=list)
 
 
 def upright(clip: Clip, body: Body, spine: Spine, others: Collection[int] = ()) -> Upright:
@@ -55,7 +59,8 @@ def upright(clip: Clip, body: Body, spine: Spine, others: Collection[int] = ()) 
     ends = {
         side: clip.skeleton.end_sites.get(clip.skeleton.joints[leg[2]]) for side, leg in body.legs.items()
     }
-    seen = Seen(body, clip.positions[every], clip.global_rotations[every], ends, spine)
+    speeds = _speeds(clip)[every]
+    seen = Seen(body, clip.positions[every], clip.global_rotations[every], speeds, ends, spine)
     rest = rest_positions(clip.skeleton)
     frames, problem = from_motion(seen), stands(body, rest)
     if problem is None:
@@ -65,9 +70,17 @@ def upright(clip: Clip, body: Body, spine: Spine, others: Collection[int] = ()) 
         else:
             add_rest(frames, zero, seen)
     said = "its zero pose" if problem is None else f"its motion, since in its zero pose {problem}"
+    unsure = None if problem is None else doubt(seen)
     kept = _kept(clip, seen, others, frames)
     clip, body = with_balls(clip, body, frames)
-    return Upright(*told_anew(clip, body, [*body.joints, *kept], frames), said)
+    return Upright(*told_anew(clip, body, [*body.joints, *kept], frames), said, [unsure] if unsure else [])
+
+
+def _speeds(clip: Clip) -> Array:
+    """(F, J) cm a second."""
+    if len(clip) < 2:
+        return np.zeros(clip.positions.shape[:2])
+    return np.linalg.norm(np.gradient(clip.positions, axis=0), axis=-1) * clip.fps
 
 
 def _kept(clip: Clip, seen: Seen, others: Collection[int], frames: dict[int, Array]) -> list[int]:

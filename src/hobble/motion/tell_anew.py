@@ -11,8 +11,9 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
-from hobble.motion.body import SIDES, Body, above
+from hobble.motion.body import SIDES, Body
 from hobble.motion.seen import LEFT
+from hobble.motion.tree import above
 
 MOVES = 0.1  # cm
 BALL = np.array([0.0, -0.045, 0.14])  # from the ankle, to the length of the leg, of a foot without toes

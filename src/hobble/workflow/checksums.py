@@ -17,9 +17,9 @@ from pathlib import Path
 from hobble.core.errors import InputError
 from hobble.core.files import write_text
 
-CARRY_THEIR_OWN = {".npz"}
-BLOCK = 1 << 20
-TICK = 0.02  # seconds: coarser than the clock that stamps files
+OWN_CHECKSUM = {".npz"}
+BLOCK_BYTES = 1 << 20
+CLOCK_TICK = 0.02  # seconds: coarser than the clock that stamps files
 
 Stamp = tuple[int, int, int]
 
@@ -31,7 +31,7 @@ def record_of(path: Path) -> Path | None:
         return None
     results = len(parts) - parts[::-1].index("results")
     root = results + (2 if parts[results : results + 1] == ("datasets",) else 1)
-    if len(parts) <= root or path.suffix in CARRY_THEIR_OWN:
+    if len(parts) <= root or path.suffix in OWN_CHECKSUM:
         return None
     return Path(*parts[:root], "checksums", *parts[root:-1], f"{path.name}.crc32")
 
@@ -72,8 +72,8 @@ def stamps(paths: Iterable[str]) -> Mapping[str, Stamp]:
     out = {}
     for path in map(str, paths):
         if os.path.isfile(path):
-            if 0 <= time.time() - os.stat(path).st_mtime < TICK:
-                time.sleep(TICK)  # else a write that follows at once could bear the same time
+            if 0 <= time.time() - os.stat(path).st_mtime < CLOCK_TICK:
+                time.sleep(CLOCK_TICK)  # else a write that follows at once could bear the same time
             found = os.stat(path)
             out[path] = (found.st_mtime_ns, found.st_size, found.st_ino)
     return out
@@ -98,7 +98,7 @@ def _checksum(path: Path) -> int:
     crc = 0
     try:
         with open(path, "rb") as file:
-            while block := file.read(BLOCK):
+            while block := file.read(BLOCK_BYTES):
                 crc = zlib.crc32(block, crc)
     except OSError as error:
         raise InputError(path, f"cannot be read: {error.strerror}") from error

@@ -11,24 +11,30 @@ from urllib.parse import quote
 
 from hobble.config.load import Catalogue
 from hobble.config.models import ClipEntry
-from hobble.core.clip_files import NAMES, can_be_called, find_clips, orphan_notes, the_file
+from hobble.core.clip_files import (
+    CLIP_NAME_RULE,
+    find_clips,
+    is_valid_clip_name,
+    only_file,
+    unused_file_notes,
+)
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular
 from hobble.hurt.options import TELLS
 from hobble.synthetic.links import WRITES
+from hobble.workflow.channel_sources import ChannelSources
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
-from hobble.workflow.told import Told
 
 DATASETS = "results/datasets"
-MIRROR = "_mirror"
-HURT = re.compile(r"_hurt([1-9])$")  # at the end of a hurt version's name
-MOST_NOTES = 10
+MIRROR_SUFFIX = "_mirror"
+HURT_SUFFIX = re.compile(r"_hurt([1-9])$")  # at the end of a hurt version's name
+MAX_NOTES = 10
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 
 
 def original(clip: str) -> str:
     """The clip that a mirror, a hurt version, or the mirror of one is made from; else itself."""
-    return HURT.sub("", clip.removesuffix(MIRROR))
+    return HURT_SUFFIX.sub("", clip.removesuffix(MIRROR_SUFFIX))
 
 
 class Clips:
@@ -36,35 +42,35 @@ class Clips:
 
     def __init__(self, base: Path, mocap: Path, catalogue: Catalogue) -> None:
         self.base, self.mocap, self.catalogue = base, mocap, catalogue
-        self.told = Told(catalogue, self)
+        self.channel_sources = ChannelSources(catalogue, self)
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def of(self, dataset: str) -> dict[str, ClipEntry]:
         """The clips of a data set by name, hurt versions among them, without mirrors.
 
-        Raises HobbleError where there are none.
+        Raises HobbleError if there are none.
         """
-        own = self.own(dataset)
-        return {**own, **{version: own[original(version)] for version in self.versions(dataset)}}
+        own = self.listed(dataset)
+        return {**own, **{version: own[original(version)] for version in self.hurt_versions(dataset)}}
 
     @functools.cache  # noqa: B019
-    def own(self, dataset: str) -> dict[str, ClipEntry]:
+    def listed(self, dataset: str) -> dict[str, ClipEntry]:
         """The clips that the data set lists or its folder holds."""
         listed = self.catalogue.dataset(dataset).clips or dict.fromkeys(self._scanned(dataset))
-        if odd := [name for name in listed if name.endswith(MIRROR)]:
+        if odd := [name for name in listed if name.endswith(MIRROR_SUFFIX)]:
             raise HobbleError(
                 f"data set {dataset}: {', '.join(odd)}: only a mirror is called so, which `mirror: true` "
                 "makes from its original. Put the original beside it and leave the mirror off the list, or "
                 "rename its file."
             )
-        if odd := [name for name in listed if HURT.search(name)]:
+        if odd := [name for name in listed if HURT_SUFFIX.search(name)]:
             raise HobbleError(
                 f"data set {dataset}: {', '.join(odd)}: only a hurt version is called so, which `hurt` makes "
                 "from its original. Take it out, or rename its file."
             )
         return {name: entry or ClipEntry() for name, entry in listed.items()}
 
-    versions_of = TELLS  # the channel that hurt versions are told
+    hurt_channel = TELLS  # the channel that hurt versions are told
 
     @staticmethod
     def original(clip: str) -> str:
@@ -72,16 +78,18 @@ class Clips:
         return original(clip)
 
     @staticmethod
-    def is_version(clip: str) -> bool:
+    def is_hurt_version(clip: str) -> bool:
         """Whether it is a hurt version of a clip, or the mirror of one."""
-        return HURT.search(clip.removesuffix(MIRROR)) is not None
+        return HURT_SUFFIX.search(clip.removesuffix(MIRROR_SUFFIX)) is not None
 
     @functools.cache  # noqa: B019
-    def versions(self, dataset: str) -> dict[str, int]:
+    def hurt_versions(self, dataset: str) -> dict[str, int]:
         """The hurt versions of the healthy clips by name, and which turn each has among them, from 0."""
         options = self.catalogue.dataset(dataset).hurt
         healthy = (
-            [clip for clip in self.own(dataset) if self.told.neutral(dataset, clip, TELLS)] if options else []
+            [clip for clip in self.listed(dataset) if self.channel_sources.neutral(dataset, clip, TELLS)]
+            if options
+            else []
         )
         many = options.versions if options else 0
         names = [f"{clip}_hurt{version + 1}" for version in range(many) for clip in healthy]
@@ -89,7 +97,7 @@ class Clips:
 
     def entry(self, dataset: str, clip: str) -> ClipEntry:
         """What the data set says of a clip, or of the original of a mirror or of a hurt version."""
-        clips = self.own(dataset)
+        clips = self.listed(dataset)
         name = original(clip)
         if name not in clips:
             raise HobbleError(f"data set {dataset} has no clip {name!r}; it has: {', '.join(clips)}")
@@ -98,7 +106,7 @@ class Clips:
     def folder(self, dataset: str) -> Path:
         """Where the data set's own source files lie.
 
-        Raises InputError where a user's folder is missing, unless its clips can be downloaded.
+        Raises InputError if a user's folder is missing, unless its clips can be downloaded.
         """
         model = self.catalogue.dataset(dataset)
         if model.synthetic is not None:
@@ -123,7 +131,7 @@ class Clips:
         if model.synthetic is not None:
             return str(self.folder(dataset) / f"{clip}.bvh")
         if clip in (files := self._files(dataset)):
-            return str(the_file(clip, files[clip]))
+            return str(only_file(clip, files[clip]))
         if clip in (known := self._checksums(dataset)):
             return self.downloaded(model.source or dataset, clip)
         path = self.folder(dataset) / f"{clip}.bvh"
@@ -148,10 +156,10 @@ class Clips:
     def label_files(self, dataset: str, clip: str) -> list[str]:
         """Hand-made label files beside the clip."""
         if self.catalogue.dataset(dataset).synthetic is not None:
-            return self.beside(dataset, clip, ("_footsteps.txt", "_gait.txt"))
-        return self.beside(dataset, clip, LABEL_FILES) if self._reads_labels(dataset) else []
+            return self.side_files(dataset, clip, ("_footsteps.txt", "_gait.txt"))
+        return self.side_files(dataset, clip, LABEL_FILES) if self._reads_labels(dataset) else []
 
-    def beside(self, dataset: str, clip: str, suffixes: Iterable[str]) -> list[str]:
+    def side_files(self, dataset: str, clip: str, suffixes: Iterable[str]) -> list[str]:
         """The files called as the clip is, with one of `suffixes` after its name.
 
         Those of the embedded walker are named whether they exist or not, since it makes them all.
@@ -202,9 +210,11 @@ class Clips:
         """The clips in the user's folder, but for mirrors of others that lie beside their originals."""
         folder, files = self.folder(dataset), self._files(dataset)
         for name in sorted(files):
-            if not can_be_called(name):
-                raise InputError(folder, f"a clip is called {name!a:.80}", fix=f"Rename it: {NAMES}.")
-            the_file(name, files[name])
+            if not is_valid_clip_name(name):
+                raise InputError(
+                    folder, f"a clip is called {name!a:.80}", fix=f"Rename it: {CLIP_NAME_RULE}."
+                )
+            only_file(name, files[name])
         if not files:
             raise InputError(folder, "no .bvh files here", fix="Put clips there.")
         return sorted(set(files) - set(self._mirrors(dataset)))
@@ -212,14 +222,14 @@ class Clips:
     def _mirrors(self, dataset: str) -> list[str]:
         """The files that are mirrors of others beside them: they are made anew, or left out."""
         files = self._files(dataset)
-        return sorted(name + MIRROR for name in files if name + MIRROR in files)
+        return sorted(name + MIRROR_SUFFIX for name in files if name + MIRROR_SUFFIX in files)
 
     def notes(self, dataset: str) -> list[str]:
         """Sentences on files of the user's folder that no clip reads, and why."""
         model = self.catalogue.dataset(dataset)
         if model.synthetic is not None or not (folder := self.folder(dataset)).is_dir():
             return []
-        said = orphan_notes(folder, {*self._files(dataset), *self._checksums(dataset)})
+        said = unused_file_notes(folder, {*self._files(dataset), *self._checksums(dataset)})
         mirrors = [] if model.clips or model.mirror else self._mirrors(dataset)
         if mirrors:
             said.insert(
@@ -228,8 +238,8 @@ class Clips:
                 "and were left out: `mirror: true` makes them anew, labels too, on the side of the split "
                 "that their originals are on.",
             )
-        more = len(said) - MOST_NOTES
-        return [*said[:MOST_NOTES], *([f"{more} more files belong to no clip."] if more > 0 else [])]
+        more = len(said) - MAX_NOTES
+        return [*said[:MAX_NOTES], *([f"{more} more files belong to no clip."] if more > 0 else [])]
 
     def _manifest(self, dataset: str) -> Path:
         options = self.catalogue.dataset(dataset).download

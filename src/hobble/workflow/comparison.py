@@ -6,7 +6,7 @@ from typing import Any
 
 from hobble.core.errors import HobbleError
 from hobble.workflow.configurations import Configurations
-from hobble.workflow.measurements import NAMES, found
+from hobble.workflow.measurements import NAMES, result_file
 
 COMPARE = "compare"  # the folder under results/, and the key of --config
 
@@ -31,12 +31,12 @@ class Comparison:
             )
         return list(names)
 
-    def measured(self) -> dict[str, list[str]]:
+    def input_files(self) -> dict[str, list[str]]:
         """Kind of file, or measurement -> that of each configuration compared."""
         names = self.names()
         return {
             "configuration": [f"results/{name}/configuration.yaml" for name in names],
             "pipeline": [f"results/{name}/pipeline.json" for name in names],
             "history": [self.configurations.network(name, "history.csv") for name in names],
-            **{measure: [found(name, measure) for name in names] for measure in NAMES},
+            **{measure: [result_file(name, measure) for name in names] for measure in NAMES},
         }

@@ -7,9 +7,9 @@ import json
 from typing import Any
 
 from hobble.config.load import Catalogue
+from hobble.workflow.channel_sources import database_folder
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.datasets import Datasets
-from hobble.workflow.told import folder
 
 
 class Configurations:
@@ -71,7 +71,8 @@ class Configurations:
 
     def database(self, configuration: str) -> str:
         """The database that the configuration learns from."""
-        return f"{DATASETS}/{self.dataset(configuration)}/database/{folder(self.channels(configuration))}"
+        folder = database_folder(self.channels(configuration))
+        return f"{DATASETS}/{self.dataset(configuration)}/database/{folder}"
 
     def start(self, configuration: str) -> list[str]:
         """The checkpoint that training goes on from, if it continues another configuration's."""

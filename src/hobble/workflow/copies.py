@@ -15,7 +15,7 @@ from hobble.workflow.datasets import Datasets
 def same_files(clips: Clips, dataset: str) -> list[tuple[str, str, str]]:
     """Pairs of clips with equal files: name, name, "the same file". Only files of one size are read."""
     sizes: dict[int, list[tuple[str, Path]]] = defaultdict(list)
-    for clip in clips.own(dataset):
+    for clip in clips.listed(dataset):
         path = Path(clips.source(dataset, clip))
         if path.is_file() and (size := path.stat().st_size):
             sizes[size].append((clip, path))
@@ -28,7 +28,7 @@ def same_files(clips: Clips, dataset: str) -> list[tuple[str, str, str]]:
 
 
 def refuse_copies(clips: Clips, datasets: Datasets, dataset: str, channels: tuple[str, ...]) -> None:
-    """Raise HobbleError where one file is trained on under one name and held out under another."""
+    """Raise HobbleError if one file is trained on under one name and held out under another."""
     model = datasets.catalogue.dataset(dataset)
     if model.synthetic is None and model.held_out:
         splits = {original(name): side for name, side in datasets.selected(dataset, channels).items()}

@@ -7,7 +7,7 @@ from pathlib import Path
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.configurations import Configurations
 
-OF_DATASET = ("synthetic", "motion", "labels", "channels", "terrain", "database")
+DATASET_STAGES = ("synthetic", "motion", "labels", "channels", "terrain", "database")
 
 Places = dict[str, list[str]]
 
@@ -17,7 +17,7 @@ def stages(configurations: Configurations, name: str) -> dict[str, Places]:
     dataset = configurations.dataset(name)
     root, own = Path(DATASETS, dataset), Path("results", name)
     source = Path(DATASETS, configurations.catalogue.dataset(dataset).source or dataset)
-    out = {stage: _places(root, stage, stage) for stage in OF_DATASET}
+    out = {stage: _places(root, stage, stage) for stage in DATASET_STAGES}
     out["synthetic"] = _places(source, "synthetic", "synthetic")
     out["database"]["files"] = [str(root / "database/clips"), configurations.database(name)]
     out["training"] = _places(Path("results", configurations.owner(name)), "training", "network")

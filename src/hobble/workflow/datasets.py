@@ -8,14 +8,14 @@ from typing import Any
 from hobble.config.load import Catalogue
 from hobble.core.errors import HobbleError
 from hobble.core.section import Section
-from hobble.workflow.clips import MIRROR, Clips, original
+from hobble.workflow.clips import MIRROR_SUFFIX, Clips, original
 
 
 class Datasets:
     """The data sets of a project, with the clips that lie in its folders."""
 
     def __init__(self, catalogue: Catalogue, clips: Clips) -> None:
-        self.catalogue, self.clips, self.told = catalogue, clips, clips.told
+        self.catalogue, self.clips, self.channel_sources = catalogue, clips, clips.channel_sources
 
     def options(self, dataset: str, section: str, *keys: str) -> dict[str, Any]:
         """Plain values of one section of a data set: of those `keys`, or of all where none is named."""
@@ -36,16 +36,16 @@ class Datasets:
         """Synthetic clips: the frames at 60 Hz that fall to this one."""
         synthetic = self.catalogue.dataset(dataset).synthetic
         assert synthetic is not None
-        total = sum(entry.share for entry in self.clips.own(dataset).values())
+        total = sum(entry.share for entry in self.clips.listed(dataset).values())
         return round(synthetic.frames * self.clips.entry(dataset, clip).share / total)
 
     def selected(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
         """Clip -> "train" or "held_out", of the clips that no other channel tells anything.
 
-        channels: those that the network is told. Mirrors go with originals. Raises HobbleError where the data
+        channels: those that the network is told. Mirrors go with originals. Raises HobbleError if the data
         set lacks one of `channels`, or no clip is left to train on.
         """
-        there = self.told.channels(dataset)
+        there = self.channel_sources.channels(dataset)
         if lacking := [name for name in channels if name not in there]:
             raise HobbleError(
                 f"data set {dataset} says nothing of {', '.join(lacking)}: give it a section "
@@ -54,13 +54,13 @@ class Datasets:
         others = [name for name in there if name not in channels]
         model, clips = self.catalogue.dataset(dataset), self.clips.of(dataset)
         held_out = set(model.held_out)
-        if missing := held_out - set(self.clips.own(dataset)):
+        if missing := held_out - set(self.clips.listed(dataset)):
             raise HobbleError(f"data set {dataset}: held_out names no clip: {', '.join(sorted(missing))}")
         splits = {}
         for clip in clips:
-            if not all(self.told.neutral(dataset, clip, name) for name in others):
+            if not all(self.channel_sources.neutral(dataset, clip, name) for name in others):
                 continue
-            for name in (clip, clip + MIRROR) if model.mirror else (clip,):
+            for name in (clip, clip + MIRROR_SUFFIX) if model.mirror else (clip,):
                 splits[name] = "held_out" if original(clip) in held_out else "train"
         if "train" not in splits.values():
             only = f" that is told nothing of {' or '.join(others)}" if others else ""
@@ -78,5 +78,5 @@ class Datasets:
     def sources(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
         """Hurt version -> the healthy clip that it is made from, of the clips that are selected."""
         chosen = self.selected(dataset, channels)
-        mirrors = {clip: MIRROR if clip.endswith(MIRROR) else "" for clip in chosen}
-        return {clip: original(clip) + mirrors[clip] for clip in chosen if self.clips.is_version(clip)}
+        mirrors = {clip: MIRROR_SUFFIX if clip.endswith(MIRROR_SUFFIX) else "" for clip in chosen}
+        return {clip: original(clip) + mirrors[clip] for clip in chosen if self.clips.is_hurt_version(clip)}

@@ -22,13 +22,13 @@ from hobble.workflow.project import Project
 
 ENGINE_MB = 400  # Snakemake, twice in a cluster's job: as the step that SLURM starts, and beside the script
 PYTHON_MB = 400  # Python with numpy, scipy and the package
-SPARE = 1.5  # asked for each megabyte measured
-SLOWER = 10  # the share of a second's work that a second on a busy, old machine may do
-JOINTS = 31  # of the figure that was measured
-UNKNOWN = 20_000  # frames, of a clip that has yet to be downloaded
-VISITS = 10  # of a row in a pass of training, as of the original recipe
-TITLE = 1 << 20  # bytes, of a BVH file, within which its motion begins
-WEEK = 7 * 24 * 60  # minutes, the longest that a job asks for
+MEMORY_MARGIN = 1.5  # asked for each megabyte measured
+TIME_MARGIN = 10  # the share of a second's work that a second on a busy, old machine may do
+MEASURED_JOINTS = 31  # of the figure that was measured
+ASSUMED_FRAMES = 20_000  # frames, of a clip that has yet to be downloaded
+VISITS_PER_PASS = 10  # of a row in a pass of training, as of the original recipe
+HEADER_BYTES = 1 << 20  # bytes, of a BVH file, within which its motion begins
+WEEK_MINUTES = 7 * 24 * 60  # minutes, the longest that a job asks for
 
 
 class Demands:
@@ -57,7 +57,7 @@ class Demands:
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
         """Megabytes for the measurement `name`."""
         cost = measure(name).cost
-        more = math.ceil(SPARE * cost.memory_mb * attempt)
+        more = math.ceil(MEMORY_MARGIN * cost.memory_mb * attempt)
         return more + self.evaluation_memory(configuration, cost.memory_each, attempt)
 
     def measure_minutes(self, configuration: str, name: str, attempt: int = 1) -> int:
@@ -86,8 +86,8 @@ class Demands:
         """
         training = self.project.configurations.section(configuration, "training")
         dataset = self.project.configurations.dataset(configuration)
-        frames = 1e3 * self.all_thousands(dataset) * JOINTS / self._joints(dataset)
-        samples = frames * VISITS * training["passes"]
+        frames = 1e3 * self.all_thousands(dataset) * MEASURED_JOINTS / self._joints(dataset)
+        samples = frames * VISITS_PER_PASS * training["passes"]
         return _minutes(samples * self.weights(configuration) / 4 / 6.4e9, attempt, least=60)
 
     def gpus(self, configuration: str) -> int:
@@ -98,7 +98,7 @@ class Demands:
 
     def thousands(self, dataset: str, clip: str) -> float:
         """Thousands of frames at the data set's rate, as if of 31 joints."""
-        return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / JOINTS
+        return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / MEASURED_JOINTS
 
     def weights(self, configuration: str) -> float:
         """Numbers that are trained, by the columns of the configuration's rows."""
@@ -129,7 +129,7 @@ class Demands:
             return self.project.datasets.frames(dataset, clip)
         seconds = bvh_seconds(Path(self.project.clips.source(dataset, clip)))
         rate = self.project.datasets.options(dataset, "motion")["fps"]
-        return UNKNOWN if seconds is None else seconds * rate
+        return ASSUMED_FRAMES if seconds is None else seconds * rate
 
 
 def bvh_seconds(path: Path) -> float | None:
@@ -140,7 +140,7 @@ def bvh_seconds(path: Path) -> float | None:
     try:
         size = os.path.getsize(path)
         with open(path, "rb") as file:
-            start = file.read(TITLE)
+            start = file.read(HEADER_BYTES)
     except OSError:
         return None
     begins = re.search(rb"Frame Time:[ \t]*([0-9.eE+-]+)\s*\n([^\n]+\n)", start)
@@ -152,8 +152,8 @@ def bvh_seconds(path: Path) -> float | None:
 
 
 def _megabytes(measured: float, attempt: int) -> int:
-    return math.ceil((ENGINE_MB + PYTHON_MB + SPARE * measured) * attempt)
+    return math.ceil((ENGINE_MB + PYTHON_MB + MEMORY_MARGIN * measured) * attempt)
 
 
 def _minutes(seconds: float, attempt: int, least: int) -> int:
-    return min(max(least, math.ceil(SLOWER * seconds / 60)) * attempt, WEEK)
+    return min(max(least, math.ceil(TIME_MARGIN * seconds / 60)) * attempt, WEEK_MINUTES)

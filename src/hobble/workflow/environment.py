@@ -14,13 +14,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TextIO
 
-OLDEST = (3, 11)
-ROOM = "2.0 GB"  # on disk, on Linux with the constraints as they are
-EVERY = 10.0  # seconds between lines where they go to a file
+OLDEST_PYTHON = (3, 11)
+DISK_SPACE = "2.0 GB"  # on disk, on Linux with the constraints as they are
+PROGRESS_SECONDS = 10.0  # seconds between lines where they go to a file
 # torch first and alone: that it can be had decides whether the rest is worth fetching.
 STEPS = (["torch==2.13.0"], ["--editable", ".[dev]"])
-FETCHES = re.compile(r"\s*(?:Downloading|Using cached) (\S+?)(?:-\d\S*)? \(([\d.]+) (kB|MB|GB)\)")
-SO_FAR = re.compile(r"Progress (\d+) of (\d+)")
+DOWNLOAD_LINE = re.compile(r"\s*(?:Downloading|Using cached) (\S+?)(?:-\d\S*)? \(([\d.]+) (kB|MB|GB)\)")
+PROGRESS_LINE = re.compile(r"Progress (\d+) of (\d+)")
 BYTES = {"kB": 1e3, "MB": 1e6, "GB": 1e9}
 
 
@@ -34,10 +34,10 @@ class Line:
 
     def take(self, said: str) -> None:
         """Follow a line of pip's."""
-        if found := FETCHES.match(said):
+        if found := DOWNLOAD_LINE.match(said):
             self.fetched += self.size
             self.name, self.size, self.now = found[1], float(found[2]) * BYTES[found[3]], 0.0
-        elif found := SO_FAR.match(said):
+        elif found := PROGRESS_LINE.match(said):
             self.now = float(found[1])
         elif said.startswith("Installing collected packages"):
             self.fetched, self.size = self.fetched + self.size, 0.0
@@ -52,7 +52,7 @@ class Line:
         text = f"environment: {(self.fetched + self.now) / 1e6:.0f} MB fetched; {self.name}{of}"
         if self.live:
             self.stream.write(f"\r\x1b[K{text[:78]}")
-        elif time.monotonic() - self.last >= EVERY:
+        elif time.monotonic() - self.last >= PROGRESS_SECONDS:
             self.last = time.monotonic()
             self.stream.write(f"{text}\n")
         self.stream.flush()
@@ -68,7 +68,7 @@ def follow(said: Iterable[str], line: Line) -> list[str]:
     words: list[str] = []
     for text in said:
         line.take(text)
-        if not SO_FAR.match(text):
+        if not PROGRESS_LINE.match(text):
             words = [*words[-30:], text]
     line.end()
     return words
@@ -86,12 +86,10 @@ def install(python: Path, arguments: list[str], line: Line) -> None:
 
 def main(folder: Path) -> None:
     """Make the environment in `folder`, or complete it."""
-    if sys.version_info < OLDEST:
+    if sys.version_info < OLDEST_PYTHON:
         sys.exit("Hobble needs Python 3.11 or later: make env PYTHON=/path/to/python3.11")
     print(f"Making the environment in {folder}: PyTorch, Snakemake, SciPy and what they need.")
-    print(
-        f"It is fetched from the package index and takes {ROOM} of disk; with a fast network, some minutes."
-    )
+    print(f"This downloads packages and takes {DISK_SPACE} of disk, and a few minutes with a fast network.")
     began = time.monotonic()
     venv.create(folder, with_pip=True)
     python, line = folder / "bin" / "python", Line(sys.stdout)

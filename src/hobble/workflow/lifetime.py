@@ -22,20 +22,20 @@ from typing import Any
 
 LOCKS = Path(".snakemake/locks")  # Snakemake removes the folder when it unlocks
 OWNER = "owner.json"
-RUN = "HOBBLE_RUN"  # in a job's environment: the process of its run, and when that began
-LOOK = 0.5  # seconds between a job's looks at its run
-GRACE = 2.0  # seconds that a job has for tidying up after SIGTERM
+RUN_VARIABLE = "HOBBLE_RUN"  # in a job's environment: the process of its run, and when that began
+CHECK_SECONDS = 0.5  # seconds between a job's looks at its run
+GRACE_SECONDS = 2.0  # seconds that a job has for tidying up after SIGTERM
 
 
-def announce() -> None:
+def set_run_variable() -> None:
     """Say in the environment, which jobs inherit, which process the run is."""
-    os.environ[RUN] = f"{os.getpid()} {_began(os.getpid())}"
+    os.environ[RUN_VARIABLE] = f"{os.getpid()} {_start_time(os.getpid())}"
 
 
-def own_lock(locks: Path = LOCKS) -> None:
+def record_lock_owner(locks: Path = LOCKS) -> None:
     """Note beside the lock that Snakemake has just taken whose it is."""
     if locks.is_dir():
-        owner = {"host": platform.node(), "pid": os.getpid(), "began": _began(os.getpid())}
+        owner = {"host": platform.node(), "pid": os.getpid(), "began": _start_time(os.getpid())}
         with contextlib.suppress(OSError):
             (locks / OWNER).write_text(json.dumps(owner), encoding="utf-8")
 
@@ -48,7 +48,7 @@ def clear_stale_lock(locks: Path = LOCKS) -> bool:
         host, pid, began = owner["host"], int(owner["pid"]), str(owner["began"])
     except (OSError, ValueError, TypeError, KeyError):
         return False
-    if host != platform.node() or _lives(pid, began):
+    if host != platform.node() or _is_alive(pid, began):
         return False
     # Renamed first, so that of two runs that begin at once only one takes it away.
     stale = locks.with_name(f"{locks.name}.stale.{os.getpid()}")
@@ -65,7 +65,7 @@ def clear_stale_lock(locks: Path = LOCKS) -> bool:
         return False
 
 
-def end_jobs_with_run() -> None:
+def end_jobs_on_signal() -> None:
     """On SIGINT or SIGTERM end the jobs that run, and then Snakemake as by Ctrl-C: with no lock left."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)
@@ -74,11 +74,11 @@ def end_jobs_with_run() -> None:
 def _stop(number: int, frame: FrameType | None) -> None:
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.SIG_IGN)  # once is enough: what follows takes seconds at most
-    threading.Thread(target=end_below, args=(os.getpid(),), daemon=True).start()
+    threading.Thread(target=end_children, args=(os.getpid(),), daemon=True).start()
     raise KeyboardInterrupt
 
 
-def end_below(pid: int, grace: float = GRACE) -> None:
+def end_children(pid: int, grace: float = GRACE_SECONDS) -> None:
     """End every process below one: SIGTERM, and SIGKILL for those still there after `grace` seconds."""
     import psutil  # which Snakemake needs too; it takes longer to import than all of a job's frame
 
@@ -109,10 +109,10 @@ def ends_with_run() -> Iterator[None]:
     before = {}
     with contextlib.suppress(ValueError):  # not in the main thread, as in a test
         for number in (signal.SIGINT, signal.SIGTERM):
-            before[number] = signal.signal(number, _leave)
+            before[number] = signal.signal(number, _exit)
     done = threading.Event()
-    if run := os.environ.get(RUN):
-        threading.Thread(target=_watch, args=(run, done), daemon=True).start()
+    if run := os.environ.get(RUN_VARIABLE):
+        threading.Thread(target=_exit_with_run, args=(run, done), daemon=True).start()
     try:
         yield
     finally:
@@ -121,21 +121,21 @@ def ends_with_run() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _leave(number: int, frame: FrameType | None) -> None:
+def _exit(number: int, frame: FrameType | None) -> None:
     raise SystemExit(128 + number)  # past every `except Exception`, through every `finally`
 
 
-def _watch(run: str, done: threading.Event) -> None:
+def _exit_with_run(run: str, done: threading.Event) -> None:
     """End this process when its run is no more; by SIGKILL where compiled code lets no signal through."""
     pid, _, began = run.partition(" ")
-    while not done.wait(LOOK):
-        if not _lives(int(pid), began):
+    while not done.wait(CHECK_SECONDS):
+        if not _is_alive(int(pid), began):
             os.kill(os.getpid(), signal.SIGTERM)
-            if not done.wait(GRACE):
+            if not done.wait(GRACE_SECONDS):
                 os.kill(os.getpid(), signal.SIGKILL)
 
 
-def _lives(pid: int, began: str) -> bool:
+def _is_alive(pid: int, began: str) -> bool:
     """Whether process `pid` runs and is the one that began then, as another may bear its number by now."""
     try:
         os.kill(pid, 0)
@@ -143,10 +143,10 @@ def _lives(pid: int, began: str) -> bool:
         return False
     except OSError:
         return True  # another user's
-    return _began(pid) == began
+    return _start_time(pid) == began
 
 
-def _began(pid: int) -> str:
+def _start_time(pid: int) -> str:
     """When a process began, in ticks since the machine did; "" for a zombie, "?" where no /proc tells."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()

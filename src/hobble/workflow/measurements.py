@@ -12,7 +12,7 @@ from hobble.workflow.package import Package
 NAMES = tuple(one.name for one in MEASURES)
 
 
-def found(configuration: str, name: str) -> str:
+def result_file(configuration: str, name: str) -> str:
     """The JSON of a measurement."""
     return f"results/{configuration}/evaluation/{name}.json"
 
@@ -37,7 +37,7 @@ class Measurements:
             return self.clips.skeleton_file(configurations.dataset(configuration))
         if asked == "published":
             return self.package.published()
-        return found(configuration, measure(asked).name)
+        return result_file(configuration, measure(asked).name)
 
     def splits(self, configuration: str, name: str) -> dict[str, str]:
         """Clip -> split, where the measurement reads clips."""

@@ -25,7 +25,7 @@ class Project:
 
     base: the folder of the Snakefile. config: Snakemake's config; `mocap` is the folder with the
     user's clips, `compare` the configurations to set side by side, every other key goes on top of each
-    configuration. Raises HobbleError where a configuration has the name of a folder of results/, and for a
+    configuration. Raises HobbleError if a configuration has the name of a folder of results/, and for a
     `mocap` that is no folder's name.
     """
 

@@ -9,16 +9,16 @@ from pathlib import Path
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_text
 
-HEADER = 1 << 18  # bytes; that of 191 joints takes 40 kB
+HEADER_BYTES = 1 << 18  # bytes; that of 191 joints takes 40 kB
 JOINT = re.compile(r"^\s*(?:ROOT|JOINT)\s+(.*?)\s*\{?\s*$", re.MULTILINE | re.IGNORECASE)
-LINE = re.compile(r"([0-9a-fA-F]{64}) [ *](\S+)\.bvh")
+CHECKSUM_LINE = re.compile(r"([0-9a-fA-F]{64}) [ *](\S+)\.bvh")
 
 
 def joint_names(path: Path) -> set[str]:
     """The joints of a BVH file without prefixes, as far as its beginning says; none of a missing one."""
     try:
         with open(path, "rb") as file:
-            header = file.read(HEADER).partition(b"MOTION")[0].decode("latin-1")
+            header = file.read(HEADER_BYTES).partition(b"MOTION")[0].decode("latin-1")
     except OSError:
         return set()
     return {name.rpartition(":")[2].strip() for name in JOINT.findall(header)}
@@ -42,7 +42,7 @@ def read_checksums(path: Path) -> dict[str, str]:
     for number, line in enumerate(read_text(path).splitlines(), 1):
         if not line.strip():
             continue
-        match = LINE.fullmatch(line.strip())
+        match = CHECKSUM_LINE.fullmatch(line.strip())
         if match is None:
             raise InputError(path, "a line holds a SHA-256, two spaces and a clip's file", line=number)
         out[match[2]] = match[1].lower()

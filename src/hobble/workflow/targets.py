@@ -16,6 +16,7 @@ from hobble.workflow.project import Project
 if TYPE_CHECKING:
     from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 
+INJURY = "injury"  # the channel that the questionnaire asks about
 PAGE = "page"  # under results/: what all reports share
 
 
@@ -27,13 +28,13 @@ def check(project: Project, targets: Iterable[str]) -> None:
     for target in list(targets) or ["results/holden/report.html"]:
         _, name, folder, file, *_ = (*Path(target).parts, "", "", "")
         if name == "datasets":
-            _dataset(project, folder)
+            _check_dataset(project, folder)
         elif name == COMPARE:
             for one in project.comparison.names():
-                _configuration(project, one)
+                _check_configuration(project, one)
         elif name and name != PAGE:
-            _configuration(project, name)
-            _asked(project, name, folder, file)
+            _check_configuration(project, name)
+            _check_possible(project, name, folder, file)
 
 
 def notes(project: Project, targets: Iterable[str]) -> list[str]:
@@ -50,20 +51,20 @@ def notes(project: Project, targets: Iterable[str]) -> list[str]:
     return [f"data set {name}: {note}" for name in dict.fromkeys(names) for note in project.clips.notes(name)]
 
 
-def _configuration(project: Project, name: str) -> None:
+def _check_configuration(project: Project, name: str) -> None:
     model = project.catalogue.configuration(name)
     for other in filter(None, (model.network_of, model.training.continues)):
         if other == name:
             raise HobbleError(f"configuration {name} cannot go on from itself")
         project.catalogue.configuration(other)
     if model.training.continues:
-        _goes_on(name, model, project.catalogue.configuration(model.training.continues))
-    _dataset(project, model.dataset)
+        _check_continues(name, model, project.catalogue.configuration(model.training.continues))
+    _check_dataset(project, model.dataset)
     project.datasets.selected(model.dataset, model.channels)
     refuse_copies(project.clips, project.datasets, model.dataset, tuple(model.channels))
 
 
-def _goes_on(name: str, model: Configuration, start: Configuration) -> None:
+def _check_continues(name: str, model: Configuration, start: Configuration) -> None:
     """A training goes on with a network of the same shape, and counts its passes in sections."""
     begun = model.training.continues
     for key, mine, of_start in (
@@ -82,20 +83,20 @@ def _goes_on(name: str, model: Configuration, start: Configuration) -> None:
         )
 
 
-def _dataset(project: Project, name: str) -> None:
+def _check_dataset(project: Project, name: str) -> None:
     model = project.catalogue.dataset(name)
     skeleton = project.catalogue.skeleton(model.skeleton)
-    for clip, entry in project.clips.own(name).items():
+    for clip, entry in project.clips.listed(name).items():
         project.clips.rig_files(name, clip)
-        _entry(f"data set {name}: clips.{clip}", entry)
-    _hurt(name, model, [f"{a}-{b}" for a, b in skeleton.links])
-    project.datasets.told.check(name)
-    project.datasets.selected(name, project.datasets.told.channels(name))
+        _check_entry(f"data set {name}: clips.{clip}", entry)
+    _check_hurt(name, model, [f"{a}-{b}" for a, b in skeleton.links])
+    project.datasets.channel_sources.check(name)
+    project.datasets.selected(name, project.datasets.channel_sources.channels(name))
     if model.mirror:
-        _mirrored(model.skeleton, skeleton)
+        _check_mirror(model.skeleton, skeleton)
 
 
-def _entry(where: str, entry: ClipEntry) -> None:
+def _check_entry(where: str, entry: ClipEntry) -> None:
     """What a clip's entry asks of the walker: what it can do."""
     # Imported where there is something to check: it brings numpy, which takes longer than all else here.
     if entry.injured is not None:
@@ -111,7 +112,7 @@ def _entry(where: str, entry: ClipEntry) -> None:
             )
 
 
-def _hurt(name: str, model: Dataset, links: Sequence[str]) -> None:
+def _check_hurt(name: str, model: Dataset, links: Sequence[str]) -> None:
     """What a data set says of hurt versions: links that there are."""
     if model.hurt is None or not model.hurt.versions:
         return
@@ -125,7 +126,7 @@ def _hurt(name: str, model: Dataset, links: Sequence[str]) -> None:
         )
 
 
-def _mirrored(name: str, skeleton: SkeletonFile) -> None:
+def _check_mirror(name: str, skeleton: SkeletonFile) -> None:
     """Raise HobbleError for a skeleton that has no mirror image."""
     from hobble.core.skeleton import Skeleton
     from hobble.motion.mirror import mirror_skeleton
@@ -135,13 +136,18 @@ def _mirrored(name: str, skeleton: SkeletonFile) -> None:
     _ = rig.mirror_links
 
 
-def _asked(project: Project, name: str, folder: str, file: str) -> None:
+def _check_possible(project: Project, name: str, folder: str, file: str) -> None:
     """What no network of this configuration could give, though it were trained."""
     owner = project.catalogue.configuration(name).network_of or name
     if folder == "stimuli" and not project.catalogue.configuration(owner).channels:
         raise HobbleError(
             f"results/{name}/stimuli: the network of configuration {owner} is told nothing, so that there is "
             "one walk to show. Ask for those of a configuration that has `channels`."
+        )
+    if folder == "questionnaire" and INJURY not in project.catalogue.configuration(owner).channels:
+        raise HobbleError(
+            f"results/{name}/questionnaire: the network of configuration {owner} is not told what hurts. Ask "
+            f"for that of a configuration with `channels: [{INJURY}]`."
         )
     stem, _, suffix = file.rpartition(".")
     if folder == "export" and suffix == "onnx" and stem not in get_args(PhaseMode):

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-EVERY = 10.0  # seconds between lines of progress where they go to a file
+PROGRESS_SECONDS = 10.0  # seconds between lines of progress where they go to a file
 WIDTH = 100  # columns of the line that is written over
-MOST_NAMED = 20  # failures that the summary names
-TAIL = 1 << 16  # bytes at the end of a job's log in which its message stands
+MAX_FAILURES_LISTED = 20  # failures that the summary names
+TAIL_BYTES = 1 << 16  # bytes at the end of a job's log in which its message stands
 MESSAGE = re.compile(r"^\S+ \S+ ERROR (.*)$", re.M)
 # What Snakemake says and a person need not read: it is said in fewer words here.
 JOB_ENDED = re.compile(r"CalledProcessError|Command 'set -euo pipefail|returned non-zero exit status")
@@ -25,9 +25,9 @@ SUPERFLUOUS = re.compile(
     r"Exiting because a job execution failed|Look below for error messages|^Shutting down|"
     r"^At least one job did not complete|^WorkflowError:\s*At least one job did not complete"
 )
-SAID = re.compile(r"^Nothing to be done|^Reasons:|^This was a dry-run|^Unlocking|^Touching|^Error")
-STOPPED = "Terminating processes on user request"
-SEE_JOBS = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
+PASSED_ON = re.compile(r"^Nothing to be done|^Reasons:|^This was a dry-run|^Unlocking|^Touching|^Error")
+STOP_MESSAGE = "Terminating processes on user request"
+JOB_HINT = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Terminal:
         self.running: dict[int, Job] = {}
         self.failed: list[Job] = []
         self.done = self.total = 0
-        self.stopped = self.told = self.shown = self.closed = False
+        self.stopped = self.announced = self.shown = self.closed = False
 
     def take(self, record: logging.LogRecord) -> None:
         """Say what there is to say of a record of Snakemake's logger."""
@@ -77,10 +77,10 @@ class Terminal:
         count = f"{self.done} of {self.total or len(self.jobs)} jobs done in {took}"
         if self.failed:
             self._line(f"{count}, {len(self.failed)} failed:")
-            for job in self.failed[:MOST_NAMED]:
+            for job in self.failed[:MAX_FAILURES_LISTED]:
                 self._line(f"  {job.name}: {job.log}")
-            if len(self.failed) > MOST_NAMED:
-                self._line(f"  and {len(self.failed) - MOST_NAMED} more")
+            if len(self.failed) > MAX_FAILURES_LISTED:
+                self._line(f"  and {len(self.failed) - MAX_FAILURES_LISTED} more")
             self._line("The same command goes on from here once this is put right.")
         elif self.stopped:
             self._line(f"{count}, then stopped. The same command goes on from here.")
@@ -92,13 +92,13 @@ class Terminal:
     def _run_info(self, data: Mapping[str, Any]) -> None:
         stats = data.get("stats") or {}
         self.total = stats.get("total", self.total)
-        if self.dryrun and not self.told:
+        if self.dryrun and not self.announced:
             self._line(str(data["msg"]))
-        elif not self.told:
+        elif not self.announced:
             rules = Counter({rule: n for rule, n in stats.items() if rule != "total"})
             most = ", ".join(f"{n} {rule}" for rule, n in rules.most_common(6))
             self._line(f"{self.total} jobs: {most}{', ...' if len(rules) > 6 else ''}")
-        self.told = True
+        self.announced = True
 
     def _job_info(self, data: Mapping[str, Any]) -> None:
         about = " ".join(str(value) for value in dict(data.get("wildcards") or {}).values())
@@ -121,7 +121,7 @@ class Terminal:
             self.stream.write(f"\r\x1b[K{line[:WIDTH]}")
             self.stream.flush()
             self.shown = True
-        elif self.now() - self.last >= EVERY:
+        elif self.now() - self.last >= PROGRESS_SECONDS:
             self.last = self.now()
             self._line(line)
 
@@ -138,14 +138,14 @@ class Terminal:
 
     def _words(self, record: logging.LogRecord) -> None:
         text = str(record.msg or "").strip()
-        if STOPPED in text:
+        if STOP_MESSAGE in text:
             self.stopped = True
             self._line("Stopping the jobs that run.")
         elif record.levelno >= logging.ERROR:
             if not (JOB_ENDED.search(text) or SUPERFLUOUS.search(text)) and text:
                 self._line(text)
-        elif record.levelno >= logging.WARNING or SAID.search(text):
-            self._line(SEE_JOBS.sub("", text))
+        elif record.levelno >= logging.WARNING or PASSED_ON.search(text):
+            self._line(JOB_HINT.sub("", text))
 
     def _line(self, text: str) -> None:
         self._wipe()
@@ -163,7 +163,7 @@ def _message(log: str) -> str:
     try:
         with open(Path(log), "rb") as file:
             file.seek(0, 2)
-            file.seek(max(0, file.tell() - TAIL))
+            file.seek(max(0, file.tell() - TAIL_BYTES))
             found = MESSAGE.findall(file.read().decode(errors="replace"))
     except OSError:
         return ""

@@ -14,7 +14,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.crowd import FPS, Stretch, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
-from hobble.evaluation.pose_distance import apart, mean_cycle
+from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle
 from hobble.evaluation.spearman import spearman
 from hobble.hurt.parts import part_of_link
 from hobble.models.network import Network
@@ -39,7 +39,7 @@ def _cycle(walks: Walks, stretch: int, figure: int) -> Array:
 
 def _from(walks: Walks, stretch: int, figure: int, cycle: Array) -> float:
     span = walks.measured(stretch, figure)
-    return float(np.mean(apart(walks.local[span, figure], walks.phase[span, figure], cycle)))
+    return float(np.mean(distance_to_cycle(walks.local[span, figure], walks.phase[span, figure], cycle)))
 
 
 def _speed(network: Network, walks: Walks, stretch: int, figure: int) -> float:

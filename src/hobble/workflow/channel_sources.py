@@ -13,10 +13,10 @@ from hobble.core.errors import HobbleError, InputError
 if TYPE_CHECKING:
     from hobble.workflow.clips import Clips
 
-PLAIN = "plain"  # the folder of the database whose network is told nothing
+NO_CHANNEL = "plain"  # the folder of the database whose network is told nothing
 
 
-class Told:
+class ChannelSources:
     """The channels of the data sets of a project."""
 
     def __init__(self, catalogue: Catalogue, clips: Clips) -> None:
@@ -31,7 +31,7 @@ class Told:
         """What channel `name` reads of a clip: the file beside it, if its entry says nothing, and tables."""
         one, made = channel(name), self.catalogue.dataset(dataset).synthetic is not None
         said = self._value(dataset, clip, name) is not None and not made
-        beside = self.clips.beside(dataset, clip, (one.suffix,)) if one.suffix and not said else []
+        beside = self.clips.side_files(dataset, clip, (one.suffix,)) if one.suffix and not said else []
         return [*beside, *self._tables(dataset, name)]
 
     def source(self, dataset: str, clip: str, name: str) -> dict[str, Any]:
@@ -46,7 +46,7 @@ class Told:
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def neutral(self, dataset: str, clip: str, name: str) -> bool:
         """Whether a clip is told nothing by channel `name`."""
-        if self.clips.is_version(clip) and name == self.clips.versions_of:
+        if self.clips.is_hurt_version(clip) and name == self.clips.hurt_channel:
             return False
         made = self.catalogue.dataset(dataset).synthetic is not None
         files = self._tables(dataset, name) if made else self.files(dataset, clip, name)
@@ -56,7 +56,7 @@ class Told:
         """Raise HobbleError for what the entries or options say that a channel cannot understand."""
         model = self.catalogue.dataset(dataset)
         rig = self.catalogue.skeleton(model.skeleton)
-        for clip, entry in self.clips.own(dataset).items():
+        for clip, entry in self.clips.listed(dataset).items():
             if extra := set(entry.channels) - set(self.channels(dataset)):
                 raise HobbleError(
                     f"data set {dataset}: clips.{clip}.channels: the data set has no "
@@ -79,17 +79,17 @@ class Told:
         return [str(file) for file in files]
 
 
-def folder(told: Sequence[str]) -> str:
+def database_folder(told: Sequence[str]) -> str:
     """The name of the database whose network is told these channels."""
-    return "+".join(told) or PLAIN
+    return "+".join(told) or NO_CHANNEL
 
 
-def told_by(folder_name: str) -> tuple[str, ...]:
+def channels_of_folder(folder_name: str) -> tuple[str, ...]:
     """The inverse of `folder`. Raises HobbleError for no such name."""
-    names = () if folder_name == PLAIN else tuple(folder_name.split("+"))
+    names = () if folder_name == NO_CHANNEL else tuple(folder_name.split("+"))
     if any(name not in NAMES for name in names) or list(names) != sorted(set(names), key=NAMES.index):
         raise HobbleError(
-            f"no database is called {folder_name}: it is {PLAIN}, or channels, + between, in the order of "
-            f"{', '.join(NAMES)}"
+            f"no database is called {folder_name}. It is `{NO_CHANNEL}` or names of channels with + between "
+            f"them, in the order {', '.join(NAMES)}"
         )
     return names
