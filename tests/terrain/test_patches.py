@@ -134,7 +134,7 @@ def test_what_cannot_be_drawn_is_refused_by_name() -> None:
         draw(plane(0, 0), plane(3, 3))
     with pytest.raises(InputError, match="plane: 90 x 300 cells are too few for patches of 128 x 128"):
         draw(plane(0, 0, rows=90))
-    with pytest.raises(HobbleError, match="no heightmap"):
+    with pytest.raises(HobbleError, match="heightmaps is empty"):
         draw()
 
 

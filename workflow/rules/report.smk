@@ -183,7 +183,7 @@ rule questionnaire:
     """A page that shows thirteen films of the character and asks what hurts, and the list of what does."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
-        template=kept(package.templates()),
+        template=keep_local(package.templates()),
     output:
         folder=directory("results/{configuration}/questionnaire"),
     log:
