@@ -120,9 +120,9 @@ def test_every_problem_is_told_at_once() -> None:
         ({"skeleton": "s", "folder": "f", "motion": {"fps": 30}}, r"motion\.fps: clips are made at 60"),
         (
             {"skeleton": "s", "folder": "f", "terrain": {"patches": 5}},
-            "`patches` .5. are fewer than the `fits`",
+            "`patches` .5. must not be fewer than `fits`",
         ),
-        ({"skeleton": "s", "folder": "f", "terrain": {"heightmaps": []}}, "`heightmaps` names none"),
+        ({"skeleton": "s", "folder": "f", "terrain": {"heightmaps": []}}, "`heightmaps` is empty"),
         ({"skeleton": "s", "folder": "f", "terrain": {"sole": float("nan")}}, r"terrain\.sole: .*finite"),
         ({"skeleton": "s", "folder": "f", "held_out": ["../a"]}, "a clip's name has no .*slashes"),
         ({"skeleton": "../s", "folder": "f"}, "skeleton: string should match"),

@@ -220,7 +220,7 @@ def test_where_no_foot_ever_stands_the_lowest_points_count(
     walk = made.walk(GROUNDS["level"])
     labels = {**walk.labels, "contacts": np.zeros((len(walk.clip), 4), bool)}
     fits = clip_fits(walk.clip, labels, patches, "rocky", made.options(), made.database())
-    assert "no foot stands in frames 64 to 128" in caplog.text
+    assert "no contact in frames 64 to 128" in caplog.text
     assert np.isfinite(fits.heights).all()
     assert fits.foot_error[..., 0].max() < 1
 
@@ -228,11 +228,13 @@ def test_where_no_foot_ever_stands_the_lowest_points_count(
 def test_labels_of_another_clip_are_refused(made: SimpleNamespace, patches: Patches) -> None:
     walk = made.walk(GROUNDS["level"])
     few = {**walk.labels, "contacts": walk.labels["contacts"][1:]}
-    with pytest.raises(InputError, match=r"figure: labels have contacts of shape \(419, 4\) for 420 frames"):
+    with pytest.raises(
+        InputError, match=r"figure: the contacts have shape \(419, 4\), but the clip has 420 frames"
+    ):
         clip_fits(walk.clip, few, patches, "rocky", made.options(), made.database())
     late = {**walk.labels, "cycles": np.array([[64, 128], [300, 420]])}
     with pytest.raises(
-        InputError, match="frame 300: the cycle of frames 300 to 420 does not lie in the clip's 420"
+        InputError, match="frame 300: a cycle has frames 300 to 420, but the clip has 420 frames"
     ):
         clip_fits(walk.clip, late, patches, "rocky", made.options(), made.database())
     with pytest.raises(InputError, match="300 patches are fewer than the 400 fits"):

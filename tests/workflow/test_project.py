@@ -127,6 +127,7 @@ def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
     [
         ("results/one/stimuli", "configuration one is told nothing.*has `channels`"),
         ("results/eyes/stimuli/", "configuration one is told nothing"),
+        ("results/one/questionnaire", r"configuration one is not told what hurts.*\[injury\]"),
         ("results/hurt/export/cubik.onnx", "export/cubik.onnx: there are constant, linear, cubic"),
     ],
 )
@@ -137,7 +138,12 @@ def test_what_no_network_could_give_is_told_before_it_is_trained(
     monkeypatch.setattr(targets, "_check_dataset", lambda *_: None)
     with pytest.raises(HobbleError, match=message):
         check(Project(base, {}), [target])
-    fine = ("results/hurt/stimuli", "results/one/export/pfnn", "results/one/export/cubic.onnx")
+    fine = (
+        "results/hurt/stimuli",
+        "results/hurt/questionnaire",
+        "results/one/export/pfnn",
+        "results/one/export/cubic.onnx",
+    )
     check(Project(base, {}), fine)
 
 

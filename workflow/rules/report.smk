@@ -179,6 +179,30 @@ rule stimuli:
         "../scripts/stimuli.py"
 
 
+rule questionnaire:
+    """A page that shows thirteen films of the character and asks what hurts, and the list of what does."""
+    input:
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        template=keep_local(package.templates()),
+    output:
+        folder=directory("results/{configuration}/questionnaire"),
+    log:
+        "results/{configuration}/logs/report/questionnaire.log",
+    benchmark:
+        "results/{configuration}/benchmarks/report/questionnaire.tsv"
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        configuration=lambda w: w.configuration,
+        runtime=lambda w: configurations.section(w.configuration, "runtime"),
+        code=lambda w: package.code(
+            "questionnaire", configurations.kind(w.configuration), *shown_modules()
+        ),
+    script:
+        "../scripts/questionnaire.py"
+
+
 rule export_web:
     """The character for other web pages: an ES module, its network, TypeScript types and an example."""
     input:

@@ -6,10 +6,10 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 
-from hobble.cli import injury, labels, motion, play
+from hobble.cli import injury, labels, motion, play, study
 from hobble.core.errors import HobbleError
 
-COMMANDS = {"motion": motion, "labels": labels, "injury": injury, "play": play}
+COMMANDS = {"motion": motion, "labels": labels, "injury": injury, "play": play, "study": study}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,7 +1,7 @@
-"""What a patch still lacks after it was chosen: the ground is bent so that it meets the feet.
+"""Corrects the chosen patch so that the ground meets the feet.
 
-First the original's way: the residual at the contacts is added as a surface of radial basis functions. Then,
-where a foot is still below the ground, the ground is dug out around it.
+First, as in the original, a surface of radial basis functions is fitted to the residual at the contacts and
+added. Then the ground is lowered around feet that are still below it.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.terrain.soles import Mask
 
-WALL_STEEPNESS = 2.0  # cm of height per cm: the walls of what is dug out
-MAX_REFITS = 8  # times, by a quarter each, a surface is made anew that leaves too much
+WALL_STEEPNESS = 2.0  # of the walls of a pit, cm per cm
+MAX_REFITS = 8  # a surface that leaves too much residual is fitted again with a quarter of the smoothing
 
 
 @dataclass(frozen=True)
 class Stances:
-    """Contacts gathered into N points: a foot that stands for 30 frames is one point that counts 30 times.
+    """Contacts of feet, gathered into N points. A foot that stands for several frames is one point.
 
-    place: (N, 2) x and z; height: (N,) of the sole; count: (N,) frames.
+    place: (N, 2) x and z, cm. height: (N,) of the sole, cm. count: (N,) number of frames, used as a weight.
     """
 
     place: Array = field(repr=False)
@@ -30,9 +30,9 @@ class Stances:
 
 
 def gather_stances(soles: Array, contacts: Mask, longest: int) -> Stances:
-    """Gather the runs of each joint in which `contacts` is true, cut into pieces of at most `longest` frames.
+    """Average the sole of each joint over each run of contact frames; longer runs are cut.
 
-    soles: (T, 4, 3). contacts: (T, 4) bool.
+    soles: (T, 4, 3). contacts: (T, 4) bool. longest: most frames of one point.
     """
     frame, joint = np.nonzero(contacts)
     order = np.lexsort((frame, joint))
@@ -50,7 +50,7 @@ def gather_stances(soles: Array, contacts: Mask, longest: int) -> Stances:
 
 
 def joined(a: Stances, b: Stances) -> Stances:
-    """The points of both."""
+    """The points of `a`, then those of `b`."""
     return Stances(
         np.concatenate([a.place, b.place]),
         np.concatenate([a.height, b.height]),
@@ -60,9 +60,9 @@ def joined(a: Stances, b: Stances) -> Stances:
 
 @dataclass(frozen=True)
 class Surface:
-    """A surface of radial basis functions phi(r) = r / spread about N places.
+    """A surface of radial basis functions phi(r) = r / spread around N places.
 
-    places: (N, 2) x and z. weights: (N,). spread: the mean distance of the places, cm.
+    places: (N, 2) x and z, cm. weights: (N,). spread: mean distance between the places, cm.
     """
 
     places: Array = field(repr=False)
@@ -79,12 +79,13 @@ class Surface:
 def fit_surfaces(
     points: Stances, residual: Array, smoothing: float, most: float | None = None, standing: int | None = None
 ) -> list[Surface]:
-    """The surfaces through each row of `residual` (K, N) at N points, regularised by `smoothing`.
+    """One surface for each row of `residual` (K, N) at N points, regularised by `smoothing`.
 
-    A point that counts m times has a diagonal of smoothing / m, and weighs m in the mean distance: that is
-    exactly what m points at one place come to. most: a surface that leaves more than this at the points on
-    average (cm), as under feet that stand half a metre beside a beam, is smoothed less. standing: only the
-    first so many points are looked at for that.
+    A point with count m has the diagonal smoothing / m and the weight m in the mean distance. This gives
+    exactly the surface of m points at one place.
+    most: if a surface leaves more than this on average at the points (cm), for example under feet that stand
+    half a metre beside a beam, it is fitted again with less smoothing. standing: the average is over only the
+    first `standing` points.
     """
     apart = distances(points.place, points.place)
     spread = float(points.count @ apart @ points.count / points.count.sum() ** 2)
@@ -95,7 +96,7 @@ def fit_surfaces(
     share = points.count[:standing] / points.count[:standing].sum()
     rough = np.arange(len(residual)) if most is not None else np.zeros(0, int)
     for _ in range(MAX_REFITS):
-        left = np.sum(np.abs(weights[rough] * diagonal)[:, :standing] * share, axis=1)  # of the residual
+        left = np.sum(np.abs(weights[rough] * diagonal)[:, :standing] * share, axis=1)  # mean residual, cm
         rough = rough[left > (most or 0.0)]
         if not len(rough):
             break
@@ -106,14 +107,17 @@ def fit_surfaces(
 
 @dataclass(frozen=True)
 class Pits:
-    """Cones that the ground is dug out to: N places (N, 2), heights (N,) and steepness (N,) in cm per cm."""
+    """Cones, open at the top, that cut into the ground.
+
+    places: (N, 2) x and z of the tips, cm. heights: (N,) of the tips, cm. steepness: (N,) cm per cm.
+    """
 
     places: Array = field(repr=False)
     heights: Array = field(repr=False)
     steepness: Array = field(repr=False)
 
     def of(self, ground: Array, points: Array) -> Array:
-        """Ground (M,) at points (M, 2), lowered to the cones where it is above them."""
+        """Heights (M,) of the ground at points (M, 2), lowered to the cones where it is above them."""
         from hobble.terrain.kernels import lowest_cone
 
         if not len(self.places):
@@ -123,9 +127,9 @@ class Pits:
 
 
 def dig_pits(soles: Array, standing: Stances, depth: float) -> Pits:
-    """What lets soles (N, 3) be no more than `depth` cm below the ground.
+    """Pits that leave soles (N, 3) no more than `depth` cm below the ground.
 
-    As steep as they must be to leave alone the ground under feet that stand beside them, on a step say.
+    Their walls are steep enough that the ground under other standing feet, such as on a step, stays.
     """
     places, heights = soles[:, [0, 2]], soles[:, 1] + depth
     apart = np.maximum(distances(places, standing.place), 1e-3)
@@ -134,7 +138,7 @@ def dig_pits(soles: Array, standing: Stances, depth: float) -> Pits:
 
 
 def distances(a: Array, b: Array) -> Array:
-    """(M, 2) and (N, 2) -> (M, N)."""
+    """Distances (M, N) between points a (M, 2) and b (N, 2)."""
     x, z = a[:, None, 0] - b[None, :, 0], a[:, None, 1] - b[None, :, 1]
     return np.sqrt(x * x + z * z)
 

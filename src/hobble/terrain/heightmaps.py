@@ -15,8 +15,8 @@ from hobble.core.untrusted import read_text
 from hobble.terrain import options
 from hobble.terrain.generate import generate
 
-MAX_CELLS = 1 << 26  # of a map: 8192 squared, half a gigabyte; 322 m a side at 3.9 cm a cell
-MAX_TEXT_BYTES = 1 << 28  # of a map as text, which takes some eight times that while it is read
+MAX_CELLS = 1 << 26  # of a map: 8192 x 8192, 512 MB, 322 x 322 m with cells of 3.9 cm
+MAX_TEXT_BYTES = 1 << 28  # of a map as text; reading it takes about eight times as much memory
 
 
 ESRI_HEADER = {
@@ -34,12 +34,12 @@ IMAGE_FORMATS = {
     ".tif": ("TIFF",),
     ".tiff": ("TIFF",),
 }  # a suffix, and what the file must be
-GDAL_NODATA = 42113  # the tag of a TIFF in which GDAL says, as text, what stands for no data
+GDAL_NODATA = 42113  # the TIFF tag with the value that means "no data", as text
 
 
 @dataclass(frozen=True)
 class Heightmap:
-    """Heights (rows, columns) in cm, a cell being `cell` centimetres wide; nan where the map has a hole."""
+    """Heights (rows, columns), cm, nan in holes. cell: width of a cell, cm."""
 
     name: str
     heights: Array = field(repr=False)
@@ -51,9 +51,9 @@ def heightmaps(
 ) -> list[Heightmap]:
     """The heightmaps that a data set lists.
 
-    entries: with `cell` and `height_scale` where they differ from the general ones. files: those of the
-    entries of kind `file`, in their order. cell: cm a cell. height_scale: what the heights of files are
-    multiplied by to make them cm. Raises InputError for a file that cannot be used.
+    entries: may have their own `cell` and `height_scale`. files: the files of the entries of kind `file`, in
+    the same order. cell: width of a cell, cm. height_scale: factor that makes cm of the heights in files.
+    Raises InputError for a file that cannot be used.
     """
     given = iter(files)
     out = []
@@ -74,10 +74,11 @@ def heightmaps(
 
 
 def elevation(cell: float) -> Array:
-    """The elevation model of a real landscape that matplotlib carries, true to scale: cm.
+    """The elevation model of a real landscape from matplotlib's sample data, reduced in size, cm.
 
-    Its 3 arc seconds are 92.6 m north to south and 74.3 m east to west at 36.6 degrees north; columns are
-    resampled so that cells are square, and one cell becomes `cell` centimetres. Slopes reach 36 degrees.
+    One cell of 3 arc seconds is 92.6 m north to south and 74.3 m east to west at 36.6 degrees north. The
+    columns are resampled so that cells are square. Then lengths and heights are scaled by the same factor so
+    that a cell is `cell` cm wide. Slopes reach 36 degrees.
     """
     import matplotlib
 
@@ -93,12 +94,12 @@ def elevation(cell: float) -> Array:
 
 
 def read_heights(path: str | Path) -> Array:
-    """Heights (rows, columns) as a file has them: a text matrix, an image, a NumPy array.
+    """Heights (rows, columns) from a file, in the file's unit; nan in holes.
 
-    .txt .csv .dat .asc: numbers in rows, apart by spaces, commas or semicolons, after the header of an ESRI
-    grid if there is one. .npy; .npz: its only array of two dimensions, or the one called `heights` or
-    `elevation`. .png .tif .tiff: grey values, of up to 32 bits. What a GeoTIFF or a grid calls no data is a
-    hole. Raises InputError.
+    .txt .csv .dat .asc: rows of numbers separated by spaces, commas or semicolons, with or without the header
+    of an ESRI grid. .npy. .npz: its only 2D array, or the array called `heights` or `elevation`.
+    .png .tif .tiff: grey values of up to 32 bits. The "no data" value of a GeoTIFF or grid marks a hole.
+    Raises InputError if the file cannot be used.
     """
     path = Path(path)
     if not path.is_file():
@@ -106,9 +107,9 @@ def read_heights(path: str | Path) -> Array:
     readers = {".npz": _npz, ".npy": _npy, **dict.fromkeys(IMAGE_FORMATS, _image)}
     heights = np.asarray(readers.get(path.suffix.lower(), _text)(path))
     if heights.ndim != 2 or min(heights.shape) < 2:
-        raise InputError(path, f"a heightmap has rows and columns, this has shape {heights.shape}")
+        raise InputError(path, f"a heightmap needs rows and columns, but this has shape {heights.shape}")
     if heights.dtype.kind not in "fiub":
-        raise InputError(path, f"heights are numbers, not {heights.dtype}")
+        raise InputError(path, f"heights must be numbers, not {heights.dtype}")
     heights = heights.astype(float)
     if not np.isfinite(heights).any():
         raise InputError(path, "holds no finite height")
@@ -132,7 +133,7 @@ def _text(path: Path) -> Array:
                 path, f"not a number: {str(error).split(':')[-1].strip()}", line=number
             ) from error
         if len(rows[-1]) != len(rows[0]):
-            problem = f"{len(rows[-1])} heights where the rows above have {len(rows[0])}"
+            problem = f"{len(rows[-1])} heights, but the rows above have {len(rows[0])}"
             raise InputError(path, problem, line=number)
     if not rows:
         raise InputError(path, "holds no heights")
@@ -142,8 +143,8 @@ def _text(path: Path) -> Array:
 
 def _npy(path: Path) -> Array:
     try:
-        # Mapped, so that a header that promises more than the file holds takes no memory.
-        heights = np.lib.format.open_memmap(path, mode="r")  # never a pickle or an archive
+        # A memory map, so that a header that claims too much data allocates nothing. It reads no pickles.
+        heights = np.lib.format.open_memmap(path, mode="r")
         if heights.size > MAX_CELLS:
             raise InputError(path, f"{heights.size} heights, more than {MAX_CELLS}")
         return np.array(heights)
@@ -167,7 +168,7 @@ def _image(path: Path) -> Array:
     from PIL import Image, UnidentifiedImageError
 
     try:
-        # Of the other formats some run programs: Ghostscript for what begins as PostScript does.
+        # Only these formats: for others Pillow may start programs, such as Ghostscript for PostScript.
         with Image.open(path, formats=IMAGE_FORMATS[path.suffix.lower()]) as image:
             if image.width * image.height > MAX_CELLS:
                 raise InputError(path, f"{image.width} x {image.height} cells, more than {MAX_CELLS}")
@@ -176,6 +177,6 @@ def _image(path: Path) -> Array:
             nothing = getattr(image, "tag_v2", {}).get(GDAL_NODATA)
             return heights if nothing is None else np.where(heights == float(nothing), np.nan, heights)
     except (UnidentifiedImageError, Image.DecompressionBombError, OSError, SyntaxError, ValueError) as error:
-        wide = "Numbers of 64 bits are not read from a TIFF; save them as 32 bits or as .npy."
+        wide = "64-bit numbers in a TIFF cannot be read. Save them as 32 bits or as .npy."
         fix = wide if path.suffix.lower() in (".tif", ".tiff") else None
         raise InputError(path, f"not an image that can be read ({error})", fix=fix) from error

@@ -1,4 +1,4 @@
-"""What a picture of a fit needs: the ground as a grid, the feet over time, the figure at three moments."""
+"""Data for a picture of a fit: the ground as a grid, the feet over time, and three poses."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ MOST = 2
 
 @dataclass(frozen=True)
 class Picture:
-    """One fit, the best, of one cycle; centimetres in the clip's world.
+    """The best fit of one cycle, in centimetres in the clip's world.
 
-    x, z: (G,) of the grid; ground: (G, G) heights at x[i], z[j]. soles: (T, 4, 3), contacts: (T, 4). pose:
-    (3, J, 3) joints at the beginning, the middle and the end of the cycle; parents: (J,).
+    x, z: (G,) of the grid. ground: (G, G) heights at x[i], z[j]. soles: (T, 4, 3). contacts: (T, 4).
+    pose: (3, J, 3) joint positions at a quarter, half and three quarters of the frames. parents: (J,).
     """
 
     cycle: int
@@ -35,12 +35,12 @@ class Picture:
 
 
 def picture_cycles(cycles: int) -> set[int]:
-    """Which cycles of a clip are shown: one from its first half and one from its second."""
+    """The cycles of a clip that get a picture: one from the first half and one from the second."""
     return {cycles // 4, (3 * cycles) // 4} if cycles > 1 else set(range(cycles))
 
 
 def picture_of(clip: Clip, cycle: int, ground: Ground, feet: Feet, around: slice) -> Picture:
-    """The best fit of a cycle, whose frames with the window on either side are `around`."""
+    """The picture of the best fit of a cycle. around: its frames, with the window on both sides."""
     soles = feet.soles[around]
     low, high = (
         soles[..., [0, 2]].min(axis=(0, 1)) - MARGIN_CM,

@@ -1,4 +1,4 @@
-"""Where the soles of the feet are, and when they stand on the ground."""
+"""Positions of the soles of the feet, and when they are on the ground."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ IS_HEEL = np.array([True, False, True, False])
 
 @dataclass(frozen=True)
 class Feet:
-    """The four contact joints over F frames.
+    """The four contact joints over F frames, in the order of FOOT_ROLES.
 
-    soles: (F, 4, 3) positions less the height of the joint above its sole, cm. contacts: (F, 4) bool.
-    heel_height, toe_height: what was taken off.
+    soles: (F, 4, 3) positions of the joints, lowered to the sole, cm. contacts: (F, 4) bool.
+    heel_height, toe_height: height of the joints above the sole, cm.
     """
 
     soles: Array = field(repr=False)
@@ -44,10 +44,10 @@ def find_soles(
 ) -> Feet:
     """The soles of a clip. A height of "auto" is found from the clip or its skeleton.
 
-    frames: those that count, (N,). On flat ground, which lies at zero, "auto" is the median height of the
-    joints in contact, or a little less where that keeps every foot from going further than `deepest` (cm)
-    below the ground. Elsewhere the toe joint is `sole` cm above the ground, and the heel as much higher as in
-    the skeleton's rest pose.
+    frames: (N,) the frames to look at. On flat ground, which is at height 0, "auto" is the median height of
+    the joints in contact. It is up to `deepest` cm less if that keeps all feet within `deepest` below the
+    ground. On other ground the toe joint is `sole` cm above its sole, and the heel joint is higher by the
+    difference in the rest pose.
     """
     joints = clip.positions[:, [clip.skeleton.role(role) for role in FOOT_ROLES]].copy()
     found: list[float] = []
@@ -64,21 +64,21 @@ def find_soles(
 
 
 def held_above_other(feet: Feet, least: float) -> Mask:
-    """(F, 4) whether a joint is more than `least` cm above the other of its foot, which is in contact."""
+    """(F, 4) whether a joint is more than `least` cm above the other joint of its foot, which has contact."""
     other = [1, 0, 3, 2]
     height = feet.soles[..., 1]
     return (height - height[:, other] > least) & feet.contacts[:, other]
 
 
 def _flat_height(heights: Array, down: Array, deepest: float | None) -> float:
-    """The median height in contact; up to `deepest` less where that keeps every foot above -deepest."""
+    """The median height in contact, or up to `deepest` less if that keeps every foot above -deepest."""
     median = float(np.median(heights[down]))
     wanted = float(heights.min()) + (deepest or 0.0)
     return wanted if deepest is not None and median - deepest <= wanted < median else median
 
 
 def heel_above_toe(skeleton: Skeleton) -> float:
-    """How much higher the heel joint is than the toe joint in the rest pose, cm, both sides together."""
+    """Height of the heel joint above the toe joint in the rest pose, cm, mean of both sides."""
     from hobble.core.skeleton import forward_kinematics
 
     rest = np.zeros((1, len(skeleton.joints), 4))

@@ -17,6 +17,7 @@ from hobble.channels import channel
 from hobble.measures.registry import measure
 from hobble.models import model
 from hobble.rows.layout import RowLayout
+from hobble.training.options import Machines
 from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 
@@ -75,9 +76,13 @@ class Demands:
         return self.minutes_of_all(dataset, each, attempt, least)
 
     def training_memory(self, configuration: str, attempt: int = 1) -> int:
-        """Megabytes for a training: PyTorch, the part of the database it holds, weights and their moments."""
+        """Megabytes for a training on each machine.
+
+        Each process has PyTorch, the part of the database it holds, weights and their moments.
+        """
         training = self.project.configurations.section(configuration, "training")
-        return _megabytes(500 + training["memory_mb"] + 32e-6 * self.weights(configuration), attempt)
+        each = 500 + training["memory_mb"] + 32e-6 * self.weights(configuration)
+        return _megabytes(self.machines(configuration).each * each, attempt)
 
     def training_minutes(self, configuration: str, attempt: int = 1) -> int:
         """Minutes for a training, as long as a week; killed by its limit it goes on from its last checkpoint.
@@ -88,11 +93,32 @@ class Demands:
         dataset = self.project.configurations.dataset(configuration)
         frames = 1e3 * self.all_thousands(dataset) * MEASURED_JOINTS / self._joints(dataset)
         samples = frames * VISITS_PER_PASS * training["passes"]
-        return _minutes(samples * self.weights(configuration) / 4 / 6.4e9, attempt, least=60)
+        seconds = samples * self.weights(configuration) / 4 / 6.4e9
+        return _minutes(seconds / self.machines(configuration).count, attempt, least=60)
+
+    def machines(self, configuration: str) -> Machines:
+        """On what a configuration trains."""
+        return self.project.catalogue.configuration(configuration).training
+
+    def training_threads(self, configuration: str) -> int:
+        """Two for one process, one for each of several on a CPU, two for each GPU that SLURM gives."""
+        machines = self.machines(configuration)
+        return 2 if machines.gpus else max(2, machines.processes)
 
     def gpus(self, configuration: str) -> int:
-        """1 where a training is told to use CUDA: `auto` takes what it finds, but asks for none."""
+        """GPUs of a training on one machine: those it is told to use, 1 for `device: cuda`.
+
+        `auto` takes what it finds, but asks for none.
+        """
+        machines = self.machines(configuration)
+        if machines.gpus:
+            return machines.gpus if machines.nodes == 1 else 0
         return int(self.project.configurations.section(configuration, "training")["device"] == "cuda")
+
+    def gres(self, configuration: str) -> str:
+        """GPUs on each of several machines, as SLURM says it; else nothing."""
+        machines = self.machines(configuration)
+        return f"gpu:{machines.gpus}" if machines.gpus and machines.nodes > 1 else ""
 
     # Sizes
 

@@ -29,7 +29,12 @@ GRACE_SECONDS = 2.0  # seconds that a job has for tidying up after SIGTERM
 
 def set_run_variable() -> None:
     """Say in the environment, which jobs inherit, which process the run is."""
-    os.environ[RUN_VARIABLE] = f"{os.getpid()} {_start_time(os.getpid())}"
+    os.environ[RUN_VARIABLE] = this_process()
+
+
+def this_process() -> str:
+    """This process as `RUN_VARIABLE` names one: its number, and when it began."""
+    return f"{os.getpid()} {_start_time(os.getpid())}"
 
 
 def record_lock_owner(locks: Path = LOCKS) -> None:

@@ -23,8 +23,8 @@ class Package:
         return fingerprint(path, self.base / "src", modules)
 
     def templates(self) -> list[str]:
-        """The page's templates; a change in one re-makes only the reports."""
-        kinds = {".j2", ".css", ".yaml"}
+        """The pages' templates; a change in one re-makes only the pages."""
+        kinds = {".j2", ".css", ".js", ".yaml"}
         files = [str(path) for path in (self.folder / "report").iterdir() if path.suffix in kinds]
         return sorted([*files, self.published()])
 

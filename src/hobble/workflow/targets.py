@@ -16,6 +16,7 @@ from hobble.workflow.project import Project
 if TYPE_CHECKING:
     from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 
+INJURY = "injury"  # the channel that the questionnaire asks about
 PAGE = "page"  # under results/: what all reports share
 
 
@@ -142,6 +143,11 @@ def _check_possible(project: Project, name: str, folder: str, file: str) -> None
         raise HobbleError(
             f"results/{name}/stimuli: the network of configuration {owner} is told nothing, so that there is "
             "one walk to show. Ask for those of a configuration that has `channels`."
+        )
+    if folder == "questionnaire" and INJURY not in project.catalogue.configuration(owner).channels:
+        raise HobbleError(
+            f"results/{name}/questionnaire: the network of configuration {owner} is not told what hurts. Ask "
+            f"for that of a configuration with `channels: [{INJURY}]`."
         )
     stem, _, suffix = file.rpartition(".")
     if folder == "export" and suffix == "onnx" and stem not in get_args(PhaseMode):

@@ -32,7 +32,10 @@ def _beside_people(measured: ConfigurationResults, people: Json) -> list[dict[st
     if not found["applies"]:
         return []
     named, generated = {**people, "configuration": measured.name}, found["generated"]
-    shares = {"all severities": generated["right"]}
+    shares = {
+        "all severities": generated["right"],
+        "all severities, left and right taken for the same": generated["right_without_side"],
+    }
     hurt = [row for row in generated["by_severity"] if row["severity"] > 0]
     shares |= {f"severity {row['severity']:g}": row["right"] for row in hurt}
     return [
