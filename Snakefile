@@ -12,7 +12,7 @@ from hobble.workflow.demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check, notes
-from hobble.workflow.told import told_by
+from hobble.workflow.channel_sources import channels_of_folder
 
 try:
     # Relative, so that a checkout can be moved without making anything again.
@@ -25,7 +25,7 @@ try:
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 
-lifetime.announce()
+lifetime.set_run_variable()
 lifetime.clear_stale_lock()
 
 # What the rules ask; each part is a module of hobble.workflow.
@@ -40,13 +40,13 @@ demands = Demands(project)
 
 
 # A clip that a data set lists or its folder holds: no mirror, no hurt version.
-OWN = r"[^/]+(?<!_mirror)(?<!_hurt[1-9])"
+LISTED_CLIP = r"[^/]+(?<!_mirror)(?<!_hurt[1-9])"
 
 
 onstart:
     if workflow.is_main_process:
-        lifetime.own_lock()
-        lifetime.end_jobs_with_run()
+        lifetime.record_lock_owner()
+        lifetime.end_jobs_on_signal()
 
 
 wildcard_constraints:
@@ -59,10 +59,10 @@ wildcard_constraints:
     measure="|".join(MEASURES),
 
 
-def kept(files):
+def keep_local(files):
     """Files of the checkout or the user: they stay where they are, though results may lie in an object store."""
     if isinstance(files, dict):
-        return {name: kept(some) for name, some in files.items()}
+        return {name: keep_local(some) for name, some in files.items()}
     many = [files] if isinstance(files, str) else files
     many = [f if f.startswith("results/") else local(f) for f in many]
     return many[0] if isinstance(files, str) else many

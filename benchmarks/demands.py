@@ -1,9 +1,10 @@
-"""What each rule asks of a cluster, beside what its jobs took in a finished run; status 1 where that is more.
+"""Compare the memory and time that each rule requests with what its jobs used in a finished run.
 
-    benchmarks/demands.py [FOLDER] [TARGET ...] [-- what else snakemake was given, as --config mocap=...]
+    benchmarks/demands.py [FOLDER] [TARGET ...] [-- other arguments of the run, such as --config mocap=...]
 
-FOLDER is that in which Snakemake ran. Of each rule, for the job that came closest to what it asked for: the
-memory it took, with that of Snakemake beside it, and its seconds. Both shares have to be below 1.
+FOLDER is the folder in which Snakemake ran. For each rule the table shows the job that came closest to its
+request: its memory (with Snakemake's own) and its seconds. Exits with status 1 if a job used more than it
+requested.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 
-from hobble.workflow.asked import Job, measured, planned
 from hobble.workflow.demands import ENGINE_MB
+from hobble.workflow.resource_use import JobResources, planned_jobs, with_use
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -30,17 +31,18 @@ def plan(folder: Path, targets: list[str], more: list[str]) -> str:
     return done.stdout + done.stderr
 
 
-def table(jobs: list[Job]) -> str:
+def table(jobs: list[JobResources]) -> str:
     """A line for each rule."""
     by_rule = defaultdict(list)
     for job in jobs:
         by_rule[job.rule].append(job)
-    lines = ["rule                jobs  took MB   asks  share   took s    asks  share"]
+    lines = ["rule                jobs  used MB   asks  share   used s    asks  share"]
     for rule, those in by_rule.items():
-        m, t = max(those, key=lambda job: job.memory), max(those, key=lambda job: job.time)
+        m, t = max(those, key=lambda job: job.memory_share), max(those, key=lambda job: job.time_share)
+        used_mb = (m.used_mb or 0) + ENGINE_MB
         lines.append(
-            f"{rule:18}{len(those):6}{(m.took_mb or 0) + ENGINE_MB:9.0f}{m.asked_mb:7}{m.memory:7.2f}"
-            f"{t.took_s or 0:9.1f}{t.asked_s:8}{t.time:7.2f}"
+            f"{rule:18}{len(those):6}{used_mb:9.0f}{m.requested_mb:7}{m.memory_share:7.2f}"
+            f"{t.used_s or 0:9.1f}{t.requested_s:8}{t.time_share:7.2f}"
         )
     return "\n".join(lines)
 
@@ -53,13 +55,14 @@ def main() -> None:
     if "--" in own:
         own, more = own[: own.index("--")], own[own.index("--") + 1 :]
     options = parser.parse_args(own)
-    jobs = list(measured(planned(plan(options.folder, options.targets, more)), options.folder))
-    if not any(job.took_mb for job in jobs):
+    jobs = list(with_use(planned_jobs(plan(options.folder, options.targets, more)), options.folder))
+    if not any(job.used_mb for job in jobs):
         sys.exit(f"{options.folder}: no run whose logs say what its jobs took")
     print(table(jobs))
-    short = [job for job in jobs if max(job.memory, job.time) >= 1]
+    short = [job for job in jobs if max(job.memory_share, job.time_share) >= 1]
     for job in short:
-        print(f"asks too little: {job.log}: {job.memory:.2f} of its memory, {job.time:.2f} of its time")
+        memory, time = job.memory_share, job.time_share
+        print(f"requests too little: {job.log}: used {memory:.2f} of its memory, {time:.2f} of its time")
     sys.exit(bool(short))
 
 

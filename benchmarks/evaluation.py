@@ -15,13 +15,15 @@ from time import process_time
 import numpy as np
 from runtime import SKELETON, load_skeleton, random_network
 
-from hobble.evaluation.crowd import Stretch, run, severities
+from hobble.channels.injury.walks import severities
+from hobble.evaluation.crowd import Stretch, run
 from hobble.measures.rollouts.run import Inputs, roll_out
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
+from hobble.runtime.options import Runtime
 
-RUNTIME = {"mode": "cubic"}
+RUNTIME = Runtime(mode="cubic")
 FRAMES = 120
 
 

@@ -32,13 +32,14 @@ from runtime import SKELETON, load_skeleton
 from torch import Tensor
 from training import L1, PART, RATE, Batch, seconds
 
+from hobble.core.processors import multiplies_bfloat16
 from hobble.models import model
 from hobble.models.load import network_from_arrays
 from hobble.models.mann.forward import GATE_INPUTS
 from hobble.models.mann.fused import FusedStep
 from hobble.models.mann.step import Step
 from hobble.models.mann.trainable import initialise, with_one
-from hobble.models.products import bfloat16_is_fast, product
+from hobble.models.products import product
 from hobble.rows.layout import RowLayout
 from hobble.training.optimiser import Adam
 from hobble.training.start import use_threads
@@ -140,7 +141,7 @@ def steps(batches: list[int], sizes: tuple[int, ...], turns: int) -> None:
         "  without Adam": by_hand(FusedStep, False, sizes, moves=False),
         "products, float32": products(False, sizes),
     }
-    if bfloat16_is_fast():
+    if multiplies_bfloat16():
         ways["fused, bfloat16"] = by_hand(FusedStep, True, sizes)
         ways["  without Adam, bf16"] = by_hand(FusedStep, True, sizes, moves=False)
         ways["products, bfloat16"] = products(True, sizes)

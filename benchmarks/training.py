@@ -28,10 +28,11 @@ import hobble.training  # noqa: F401 - first, since it says how threads wait
 import torch
 from torch import Tensor
 
+from hobble.core.processors import multiplies_bfloat16
 from hobble.models.pfnn.fused import FusedStep
 from hobble.models.pfnn.step import Step
 from hobble.models.pfnn.trainable import coefficients, initialise
-from hobble.models.products import bfloat16_is_fast, product
+from hobble.models.products import product
 from hobble.training.optimiser import Adam
 from hobble.training.start import use_threads
 
@@ -136,7 +137,7 @@ def main() -> None:
         "fused, float32": by_hand(FusedStep, False, sizes),
         "floor, float32": products(False, sizes),
     }
-    if bfloat16_is_fast():
+    if multiplies_bfloat16():
         ways["fused, bfloat16"] = by_hand(FusedStep, True, sizes)
         ways["floor, bfloat16"] = products(True, sizes)
     inputs = sum(size * out for size, out in pairwise(sizes[:2]))

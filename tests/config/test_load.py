@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hobble.config.load import Catalogue, layers, merge, read_yaml, validate
+from hobble.config.load import Catalogue, merge, read_layers, read_yaml, validate
 from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 from hobble.core.errors import HobbleError
 
@@ -65,7 +66,7 @@ def test_a_training_that_is_not_there_is_told(folder: Path) -> None:
     with pytest.raises(HobbleError, match=r"slow\.yaml: no such file\. There are: base, child"):
         Catalogue(folder, {"training": "slow"}).configuration("base")
     (folder / "like.yaml").write_text("training: like\n")
-    with pytest.raises(HobbleError, match="`training: like` leads back to itself"):
+    with pytest.raises(HobbleError, match="`training: like` refers to itself"):
         Catalogue(folder).configuration("like")
 
 
@@ -79,8 +80,8 @@ def test_a_name_that_yaml_takes_for_a_number_belongs_in_quotes(tmp_path: Path, t
 
 def test_a_circle_of_extends_is_told(folder: Path) -> None:
     (folder / "base.yaml").write_text("extends: child\n")
-    with pytest.raises(HobbleError, match=r"child\.yaml: extends itself by way of child -> base"):
-        layers(folder, "child")
+    with pytest.raises(HobbleError, match=r"child\.yaml: extends itself through child -> base"):
+        read_layers(folder, "child")
 
 
 @pytest.mark.parametrize(
@@ -119,9 +120,9 @@ def test_every_problem_is_told_at_once() -> None:
         ({"skeleton": "s", "folder": "f", "motion": {"fps": 30}}, r"motion\.fps: clips are made at 60"),
         (
             {"skeleton": "s", "folder": "f", "terrain": {"patches": 5}},
-            "`patches` .5. are fewer than the `fits`",
+            "`patches` .5. must not be fewer than `fits`",
         ),
-        ({"skeleton": "s", "folder": "f", "terrain": {"heightmaps": []}}, "`heightmaps` names none"),
+        ({"skeleton": "s", "folder": "f", "terrain": {"heightmaps": []}}, "`heightmaps` is empty"),
         ({"skeleton": "s", "folder": "f", "terrain": {"sole": float("nan")}}, r"terrain\.sole: .*finite"),
         ({"skeleton": "s", "folder": "f", "held_out": ["../a"]}, "a clip's name has no .*slashes"),
         ({"skeleton": "../s", "folder": "f"}, "skeleton: string should match"),
@@ -137,7 +138,7 @@ def test_a_data_set_that_cannot_be_is_refused(values: dict, message: str) -> Non
     [
         (
             {"injured": "A-B"},
-            r"^d\.yaml: clips\.a\.injured: only clips of a `synthetic` data set have it; use `channels`\.$",
+            r"^d\.yaml: clips\.a\.injured: only clips of a `synthetic` .* have this key; use `channels`\.$",
         ),
         ({"recipe": "walk"}, r"clips\.a\.recipe: only clips of a `synthetic` data set"),
         ({"share": 4}, r"clips\.a\.share: only clips of a `synthetic` data set"),
@@ -188,7 +189,7 @@ def test_yaml_cannot_make_objects(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"joints": {"A": {"parent": "B", "offset": [0, 0, 0]}}}, "its parent 'B' must stand above"),
+        ({"joints": {"A": {"parent": "B", "offset": [0, 0, 0]}}}, "its parent 'B' must be listed before"),
         ({"links": [["Hips", "Tail"]]}, "links: there is no joint 'Tail'"),
         ({"roles": {"hips": "Hip"}}, "roles: there is no joint 'Hip'"),
     ],
@@ -226,3 +227,13 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
     assert catalogue.configuration("injured").channels == ("injury",)
     assert catalogue.dataset("synthetic").terrain.fits == 10
     assert catalogue.dataset("synthetic").synthetic.frames == 11_412
+
+
+def test_the_release_has_its_forty_clips_on_their_ground(root: Path) -> None:
+    """As the generator of the original database has them: 40 clips, and the mirrors of all."""
+    release = Catalogue(root / "config").dataset("pfnn")
+    grounds = Counter(entry.ground if entry else "flat" for entry in release.clips.values())
+    assert grounds == {"flat": 19, "rocky": 15, "jumpy": 5, "beam": 1}
+    assert release.mirror
+    assert release.held_out == ()
+    assert len(release.terrain.heightmaps) == 13

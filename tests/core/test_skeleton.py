@@ -109,7 +109,7 @@ def test_a_skeleton_whose_sides_its_names_do_not_tell_is_not_mirrored(holden31):
 
 def test_a_link_that_can_hurt_on_one_side_alone_is_not_mirrored(holden31):
     links = tuple(link for link in holden31.links if link != ("RightLeg", "RightFoot"))
-    with pytest.raises(HobbleError, match="hold LeftLeg-LeftFoot and not RightLeg-RightFoot"):
+    with pytest.raises(HobbleError, match="have LeftLeg-LeftFoot but not RightLeg-RightFoot"):
         _ = replace(holden31, links=links).mirror_links
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from hobble.evaluation.crowd import Stretch, run, told
+from hobble.evaluation.crowd import Stretch, channel_values, run
 from hobble.runtime.options import Runtime
 
 
 def test_a_figure_walks_the_same_alone_and_among_others(hurtable) -> None:
     links = list(hurtable.channels["injury"][:5])
-    hurt = told(hurtable, "injury", [{link: 2.0 * i} for i, link in enumerate(links)])
+    hurt = channel_values(hurtable, "injury", [{link: 2.0 * i} for i, link in enumerate(links)])
     gaits = ["walk", "jog", "walk", "jog", "walk"]
     together = run(hurtable, [Stretch(20, gaits, hurt), Stretch(20, gaits, hurt)], Runtime())
     for i, gait in enumerate(gaits):

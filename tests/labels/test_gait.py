@@ -34,23 +34,27 @@ def test_a_walk_after_a_stand(walker):
     assert (shares[230:].argmax(axis=1) == g.WALK).all()
 
 
-def test_bouncing_hips_and_feet_in_the_air_are_a_jog(walker):
-    clip = walker(half=20, swing=26, stride=160.0)
-    assert (automatic(clip)[60:-60].argmax(axis=1) == g.WALK).mean() > 0.9
-    bounce = clip.root.copy()
-    bounce[:, 1] += 4 * np.cos(2 * np.pi * np.arange(len(clip)) / 20)
-    feet = clip.translations.copy()
+def bouncing(clip, height):
+    """The clip with hips that bounce by `height` cm over feet that stay where they are."""
+    root, feet = clip.root.copy(), clip.translations.copy()
+    root[:, 1] += height * np.cos(2 * np.pi * np.arange(len(clip)) / 20)
     for role in ("left_heel", "right_heel"):
-        feet[:, clip.skeleton.role(role), 1] -= bounce[:, 1] - clip.root[:, 1]
-    jog = replace(clip, root=bounce, translations=feet)
+        feet[:, clip.skeleton.role(role), 1] -= root[:, 1] - clip.root[:, 1]
+    return replace(clip, root=root, translations=feet)
+
+
+def test_bouncing_hips_and_feet_in_the_air_are_a_jog(walker):
+    jog = bouncing(walker(half=20, swing=34, stride=160.0), 4.0)
     assert (automatic(jog)[60:-60].argmax(axis=1) == g.JOG).all()
 
 
+def test_a_walk_that_bounces_and_always_has_a_foot_down_is_a_walk(walker):
+    happy = bouncing(walker(half=20, swing=26, stride=160.0), 4.0)
+    assert (automatic(happy)[60:-60].argmax(axis=1) == g.WALK).all()
+
+
 def test_what_the_clip_is_said_to_show_tips_the_balance(walker):
-    clip = walker(half=20, swing=22, stride=160.0)
-    root = clip.root.copy()
-    root[:, 1] += 1.0 * np.cos(2 * np.pi * np.arange(len(clip)) / 20)
-    between = replace(clip, root=root)
+    between = bouncing(walker(half=20, swing=32, stride=160.0), 0.5)
     assert (automatic(between, "walk")[60:-60].argmax(axis=1) == g.WALK).all()
     assert (automatic(between, "jog")[60:-60].argmax(axis=1) == g.JOG).all()
 

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from hobble.core.section import Positive, Section
-from hobble.evaluation.options import together
+from hobble.evaluation.options import joined_sections
 from hobble.measures.joints import Joints
 from hobble.measures.measure import INPUTS, Measure
 from hobble.measures.registry import MEASURES, measure, modules, of_channels
@@ -70,7 +70,7 @@ def test_the_list_and_the_options_are_read_without_what_measures() -> None:
 
 
 def test_options_of_all_are_one_section() -> None:
-    both = together([Joints, Section, Far, Laps, Joints])
+    both = joined_sections([Joints, Section, Far, Laps, Joints])
     assert both().model_dump() == {"joints": "all", "far": 4, "laps": 2}
     assert list(both.model_fields) == ["joints", "far", "laps"]
     with pytest.raises(ValueError, match="greater than 0"):
@@ -81,4 +81,4 @@ def test_options_of_all_are_one_section() -> None:
 
 def test_a_key_that_two_measurements_define_is_refused() -> None:
     with pytest.raises(TypeError, match="laps is a key of"):
-        together([Laps, Rounds])
+        joined_sections([Laps, Rounds])

@@ -45,7 +45,8 @@ def test_laps_that_are_finished(steady) -> None:
     assert result["laps_finished"] == 2
     assert [lap["waypoints_reached"] for lap in result["laps"]] == [3, 3]
     assert all(lap["finished"] and lap["frames"] < 20 for lap in result["laps"])
-    assert result["track"] == {"waypoints": 3, "metres": 1.2}
+    assert (result["track"]["waypoints"], result["track"]["metres"]) == (3, 1.2)
+    assert (result["track"]["x"], result["track"]["z"]) == ([0.0, 0.3, 0.6], [0.0, 0.0, 0.0])
 
 
 def test_what_was_asked_is_what_was_taken_unless_it_was_held_back() -> None:
@@ -77,6 +78,12 @@ def test_a_character_that_cannot_turn_is_ended_by_the_clock(steady) -> None:
         assert lap["path_overshoot_cm"] == pytest.approx(past * 3 / np.sqrt(3**2 + 1), abs=30)
     assert result["waypoints_reached"] == 2
     assert result["waypoints"] == 6
+    for lap, run_of in zip(result["laps"], result["runs"], strict=True):
+        # It glides along z from the third waypoint, a quarter of a second from place to place.
+        assert len(run_of["x"]) == 480 / 15
+        np.testing.assert_allclose(run_of["x"], 0, atol=0.02)
+        np.testing.assert_allclose(np.diff(run_of["z"])[2:], 15 * 0.015, atol=0.02)
+        assert max(run_of["off_cm"]) == pytest.approx(lap["path_overshoot_cm"], abs=25)
     # The second lap begins where the first did.
     np.testing.assert_allclose(
         result["laps"][0]["path_distance_cm"], result["laps"][1]["path_distance_cm"], atol=1e-6

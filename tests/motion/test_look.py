@@ -41,7 +41,9 @@ def test_files_that_are_there_twice_and_files_of_no_clip_are_told(root, folder):
     (folder / "helthy_injuries.txt").write_text("frames:600\n")
     text = table(seen(root, folder))
     assert "again and healthy are the same file" in text
-    assert "helthy_injuries.txt belongs to no clip and is not read: is it that of healthy?" in text
+    assert (
+        "helthy_injuries.txt belongs to no clip and is not read. If it belongs to healthy, rename it." in text
+    )
     assert "Nobody stands in these clips" in text
 
 

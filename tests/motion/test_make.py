@@ -14,8 +14,11 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.motion.decode import frame_rate
+from hobble.motion.options import ClipMotion
+from hobble.motion.read import read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.rig import load_skeleton
+from hobble.motion.source import load_source
 
 
 def test_a_clip_on_the_skeleton_passes_through_untouched(walk, bvh, make):
@@ -170,6 +173,24 @@ def test_a_floor_that_is_not_at_zero_is_put_there_and_said(walker, bvh, make, ro
     assert [s for s in report["repairs"] if "The floor lies at" in s and s.endswith("so that it lies at 0.")]
     with pytest.raises(InputError, match=r"walk.bvh: The floor lies at -?\d+ cm.*defects: repair"):
         make(path, defects="refuse")
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("every", [1, 4, 5])
+def test_the_floor_of_a_short_run_is_found_at_any_rate(shared, bvh, make, root, every):
+    """One second of a run at 120, 30 and 24 frames a second: a foot stands in few of them."""
+    source = load_source(
+        read_bvh(shared / "mocap/cmu/09_08.bvh"),
+        load_skeleton(root / "config/skeletons/holden31.yaml"),
+        root / "config/skeletons",
+        ClipMotion(),
+    ).clip
+    part = slice(None, None, every)
+    clip = replace(
+        source, fps=source.fps / every, rotations=source.rotations[part], root=source.root[part] - [0, 9, 0]
+    )
+    _, report = make(bvh(clip))
+    assert any(said.startswith("The floor lies at -") for said in report["repairs"])
 
 
 @pytest.mark.parametrize("height", [-1.5, 1.5])

@@ -6,8 +6,7 @@ import pytest
 
 from tests.motion.scramble import outcome
 
-# A rig that says nothing of what a foot's rest is, or has no toes, is told apart from its original by that.
-MOST = 1.6
+MOST = 1.0  # cm, mean over all joints
 FILES = ("02_01", "16_11", "07_04", "105_16", "09_03", "08_03")
 
 
@@ -15,4 +14,5 @@ FILES = ("02_01", "16_11", "07_04", "105_16", "09_03", "08_03")
 @pytest.mark.parametrize("seed", range(0, 24))
 def test_a_clip_comes_out_of_another_rig_as_it_is(shared, tmp_path, seed):
     one = outcome(shared / f"mocap/cmu/{FILES[seed % len(FILES)]}.bvh", seed, tmp_path, 420)
-    assert one.refused.count("degrees off its source") if one.off is None else one.off.mean() < MOST, one
+    assert one.off is not None, one
+    assert one.off.mean() < MOST, one

@@ -63,3 +63,22 @@ def test_a_rig_without_a_file_is_found(shared, make, name):
     assert (roles["chest"], roles["head"], roles["left_shoulder"]) == ("Spine1", "HEad", "LeftArm")
     assert "neck" not in roles
     same_bends(path, clip, roles)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("name", ["03_04", "07_04", "105_16"])
+def test_hips_and_shoulders_are_as_level_as_in_the_file(shared, make, name):
+    """Captured rigs have spines that are bent sideways in their zero pose; what they carry is not."""
+    path = shared / f"mocap/cmu/{name}.bvh"
+    clip, report = make(path)
+    places, fps = seen(path), 1 / read_bvh(path).frame_time
+    at = np.minimum(np.round(np.arange(len(clip)) / 60 * fps).astype(int), len(places["Hips"]) - 1)
+
+    def tilt(left, right):
+        way = left - right
+        return np.degrees(np.arctan2(way[:, 1], np.hypot(way[:, 0], way[:, 2])))
+
+    for part in ("hip", "shoulder"):
+        before = tilt(*(places[report["roles"][f"{side}_{part}"]][at] for side in ("left", "right")))
+        after = tilt(*(clip.positions[:, clip.skeleton.role(f"{side}_{part}")] for side in ("left", "right")))
+        assert abs((after - before).mean()) < 1

@@ -12,8 +12,8 @@ import yaml
 
 from hobble.channels.injury.response.comparison_page import injury_table
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.compare import compare
-from hobble.evaluation.measured import Measured
+from hobble.evaluation.compare_configurations import compare
+from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.measures.accuracy import comparison_page as of_accuracy
 from hobble.measures.responsivity import comparison_page as of_responsivity
 from hobble.models.load import load_network
@@ -63,7 +63,7 @@ def compared(material: Material) -> dict[str, Any]:
             for n in (1, 10)
         ]
         measured.append(
-            Measured(
+            ConfigurationResults(
                 name=name,
                 resolved=resolved,
                 measured={

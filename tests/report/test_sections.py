@@ -252,3 +252,21 @@ def test_every_pair_of_injuries_is_drawn_as_it_is_measured() -> None:
     assert (far["y"], far["x"], far["z"]) == (["a-b", "c-d"], ["c-d", "a-b"], [[2.0, None], [None, 0.0]])
     assert share["z"] == [[0.5, None], [None, None]]
     assert page_cases.second_chart([]) is None
+
+
+def test_the_runs_lie_over_the_track_and_are_red_where_they_left_it() -> None:
+    track = {"x": [0.0, 10.0, 10.0], "z": [0.0, 0.0, 5.0], "gaits": ["walk", "jog", "crouch"]}
+    near = {"lap": 1, "x": [0.0, 5.0], "z": [0.0, 0.1], "off_cm": [0.0, 10.0]}
+    far = {"lap": 2, "x": [0.0, 5.0, 9.0], "z": [0.0, -2.0, 0.0], "off_cm": [0.0, 200.0, 3.0]}
+    chart = responsivity_page.track_chart({"track": track, "runs": [near, far]})
+    assert chart is not None
+    by_name = {trace["name"]: trace for trace in chart.traces}
+    assert by_name["track"]["x"] == [0.0, 10.0, 10.0, 0.0], "it is closed"
+    assert by_name["waypoints"]["text"] == ["0, walk", "1, jog", "2, crouch"]
+    left = by_name["more than 50 cm off"]
+    assert (left["x"], left["y"], left["customdata"]) == ([5.0], [-2.0], [[200.0, 2]])
+    assert "the furthest was 200 cm" in chart.caption
+    kept = responsivity_page.track_chart({"track": track, "runs": [near]})
+    assert kept is not None
+    assert "none was further from it than 50 cm; the furthest was 10 cm" in kept.caption
+    assert responsivity_page.track_chart({"track": {"waypoints": 6}}) is None

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hobble.config import sections
+from hobble.config.load import Catalogue
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
@@ -27,20 +28,8 @@ from hobble.terrain.patches import draw_patches
 
 NAME = "LocomotionFlat09_000"
 OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0}
-# A data set as the original made it: what differs from the defaults, as a configuration would say it.
-ORIGINAL = {
-    "motion": {"proportions": "clip", "defects": "refuse"},
-    "labels": {"margins": "drop", "contacts": "original"},
-    "terrain": {
-        "flat_level": "feet",
-        "heel_height": 5.0,
-        "toe_height": 4.0,
-        "held_up": None,
-        "deepest": None,
-        "bend_flat": False,
-    },
-    "database": {},
-}
+# The data set of the original release, whose sections are to make the original's rows.
+RELEASE = Catalogue(Path(__file__).parents[2] / "config").dataset("pfnn")
 IN_CENTIMETRES = ("position", "joint_position")
 
 
@@ -65,7 +54,7 @@ def original(shared: Path) -> dict[str, np.ndarray]:
 def options(section: str, **changed: object) -> dict[str, Any]:
     """A section of the original's data set, as its stage gets it."""
     model = getattr(sections, section.capitalize())
-    return model(**ORIGINAL[section] | changed).model_dump(mode="json")
+    return model(**getattr(RELEASE, section).model_dump() | changed).model_dump(mode="json")
 
 
 def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrain: object) -> ClipRows:
@@ -102,7 +91,7 @@ def rows(shared: Path, root: Path) -> ClipRows:
 @pytest.mark.shared
 def test_the_original_rows_column_by_column(rows, original):
     layout = replace(rows.layout, channels=())
-    (pairs,) = expanded(rows, rows.layout.told(()))
+    (pairs,) = expanded(rows, rows.layout.with_channels(()))
     np.testing.assert_array_equal(np.bincount(rows.cycle), original["cycle_length"])
     np.testing.assert_allclose(pairs.p, original["P"], atol=1e-6)
     differing = []
@@ -237,7 +226,8 @@ def test_fits_of_a_row_share_its_frame_and_differ_in_the_ground(walk, labels, te
     rows = clip_rows("walk", walk, labels, {"injury": np.zeros((300, 2))}, hilly, **OPTIONS)
     layout = rows.layout
     x, y = (
-        np.concatenate(parts) for parts in list(zip(*expanded(rows, rows.layout.told(())), strict=True))[:2]
+        np.concatenate(parts)
+        for parts in list(zip(*expanded(rows, rows.layout.with_channels(())), strict=True))[:2]
     )
     centre = hilly["heights"][:, 12:24].mean(axis=1)
     np.testing.assert_allclose(x[:, layout.x_terrain], hilly["heights"] - centre[:, None], atol=1e-4)
@@ -264,7 +254,7 @@ def test_a_clip_without_cycles_has_no_rows(walk, labels):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"phase": np.zeros(299)}, "labels of 299 frames for a clip of 300"),
+        ({"phase": np.zeros(299)}, "labels have 299 frames, the clip has 300"),
         ({"cycles": np.array([[60, 100], [100, 130], [200, 241]])}, "other cycles"),
     ],
 )
@@ -274,12 +264,12 @@ def test_files_that_do_not_belong_together_are_refused(walk, labels, terrain, ch
 
 
 def test_severities_and_cycles_that_do_not_fit_are_refused(walk, labels, terrain):
-    with pytest.raises(InputError, match="injury of 3 columns for a skeleton of 2"):
+    with pytest.raises(InputError, match="injury has 3 columns where the skeleton needs 2"):
         clip_rows("walk", walk, labels, {"injury": np.zeros((300, 3))}, terrain, **OPTIONS)
     for cycle, frame in (([0, 40], 0), ([260, 299], 299)):
         near = {**labels, "cycles": np.array([cycle])}
         ground = flat_terrain(near["cycles"], np.zeros(1))
-        with pytest.raises(InputError, match=f"walk, frame {frame}: a cycle has no frame before it or none"):
+        with pytest.raises(InputError, match=f"walk, frame {frame}: the clip has no frame before or after"):
             clip_rows("walk", walk, near, {"injury": np.zeros((300, 2))}, ground, **OPTIONS)
 
 

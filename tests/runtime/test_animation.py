@@ -554,3 +554,36 @@ def test_a_terrain_that_raises_leaves_the_state_as_it_was(hurtable, call: int) -
     assert same(before, troubled.state)
     a, b = (walk(c, 5, terrain=t)[-1] for c, t in ((calm, hills), (troubled, fails)))
     np.testing.assert_array_equal(a.positions, b.positions)
+
+
+def test_a_frame_that_failed_is_as_if_it_had_not_been_asked_for(hurtable) -> None:
+    """Whichever of its two looks at the ground failed, in the first frame too."""
+
+    def hills(x, z):
+        return 40 + 0.2 * z
+
+    for failing in (0, 1, 40, 41):
+        whole, disturbed = ProceduralAnimation(hurtable), ProceduralAnimation(hurtable)
+        looks = iter(range(10**6))
+
+        def once(x, z, looks=looks, failing=failing):
+            if next(looks) == failing:
+                raise OSError("gone")
+            return hills(x, z)
+
+        for frame in range(40):
+            pose = whole.next_pose((0, 2.0), terrain=hills)
+            if frame == failing // 2:
+                with pytest.raises(OSError, match="gone"):
+                    disturbed.next_pose((0, 2.0), terrain=once)
+            again = disturbed.next_pose((0, 2.0), terrain=once)
+            np.testing.assert_array_equal(again.positions, pose.positions)
+            np.testing.assert_array_equal(again.root, pose.root)
+
+
+def test_it_starts_on_the_ground_wherever_that_is(steady) -> None:
+    low, high = ProceduralAnimation(steady), ProceduralAnimation(steady)
+    for _ in range(3):
+        a = low.next_pose((0, 1.5)).positions
+        b = high.next_pose((0, 1.5), terrain=lambda x, z: 500.0).positions
+        np.testing.assert_allclose(b - a, np.broadcast_to([0, 500.0, 0], a.shape), atol=1e-3)

@@ -12,6 +12,7 @@ from hobble.core.ik import two_bone_knee
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.feet import (
+    BODY_FREE,
     FLOATING,
     LOCK_AT,
     MOST_ADDED,
@@ -19,6 +20,7 @@ from hobble.runtime.feet import (
     TOO_FAR,
     bend,
     carried,
+    carry_body,
     leg_joints,
     place_feet,
     reach,
@@ -202,3 +204,34 @@ def test_no_leg_turns_too_fast_wherever_the_foot_is_to_be(holden31: Skeleton) ->
         last = feet.rotation
     assert furthest <= MOST_ADDED + 1e-6
     assert plain > 1.5 * MOST_ADDED, "the feet asked for should need more"
+
+
+def test_the_figure_goes_where_its_standing_feet_say(holden31: Skeleton) -> None:
+    """Up out of the ground and down to it, by the foot in contact; the hips stay within their range."""
+    base, _ = crouched(holden31)
+    legs, hips, sole = leg_joints(holden31), holden31.role("hips"), np.array([5.0, 4.0])
+    soles = [min(base[leg[2], 1] - sole[0], base[leg[3], 1] - sole[1]) for leg in legs]
+
+    def carried_to(left: float, right: float, contacts: list[float], low: float, high: float) -> float:
+        """Where the figure comes to; left, right: the ground under its feet, its hips over their mean."""
+        ground = np.array([[left, left, right, right, (left + right) / 2]])
+        lift = np.zeros(1)
+        for _ in range(80):
+            position = base[None].copy()
+            carry_body(
+                np.array([contacts], np.float32), 0, ground, hips, low, high, legs, sole, lift, position
+            )
+        moved = position[0] - base
+        np.testing.assert_allclose(moved[:, 1], moved[0, 1], atol=1e-12)
+        np.testing.assert_array_equal(moved[:, ::2], 0)
+        return float(moved[0, 1])
+
+    far, stands = 1e6, [1.0, 1.0, 0.0, 0.0]
+    up, down = soles[0] + 20, soles[0] - 20
+    assert carried_to(up, 0.0, stands, -far, far) == pytest.approx(20 - BODY_FREE, abs=1e-3)
+    assert carried_to(down, 0.0, stands, -far, far) == pytest.approx(BODY_FREE - 20, abs=1e-3)
+    assert carried_to(soles[0] + 2, 90.0, stands, -far, far) == 0.0
+    assert carried_to(up, up, [0.0] * 4, -far, far) == 0.0
+    above = base[hips, 1] - soles[0]
+    assert carried_to(soles[0], soles[0], stands, -far, above - 6) == pytest.approx(-6)
+    assert carried_to(soles[0], soles[0], [0.0] * 4, above + 5, far) == pytest.approx(5)

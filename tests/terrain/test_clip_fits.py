@@ -14,11 +14,11 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.options import ClipMotion
 from hobble.motion.root import RootFrames, root_frames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
-from hobble.terrain.feet import HEEL, Feet, feet_of, heel_above_toe, held_up
 from hobble.terrain.ground import fit_cycle
 from hobble.terrain.heightmaps import heightmaps
 from hobble.terrain.options import Heightmap
 from hobble.terrain.patches import Patches, draw_patches
+from hobble.terrain.soles import IS_HEEL, Feet, find_soles, heel_above_toe, held_above_other
 
 GROUNDS = {
     "level": lambda x, z: np.zeros_like(z),
@@ -165,7 +165,7 @@ def test_a_heel_is_held_up_only_over_a_toe_that_stands() -> None:
     soles = np.zeros((2, 4, 3))
     soles[:, 0, 1] = 5.0
     contacts = np.array([[True, True, True, True], [True, False, True, True]])
-    up = held_up(Feet(soles, contacts, 0.0, 0.0), 2.0)
+    up = held_above_other(Feet(soles, contacts, 0.0, 0.0), 2.0)
     assert up.tolist() == [[True, False, False, False], [False] * 4]
 
 
@@ -220,7 +220,7 @@ def test_where_no_foot_ever_stands_the_lowest_points_count(
     walk = made.walk(GROUNDS["level"])
     labels = {**walk.labels, "contacts": np.zeros((len(walk.clip), 4), bool)}
     fits = clip_fits(walk.clip, labels, patches, "rocky", made.options(), made.database())
-    assert "no foot stands in frames 64 to 128" in caplog.text
+    assert "no contact in frames 64 to 128" in caplog.text
     assert np.isfinite(fits.heights).all()
     assert fits.foot_error[..., 0].max() < 1
 
@@ -228,11 +228,13 @@ def test_where_no_foot_ever_stands_the_lowest_points_count(
 def test_labels_of_another_clip_are_refused(made: SimpleNamespace, patches: Patches) -> None:
     walk = made.walk(GROUNDS["level"])
     few = {**walk.labels, "contacts": walk.labels["contacts"][1:]}
-    with pytest.raises(InputError, match=r"figure: labels have contacts of shape \(419, 4\) for 420 frames"):
+    with pytest.raises(
+        InputError, match=r"figure: the contacts have shape \(419, 4\), but the clip has 420 frames"
+    ):
         clip_fits(walk.clip, few, patches, "rocky", made.options(), made.database())
     late = {**walk.labels, "cycles": np.array([[64, 128], [300, 420]])}
     with pytest.raises(
-        InputError, match="frame 300: the cycle of frames 300 to 420 does not lie in the clip's 420"
+        InputError, match="frame 300: a cycle has frames 300 to 420, but the clip has 420 frames"
     ):
         clip_fits(walk.clip, late, patches, "rocky", made.options(), made.database())
     with pytest.raises(InputError, match="300 patches are fewer than the 400 fits"):
@@ -245,13 +247,13 @@ AUTO = {"heel_height": "auto", "toe_height": "auto", "sole": 4.0, "deepest": 1.0
 def test_heights_of_joints_above_their_soles(made: SimpleNamespace, holden31: Skeleton) -> None:
     walk = made.walk(GROUNDS["level"])
     contacts, frames = walk.labels["contacts"], np.arange(60, 360)
-    flat = feet_of(walk.clip, contacts, frames, True, **AUTO)
+    flat = find_soles(walk.clip, contacts, frames, True, **AUTO)
     assert (flat.heel_height, flat.toe_height) == (pytest.approx(7.0), pytest.approx(2.5))
     assert np.abs(flat.soles[contacts][:, 1]).max() < 1e-9
-    uneven = feet_of(walk.clip, contacts, frames, False, **AUTO)
+    uneven = find_soles(walk.clip, contacts, frames, False, **AUTO)
     assert (uneven.heel_height, uneven.toe_height) == (8.5, 4.0)
-    given = feet_of(walk.clip, contacts, frames, True, **AUTO | {"heel_height": 5.0, "toe_height": 4.5})
-    expected = walk.clip.positions[:, -4:, 1] - np.where(HEEL, 5.0, 4.5)
+    given = find_soles(walk.clip, contacts, frames, True, **AUTO | {"heel_height": 5.0, "toe_height": 4.5})
+    expected = walk.clip.positions[:, -4:, 1] - np.where(IS_HEEL, 5.0, 4.5)
     assert np.allclose(given.soles[..., 1], expected)
     assert heel_above_toe(holden31) == pytest.approx(4.5)
 
@@ -263,7 +265,7 @@ def test_a_single_low_frame_lowers_the_soles_a_fault_of_capture_does_not(made: S
         feet = walk.clip.positions[:, -4:].copy()
         feet[100, 1, 1] = 2.5 - depth
         clip = made.figure(feet, walk.clip.root)
-        found = feet_of(clip, walk.labels["contacts"], frames, True, **AUTO)
+        found = find_soles(clip, walk.labels["contacts"], frames, True, **AUTO)
         assert found.toe_height == pytest.approx(expected)
         assert replace(found).heel_height == pytest.approx(7.0)
 

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.terrain.correction import STEEPNESS, Stances, bends, distances, pits, stances
+from hobble.terrain.correction import (
+    WALL_STEEPNESS,
+    Stances,
+    dig_pits,
+    distances,
+    fit_surfaces,
+    gather_stances,
+)
 
 
 def points(seed: int, count: int = 12) -> tuple[Stances, np.ndarray]:
@@ -20,7 +27,7 @@ def points(seed: int, count: int = 12) -> tuple[Stances, np.ndarray]:
 @given(st.integers(0, 10_000))
 def test_without_smoothing_the_surface_goes_through_every_point(seed: int) -> None:
     at, residual = points(seed)
-    for surface, wanted in zip(bends(at, residual, 0.0), residual, strict=True):
+    for surface, wanted in zip(fit_surfaces(at, residual, 0.0), residual, strict=True):
         assert np.allclose(surface.at(at.place), wanted, atol=1e-6)
 
 
@@ -31,7 +38,7 @@ def test_it_is_the_regularised_system_of_the_original() -> None:
     weights = np.linalg.solve(phi - 0.1 * np.eye(12), residual[0])
     elsewhere = np.random.default_rng(5).uniform(-300, 300, (40, 2))
     expected = distances(elsewhere, at.place) / spread @ weights
-    assert np.allclose(bends(at, residual, 0.1)[0].at(elsewhere), expected)
+    assert np.allclose(fit_surfaces(at, residual, 0.1)[0].at(elsewhere), expected)
 
 
 def test_a_point_that_counts_m_times_is_m_points_at_one_place() -> None:
@@ -40,8 +47,8 @@ def test_a_point_that_counts_m_times_is_m_points_at_one_place() -> None:
     many = Stances(np.repeat(at.place, count, axis=0), np.zeros(20), np.ones(20))
     few = Stances(at.place, at.height, count.astype(float))
     elsewhere = np.random.default_rng(5).uniform(-300, 300, (40, 2))
-    one = bends(many, np.repeat(residual, count, axis=1), 0.1)
-    other = bends(few, residual, 0.1)
+    one = fit_surfaces(many, np.repeat(residual, count, axis=1), 0.1)
+    other = fit_surfaces(few, residual, 0.1)
     for a, b in zip(one, other, strict=True):
         assert np.allclose(a.at(elsewhere), b.at(elsewhere), atol=1e-9)
 
@@ -54,7 +61,7 @@ def test_large_residuals_are_met_and_small_ones_left_as_in_the_original(seed: in
     place = rng.uniform(-60, 60, (40, 2))
     at = Stances(place, np.zeros(40), rng.integers(1, 9, 40).astype(float))
     residual = np.stack([rng.normal(0, 0.1, 40), rng.choice([0.0, 50.0], 40)])
-    once, met = bends(at, residual, 0.1), bends(at, residual, 0.1, 0.5)
+    once, met = fit_surfaces(at, residual, 0.1), fit_surfaces(at, residual, 0.1, 0.5)
     left = [np.abs(r - s.at(place)) @ at.count / at.count.sum() for r, s in zip(residual, met, strict=True)]
     assert max(left) <= 0.5 + 1e-9
     assert np.abs(residual[1] - once[1].at(place)) @ at.count / at.count.sum() > 0.5
@@ -63,7 +70,7 @@ def test_large_residuals_are_met_and_small_ones_left_as_in_the_original(seed: in
 
 def test_points_that_are_all_at_one_place_bend_nothing() -> None:
     at = Stances(np.full((3, 2), 7.0), np.zeros(3), np.ones(3))
-    (surface,) = bends(at, np.ones((1, 3)), 0.1)
+    (surface,) = fit_surfaces(at, np.ones((1, 3)), 0.1)
     assert np.all(surface.at(np.zeros((4, 2))) == 0)
 
 
@@ -75,7 +82,7 @@ def test_stances_are_runs_of_one_joint_cut_to_length() -> None:
     contacts[2:7, 0] = True
     contacts[8:10, 0] = True
     contacts[5:10, 3] = True
-    found = stances(soles, contacts, longest=3)
+    found = gather_stances(soles, contacts, longest=3)
     assert found.count.tolist() == [3, 2, 2, 3, 2]
     assert found.place[:, 0].tolist() == [0, 0, 0, 30, 30]
     assert found.height.tolist() == [3, 5.5, 8.5, 6, 8.5]
@@ -90,22 +97,22 @@ def test_digging_lets_feet_through_and_touches_nothing_that_is_far(seed: int) ->
     standing = Stances(rng.uniform(-50, 50, (4, 2)), np.full(4, -20.0), np.ones(4))
     where = np.concatenate([soles[:, [0, 2]], rng.uniform(-100, 100, (50, 2))])
     ground = rng.uniform(0, 5, 55)
-    dug = pits(soles, standing, 0.5).of(ground, where)
+    dug = dig_pits(soles, standing, 0.5).of(ground, where)
     assert np.all(dug[:5] <= soles[:, 1] + 0.5 + 1e-9)
     assert np.all(dug <= ground)
-    far = distances(where, soles[:, [0, 2]]).min(axis=1) > 15 / STEEPNESS
+    far = distances(where, soles[:, [0, 2]]).min(axis=1) > 15 / WALL_STEEPNESS
     assert np.array_equal(dug[far], ground[far])
-    assert pits(soles[:0], standing, 0.5).of(ground, where) is ground
+    assert dig_pits(soles[:0], standing, 0.5).of(ground, where) is ground
 
 
 def test_digging_is_as_steep_as_it_may_be_and_as_it_must_be() -> None:
     along = np.column_stack([np.linspace(-40, 40, 801), np.zeros(801)])
     sole = np.array([[0.0, -8.0, 0.0]])
     far = Stances(np.array([[30.0, 0.0]]), np.array([3.0]), np.ones(1))
-    dug = pits(sole, far, 0.0).of(np.full(801, 3.0), along)
+    dug = dig_pits(sole, far, 0.0).of(np.full(801, 3.0), along)
     assert dug.min() == pytest.approx(-8)
-    assert np.abs(np.diff(dug)).max() == pytest.approx(STEEPNESS * 0.1)
+    assert np.abs(np.diff(dug)).max() == pytest.approx(WALL_STEEPNESS * 0.1)
     near = Stances(np.array([[1.0, 0.0]]), np.array([3.0]), np.ones(1))
-    dug = pits(sole, near, 0.0).of(np.full(801, 3.0), along)
+    dug = dig_pits(sole, near, 0.0).of(np.full(801, 3.0), along)
     assert dug.min() == pytest.approx(-8)
     assert dug[410] == pytest.approx(3.0)

@@ -111,8 +111,8 @@ def test_files_are_scaled_and_may_say_their_own_cell_and_scale(tmp_path: Path) -
 BAD = {
     "empty.txt": (b"", "holds no heights"),
     "word.txt": (b"1 2 3\n4 five 6\n", "line 2: not a number: 'five'"),
-    "ragged.txt": (b"1 2 3\n4 5 6\n7 8\n", "line 3: 2 heights where the rows above have 3"),
-    "row.txt": (b"1 2 3\n", "has rows and columns"),
+    "ragged.txt": (b"1 2 3\n4 5 6\n7 8\n", "line 3: 2 heights, but the rows above have 3"),
+    "row.txt": (b"1 2 3\n", "needs rows and columns"),
     "binary.txt": (bytes(range(256)), "not a text"),
     "nan.txt": (b"nan nan\nnan nan\n", "no finite height"),
     "not.png": (b"\x89PNG\r\n\x1a\n" + b"rubbish" * 9, "not an image"),

@@ -130,11 +130,11 @@ def test_patches_come_back_from_their_file_and_are_small(tmp_path: Path, patches
 
 
 def test_what_cannot_be_drawn_is_refused_by_name() -> None:
-    with pytest.raises(InputError, match="plane: none of 1000 crops of 128 cells stays within 50 cm"):
+    with pytest.raises(InputError, match="plane: none of 1000 views of 128 cells stay within 50 cm"):
         draw(plane(0, 0), plane(3, 3))
     with pytest.raises(InputError, match="plane: 90 x 300 cells are too few for patches of 128 x 128"):
         draw(plane(0, 0, rows=90))
-    with pytest.raises(HobbleError, match="no heightmap"):
+    with pytest.raises(HobbleError, match="heightmaps is empty"):
         draw()
 
 

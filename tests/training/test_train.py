@@ -62,9 +62,10 @@ def test_batches_are_the_sections_samples_in_order(data: Database, kind: type[Ho
     blocks = list(data.blocks("train", 1, 2, 3, 5))
     assert [len(batch.p) for batch in seen[:-1]] == [size] * (len(seen) - 1)
     assert 0 < len(seen[-1].p) <= size
-    for mine, theirs in zip(zip(*seen, strict=True), zip(*blocks, strict=True), strict=True):
+    *columns, whole = zip(*seen, strict=True)
+    for mine, theirs in zip(columns, zip(*blocks, strict=True), strict=True):
         assert np.array_equal(np.concatenate(mine), np.concatenate(theirs))
-    assert sum(len(batch.p) for batch in seen) == data.section_pairs("train", 2, 3)
+    assert sum(len(batch.p) for batch in seen) == sum(whole) == data.section_pairs("train", 2, 3)
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float16", "bfloat16"])
@@ -89,7 +90,7 @@ def test_rows_on_a_device_are_those_of_the_reader(tmp_path: Path, dtype: str) ->
         mine = rows.batches(*place, seed=2, size=2000)
         theirs = data.blocks("train", *place, 2)
         for batch, block in zip(mine, theirs, strict=True):
-            for ours, wanted in zip(batch, block, strict=True):
+            for ours, wanted in zip(batch[:5], block, strict=True):
                 assert np.array_equal(ours, wanted)
 
 

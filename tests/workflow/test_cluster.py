@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hobble.workflow.asked import measured, planned
-from hobble.workflow.demands import ENGINE_MB, WEEK, Demands, bvh_seconds
+from hobble.workflow.demands import ENGINE_MB, WEEK_MINUTES, Demands, bvh_seconds
 from hobble.workflow.project import Project
+from hobble.workflow.resource_use import planned_jobs, with_use
 
 CLIPS = 40
 MANY = "skeleton: holden31\nfolder: many\nmirror: true\nheld_out: [clip-00]\n"
@@ -98,7 +98,7 @@ def test_more_motion_asks_for_more_and_a_second_attempt_too(demands) -> None:
         "synthetic", "jog-1", 600.0
     )
     assert demands.training_memory("ava") > demands.training_memory("holden")
-    assert demands.training_minutes("ava", attempt=10_000) == WEEK
+    assert demands.training_minutes("ava", attempt=10_000) == WEEK_MINUTES
 
 
 def test_the_length_of_a_clip_is_that_of_its_rows_not_what_its_header_promises(tmp_path) -> None:
@@ -120,7 +120,7 @@ def test_what_a_job_took_stands_beside_what_its_rule_asks_for(tmp_path) -> None:
     for path, text in ((log, "took 500 MB of memory at most\n"), (benchmark, "s\tmax_rss\n30.0\t7.1\n")):
         path.parent.mkdir(parents=True)
         path.write_text(text)
-    (job,) = measured(planned(plan), tmp_path)
+    (job,) = with_use(planned_jobs(plan), tmp_path)
     assert job.rule == "motion_clip"
-    assert job.memory == pytest.approx((500 + ENGINE_MB) / 1000)
-    assert job.time == pytest.approx(0.25)
+    assert job.memory_share == pytest.approx((500 + ENGINE_MB) / 1000)
+    assert job.time_share == pytest.approx(0.25)

@@ -10,7 +10,7 @@ from hobble.channels import NAMES
 from hobble.measures.measure import Measure
 from hobble.measures.registry import MEASURES
 from hobble.workflow import fingerprint as fp
-from hobble.workflow.costs import OF_DATASET
+from hobble.workflow.costs import DATASET_STAGES
 
 
 @pytest.fixture
@@ -134,7 +134,7 @@ def test_what_has_no_part_in_a_result_is_there_and_has_a_reason(root: Path) -> N
 
 
 def test_no_stage_imports_from_below(root: Path) -> None:
-    order = [*OF_DATASET, "training", "runtime", "evaluation", "report"]
+    order = [*DATASET_STAGES, "training", "runtime", "evaluation", "report"]
     order.insert(order.index("database"), "rows")
     order.insert(order.index("training"), "character")
     order.insert(order.index("channels"), "gait")  # how a walk is measured; no rule is its own

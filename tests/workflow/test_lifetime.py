@@ -31,7 +31,7 @@ def locks(tmp_path: Path) -> Path:
     folder = tmp_path / ".snakemake/locks"
     folder.mkdir(parents=True)
     (folder / "0.output.lock").write_text("results/a\n")
-    lifetime.own_lock(folder)
+    lifetime.record_lock_owner(folder)
     return folder
 
 
@@ -81,7 +81,7 @@ def test_a_lock_that_does_not_say_whose_it_is_stays(locks: Path, text: str) -> N
 def started(tmp_path: Path, work: str, run: int) -> subprocess.Popen[str]:
     """A job of the run with that process, as soon as its work has begun."""
     script = JOB.format(log=str(tmp_path / "job.log"), work=work)
-    environment = {**os.environ, lifetime.RUN: f"{run} {lifetime._began(run)}"}
+    environment = {**os.environ, lifetime.RUN_VARIABLE: f"{run} {lifetime._start_time(run)}"}
     command = [sys.executable, "-c", script]
     piped = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
     process = subprocess.Popen(command, env=environment, **piped)

@@ -54,13 +54,15 @@ def test_files_beside_a_clip_are_found_and_no_others(base: Path) -> None:
     project = Project(base, {})
     assert [Path(f).name for f in project.clips.label_files("mine", "b")] == ["b_gait.txt"]
     assert project.clips.label_files("mine", "c") == []
-    assert [Path(f).name for f in project.datasets.told.files("mine", "c", "injury")] == ["c_injuries.txt"]
+    assert [Path(f).name for f in project.datasets.channel_sources.files("mine", "c", "injury")] == [
+        "c_injuries.txt"
+    ]
 
 
 def test_a_status_in_the_configuration_takes_the_place_of_the_file(base: Path) -> None:
     text = DATASET + "clips: {a: , b: , c: {channels: {injury: 'LeftArm-LeftForeArm[3]'}}}\n"
     (base / "config/datasets/mine.yaml").write_text(text)
-    assert Project(base, {}).datasets.told.files("mine", "c", "injury") == []
+    assert Project(base, {}).datasets.channel_sources.files("mine", "c", "injury") == []
 
 
 def test_severities_of_0_hurt_nobody(base: Path) -> None:
@@ -70,7 +72,7 @@ def test_severities_of_0_hurt_nobody(base: Path) -> None:
     (base / "data/mine/c_injuries.txt").write_text(
         "frames:9\n1-4 LeftLeg-LeftFoot[0];\n5-9 LeftLeg-LeftFoot[.5];\n"
     )
-    assert [Project(base, {}).datasets.told.neutral("mine", clip, "injury") for clip in "abc"] == [
+    assert [Project(base, {}).datasets.channel_sources.neutral("mine", clip, "injury") for clip in "abc"] == [
         True,
         True,
         False,
@@ -81,7 +83,7 @@ def test_severities_of_0_hurt_nobody(base: Path) -> None:
         + "b: {channels: {injury: 'LeftLeg-LeftFoot[0]'}}, c: }\n"
     )
     (base / "config/datasets/mine.yaml").write_text(text)
-    assert [Project(base, {}).datasets.told.neutral("mine", clip, "injury") for clip in "abc"] == [
+    assert [Project(base, {}).datasets.channel_sources.neutral("mine", clip, "injury") for clip in "abc"] == [
         False,
         True,
         False,
@@ -102,9 +104,9 @@ def test_a_clip_can_be_configured_whatever_its_file_is_called(base: Path, name: 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (DATASET + "clips: {b: , a_mirror: }\n", "a_mirror: only a mirror is called so"),
-        (DATASET.replace("[b]", "[z]"), "held_out names no clip: z"),
-        (DATASET.replace("[b]", "[a, b, c]"), "no clip that is told nothing of injury is left to train on"),
+        (DATASET + "clips: {b: , a_mirror: }\n", "a_mirror: names that end in _mirror are reserved"),
+        (DATASET.replace("[b]", "[z]"), "held_out names clips that do not exist: z"),
+        (DATASET.replace("[b]", "[a, b, c]"), "no clip without injury is left to train on"),
         ("skeleton: s\nfolder: empty\n", "empty: no such folder"),
     ],
 )
@@ -123,19 +125,25 @@ def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
 @pytest.mark.parametrize(
     ("target", "message"),
     [
-        ("results/one/stimuli", "configuration one is told nothing.*has `channels`"),
-        ("results/eyes/stimuli/", "configuration one is told nothing"),
-        ("results/hurt/export/cubik.onnx", "export/cubik.onnx: there are constant, linear, cubic"),
+        ("results/one/stimuli", "configuration one has no `channels`"),
+        ("results/eyes/stimuli/", "configuration one has no `channels`"),
+        ("results/one/questionnaire", r"configuration one is not told what hurts.*\[injury\]"),
+        ("results/hurt/export/cubik.onnx", "export/cubik.onnx: the phase modes are constant, linear, cubic"),
     ],
 )
 def test_what_no_network_could_give_is_told_before_it_is_trained(
     base: Path, monkeypatch: pytest.MonkeyPatch, target: str, message: str
 ) -> None:
     (base / "config/eyes.yaml").write_text("extends: hurt\nnetwork_of: one\n")
-    monkeypatch.setattr(targets, "_dataset", lambda *_: None)
+    monkeypatch.setattr(targets, "_check_dataset", lambda *_: None)
     with pytest.raises(HobbleError, match=message):
         check(Project(base, {}), [target])
-    fine = ("results/hurt/stimuli", "results/one/export/pfnn", "results/one/export/cubic.onnx")
+    fine = (
+        "results/hurt/stimuli",
+        "results/hurt/questionnaire",
+        "results/one/export/pfnn",
+        "results/one/export/cubic.onnx",
+    )
     check(Project(base, {}), fine)
 
 
@@ -147,7 +155,7 @@ def test_a_listed_clip_without_its_file_is_told(base: Path) -> None:
 
 def test_the_walkers_frames_are_shared_out(root: Path) -> None:
     project = Project(root, {})
-    total = sum(project.datasets.frames("synthetic", clip) for clip in project.clips.own("synthetic"))
+    total = sum(project.datasets.frames("synthetic", clip) for clip in project.clips.listed("synthetic"))
     assert abs(total - 11_412) < 20
 
 
@@ -228,10 +236,13 @@ def test_a_skeleton_without_a_mirror_image_is_told_before_anything_runs(complete
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("channels: [injury]", r"its channels has to be \[\], not"),
-        ("network: {units: 9}", "its network has to be .*512.*, not .*9"),
-        ("training: {sections: 5}", r"its training\.sections has to be 10, not 5"),
-        ("training: {passes: 19}", r"which ends after 20 passes, to training\.passes: 19; give more"),
+        ("channels: [injury]", r"its channels must be \[\], not"),
+        ("network: {units: 9}", "its network must be .*512.*, not .*9"),
+        ("training: {sections: 5}", r"its training\.sections must be 10, not 5"),
+        (
+            "training: {passes: 19}",
+            r"which has 20 passes\. Its training\.passes must not be fewer, but it is 19",
+        ),
         ("training: {learning_rate: 1.0e-3, batch: 64}", None),
         ("", None),
     ],
@@ -244,7 +255,7 @@ def test_what_cannot_be_gone_on_from_is_told_before_anything_runs(
     project = Project(complete, {})
     if message is None:
         return check(project, ["results/other/report.html"])
-    with pytest.raises(HobbleError, match=f"configuration other goes on from one, .*{message}"):
+    with pytest.raises(HobbleError, match=f"configuration other continues from one, .*{message}"):
         check(project, ["results/other/report.html"])
 
 
@@ -258,12 +269,12 @@ def test_what_is_compared(complete: Path) -> None:
     base = complete
     project = Project(base, {"compare": ["one", "hurt"]})
     check(project, ["results/compare/compare.json"])
-    assert project.comparison.measured()["accuracy"] == [
+    assert project.comparison.input_files()["accuracy"] == [
         f"results/{n}/evaluation/accuracy.json" for n in ("one", "hurt")
     ]
     assert Project(base, {"compare": "one,hurt"}).comparison.names() == ["one", "hurt"]
     (base / "config/read.yaml").write_text("extends: one\nnetwork_of: one\n")
-    read = Project(base, {"compare": ["read"]}).comparison.measured()
+    read = Project(base, {"compare": ["read"]}).comparison.input_files()
     assert read["history"] == ["results/one/network/history.csv"]
     # A list of configurations is no part of any of them.
     assert project.configurations.resolved("one") == Project(base, {}).configurations.resolved("one")
@@ -273,10 +284,10 @@ def test_what_is_compared(complete: Path) -> None:
     ("names", "message"),
     [
         (["one", "two"], "two.yaml: no such file. There are: hurt, one"),
-        (["one", "one"], "each configuration once"),
-        ([], "one or more, not none"),
-        ([1], "a list of configurations"),
-        ({"a": "one"}, "a list of configurations"),
+        (["one", "one"], "each once, not one, one"),
+        ([], "at least one configuration, each once, not none"),
+        ([1], "must be a list of names"),
+        ({"a": "one"}, "must be a list of names"),
     ],
 )
 def test_what_cannot_be_compared(complete: Path, names: object, message: str) -> None:
@@ -305,7 +316,7 @@ def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(bas
     assert list(project.clips.of("mine")) == ["a", "b", "c", "d"]
     assert project.clips.source("mine", "d") == str(below / "d.BVH")
     assert project.clips.label_files("mine", "d") == [str(below / "d_gait.txt")]
-    assert project.datasets.told.files("mine", "d", "injury") == [str(below / "d_injuries.txt")]
+    assert project.datasets.channel_sources.files("mine", "d", "injury") == [str(below / "d_injuries.txt")]
 
 
 def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path) -> None:
@@ -321,7 +332,7 @@ def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path)
     project = Project(base, {})
     assert list(project.clips.of("mine")) == ["a", "b", "c", "d"]
     assert project.clips.source("mine", "d") == str(base / "data/mine/first/day 1/d.bvh")
-    assert project.datasets.told.files("mine", "d", "injury") == [
+    assert project.datasets.channel_sources.files("mine", "d", "injury") == [
         str(base / "data/mine/first/day 1/d_injuries.txt")
     ]
 
@@ -333,12 +344,10 @@ def test_a_mirror_beside_its_original_is_left_out_and_made_anew_or_told(base: Pa
     (base / "data/mine/a_mirror_footsteps.txt").write_text("1 2\n")
     clips = Project(base, {}).clips
     assert list(clips.of("mine")) == ["a", "b", "c"]
-    said = (
-        [] if mirror else ["1 files in .* are mirrors of clips beside them .a_mirror.bvh, .*`mirror: true` m"]
-    )
+    said = [] if mirror else ["1 files in .* are mirrors of other clips .a_mirror.bvh, .*`mirror: true` m"]
     assert all(re.search(wanted, note) for wanted, note in zip(said, clips.notes("mine"), strict=True))
     (base / "data/mine/a_mirror.bvh").rename(base / "data/mine/z_mirror.bvh")
-    with pytest.raises(HobbleError, match="z_mirror: only a mirror is called so, which `mirror: true` makes"):
+    with pytest.raises(HobbleError, match=r"z_mirror: names that end in _mirror are .* `mirror: true` makes"):
         Project(base, {}).clips.of("mine")
 
 
@@ -347,13 +356,15 @@ def test_a_status_file_of_no_clip_is_told_with_the_nearest_name(base: Path) -> N
     (base / "data/mine/orphn_injuries.txt").write_text("frames:9\n1-9 LeftLeg-LeftFoot[4];\n")
     (note,) = notes(Project(base, {}), ["results/one/report.html", "results/hurt/report.html"])
     assert note.startswith("data set mine: ")
-    assert "orphn_injuries.txt belongs to no clip and is not read: is it that of orphan?" in note
+    assert (
+        "orphn_injuries.txt belongs to no clip and is not read. If it belongs to orphan, rename it." in note
+    )
 
 
 def test_two_files_of_one_clip_are_refused_with_both(base: Path) -> None:
     (base / "data/mine/old").mkdir()
     (base / "data/mine/old/a.BVH").write_text("")
-    with pytest.raises(HobbleError, match=r"old/a\.BVH: a second file of clip a, beside .*mine/a\.bvh"):
+    with pytest.raises(HobbleError, match=r"old/a\.BVH: a second file of clip a; the first is .*mine/a\.bvh"):
         Project(base, {}).clips.of("mine")
     (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , c: }\n")
     with pytest.raises(HobbleError, match="a second file of clip a"):
@@ -374,14 +385,18 @@ def test_what_the_folder_lacks_is_downloaded(base: Path) -> None:
     project = Project(base, {})
     assert project.clips.source("far", "2_1") == str(base / "data/downloaded/far/2_1.bvh")
     assert (
-        project.clips.label_files("far", "2_1") == project.datasets.told.files("far", "2_1", "injury") == []
+        project.clips.label_files("far", "2_1")
+        == project.datasets.channel_sources.files("far", "2_1", "injury")
+        == []
     )
     assert project.clips.download("far", "2_2") == {
         "url": "https://host/002/2_2.bvh",
         "sha256": "b" * 64,
         "folder": str(base / "data/far"),
     }
-    with pytest.raises(HobbleError, match=r"far/2_3\.bvh: no such file, .*far\.sha256 has none to download"):
+    with pytest.raises(
+        HobbleError, match=r"far/2_3\.bvh: no such file, .*not in the download list .*far\.sha256"
+    ):
         project.clips.source("far", "2_3")
     (base / "data/far").mkdir()
     (base / "data/far/2_1.bvh").write_text("")
@@ -413,17 +428,19 @@ def test_an_address_that_cannot_work_is_told(base: Path, old: str, new: str, mes
 def test_a_manifest_that_does_not_read_is_told_with_its_line(base: Path) -> None:
     (base / "config/datasets/far.yaml").write_text(FAR + "clips: {'2_1': }\n")
     (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'a' * 63}  2_2.bvh\n")
-    with pytest.raises(HobbleError, match=r"far\.sha256, line 2: a line holds a SHA-256"):
+    with pytest.raises(HobbleError, match=r"far\.sha256, line 2: expected a SHA-256"):
         Project(base, {}).clips.source("far", "2_1")
 
 
 def test_every_clip_of_the_cmu_set_has_a_checksum_and_an_address(root: Path) -> None:
     project = Project(root, {"mocap": "nowhere"})
     check(project, ["results/datasets/cmu/motion/02_01.npz"])
-    assert len(project.clips.own("cmu")) == 69
+    assert len(project.clips.listed("cmu")) == 69
     assert project.clips.download("cmu", "02_01")["url"].endswith("/cmu-mocap/master/data/002/02_01.bvh")
     assert project.clips.download("cmu", "105_16")["url"].endswith("/105/105_16.bvh")
-    assert all(len(project.clips.download("cmu", clip)["sha256"]) == 64 for clip in project.clips.own("cmu"))
+    assert all(
+        len(project.clips.download("cmu", clip)["sha256"]) == 64 for clip in project.clips.listed("cmu")
+    )
 
 
 @pytest.mark.shared
@@ -431,7 +448,7 @@ def test_the_checksums_are_those_of_the_files(root: Path, shared: Path) -> None:
     import hashlib
 
     project = Project(root, {})
-    for clip in project.clips.own("cmu"):
+    for clip in project.clips.listed("cmu"):
         data = (shared / f"mocap/cmu/{clip}.bvh").read_bytes()
         assert project.clips.download("cmu", clip)["sha256"] == hashlib.sha256(data).hexdigest()
 

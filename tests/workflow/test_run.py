@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from hobble.measures.registry import MEASURES
-from hobble.workflow.asked import measured, planned
+from hobble.workflow.resource_use import planned_jobs, with_use
 
 pytestmark = pytest.mark.workflow
 
@@ -150,6 +150,10 @@ def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> Non
 
 
 def test_no_job_took_more_than_its_rule_asks_of_a_cluster(finished) -> None:
-    jobs = list(measured(planned(finished.run("-np", "-F", TARGET)), finished.folder))
-    assert {"motion_clip", "terrain_fits", "training", "report"} <= {job.rule for job in jobs if job.took_mb}
-    assert [(job.log, job.memory, job.time) for job in jobs if max(job.memory, job.time) >= 1] == []
+    jobs = list(with_use(planned_jobs(finished.run("-np", "-F", TARGET)), finished.folder))
+    assert {"motion_clip", "terrain_fits", "training", "report"} <= {job.rule for job in jobs if job.used_mb}
+    assert [
+        (job.log, job.memory_share, job.time_share)
+        for job in jobs
+        if max(job.memory_share, job.time_share) >= 1
+    ] == []

@@ -3,7 +3,9 @@ rule channel_clip:
     input:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
         report="results/datasets/{dataset}/motion/{clip}.json",
-        files=lambda w: kept(datasets.told.files(w.dataset, w.clip, w.channel)),
+        files=lambda w: keep_local(
+            datasets.channel_sources.files(w.dataset, w.clip, w.channel)
+        ),
     output:
         values="results/datasets/{dataset}/channels/{channel}/{clip}.npz",
         report="results/datasets/{dataset}/channels/{channel}/{clip}.json",
@@ -18,7 +20,7 @@ rule channel_clip:
     params:
         clip=lambda w: w.clip,
         channel=lambda w: w.channel,
-        source=lambda w: datasets.told.source(w.dataset, w.clip, w.channel),
+        source=lambda w: datasets.channel_sources.source(w.dataset, w.clip, w.channel),
         code=lambda w: package.code("channel_clip", f"hobble.channels.{w.channel}"),
     script:
         "../scripts/channel_clip.py"

@@ -8,7 +8,7 @@ rule database_clip:
         labels="results/datasets/{dataset}/labels/{rows}.npz",
         channels=lambda w: [
             f"results/datasets/{w.dataset}/channels/{channel}/{w.rows}.npz"
-            for channel in datasets.told.channels(w.dataset)
+            for channel in datasets.channel_sources.channels(w.dataset)
         ],
         terrain="results/datasets/{dataset}/terrain/clips/{rows}.npz",
     output:
@@ -23,10 +23,10 @@ rule database_clip:
         runtime=lambda w, attempt: demands.minutes(w.dataset, w.rows, 0.15, attempt),
     params:
         clip=lambda w: w.rows,
-        channels=lambda w: datasets.told.channels(w.dataset),
+        channels=lambda w: datasets.channel_sources.channels(w.dataset),
         options=lambda w: datasets.part(w.dataset, "database", Rows),
         code=lambda w: package.code(
-            "database_clip", *modules_of(datasets.told.channels(w.dataset))
+            "database_clip", *modules_of(datasets.channel_sources.channels(w.dataset))
         ),
     script:
         "../scripts/database_clip.py"
@@ -37,16 +37,16 @@ rule database_merge:
     input:
         clips=lambda w: expand(
             f"results/datasets/{w.dataset}/database/clips/{{clip}}.npz",
-            clip=datasets.selected(w.dataset, told_by(w.told)),
+            clip=datasets.selected(w.dataset, channels_of_folder(w.told)),
         ),
         # No motion may lie on both sides of the split.
         compared=lambda w: expand(
             f"results/datasets/{w.dataset}/motion/{{clip}}.npz",
-            clip=datasets.compared(w.dataset, told_by(w.told)),
+            clip=datasets.compared(w.dataset, channels_of_folder(w.told)),
         ),
         reports=lambda w: expand(
             f"results/datasets/{w.dataset}/motion/{{clip}}.json",
-            clip=datasets.compared(w.dataset, told_by(w.told)),
+            clip=datasets.compared(w.dataset, channels_of_folder(w.told)),
         ),
     output:
         database=directory("results/datasets/{dataset}/database/{told}"),
@@ -62,10 +62,12 @@ rule database_merge:
         ),
     params:
         dataset=lambda w: w.dataset,
-        splits=lambda w: datasets.selected(w.dataset, told_by(w.told)),
-        channels=lambda w: told_by(w.told),
-        sources=lambda w: datasets.sources(w.dataset, told_by(w.told)),
+        splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.told)),
+        channels=lambda w: channels_of_folder(w.told),
+        sources=lambda w: datasets.sources(w.dataset, channels_of_folder(w.told)),
         options=lambda w: datasets.part(w.dataset, "database", Merging),
-        code=lambda w: package.code("database_merge", *modules_of(told_by(w.told))),
+        code=lambda w: package.code(
+            "database_merge", *modules_of(channels_of_folder(w.told))
+        ),
     script:
         "../scripts/database_merge.py"

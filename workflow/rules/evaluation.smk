@@ -1,7 +1,7 @@
 rule measure:
     """One measurement of a network: its JSON, and its tables as CSV. What there is to measure: hobble.measures."""
     input:
-        unpack(lambda w: kept(measurements.inputs(w.configuration, w.measure))),
+        unpack(lambda w: keep_local(measurements.inputs(w.configuration, w.measure))),
     output:
         json="results/{configuration}/evaluation/{measure}.json",
         tables=directory("results/{configuration}/evaluation/{measure}"),
@@ -33,8 +33,8 @@ rule measure:
 rule compare:
     """Configurations side by side, with the published figures: one JSON and its tables as CSV."""
     input:
-        unpack(lambda w: comparison.measured()),
-        published=kept(package.published()),
+        unpack(lambda w: comparison.input_files()),
+        published=keep_local(package.published()),
     output:
         json="results/compare/compare.json",
         tables=directory("results/compare/tables"),
@@ -45,7 +45,7 @@ rule compare:
         runtime=10,
     params:
         configurations=lambda w: comparison.names(),
-        files=lambda w: sorted(comparison.measured()),
+        files=lambda w: sorted(comparison.input_files()),
         code=package.code("compare", *modules("comparison")),
     script:
         "../scripts/compare.py"

@@ -17,7 +17,7 @@ rule hurt_clip:
     benchmark:
         "results/datasets/{dataset}/benchmarks/motion/hurt_clip/{clip}_hurt{version}.tsv"
     wildcard_constraints:
-        clip=OWN,
+        clip=LISTED_CLIP,
         version="[1-9]",
     threads: 1
     resources:
@@ -25,7 +25,7 @@ rule hurt_clip:
         runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.4, attempt),
     params:
         clip=lambda w: f"{w.clip}_hurt{w.version}",
-        turn=lambda w: clips.versions(w.dataset)[f"{w.clip}_hurt{w.version}"],
+        turn=lambda w: clips.hurt_versions(w.dataset)[f"{w.clip}_hurt{w.version}"],
         ground=lambda w: clips.entry(w.dataset, w.clip).ground,
         options=lambda w: datasets.options(w.dataset, "hurt"),
         code=package.code("hurt_clip"),

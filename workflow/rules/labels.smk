@@ -1,8 +1,8 @@
-def of_own(dataset, file):
+def for_listed_clips(dataset, file):
     """That file of each clip that the data set lists or its folder holds."""
     return [
         f"results/datasets/{dataset}/{file}".format(clip=clip)
-        for clip in clips.own(dataset)
+        for clip in clips.listed(dataset)
     ]
 
 
@@ -11,7 +11,7 @@ rule labels_clip:
     input:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
         report="results/datasets/{dataset}/motion/{clip}.json",
-        files=lambda w: kept(clips.label_files(w.dataset, w.clip)),
+        files=lambda w: keep_local(clips.label_files(w.dataset, w.clip)),
     output:
         labels="results/datasets/{dataset}/labels/{clip}.npz",
         report="results/datasets/{dataset}/labels/{clip}.json",
@@ -20,7 +20,7 @@ rule labels_clip:
     benchmark:
         "results/datasets/{dataset}/benchmarks/labels/labels_clip/{clip}.tsv"
     wildcard_constraints:
-        clip=OWN,
+        clip=LISTED_CLIP,
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 5, attempt),
@@ -63,10 +63,10 @@ rule labels_mirror:
 rule look_page:
     """What the clips of a data set say about themselves, one line a clip."""
     input:
-        clips=lambda w: of_own(w.dataset, "motion/{clip}.npz"),
-        reports=lambda w: of_own(w.dataset, "motion/{clip}.json"),
-        labels=lambda w: of_own(w.dataset, "labels/{clip}.json"),
-        contacts=lambda w: of_own(w.dataset, "labels/{clip}.npz"),
+        clips=lambda w: for_listed_clips(w.dataset, "motion/{clip}.npz"),
+        reports=lambda w: for_listed_clips(w.dataset, "motion/{clip}.json"),
+        labels=lambda w: for_listed_clips(w.dataset, "labels/{clip}.json"),
+        contacts=lambda w: for_listed_clips(w.dataset, "labels/{clip}.npz"),
     output:
         html="results/datasets/{dataset}/look.html",
     log:

@@ -20,8 +20,8 @@ rule download_clip:
 rule motion_clip:
     """A BVH file, read, checked and put on the data set's skeleton at 60 Hz."""
     input:
-        bvh=lambda w: kept(clips.source(w.dataset, w.clip)),
-        skeleton=lambda w: kept(clips.skeleton_file(w.dataset)),
+        bvh=lambda w: keep_local(clips.source(w.dataset, w.clip)),
+        skeleton=lambda w: keep_local(clips.skeleton_file(w.dataset)),
         rig=lambda w: clips.rig_files(w.dataset, w.clip),
     output:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
@@ -31,7 +31,7 @@ rule motion_clip:
     benchmark:
         "results/datasets/{dataset}/benchmarks/motion/motion_clip/{clip}.tsv"
     wildcard_constraints:
-        clip=OWN,
+        clip=LISTED_CLIP,
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 13, attempt),

@@ -1,7 +1,7 @@
 rule page_packages:
     """What the page takes from the npm registry, as its lock file says; fetched once."""
     input:
-        kept(package.web(".json")),
+        keep_local(package.web(".json")),
     output:
         "results/page/node_modules/.package-lock.json",
     log:
@@ -20,7 +20,7 @@ rule page_bundle:
     """The page's scripts in one, shared by every report."""
     input:
         packages=rules.page_packages.output,
-        scripts=kept(package.web(".js")),
+        scripts=keep_local(package.web(".js")),
     output:
         js="results/page/bundle.js",
     log:
@@ -90,7 +90,7 @@ rule report:
         ),
         told=lambda w: [
             file
-            for channel in datasets.told.channels(
+            for channel in datasets.channel_sources.channels(
                 configurations.dataset(w.configuration)
             )
             for file in configurations.of_dataset(
@@ -103,7 +103,7 @@ rule report:
         terrain=lambda w: configurations.of_dataset(
             w.configuration, "terrain/clips/{clip}.npz"
         ),
-        template=kept(package.templates()),
+        template=keep_local(package.templates()),
         bundle=rules.page_bundle.output.js,
     output:
         html="results/{configuration}/report.html",
@@ -137,11 +137,11 @@ rule report_compare:
     """Configurations side by side, and two of them in the same world."""
     input:
         compared=rules.compare.output.json,
-        configuration=lambda w: comparison.measured()["configuration"],
+        configuration=lambda w: comparison.input_files()["configuration"],
         weights=lambda w: [
             configurations.network(name, "weights.npz") for name in comparison.names()
         ],
-        template=kept(package.templates()),
+        template=keep_local(package.templates()),
         bundle=rules.page_bundle.output.js,
     output:
         html="results/compare/report.html",
@@ -179,13 +179,37 @@ rule stimuli:
         "../scripts/stimuli.py"
 
 
+rule questionnaire:
+    """A page that shows thirteen films of the character and asks what hurts, and the list of what does."""
+    input:
+        weights=lambda w: configurations.network(w.configuration, "weights.npz"),
+        template=keep_local(package.templates()),
+    output:
+        folder=directory("results/{configuration}/questionnaire"),
+    log:
+        "results/{configuration}/logs/report/questionnaire.log",
+    benchmark:
+        "results/{configuration}/benchmarks/report/questionnaire.tsv"
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        configuration=lambda w: w.configuration,
+        runtime=lambda w: configurations.section(w.configuration, "runtime"),
+        code=lambda w: package.code(
+            "questionnaire", configurations.kind(w.configuration), *shown_modules()
+        ),
+    script:
+        "../scripts/questionnaire.py"
+
+
 rule export_web:
     """The character for other web pages: an ES module, its network, TypeScript types and an example."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         packages=rules.page_packages.output,
         scripts=rules.page_bundle.input.scripts,
-        files=kept([*package.web(".ts"), *package.web(".html")]),
+        files=keep_local([*package.web(".ts"), *package.web(".html")]),
     output:
         folder=directory("results/{configuration}/export/web"),
     log:

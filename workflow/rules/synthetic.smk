@@ -1,7 +1,7 @@
 rule synthetic_clip:
     """One clip of the embedded walker, as a user's folder would hold it."""
     input:
-        skeleton=lambda w: kept(clips.skeleton_file(w.dataset)),
+        skeleton=lambda w: keep_local(clips.skeleton_file(w.dataset)),
     output:
         bvh="results/datasets/{dataset}/synthetic/{clip}.bvh",
         footsteps="results/datasets/{dataset}/synthetic/{clip}_footsteps.txt",
@@ -12,7 +12,7 @@ rule synthetic_clip:
     benchmark:
         "results/datasets/{dataset}/benchmarks/synthetic/synthetic_clip/{clip}.tsv"
     wildcard_constraints:
-        clip=OWN,
+        clip=LISTED_CLIP,
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 13, attempt),

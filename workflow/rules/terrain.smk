@@ -4,7 +4,7 @@ from hobble.terrain.options import Drawing, Fitting, Sampling
 rule terrain_patches:
     """Patches of ground drawn from the heightmaps."""
     input:
-        files=lambda w: kept(clips.heightmap_files(w.dataset)),
+        files=lambda w: keep_local(clips.heightmap_files(w.dataset)),
     output:
         patches="results/datasets/{dataset}/terrain/patches.npz",
     log:

@@ -1,3 +1,6 @@
+from hobble.training.options import Recipe
+
+
 rule training:
     """The network, learnt from the database; checkpoints survive a kill."""
     input:
@@ -12,15 +15,23 @@ rule training:
         "results/{configuration}/logs/training/training.log",
     benchmark:
         "results/{configuration}/benchmarks/training/training.tsv"
-    threads: 2
+    threads: lambda w: demands.training_threads(w.configuration)
     resources:
         mem_mb=lambda w, attempt: demands.training_memory(w.configuration, attempt),
         runtime=lambda w, attempt: demands.training_minutes(w.configuration, attempt),
         gpu=lambda w: demands.gpus(w.configuration),
+        # Processes on each of so many machines; `tasks` and `gres` are SLURM's words, one task for each machine.
+        nodes=lambda w: demands.machines(w.configuration).nodes,
+        tasks=lambda w: demands.machines(w.configuration).nodes,
+        gres=lambda w: demands.gres(w.configuration),
+        processes=lambda w: demands.machines(w.configuration).each,
     params:
         configuration=lambda w: w.configuration,
         network=lambda w: configurations.section(w.configuration, "network"),
-        training=lambda w: configurations.section(w.configuration, "training"),
+        # Not the machines: where it runs is no part of what is learnt.
+        training=lambda w: configurations.section(
+            w.configuration, "training", *Recipe.model_fields
+        ),
         terrain_side=lambda w: datasets.options(
             configurations.dataset(w.configuration), "database", "terrain_side"
         )["terrain_side"],

@@ -5,16 +5,16 @@ from pathlib import Path
 import yaml
 
 from hobble.core.files import write_json
-from hobble.evaluation.compare import compare
+from hobble.evaluation.compare_configurations import compare
 from hobble.evaluation.compare_tables import tables
-from hobble.evaluation.measured import read_measured
+from hobble.evaluation.configuration_results import read_results
 from hobble.evaluation.tables import write_tables
 from hobble.workflow.job import job
 
 with job(snakemake):
     files = snakemake.input
     measured = [
-        read_measured(name, {key: files[key][i] for key in snakemake.params.files})
+        read_results(name, {key: files[key][i] for key in snakemake.params.files})
         for i, name in enumerate(snakemake.params.configurations)
     ]
     compared = compare(measured, yaml.safe_load(Path(files.published).read_text(encoding="utf-8")))

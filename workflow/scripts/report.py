@@ -7,7 +7,7 @@ from hobble.models.load import load_network
 from hobble.report.compare import comparisons
 from hobble.report.gather import gather
 from hobble.report.page import render
-from hobble.report.playable import playable
+from hobble.report.recogniser import playable_and_judged
 from hobble.report.scenes import scenes
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
@@ -33,7 +33,9 @@ with job(snakemake):
     network = material.network
     play = scenes(given.scenarios, network["skeleton"], network["channels"])
     trained = load_network(given.weights)
-    character = playable(trained, Runtime.model_validate(material.resolved["configuration"]["runtime"]))
+    character = playable_and_judged(
+        trained, Runtime.model_validate(material.resolved["configuration"]["runtime"])
+    )
     compared = comparisons(trained, given.rows, asked.splits)
     bundle = Path(given.bundle).read_text(encoding="utf-8")
     write_text(snakemake.output.html, render(material, play, character, compared, bundle))

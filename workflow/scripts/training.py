@@ -2,21 +2,33 @@
 
 from pathlib import Path
 
-from hobble.models import options
-from hobble.training.options import Training
+from hobble.models import network_options
+from hobble.training.options import Machines, Training
 from hobble.training.run import run
 from hobble.workflow.job import job
+from hobble.workflow.together import on_machines, train_together
 
 with job(snakemake):
+    recipe = Training.model_validate(snakemake.params.training)
+    machines = Machines(nodes=snakemake.resources.nodes, processes=snakemake.resources.processes)
+    gpus = bool(snakemake.resources.get("gpu") or snakemake.resources.get("gres"))
+    training = on_machines(recipe, machines, gpus)
+    start = Path(snakemake.input.checkpoint[0]) if snakemake.input.checkpoint else None
+    arguments = {
+        "database": Path(snakemake.input.database),
+        "network": network_options(snakemake.params.network),
+        "training": training,
+        "checkpoints": Path(snakemake.params.checkpoints),
+        "start": start,
+        "code": snakemake.params.get("code"),
+    }
+    if machines.count > 1:
+        train_together(machines, snakemake.threads, Path(snakemake.log[0]), **arguments)
+    # Alone it trains; after the others it finds their last checkpoint, and writes what is asked for.
     run(
-        Path(snakemake.input.database),
+        **arguments,
         configuration=snakemake.params.configuration,
-        network=options(snakemake.params.network),
-        training=Training.model_validate(snakemake.params.training),
-        checkpoints=Path(snakemake.params.checkpoints),
         threads=snakemake.threads,
-        start=Path(snakemake.input.checkpoint[0]) if snakemake.input.checkpoint else None,
-        code=snakemake.params.get("code"),
         weights=Path(snakemake.output.weights),
         history=Path(snakemake.output.history),
         checkpoint=Path(snakemake.output.checkpoint),

@@ -1,1 +1,1 @@
-"""The command `hobble`: what can be done with single clips and networks, beside the workflow."""
+"""The command `hobble`, for single clips and networks outside the workflow."""

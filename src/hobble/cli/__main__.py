@@ -1,4 +1,4 @@
-"""The command `hobble`; `hobble --help` lists what it does."""
+"""The command `hobble`. `hobble --help` lists its subcommands."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 
-from hobble.cli import injury, labels, motion, play
+from hobble.cli import injury, labels, motion, play, study
 from hobble.core.errors import HobbleError
 
-COMMANDS = {"motion": motion, "labels": labels, "injury": injury, "play": play}
+COMMANDS = {"motion": motion, "labels": labels, "injury": injury, "play": play, "study": study}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns the exit status: 0, 1 where something failed, 2 for wrong arguments."""
+    """Run the command. Returns 0, or 1 if something failed. Wrong arguments exit with status 2."""
     parser = argparse.ArgumentParser(
         prog="hobble",
-        description="Motion capture clips, their labels, what hurts in them, and the trained character. "
-        "The whole way from clips to a character is a Snakemake workflow: see README.md.",
+        description="Converts and labels clips, writes their injury files, and opens a trained character. "
+        "A Snakemake workflow trains a character from clips: see README.md.",
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, module in COMMANDS.items():

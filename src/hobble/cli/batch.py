@@ -1,4 +1,4 @@
-"""The same work for every BVH file of a folder: progress, and one bad file stops no other."""
+"""Does the same work for every BVH file of a folder, with progress. A bad file does not stop the others."""
 
 from __future__ import annotations
 
@@ -9,36 +9,36 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from hobble.core.clip_files import find_clips, the_file
+from hobble.core.clip_files import find_clips, only_file
 from hobble.core.errors import HobbleError, InputError
 from hobble.motion.rig import Target, load_skeleton
 
 
 def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
-    """The arguments FOLDER and OUT."""
+    """Add the arguments FOLDER and OUT. out: help text of OUT."""
     parser.add_argument("folder", type=Path, help="a folder of BVH files, or one file")
     parser.add_argument("out", type=Path, help=out)
 
 
 def clips_in(folder: Path) -> dict[str, Path]:
-    """BVH files by clip name: those in the folder and below it, or the one file.
+    """BVH files by clip name: those in a folder and its subfolders, or the one file that `folder` names.
 
-    Raises InputError where there are none, or where two files would make one clip.
+    Raises InputError if there are none, or if two files have the same clip name.
     """
     if folder.is_file():
         return {folder.stem: folder}
     if not folder.is_dir():
         raise InputError(folder, "no such file or folder")
-    found = {name: the_file(name, files) for name, files in sorted(find_clips(folder).items())}
+    found = {name: only_file(name, files) for name, files in sorted(find_clips(folder).items())}
     if not found:
         raise InputError(folder, "no .bvh files here")
     return found
 
 
 def for_each(clips: dict[str, Path], work: Callable[[str, Path], list[str]]) -> int:
-    """Call `work(name, file)` for every clip, print the notes that it returns, and a summary.
+    """Call `work(name, file)` for every clip. Print the notes that it returns, and a summary.
 
-    A clip that fails is told with its message; the others are done all the same. Returns the exit status.
+    If a clip fails, its message is printed and the others go on. Returns the exit status.
     """
     failed = 0
     bar = tqdm(clips.items(), unit=" clips", disable=None, file=sys.stderr)
@@ -56,25 +56,25 @@ def for_each(clips: dict[str, Path], work: Callable[[str, Path], list[str]]) -> 
 
 
 def skeleton_folder() -> Path:
-    """Where the skeleton files are: in the checkout, or in the installed package."""
+    """The folder of the skeleton files, in the checkout or in the installed package."""
     here = Path(__file__).resolve().parents[1]
     checkout = here.parents[1] / "config" / "skeletons"
     return checkout if checkout.is_dir() else here / "skeletons"
 
 
 def skeleton_file(name: str) -> Path:
-    """The file of a skeleton that is named, or given as a file. Raises InputError where there is none."""
+    """The path of a skeleton file; `name` is a skeleton or a path. Raises InputError if it is missing."""
     if name.endswith((".yaml", ".yml")):
         return Path(name)
     folder = skeleton_folder()
     path = folder / f"{name}.yaml"
     if not path.is_file():
         known = ", ".join(sorted(p.stem for p in folder.glob("*.yaml")))
-        raise InputError(path, "no such skeleton", fix=f"There are {known}; or name a file of your own.")
+        raise InputError(path, "no such skeleton", fix=f"There are {known}. A path to a file works too.")
     return path
 
 
 def skeleton(name: str) -> Target:
-    """The skeleton as retargeting takes it; raises as `skeleton_file` does."""
+    """The skeleton in the form that retargeting takes. Raises InputError if it is missing or wrong."""
     path = skeleton_file(name)
     return load_skeleton(path, path.stem)

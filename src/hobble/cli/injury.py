@@ -1,8 +1,8 @@
-"""Status files: write them from a table of clips, links and severities.
+"""Write injury files from a table of clips, links and severities.
 
 hobble injury TABLE.csv FOLDER
 
-TABLE.csv has the columns clip, link, severity, from, to. The status files NAME_injuries.txt go beside the
+TABLE.csv has the columns clip, link, severity, from, to. The files NAME_injuries.txt are written beside the
 clips in FOLDER, where the workflow reads them.
 """
 
@@ -17,14 +17,16 @@ from hobble.core.untrusted import read_yaml
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What `hobble injury` takes."""
+    """Add the arguments of `hobble injury`."""
     parser.add_argument("table", type=Path, help="CSV with the columns clip, link, severity, from, to")
-    parser.add_argument("folder", type=Path, help="where the clips' BVH files lie")
-    parser.add_argument("--skeleton", default="holden31", help="names the links (holden31)")
+    parser.add_argument("folder", type=Path, help="the folder of the clips' BVH files")
+    parser.add_argument(
+        "--skeleton", default="holden31", help="the skeleton that defines the links (default holden31)"
+    )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the files and print their names; returns the exit status."""
+    """Write the files and print their names. Returns the exit status."""
     links = [f"{a}-{b}" for a, b in read_yaml(batch.skeleton_file(options.skeleton)).get("links") or ()]
     for path in write_statuses(options.table, options.folder, links):
         print(path)

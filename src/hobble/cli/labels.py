@@ -1,9 +1,9 @@
-"""Write automatic labels of a folder of BVH files, to be corrected by hand and read again.
+"""Label a folder of BVH files and write label files that you can correct.
 
 hobble labels FOLDER OUT
 
-For each clip it writes NAME_footsteps.txt, NAME_gait.txt and NAME.phase, in frames of the clip's own file.
-Correct them, put them beside the clip, and the workflow takes them instead of its own labels.
+For each clip this writes NAME_footsteps.txt, NAME_gait.txt and NAME.phase, with the frame numbers of the
+clip's file. Correct them and put them beside the clip. The workflow then uses them instead of its own labels.
 """
 
 from __future__ import annotations
@@ -24,19 +24,21 @@ from hobble.labels.write_files import write_label_files
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 
-ON = "holden31"  # the skeleton on which a clip is looked at; its labels hold for any
+SKELETON = "holden31"  # clips are put on it for labelling; the labels do not depend on the skeleton
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What `hobble labels` takes."""
-    batch.add_folders(parser, "the folder to write; FOLDER itself puts the files beside the clips")
-    parser.add_argument("--gait", choices=GAITS, help="what the clips mostly show; it settles doubts")
-    parser.add_argument("--source-fps", type=float, help="the files' rate, where their Frame Time is wrong")
-    parser.add_argument("--overwrite", action="store_true", help="replace label files that are there")
+    """Add the arguments of `hobble labels`."""
+    batch.add_folders(parser, "the folder to write into; with FOLDER itself the files go beside the clips")
+    parser.add_argument("--gait", choices=GAITS, help="the main gait of the clips, used in unclear cases")
+    parser.add_argument(
+        "--source-fps", type=float, help="frame rate of the files, if their Frame Time is wrong"
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace existing label files")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Label every clip; returns the exit status."""
+    """Label every clip. Returns the exit status."""
 
     def label(name: str, file: Path) -> list[str]:
         return write_labels(name, file, options.out, options.gait, options.source_fps, options.overwrite)
@@ -48,23 +50,24 @@ def run(options: argparse.Namespace) -> int:
 def write_labels(
     name: str, file: Path, out: Path, gait: Gait | None, source_fps: float | None, overwrite: bool
 ) -> list[str]:
-    """Write the three files of one clip; returns what is odd about it.
+    """Write the three label files of one clip. Returns notes and warnings.
 
-    Raises InputError for a clip that cannot be read, and where a label file would be lost.
+    Raises InputError for a clip that cannot be read, and for label files that exist already, unless
+    `overwrite`.
     """
     paths = [out / f"{name}{end}" for end in ("_footsteps.txt", "_gait.txt", ".phase")]
     there = [path.name for path in paths if path.exists()]
     if there and not overwrite:
         raise InputError(
-            out, f"{', '.join(there)} would be replaced", fix="Say --overwrite, or name another folder."
+            out, f"{', '.join(there)} would be replaced", fix="Use --overwrite or another folder."
         )
-    skeleton = batch.skeleton_file(ON)
+    skeleton = batch.skeleton_file(SKELETON)
     clip, report = make_clip(
         file,
         skeleton,
         batch.skeleton_folder(),
         clip=name,
-        skeleton_name=ON,
+        skeleton_name=SKELETON,
         options=ClipMotion(source_fps=source_fps),
     )
     labels, told = label_clip(clip, [], report, gait, "rocky", Labels())

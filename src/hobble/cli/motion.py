@@ -3,8 +3,8 @@
 hobble motion FOLDER OUT --fps 60
 hobble motion FOLDER OUT --skeleton holden31 --mirror
 
-Every file is read whatever its rotation order, unit, axes and frame rate. It is checked, repaired where
-that is safe, and written in centimetres, Y up. Rotations are interpolated as rotations, not as angles.
+Files may have any rotation order, unit, axes and frame rate. Each is checked, repaired if that is safe, and
+written in centimetres, Y up. Rotations are interpolated as quaternions, not as Euler angles.
 """
 
 from __future__ import annotations
@@ -24,28 +24,30 @@ from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.source import load_source
 
-ROLES_FROM = "holden31"  # names the joints of a rig where no skeleton is asked for
+ROLES_FROM = "holden31"  # the skeleton that defines the roles of joints, if none is given
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What `hobble motion` takes."""
-    batch.add_folders(parser, "the folder to write; the clips keep their names")
-    parser.add_argument("--fps", type=float, default=60.0, help="frames a second to write (60)")
-    parser.add_argument("--source-fps", type=float, help="the files' rate, where their Frame Time is wrong")
+    """Add the arguments of `hobble motion`."""
+    batch.add_folders(parser, "the folder to write into; the clips keep their names")
+    parser.add_argument("--fps", type=float, default=60.0, help="frame rate to write (default 60)")
+    parser.add_argument(
+        "--source-fps", type=float, help="frame rate of the files, if their Frame Time is wrong"
+    )
     parser.add_argument(
         "--skeleton", help="put the motion on this skeleton: a name of config/skeletons or a file"
     )
     parser.add_argument(
         "--mirror", action="store_true", help="write each clip's mirror as NAME_mirror.bvh too"
     )
-    parser.add_argument("--loops", type=int, default=1, help="repeat a clip that is one cycle so often")
+    parser.add_argument("--loops", type=int, default=1, help="repeat a clip of one cycle this many times")
     parser.add_argument(
         "--refuse", action="store_true", help="refuse broken frames instead of repairing them"
     )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Convert every clip; returns the exit status."""
+    """Convert every clip. Returns the exit status."""
 
     def convert(name: str, file: Path) -> list[str]:
         clip, notes = converted(name, file, options)
@@ -59,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def converted(name: str, file: Path, options: argparse.Namespace) -> tuple[Clip, list[str]]:
-    """The clip of a file as asked for, and what was repaired or noted. Raises InputError for a bad file."""
+    """The converted clip of a file, and notes on repairs. Raises InputError for a bad file."""
     defects: Literal["repair", "refuse"] = "refuse" if options.refuse else "repair"
     keys = ClipMotion(source_fps=options.source_fps, defects=defects, loops=options.loops)
     folder = batch.skeleton_folder()

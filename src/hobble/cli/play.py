@@ -1,7 +1,7 @@
-"""Open the page on which a trained character walks under your keys.
+"""Open the page on which you control a trained character with the keyboard.
 
 hobble play                    the newest report under results/
-hobble play results/injured    that configuration's
+hobble play results/injured    the report of this configuration
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ REPORT = "report.html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What `hobble play` takes."""
-    parser.add_argument("results", nargs="?", type=Path, help="results/<configuration>, or a report's file")
-    parser.add_argument("--print", action="store_true", help="print the address instead of opening it")
+    """Add the arguments of `hobble play`."""
+    parser.add_argument("results", nargs="?", type=Path, help="results/<configuration>, or a report file")
+    parser.add_argument("--print", action="store_true", help="print the address, open no browser")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Open the page; returns the exit status."""
+    """Open the page. Returns the exit status."""
     address = report_of(options.results).resolve().as_uri() + "#play"
     print(address)
     if not options.print and not webbrowser.open(address):
-        print("No browser could be started here: open the address above in one.")
+        print("No browser could be started. Open the address above in one.")
     return 0
 
 
 def report_of(results: Path | None) -> Path:
-    """The report's file. Raises InputError, with the command that makes it, where there is none."""
+    """The report file. If there is none, raises InputError with the command that makes it."""
     if results is None:
         found = sorted(Path("results").glob(f"*/{REPORT}"), key=lambda path: path.stat().st_mtime)
         if not found:

@@ -1,1 +1,1 @@
-"""Configurations, data sets and skeletons: YAML layers, typed models, readable refusals."""
+"""Configurations, data sets and skeletons: YAML files, typed models, and clear error messages."""

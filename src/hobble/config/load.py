@@ -1,4 +1,4 @@
-"""From YAML files and command-line overrides to validated models, with errors that name file and key."""
+"""Reads YAML files and command-line overrides into validated models. Errors name the file and the key."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ from hobble.models import DEFAULT, MODELS
 
 Model = TypeVar("Model", bound=BaseModel)
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")  # so that no name leads out of its folder
-NOT_TEXT = (bool, int, float, date)  # what YAML reads words like 02_01, 1e5, 2020-01-01 and on as
-QUOTES = 'Put the name in quotes, as in "02_01": without them YAML takes it for something else.'
-NAMES = "Names are made of letters, digits, dots, dashes and underscores."
+NOT_STRINGS = (bool, int, float, date)  # types that YAML makes of unquoted 02_01, 1e5, 2020-01-01 or on
+QUOTES_HINT = 'Put the name in quotes, as in "02_01"; otherwise YAML reads it as a number or a date.'
+NAME_HINT = "Names may have letters, digits, dots, dashes and underscores."
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """`over` on top of `base`, mappings merged deeply, anything else replaced.
+    """Put `over` on top of `base`: mappings are merged recursively, everything else is replaced.
 
-    A network of another kind has other keys, so it takes none of those below it.
+    If `over` chooses another kind of network, its section `network` replaces that of `base`, because kinds
+    have different keys.
     """
     out = copy.deepcopy(dict(base))
     for key, value in over.items():
@@ -38,12 +39,12 @@ def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _kind(network: Mapping[str, Any], below: Mapping[str, Any] | None = None) -> Any:
-    """The kind of a section `network`, which may leave it to the one below it."""
+    """The kind that a section `network` names; else that of the section `below`; else the default."""
     return network.get("kind", _kind(below) if below is not None else DEFAULT)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """Read a YAML mapping; raises InputError with the line where it does not parse."""
+    """Read a YAML mapping. Raises InputError, with the line if it does not parse."""
     if not path.is_file():
         there = ", ".join(sorted(p.stem for p in path.parent.glob("*.yaml"))) or "none"
         raise InputError(path, "no such file", fix=f"There are: {there}.")
@@ -55,20 +56,21 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return data
 
 
-def layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[dict[str, Any], list[Path]]:
-    """The values of `<folder>/<name>.yaml` over those of what it `extends`, and the files read.
+def read_layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[dict[str, Any], list[Path]]:
+    """The values of `<folder>/<name>.yaml` merged over those of the file it `extends`, and the files read.
 
-    within: names whose files this one is read for.
+    within: names of the configurations that are being read, to find a loop.
     """
     files: list[Path] = []
     chain: list[dict[str, Any]] = []
     next_name: str | None = name
     while next_name is not None:
         if not isinstance(next_name, str) or not NAME.fullmatch(next_name):
-            raise InputError(files[-1] if files else folder, f"{next_name!r:.80} is not a name", fix=NAMES)
+            where = files[-1] if files else folder
+            raise InputError(where, f"{next_name!r:.80} is not a name", fix=NAME_HINT)
         path = folder / f"{next_name}.yaml"
         if path in files:
-            raise InputError(path, f"extends itself by way of {' -> '.join(p.stem for p in files)}")
+            raise InputError(path, f"extends itself through {' -> '.join(p.stem for p in files)}")
         files.append(path)
         chain.append(read_yaml(path))
         next_name = chain[-1].get("extends")
@@ -79,17 +81,17 @@ def layers(folder: Path, name: str, within: tuple[str, ...] = ()) -> tuple[dict[
 
 
 def with_training(folder: Path, values: dict[str, Any], within: tuple[str, ...] = ()) -> dict[str, Any]:
-    """`values`, where `training: NAME` stands for the whole training section of configuration NAME."""
+    """Replace `training: NAME` in `values` by the training section of configuration NAME."""
     name = values.get("training")
     if not isinstance(name, str):
         return values
     if name in within:
-        raise InputError(folder / f"{name}.yaml", f"`training: {name}` leads back to itself")
-    return {**values, "training": layers(folder, name, within)[0].get("training", {})}
+        raise InputError(folder / f"{name}.yaml", f"`training: {name}` refers to itself")
+    return {**values, "training": read_layers(folder, name, within)[0].get("training", {})}
 
 
 def validate(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
-    """Validate, or raise one HobbleError that lists every problem as `file: key: what is allowed`."""
+    """Validate `values`. Raises one HobbleError that lists every problem as `file: key: what is allowed`."""
     try:
         return model.model_validate(values)
     except ValidationError as error:
@@ -104,11 +106,11 @@ def _problem(item: Any, model: type[BaseModel]) -> str:
         return f"{key}: there is no such key. Allowed here: {allowed}."
     message = item["msg"].removeprefix("Value error, ")
     of_a_section = isinstance(item["input"], Mapping)
-    if item["type"] == "value_error" and of_a_section:  # the message says it all
+    if item["type"] == "value_error" and of_a_section:  # such a message is complete
         return f"{key}: {message}." if item["loc"] else f"{message}."
     text = f"{key}: {message[0].lower()}{message[1:]}, not {item['input']!r:.80}."
-    if item["type"] == "string_type" and isinstance(item["input"], NOT_TEXT):
-        text += f" {QUOTES}"
+    if item["type"] == "string_type" and isinstance(item["input"], NOT_STRINGS):
+        text += f" {QUOTES_HINT}"
     return text
 
 
@@ -124,9 +126,9 @@ def _keys_at(model: Any, location: tuple[Any, ...]) -> list[str]:
 
 
 class Catalogue:
-    """Everything under config/: configurations, data sets and skeletons, each validated once when asked for.
+    """The configurations, data sets and skeletons under config/, each read and validated when first needed.
 
-    overrides: values from the command line that go on top of every configuration.
+    overrides: values from the command line, merged over every configuration.
     """
 
     def __init__(self, folder: Path, overrides: Mapping[str, Any] | None = None) -> None:
@@ -135,26 +137,27 @@ class Catalogue:
         self._cache: dict[tuple[str, str], Any] = {}
 
     def names(self) -> list[str]:
-        """Names of the configurations there are."""
+        """Names of all configurations."""
         return sorted(path.stem for path in self.folder.glob("*.yaml"))
 
     def configuration(self, name: str) -> Configuration:
-        """The configuration `name`, resolved."""
+        """The configuration `name`, with everything it extends."""
         return self._get("configuration", name, self.folder, Configuration, self.overrides)
 
     @staticmethod
-    def _typed(model: type[Model], values: Mapping[str, Any], where: str) -> type[Model]:
-        """A configuration's type, which depends on the kind of its network."""
+    def _model_for(model: type[Model], values: Mapping[str, Any], where: str) -> type[Model]:
+        """The model to validate with. That of a configuration depends on the kind of its network."""
         network = values.get("network")
         if model is not Configuration or not isinstance(network, Mapping):
             return model
         kind = _kind(network)
         if kind not in MODELS:
-            raise HobbleError(f"{where}: network.kind: there is no {kind!r:.40}; {', '.join(MODELS)} can be.")
+            kinds = ", ".join(MODELS)
+            raise HobbleError(f"{where}: network.kind: there is no kind {kind!r:.40}, only {kinds}.")
         return configuration_of(kind)  # type: ignore[return-value]
 
     def dataset(self, name: str) -> Dataset:
-        """The data set `name`, resolved."""
+        """The data set `name`, with everything it extends."""
         return self._get("dataset", name, self.folder / "datasets", Dataset, {})
 
     def skeleton(self, name: str) -> SkeletonFile:
@@ -163,9 +166,9 @@ class Catalogue:
 
     def _get(self, kind: str, name: str, folder: Path, model: type[Model], over: Mapping[str, Any]) -> Model:
         if (kind, name) not in self._cache:
-            values, files = layers(folder, name)
+            values, files = read_layers(folder, name)
             where = " < ".join(str(path) for path in files)
             if over:
                 values, where = with_training(folder, merge(values, over)), f"{where} < --config"
-            self._cache[kind, name] = validate(self._typed(model, values, where), values, where)
+            self._cache[kind, name] = validate(self._model_for(model, values, where), values, where)
         return self._cache[kind, name]

@@ -1,4 +1,4 @@
-"""The two things a YAML file can describe: a data set and a configuration (and the skeleton they name)."""
+"""The typed models of the YAML files: configuration, data set and skeleton."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from pydantic import AfterValidator, Field, create_model, field_validator, model
 from hobble.channels import NAMES as NAMES_OF_CHANNELS
 from hobble.channels import channel, every
 from hobble.config import sections as s
-from hobble.core.clip_files import NAMES, can_be_called
+from hobble.core.clip_files import CLIP_NAME_RULE, is_valid_clip_name
 from hobble.models import DEFAULT, model
 from hobble.models.options import Options
 
 
 def _clip_name(name: str) -> str:
-    if not can_be_called(name):
-        raise ValueError(f"a clip's name has {NAMES}")
+    if not is_valid_clip_name(name):
+        raise ValueError(f"a clip's name has {CLIP_NAME_RULE}")
     return name
 
 
-def _renamed(values: Any, model: type[s.Section], how: str) -> Any:
-    """Refuse a key that there was before channels; how: what to write instead of it, for channel {}."""
+def _refuse_old_keys(values: Any, model: type[s.Section], how: str) -> Any:
+    """Refuse a key from before there were channels. how: what to write instead; {} is the channel."""
     for key in values if isinstance(values, dict) else ():
-        if key not in model.model_fields and isinstance(key, str) and key in FORMER:
-            raise ValueError(f"`{key}` is now `{how.format(FORMER[key])}`")
+        if key not in model.model_fields and isinstance(key, str) and key in OLD_KEYS:
+            raise ValueError(f"`{key}` is now `{how.format(OLD_KEYS[key])}`")
     return values
 
 
@@ -39,46 +39,46 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 ClipName = Annotated[str, AfterValidator(_clip_name)]
 Link = Annotated[str, Field(min_length=3)]
 ChannelName = Annotated[str, AfterValidator(_channel)]
-FORMER = {key: one.name for one in every() for key in one.former}
-SYNTHETIC = ("injured", "recipe", "share")  # keys of a clip that only the walker reads
+OLD_KEYS = {key: one.name for one in every() for key in one.former}
+WALKER_KEYS = ("injured", "recipe", "share")  # keys of a clip that only the walker reads
 
 
 class ClipEntry(s.Section):
     """One clip of a data set."""
 
-    gait: s.Gait | None = Field(None, description="the gait it mostly shows, for automatic labels")
+    gait: s.Gait | None = Field(None, description="the main gait of the clip, for automatic labels")
     ground: s.Ground = "flat"
-    channels: dict[ChannelName, Any] = Field(
-        {}, description="what the body is told all the while: channel -> what that channel reads"
+    channels: dict[ChannelName, Any] = Field({}, description="channel -> its value in all frames of the clip")
+    injured: Link | None = Field(
+        None, description="synthetic: the link that is hurt, at severities 3, 5, 7 and 10"
     )
-    injured: Link | None = Field(None, description="synthetic: the link hurt, at severities 3, 5, 7 and 10")
     recipe: str | None = Field(None, description="synthetic: which plan the walker follows")
     share: s.PositiveFloat = Field(1.0, description="synthetic: length relative to the other clips")
-    source_fps: s.PositiveFloat | None = Field(None, description="overrules the file's Frame Time")
-    loops: s.Positive | None = Field(None, description="overrules motion.loops")
-    heading: s.Finite | None = Field(None, description="overrules motion.heading")
+    source_fps: s.PositiveFloat | None = Field(None, description="overrides the file's Frame Time")
+    loops: s.Positive | None = Field(None, description="overrides motion.loops")
+    heading: s.Finite | None = Field(None, description="overrides motion.heading")
 
     @model_validator(mode="before")
     @classmethod
-    def _not_renamed(cls, values: Any) -> Any:
-        return _renamed(values, cls, "channels: {{{}: ...}}")
+    def _no_old_keys(cls, values: Any) -> Any:
+        return _refuse_old_keys(values, cls, "channels: {{{}: ...}}")
 
 
 class Dataset(s.Section):
-    """Clips, the skeleton they are put on, and how they become a database."""
+    """Clips, their skeleton, and how a database is made from them."""
 
     extends: Name | None = None
     skeleton: Name
-    source: Name | None = Field(None, description="a data set whose source files this one reads")
-    folder: s.Inside | None = Field(None, description="where the BVH files lie, inside the mocap folder")
-    download: s.Download | None = Field(None, description="where clips come from that the folder lacks")
+    source: Name | None = Field(None, description="the data set whose generated source files are read")
+    folder: s.Inside | None = Field(None, description="folder of the BVH files, inside the mocap folder")
+    download: s.Download | None = Field(None, description="address of clips that are not in the folder")
     clips: dict[ClipName, ClipEntry | None] = Field(
-        default_factory=dict, description="clips by name; none: every .bvh in the folder and those below it"
+        default_factory=dict, description="clips by name; empty: every .bvh in the folder and its subfolders"
     )
     held_out: tuple[ClipName, ...] = Field((), description="clips kept from training, with their mirrors")
     mirror: bool = False
     channels: dict[ChannelName, dict[str, Any]] = Field(
-        {}, description="where channels that need to be told find their values: a section for each"
+        {}, description="options of each channel that needs them"
     )
     synthetic: s.Synthetic | None = None
     motion: s.Motion = s.Motion()
@@ -94,7 +94,7 @@ class Dataset(s.Section):
         for name, values in given.items():
             options = channel(name).Options
             if options is None:
-                raise ValueError(f"channel {name} has no section: it is read from what lies beside the clips")
+                raise ValueError(f"channel {name} has no section: it is read from files beside the clips")
             out[name] = options.model_validate(values).model_dump(mode="json")
         return out
 
@@ -107,32 +107,32 @@ class Dataset(s.Section):
         if self.download is not None and not (self.folder and self.clips):
             raise ValueError("a data set that downloads its clips lists them and names a `folder`")
         if self.synthetic is None:
-            self._without_the_walker()
+            self._no_walker_keys()
         unknown = [c for c in self.held_out if self.clips and c not in self.clips]
         if unknown:
             raise ValueError(f"held_out names clips that are not in `clips`: {', '.join(unknown)}")
         return self
 
-    def _without_the_walker(self) -> None:
+    def _no_walker_keys(self) -> None:
         for clip, entry in self.clips.items():
-            for key in SYNTHETIC:
+            for key in WALKER_KEYS:
                 if entry and getattr(entry, key) != ClipEntry.model_fields[key].default:
                     hint = "; use `channels`" if key == "injured" else ""
                     raise ValueError(
-                        f"clips.{clip}.{key}: only clips of a `synthetic` data set have it{hint}"
+                        f"clips.{clip}.{key}: only clips of a `synthetic` data set have this key{hint}"
                     )
 
 
 class Configuration(s.Section):
-    """One network: the data it learns from, how it is trained, run, measured and shown."""
+    """One network: its data set, its training, and how it is run, measured and reported."""
 
     extends: Name | None = None
     dataset: Name = "synthetic"
     channels: tuple[ChannelName, ...] = Field(
-        (), description="what the network is told; clips that another channel tells something are left out"
+        (), description="inputs of the network; clips with values of another channel are left out"
     )
-    network_of: Name | None = Field(None, description="read another configuration's network, train none")
-    network: Options = model(DEFAULT).options()()  # of its kind; see `configuration_of`
+    network_of: Name | None = Field(None, description="use another configuration's network, train none")
+    network: Options = model(DEFAULT).options()()  # `configuration_of` gives it the type of its kind
     training: s.Training = s.Training()
     runtime: s.Runtime = s.Runtime()
     evaluation: s.Evaluation = s.Evaluation()
@@ -140,19 +140,19 @@ class Configuration(s.Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _not_renamed(cls, values: Any) -> Any:
-        return _renamed(values, cls, "channels: [{}]")
+    def _no_old_keys(cls, values: Any) -> Any:
+        return _refuse_old_keys(values, cls, "channels: [{}]")
 
     @field_validator("channels")
     @classmethod
     def _in_order(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        """In the order of the list of channels, each once: the same channels are the same database."""
+        """Each channel once, in the order of the list of channels, so that equal sets share a database."""
         return tuple(name for name in NAMES_OF_CHANNELS if name in names)
 
 
 @functools.cache
 def configuration_of(kind: str) -> type[Configuration]:
-    """`Configuration` with the keys that a network of this kind has, one of MODELS."""
+    """`Configuration` with the network keys of this kind, one of MODELS."""
     of_network = model(kind).options()
     return create_model("Configuration", __base__=Configuration, network=(of_network, of_network()))
 
@@ -177,13 +177,13 @@ class SkeletonFile(s.Section):
     )
 
     @model_validator(mode="after")
-    def _hangs_together(self) -> SkeletonFile:
+    def _joints_are_consistent(self) -> SkeletonFile:
         seen: set[str] = set()
         for name, joint in self.joints.items():
             if joint.parent is None and seen:
-                raise ValueError(f"joint {name}: only the first joint may be without a parent")
+                raise ValueError(f"joint {name}: only the first joint may have no parent")
             if joint.parent is not None and joint.parent not in seen:
-                raise ValueError(f"joint {name}: its parent {joint.parent!r} must stand above it")
+                raise ValueError(f"joint {name}: its parent {joint.parent!r} must be listed before it")
             seen.add(name)
         named: dict[str, Any] = {
             "roles": self.roles.values(),

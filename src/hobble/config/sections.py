@@ -1,7 +1,7 @@
-"""The typed sections of a data set and of a configuration, each from the stage that reads it.
+"""Collects the typed sections of data sets and configurations from the stages that read them.
 
-The keys of a section, their defaults, units and ranges are in `options.py` of its stage. They are
-validated before the DAG is built, and each job gets its own section as that same type.
+The `options.py` of a stage has the keys of its section with defaults, units and ranges. Sections are
+validated before Snakemake plans, and each job gets its section as the same type.
 """
 
 from hobble.core.section import (
@@ -51,6 +51,6 @@ __all__ = [
     "Training",
 ]
 
-# What results/compare/ sets side by side where --config compare names nothing else: the published sizes and
-# passes, and the figure that can be hurt.
+# The configurations in results/compare/ unless --config compare names others: the published networks, and the
+# character that can be hurt.
 COMPARED = ("holden", "holden-xl", "holden-xt", "injured")

@@ -1,1 +1,1 @@
-"""What every stage stands on: rotations, skeletons, clips, inverse kinematics, safe files, errors."""
+"""Code that every stage uses: rotations, skeletons, clips, inverse kinematics, safe files, errors."""

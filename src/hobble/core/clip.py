@@ -19,7 +19,7 @@ class Clip:
     """F frames of a skeleton of J joints: centimetres, right-handed, Y up, +Z forward.
 
     rotations: (F, J, 4) local, w first. root: (F, 3) position of the root joint.
-    translations: (F, J, 3) local joint positions where the source really moves them, else None.
+    translations: (F, J, 3) local joint positions if the source moves joints, else None.
     """
 
     name: str
@@ -62,7 +62,7 @@ def save_clip(path: str | Path, clip: Clip) -> None:
 
 
 def load_clip(path: str | Path) -> Clip:
-    """Read what `save_clip` wrote; rotations come back as float64 of unit length."""
+    """Read what `save_clip` wrote. Rotations are returned as float64 of unit length."""
     data = load_npz(path)
     rotations = data["rotations"].astype(float)
     rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""The BVH files of a folder by the names of their clips, and the files beside them that belong to none."""
+"""Finds the BVH files of a folder, by clip name, and label files that belong to no clip."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from hobble.core.errors import InputError
 from hobble.core.untrusted import check_regular
 
 SUFFIX = ".bvh"
-# What is read beside a clip: its name and one of these; the longer goes before the shorter.
-BESIDE = ("_footsteps.txt", "_injuries.txt", "_injuries", "_gait.txt", ".phase", ".gait")
-SPEAKABLE = re.compile(r"(?![.\s])[^{}<>\\/]+(?<!\s)")  # Snakemake fills in {x} and <x>
-NAMES = (
+# Label and status files are called as their clip, plus one of these. Longer suffixes come first.
+SIDE_FILE_SUFFIXES = ("_footsteps.txt", "_injuries.txt", "_injuries", "_gait.txt", ".phase", ".gait")
+VALID_NAME = re.compile(r"(?![.\s])[^{}<>\\/]+(?<!\s)")  # Snakemake fills in {x} and <x>
+CLIP_NAME_RULE = (
     "no control characters, braces, angle brackets, slashes or backslashes, no dot or space first and no "
     "space last"
 )
 
 
-def can_be_called(clip: str) -> bool:
-    """Whether a clip's name can stand in a path, a line of a log and a wildcard of Snakemake; see NAMES."""
-    return clip.isprintable() and SPEAKABLE.fullmatch(clip) is not None
+def is_valid_clip_name(clip: str) -> bool:
+    """Whether a clip's name works in a path, a log and a Snakemake wildcard; see CLIP_NAME_RULE."""
+    return clip.isprintable() and VALID_NAME.fullmatch(clip) is not None
 
 
 def find_clips(folder: Path) -> dict[str, list[Path]]:
-    """Clip -> its BVH files in a folder and those below it, whether they end in .bvh or .BVH, sorted.
+    """Clip -> its BVH files (.bvh or .BVH) in a folder and its subfolders, sorted.
 
-    Links are followed, to one folder once however many lead there; hidden folders are left out. Raises
-    InputError where a folder cannot be read.
+    Follows links, but enters each folder only once. Skips hidden files and folders. Raises InputError if a
+    folder cannot be read.
     """
 
     def refuse(error: OSError) -> None:
@@ -52,28 +52,28 @@ def find_clips(folder: Path) -> dict[str, list[Path]]:
     return found
 
 
-def the_file(clip: str, files: list[Path]) -> Path:
-    """The only one of a clip's files; raises InputError where there are two, or it is a device or a pipe."""
+def only_file(clip: str, files: list[Path]) -> Path:
+    """The one file of a clip. Raises InputError if there are two, or if it is a device or a pipe."""
     if len(files) > 1:
         raise InputError(
             files[1],
-            f"a second file of clip {clip}, beside {files[0]}",
-            fix="Rename one of them: a clip is called what its file is called, whatever its folder.",
+            f"a second file of clip {clip}; the first is {files[0]}",
+            fix="Rename one of them: a clip has the name of its file, whatever its folder.",
         )
-    with contextlib.suppress(OSError):  # a link that leads nowhere is told when the clip is read
+    with contextlib.suppress(OSError):  # a broken link is reported when the clip is read
         check_regular(files[0])
     return files[0]
 
 
-def orphan_notes(folder: Path, clips: Collection[str]) -> list[str]:
-    """A sentence for each label or status file of a folder, and of those below, that belongs to no clip."""
+def unused_file_notes(folder: Path, clips: Collection[str]) -> list[str]:
+    """A sentence for each label or status file in a folder or its subfolders that belongs to no clip."""
     out = []
     for here, folders, files in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         for name in sorted(files):
-            suffix = next((suffix for suffix in BESIDE if name.endswith(suffix)), None)
+            suffix = next((suffix for suffix in SIDE_FILE_SUFFIXES if name.endswith(suffix)), None)
             if suffix and (stem := name.removesuffix(suffix)) not in clips:
                 near = next(iter(get_close_matches(stem, clips, 1, 0.75)), None)
-                asks = f"is it that of {near}? Rename it so" if near else "rename it so, or take it out"
-                out.append(f"{Path(here, name)} belongs to no clip and is not read: {asks}.")
+                fix = f"If it belongs to {near}, rename it." if near else "Rename it or take it out."
+                out.append(f"{Path(here, name)} belongs to no clip and is not read. {fix}")
     return out

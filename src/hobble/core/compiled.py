@@ -1,8 +1,8 @@
-"""numba's `njit` with a cache on disk that can fail without harm.
+"""numba's `njit` with a disk cache that may fail.
 
-numba writes compiled functions beside the package, or under the user's home where that cannot be written.
-Where neither can be written it raises at import. Where the disk is full or a cached file is damaged it raises
-at the first call. Here each of these costs one warning and the seconds of compiling again.
+numba writes compiled functions next to the package, or into the user's home if it cannot write there. If it
+can write to neither, it raises at import. If the disk is full or a cached file is damaged, it raises at the
+first call. Here each of these gives one warning, and the functions are compiled again.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import Any
 
 import numba
 
-FIX = "Set NUMBA_CACHE_DIR to a folder that can be written."
+CACHE_HINT = "Set NUMBA_CACHE_DIR to a folder that can be written."
 
 
 def njit(function: Callable | None = None, **options: Any) -> Any:
-    """Like `numba.njit(cache=True)`, with or without options, but for what happens where the cache fails."""
+    """Like `numba.njit(cache=True)`, with or without options; a cache that fails only gives a warning."""
     if function is None:
         return lambda later: njit(later, **options)
     caches = options.pop("cache", True)
@@ -34,7 +34,7 @@ def njit(function: Callable | None = None, **options: Any) -> Any:
 
 
 class ForgivingCache:
-    """A numba cache whose failures count as a miss; all else is passed on."""
+    """A numba cache whose failures count as a miss. Everything else is passed on."""
 
     def __init__(self, cache: Any) -> None:
         self._cache = cache
@@ -43,27 +43,28 @@ class ForgivingCache:
         return getattr(self._cache, name)
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """The compiled function, or None where there is none or it cannot be read."""
+        """The compiled function, or None if there is none or it cannot be read."""
         try:
             return self._cache.load_overload(signature, target_context)
-        except Exception as error:  # a damaged file can raise anything: it is unpickled
+        except Exception as error:  # numba unpickles the file; a damaged one can raise anything
             _warn(error)
             return None
 
     def save_overload(self, signature: Any, data: Any) -> None:
-        """Keep the compiled function, if the disk lets us."""
+        """Store the compiled function; only warns if that fails."""
         try:
             self._cache.save_overload(signature, data)
-        except Exception as error:  # reading the index of the cache comes first, and it may be damaged
+        except Exception as error:  # numba first reads the cache's index, which may be damaged
             _warn(error)
 
 
 @functools.cache
-def _once(text: str) -> None:
+def _warn_once(text: str) -> None:
     warnings.warn(text, RuntimeWarning, stacklevel=4)
 
 
 def _warn(error: Exception) -> None:
-    """One warning in a process, whatever fails and however often."""
-    if _once.cache_info().currsize == 0:
-        _once(f"compiled functions are not kept for the next start ({type(error).__name__}: {error}). {FIX}")
+    """Warn once per process, whatever fails and however often."""
+    if _warn_once.cache_info().currsize == 0:
+        what = f"{type(error).__name__}: {error}"
+        _warn_once(f"compiled functions are not kept for the next start ({what}). {CACHE_HINT}")

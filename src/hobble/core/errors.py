@@ -1,4 +1,4 @@
-"""Errors a person can act on: one message, with the file, the place in it, and what to do."""
+"""Errors that a user can act on: one message with the file, the place in it, and what to do."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from pathlib import Path
 
 
 class HobbleError(Exception):
-    """A refusal the user can understand; its text is the whole message, no traceback is needed."""
+    """An error caused by the user's input. Its text is the whole message; no traceback is shown."""
 
 
 class InputError(HobbleError):
-    """Something is wrong with a file, at a line or a frame where one is known.
+    """Something is wrong with a file, at a line or a frame if one is known.
 
     >>> str(InputError("walk.bvh", "rotation is NaN", line=12, fix="Export the clip again."))
     'walk.bvh, line 12: rotation is NaN. Export the clip again.'

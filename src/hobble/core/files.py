@@ -12,59 +12,59 @@ import zipfile
 import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.untrusted import check_regular, read_text
+from hobble.core.untrusted import check_regular, printable, read_text
 
-MOST_INFLATED = 1 << 30  # bytes that a file's compressed arrays may become; our own are not compressed
-MOST_JSON = 1 << 30
-AGAIN = "Delete it; the next run makes it again."
-HEADERS = {
+MAX_INFLATED_BYTES = 1 << 30  # for all compressed arrays of a file, unpacked; Hobble writes uncompressed ones
+MAX_JSON_BYTES = 1 << 30
+DELETE_IT = "Delete it; the next run makes it again."
+HEADER_READERS = {
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,
 }
-DAMAGE = (
+DAMAGE_ERRORS = (
     zipfile.BadZipFile,
     zlib.error,
     struct.error,
     EOFError,
     KeyError,
-    NotImplementedError,  # a flipped bit in the number of the compression
+    NotImplementedError,  # a flipped bit in the compression method
     OverflowError,
-    RuntimeError,  # or in the flag for a password
+    RuntimeError,  # a flipped bit in the password flag
     ValueError,
 )
 
 
 @contextlib.contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; on success flush it to disk and rename it to `path`.
+    """Yield a temporary path in the folder of `path`. On success flush it to disk and rename it to `path`.
 
-    Whatever goes wrong, `path` keeps its old content and the temporary file is gone.
-    Raises HobbleError where the disk is full or the folder cannot be written.
+    On any failure `path` keeps its old content and the temporary file is removed. Raises HobbleError if the
+    disk is full or the folder cannot be written.
     """
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _sweep(path)
+        _remove_leftovers(path)
         yield temporary
         with open(temporary, "rb") as file:
             os.fsync(file.fileno())
         os.replace(temporary, path)
         sync_folder(path.parent)
     except OSError as error:
-        raise explained(error, path) from error
+        raise write_error(error, path) from error
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush a folder to disk where that can be done, so that a rename in it outlasts a loss of power."""
+    """Flush a folder to disk, if the system can, so that a rename in it survives a power cut."""
     with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
@@ -73,19 +73,19 @@ def sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
-def _sweep(path: Path) -> None:
-    """Remove what a process that was killed left half-written of `path`."""
+def _remove_leftovers(path: Path) -> None:
+    """Remove half-written temporary files of `path` from processes that were killed."""
     for left in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         try:
             os.kill(int(left.name.split(".")[-2]), 0)
         except ProcessLookupError:
             left.unlink(missing_ok=True)
         except (ValueError, OSError):
-            continue  # none of ours, or another user's
+            continue  # not one of our files, or another user's process
 
 
-def explained(error: OSError, path: Path) -> HobbleError:
-    """The same failure as a message a person can act on: a full disk, a folder that cannot be written."""
+def write_error(error: OSError, path: Path) -> HobbleError:
+    """A HobbleError that says what a person can do about a failed write."""
     reasons = {
         errno.ENOSPC: ("the disk is full", "Free some space and run the same command again."),
         errno.EDQUOT: ("the disk quota is used up", "Free some space and run the same command again."),
@@ -97,7 +97,7 @@ def explained(error: OSError, path: Path) -> HobbleError:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write `text` as UTF-8 to `path`, whole or not at all."""
+    """Write `text` as UTF-8 to `path`, completely or not at all."""
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
@@ -108,9 +108,9 @@ def write_json(path: str | Path, value: Any) -> None:
 
 
 def read_json(path: str | Path) -> Any:
-    """Read a JSON file; raises InputError with the line where it is not JSON."""
+    """Read a JSON file. Raises InputError with the line if it is not valid JSON."""
     try:
-        return json.loads(read_text(path, MOST_JSON))
+        return json.loads(read_text(path, MAX_JSON_BYTES))
     except json.JSONDecodeError as error:
         raise InputError(path, f"not valid JSON: {error.msg}", line=error.lineno) from error
     except (RecursionError, ValueError) as error:
@@ -118,32 +118,32 @@ def read_json(path: str | Path) -> Any:
 
 
 def save_npz(path: str | Path, **arrays: Any) -> None:
-    """Write arrays as an uncompressed npz; equal arrays give equal bytes (no timestamps, no pickles)."""
+    """Write arrays as an uncompressed npz. Equal arrays give equal bytes (no timestamps, no pickles)."""
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
         np.savez(file, allow_pickle=False, **arrays)
 
 
 class Arrays(dict[str, np.ndarray]):
-    """Arrays of a file by name; asking for one that is not there raises InputError."""
+    """Arrays of a file by name. A missing name raises InputError."""
 
     def __init__(self, path: str | Path, arrays: Iterable[tuple[str, np.ndarray]]) -> None:
         super().__init__(arrays)
         self.path = path
 
     def __missing__(self, name: str) -> np.ndarray:
-        raise InputError(self.path, f"holds no array {name!r}", fix=AGAIN)
+        raise InputError(self.path, f"holds no array {printable(name)!r}", fix=DELETE_IT)
 
 
 def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
-    """Read every array of an npz, or those of `names`; checksums are verified, nothing is unpickled.
+    """Read all arrays of an npz, or those in `names`. Verifies checksums and never unpickles.
 
-    Raises InputError where the file or one of the arrays is missing, damaged, or asks for more memory than
-    the file can fill.
+    Raises InputError if the file or an array is missing or damaged, or if a header claims more data than the
+    file holds.
     """
     try:
         check_regular(path)
         with zipfile.ZipFile(path) as archive:
-            if _entries(path, archive) != len(archive.infolist()):
+            if _entry_count(path, archive) != len(archive.infolist()):
                 raise zipfile.BadZipFile("its directory has lost an entry")
             _check_sizes(path, archive)
             there = [name.removesuffix(".npy") for name in archive.namelist()]
@@ -153,12 +153,12 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
         raise InputError(path, "no such file") from error
     except OSError as error:
         raise InputError(path, f"cannot be read: {error.strerror or error}") from error
-    except DAMAGE as error:
-        raise InputError(path, f"damaged or not an npz file ({error})", fix=AGAIN) from error
+    except DAMAGE_ERRORS as error:
+        raise InputError(path, f"damaged or not an npz file ({printable(error)})", fix=DELETE_IT) from error
 
 
-def _entries(path: str | Path, archive: zipfile.ZipFile) -> int:
-    """How many files the archive's last record counts; zipfile itself goes by the directory's length."""
+def _entry_count(path: str | Path, archive: zipfile.ZipFile) -> int:
+    """Number of files in the archive's end record, which zipfile does not compare with its directory."""
     with open(path, "rb") as file:
         file.seek(-22 - len(archive.comment), os.SEEK_END)
         (count,) = struct.unpack("<10xH10x", file.read(22))
@@ -166,32 +166,65 @@ def _entries(path: str | Path, archive: zipfile.ZipFile) -> int:
 
 
 def _check_sizes(path: str | Path, archive: zipfile.ZipFile) -> None:
-    """Raise ValueError where the entries ask for more memory than the file's length and MOST_INFLATED allow.
+    """Raise ValueError if the entries would need too much memory.
 
-    Entries that share bytes of the file would be read as often as they are listed.
+    Uncompressed entries may not add up to more than the file, as they do if several share the same bytes.
+    Compressed entries may not unpack to more than MAX_INFLATED_BYTES.
     """
     entries = archive.infolist()
     if any(entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for entry in entries):
-        raise ValueError("packed in a way that NumPy does not use")
+        raise ValueError("compressed in a way that NumPy does not use")
     if any(entry.file_size != entry.compress_size for entry in entries if not entry.compress_type):
-        raise ValueError("an entry that is not packed has two sizes")
+        raise ValueError("an uncompressed entry has two different sizes")
     if sum(entry.compress_size for entry in entries) > os.path.getsize(path):
-        raise ValueError("its entries lie over each other")
-    if sum(entry.file_size for entry in entries if entry.compress_type) > MOST_INFLATED:
-        raise ValueError(f"would unpack to more than {MOST_INFLATED >> 20} MB")
+        raise ValueError("its entries overlap")
+    if sum(entry.file_size for entry in entries if entry.compress_type) > MAX_INFLATED_BYTES:
+        raise ValueError(f"would unpack to more than {MAX_INFLATED_BYTES >> 20} MB")
 
 
 def _array(archive: zipfile.ZipFile, member: str) -> np.ndarray:
-    """One array. What its header says is compared with the bytes there are before any memory is taken."""
+    """One array. Its header is compared with the number of bytes before memory is allocated."""
     info = archive.getinfo(member)
     if not info.compress_type and info.header_offset + info.file_size > archive.start_dir:
         raise EOFError(f"{member} does not fit into the file")
     with archive.open(info) as file:
-        shape, _, dtype = HEADERS[np.lib.format.read_magic(file)](file)
-        count = 1
-        for length in shape:
-            count *= length
-        if dtype.hasobject or count * dtype.itemsize != info.file_size - file.tell():
-            raise ValueError(f"{member} does not hold what its header says")
+        _check_header(file, info.file_size)
     with archive.open(info) as file:
         return np.lib.format.read_array(file, allow_pickle=False)
+
+
+def load_npy(path: str | Path) -> np.ndarray:
+    """Read the array of an npy file, never a pickle or an archive.
+
+    Raises InputError where the file is missing, damaged or does not hold what its header says.
+    """
+    try:
+        size = check_regular(path).st_size
+        with open(path, "rb") as file:
+            _check_header(file, size)
+            file.seek(0)
+            return np.lib.format.read_array(file, allow_pickle=False)
+    except FileNotFoundError as error:
+        raise InputError(path, "no such file") from error
+    except OSError as error:
+        raise InputError(path, f"cannot be read: {error.strerror or error}") from error
+    except DAMAGE_ERRORS as error:
+        raise InputError(path, f"not an array file ({printable(error)})") from error
+
+
+def _check_header(file: IO[bytes], size: int) -> None:
+    """Raise ValueError where the header of an array is none, or asks for other than the `size` bytes hold.
+
+    NumPy reads a header as Python, whose parser ends in errors of many kinds.
+    """
+    try:
+        shape, _, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)
+    except OSError:
+        raise
+    except (Exception, MemoryError):  # of a header of 10,000 letters at most: too deeply nested
+        raise ValueError("an array whose header cannot be understood") from None
+    count = 1
+    for length in shape:
+        count *= length
+    if dtype.hasobject or min(shape, default=0) < 0 or count * dtype.itemsize != size - file.tell():
+        raise ValueError("an array does not hold what its header says")

@@ -1,4 +1,4 @@
-"""Two-bone inverse kinematics: bend a leg or an arm so that its end reaches a point."""
+"""Two-bone inverse kinematics: bends a leg or an arm so that its end reaches a point."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ from hobble.core.quat import Array
 
 
 def two_bone_knee(hip: Array, target: Array, pole: Array, upper: float, lower: float) -> tuple[Array, Array]:
-    """Where the knee goes, and where the ankle ends up, by the law of cosines.
+    """Positions of knee and ankle by the law of cosines, each (..., 3).
 
-    hip, target: (..., 3) positions. pole: (..., 3) direction the knee points to, not along the leg.
-    upper, lower: bone lengths. A target out of reach is approached to 0.1% of full stretch.
-    Returns knee and ankle positions, each (..., 3).
+    hip, target: (..., 3) positions. pole: (..., 3) direction in which the knee points, not along the leg.
+    upper, lower: bone lengths. If the target is out of reach, the leg stretches to 99.9% of its length.
     """
     reach = target - hip
     distance = np.linalg.norm(reach, axis=-1, keepdims=True)

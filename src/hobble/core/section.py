@@ -1,4 +1,4 @@
-"""What every section of a YAML file is made of: a model that refuses unknown keys, and types of values."""
+"""Base class and value types of the sections of a YAML file. Unknown keys are refused."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 
 def _inside(path: str) -> str:
-    """A path that stays in the folder that it is relative to."""
+    """Check that a path is relative and does not leave the mocap folder."""
     if Path(path).is_absolute() or ".." in Path(path).parts or not path.isprintable():
         raise ValueError("must be relative to the mocap folder and stay in it")
     return path
 
 
-# Upper bounds keep a mistyped or a stranger's configuration from asking for more memory than machines have.
+# The upper bound stops a mistyped or hostile configuration from using up the memory.
 Positive = Annotated[int, Field(gt=0, le=1_000_000)]
 PositiveFloat = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -27,6 +27,6 @@ PhaseMode = Literal["constant", "linear", "cubic"]
 
 
 class Section(BaseModel):
-    """A part of a YAML file; unknown keys are refused."""
+    """A part of a YAML file. Unknown keys are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, str_strip_whitespace=True)

@@ -1,4 +1,4 @@
-"""A skeleton: joints, parents, rest offsets, what its joints are for, and the links that can be hurt."""
+"""A skeleton: joints, parents, rest offsets, roles of joints, and the links that can be hurt."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from hobble.core import quat
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 
-SIDES = (("Left", "Right"), ("left", "right"), ("LEFT", "RIGHT"))
+SIDE_WORDS = (("Left", "Right"), ("left", "right"), ("LEFT", "RIGHT"))
 # L_Leg, leg.r and Bip01 L Leg; LLeg and rLeg
-LETTER = re.compile(r"(?<![^_. -])[LRlr](?![^_. -])|^[LRlr](?=[A-Z])")
-ACROSS = str.maketrans("LRlr", "RLrl")
-NAMED = "alike but for Left and Right, or L and R, as in LeftLeg, L_Leg, Leg.L, LLeg"
+SIDE_LETTER = re.compile(r"(?<![^_. -])[LRlr](?![^_. -])|^[LRlr](?=[A-Z])")
+OTHER_LETTER = str.maketrans("LRlr", "RLrl")
+PAIRED_NAMES = "alike but for Left and Right, or L and R, as in LeftLeg, L_Leg, Leg.L, LLeg"
 
 
 def other_side(name: str) -> str:
-    """The joint's counterpart across the body, or the same name for one on the midline.
+    """The name of the joint on the other side, or the same name for a joint in the middle.
 
     >>> other_side("LeftUpLeg"), other_side("LHipJoint"), other_side("Neck1"), other_side("Hand_R")
     ('RightUpLeg', 'RHipJoint', 'Neck1', 'Hand_L')
     """
-    for left, right in SIDES:
+    for left, right in SIDE_WORDS:
         if left in name:
             return name.replace(left, right)
         if right in name:
             return name.replace(right, left)
-    return LETTER.sub(lambda match: match[0].translate(ACROSS), name, count=1)
+    return SIDE_LETTER.sub(lambda match: match[0].translate(OTHER_LETTER), name, count=1)
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class Skeleton:
     joints: J names, a parent always before its children; the first is the root.
     parents: J indices, -1 for the root.
     offsets: (J, 3) in centimetres, from the parent, with every rotation at identity (the rest pose).
-    roles: what a joint is for ("hips", "left_heel", ...) -> its name; see config/skeletons/README.md.
-    links: pairs (parent-side joint, child-side joint) that can be told something each, in column order.
-    unseen: joints that the network predicts but does not get as input (their weight is 1e-10).
+    roles: role ("hips", "left_heel", ...) -> name of the joint; see config/skeletons/README.md.
+    links: pairs (upper joint, lower joint) that can be hurt, in the order of the severity columns.
+    unseen: joints that the network predicts but does not get as input (their input weight is 1e-10).
     """
 
     name: str
@@ -57,7 +57,7 @@ class Skeleton:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Skeleton:
-        """Build from plain data as config/skeletons/<name>.yaml holds it (already validated)."""
+        """Build from the validated content of config/skeletons/<name>.yaml."""
         joints = tuple(data["joints"])
         parents = tuple(
             -1 if j["parent"] is None else joints.index(j["parent"]) for j in data["joints"].values()
@@ -69,7 +69,7 @@ class Skeleton:
         return cls(data["name"], joints, parents, offsets, dict(data["roles"]), links, unseen, ends)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data, the inverse of `from_dict`; offsets to 1e-6 cm."""
+        """Plain data for `from_dict`, with offsets rounded to 1e-6 cm."""
         joints = {
             name: {
                 "parent": self.joints[p] if p >= 0 else None,
@@ -87,19 +87,19 @@ class Skeleton:
         }
 
     def index(self, joint: str) -> int:
-        """Index of a joint by name; raises KeyError with the names there are."""
+        """Index of a joint by name. Raises KeyError with the names there are."""
         try:
             return self.joints.index(joint)
         except ValueError:
             raise KeyError(f"no joint {joint!r} in skeleton {self.name}: {', '.join(self.joints)}") from None
 
     def role(self, role: str) -> int:
-        """Index of the joint that plays `role`."""
+        """Index of the joint with the role `role`."""
         return self.index(self.roles[role])
 
     @property
     def leg_length(self) -> float:
-        """Thigh and shank of the left leg, cm: the unit in which bodies of any size are compared."""
+        """Length of the left thigh and shank, cm. Bodies of different size are compared in this unit."""
         bones = np.linalg.norm(self.offsets, axis=1)
         knee, heel = self.role("left_knee"), self.role("left_heel")
         length, joint = 0.0, heel
@@ -115,17 +115,17 @@ class Skeleton:
 
     @property
     def mirror_joints(self) -> np.ndarray:
-        """(J,) index of each joint's counterpart on the other side, by their names.
+        """(J,) index of each joint's counterpart on the other side, found by name.
 
-        Raises HobbleError where the names do not pair the joints that play a role on both sides.
+        Raises HobbleError if the names do not pair the joints of a left and a right role.
         """
         swap = np.array([self._counterpart(name) for name in self.joints])
         for role, left in self.roles.items():
             right = self.roles.get(role.replace("left_", "right_", 1))
             if right not in (None, left) and self.joints[swap[self.index(left)]] != right:
-                raise self._lopsided(
+                raise self._mirror_error(
                     f"{left} is the {role.replace('_', ' ')} and {right} the right one, but their names do "
-                    f"not say so. Name the joints of both sides {NAMED}."
+                    f"not match. Name the joints of both sides {PAIRED_NAMES}."
                 )
         return swap
 
@@ -133,19 +133,19 @@ class Skeleton:
     def mirror_links(self) -> np.ndarray:
         """(L,) index of each link's counterpart on the other side.
 
-        Raises HobbleError like `mirror_joints`, and for a link without a counterpart, whose value would stay
-        where it is while the body is mirrored.
+        Raises HobbleError like `mirror_joints`, and also if a link has no counterpart: its severity would
+        stay on the wrong side of the mirrored body.
         """
         swap = self.mirror_joints
         across = [tuple(self.joints[swap[self.index(joint)]] for joint in link) for link in self.links]
         for link, other in zip(self.links, across, strict=True):
             if other not in self.links:
-                raise self._lopsided(
-                    f"its links hold {'-'.join(link)} and not {'-'.join(other)}. Add that link."
+                raise self._mirror_error(
+                    f"its links have {'-'.join(link)} but not {'-'.join(other)}. Add that link."
                 )
         return np.array([self.links.index(other) for other in across], int)
 
-    def _lopsided(self, why: str) -> HobbleError:
+    def _mirror_error(self, why: str) -> HobbleError:
         return HobbleError(f"skeleton {self.name} cannot be mirrored: {why}")
 
     def _counterpart(self, name: str) -> int:
@@ -188,7 +188,7 @@ def forward_kinematics(
 
 
 def local_rotations(skeleton: Skeleton, global_rotations: Array) -> Array:
-    """Local rotations (..., J, 4) of world rotations (..., J, 4): the way back from forward kinematics."""
+    """Local rotations (..., J, 4) of world rotations (..., J, 4), the inverse of forward kinematics."""
     out = np.array(global_rotations, float)
     for j, p in enumerate(skeleton.parents):
         if p >= 0:

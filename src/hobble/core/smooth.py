@@ -1,4 +1,7 @@
-"""Filters over time, the ends held, on (F, ...) arrays; numpy alone, so that a job per clip starts fast."""
+"""Filters over time for (F, ...) arrays; the first and last values are repeated past the ends.
+
+They use numpy only, because importing SciPy would slow the start of every job.
+"""
 
 from __future__ import annotations
 
@@ -8,24 +11,24 @@ from hobble.core.quat import Array
 
 
 def gaussian(values: Array, sigma: float) -> Array:
-    """Weighted mean with a Gaussian of `sigma` frames, cut off at four of them."""
+    """Weighted mean with a Gaussian of `sigma` frames, cut off at four sigma."""
     reach = int(4 * sigma + 0.5)
     weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
     return _weighted(values, weights / weights.sum())
 
 
 def mean(values: Array, width: int) -> Array:
-    """Mean over `width` frames, an odd number, the present one in the middle."""
+    """Mean over `width` frames (an odd number) around each frame."""
     return _weighted(values, np.full(width, 1.0 / width))
 
 
 def lowest(values: Array, width: int) -> Array:
-    """The least value within `width` frames, an odd number, the present one in the middle."""
+    """Lowest value within `width` frames (an odd number) around each frame."""
     return _windows(values, width).min(axis=-1)
 
 
 def median_of_three(values: Array) -> Array:
-    """The middle one of the values before, at and after each frame: a spike of one frame is gone."""
+    """Median of the values before, at and after each frame. This removes spikes of one frame."""
     return np.median(_windows(values, 3), axis=-1)
 
 
@@ -38,6 +41,6 @@ def _weighted(values: Array, weights: Array) -> Array:
 
 
 def _windows(values: Array, width: int) -> Array:
-    """(F, ..., width) the values around each frame."""
+    """(F, ..., width) values around each frame."""
     reach = [(width // 2, width // 2)] + [(0, 0)] * (np.ndim(values) - 1)
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), width, axis=0)

@@ -1,4 +1,4 @@
-"""Reading what a stranger wrote: bytes, text and YAML, refused before they take more than they may."""
+"""Reads bytes, text and YAML from files that may be hostile, with limits on size and depth."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     import yaml
 
 MB = 1 << 20
-MOST_TEXT = 64 * MB  # labels and status: 1 kB a frame of a clip of ten minutes at 100 Hz
-MOST_YAML = 4 * MB  # a data set that lists 20,000 clips with five keys each
-DEEPEST_YAML = 100
-MOST_NODES = 1_000_000  # of a YAML file with its aliases written out: some 100 MB as Python objects
+MAX_TEXT_BYTES = 64 * MB  # enough for label files of ten minutes at 100 Hz with 1 kB a frame
+MAX_YAML_BYTES = 4 * MB  # enough for a data set of 20,000 clips with five keys each
+MAX_YAML_DEPTH = 100
+MAX_YAML_NODES = 1_000_000  # values with all aliases replaced; about 100 MB as Python objects
 
 
 def check_regular(path: str | Path) -> os.stat_result:
-    """What the system knows of a regular file, or of what a link leads to.
+    """The stat result of a regular file or of the target of a link.
 
-    Raises InputError for a folder, and for a device or a pipe, whose reading might never end; OSError where
-    there is nothing.
+    Raises InputError for a folder, and for a device or a pipe, because reading those may never end. Raises
+    OSError if there is no such file.
     """
     kind = os.stat(path)
     if not stat.S_ISREG(kind.st_mode):
@@ -35,7 +35,7 @@ def check_regular(path: str | Path) -> os.stat_result:
 
 
 def printable(text: object, most: int = 200) -> str:
-    """Words of a stranger as a terminal may show them: one line, no control characters, not too many."""
+    """Untrusted text for a terminal: one line, at most `most` characters, no control characters."""
     plain = "".join(c if c.isprintable() else "?" for c in str(text)[: most + 1])
     return plain if len(plain) <= most else f"{plain[:most]}..."
 
@@ -43,12 +43,12 @@ def printable(text: object, most: int = 200) -> str:
 def read_bytes(path: str | Path, most: int) -> bytes:
     """The content of a regular file of at most `most` bytes.
 
-    Raises InputError for anything else: what is not there or may not be read, a folder, a device, a pipe.
+    Raises InputError if it is missing, unreadable, too large, or not a regular file.
     """
     try:
         kind = check_regular(path)
         with open(path, "rb") as file:
-            # no more room than the file takes: a buffer of `most` bytes is 1 GB for some
+            # read() allocates what it is asked for, so ask for the file's size and not for `most`
             data = file.read(kind.st_size + 1) if kind.st_size <= most else b""
     except FileNotFoundError:
         raise InputError(path, "no such file") from None
@@ -56,12 +56,15 @@ def read_bytes(path: str | Path, most: int) -> bytes:
         reason = getattr(error, "strerror", None) or error
         raise InputError(path, f"cannot be read: {reason}") from None
     if kind.st_size > most or len(data) > most:
-        raise InputError(path, f"larger than {most / MB:g} MB, which is the most that is read of such a file")
+        raise InputError(path, f"larger than {most / MB:g} MB, the limit for such a file")
     return data
 
 
-def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
-    """A text file as UTF-8, without a byte order mark; raises InputError where it is none or too large."""
+def read_text(path: str | Path, most: int = MAX_TEXT_BYTES) -> str:
+    """The content of a UTF-8 text file, without a byte order mark.
+
+    Raises InputError if it is too large or not text.
+    """
     try:
         return read_bytes(path, most).decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -69,13 +72,14 @@ def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
 
 
 def read_yaml(path: str | Path) -> Any:
-    """What a YAML file says, as plain data: no tag of it makes an object, no alias in it a mountain.
+    """The content of a YAML file as plain data.
 
-    Raises InputError, with the line where there is one; for a key that stands twice in one place too.
+    Raises InputError, with the line if it is known: for invalid YAML, tags that would create Python objects,
+    duplicate keys, deep nesting, and aliases that would expand to more than MAX_YAML_NODES values.
     """
-    import yaml  # not needed by most jobs, which are many and short
+    import yaml  # imported here because most jobs do not need it
 
-    text = read_text(path, MOST_YAML)
+    text = read_text(path, MAX_YAML_BYTES)
     kind = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     loader = kind(text)
     try:
@@ -83,15 +87,15 @@ def read_yaml(path: str | Path) -> Any:
         node = loader.get_single_node()
         if node is None:
             return None
-        if _written_out(node, {}, set()) > MOST_NODES:
-            raise InputError(path, f"its aliases stand for more than {MOST_NODES} values")
+        if _size_without_aliases(node, {}, set()) > MAX_YAML_NODES:
+            raise InputError(path, f"its aliases expand to more than {MAX_YAML_NODES} values")
         _check_keys(path, node)
         return loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else None
         raise InputError(path, f"not valid YAML: {error.problem}", line=line) from None
     except RecursionError:
-        raise InputError(path, "nested too deeply, or an alias that holds itself") from None
+        raise InputError(path, "nested too deeply, or an alias that contains itself") from None
     except (yaml.YAMLError, ValueError) as error:
         raise InputError(path, f"not valid YAML: {' '.join(str(error).split())}") from None
     finally:
@@ -99,18 +103,18 @@ def read_yaml(path: str | Path) -> Any:
 
 
 def _check_depth(events: Iterable[yaml.Event]) -> None:
-    """Raise RecursionError before the loader does: libyaml's would end the process with it."""
+    """Raise RecursionError for deep nesting, before libyaml recurses and crashes the process."""
     import yaml
 
     depth = 0
     for event in events:
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > DEEPEST_YAML:
+        if depth > MAX_YAML_DEPTH:
             raise RecursionError
 
 
 def _check_keys(path: str | Path, top: yaml.Node) -> None:
-    """Raise InputError for a key that a mapping has twice: the loader would take the last and say nothing."""
+    """Raise InputError for a duplicate key. The loader would silently take the last one."""
     todo, seen = [top], set()
     while todo:
         node = todo.pop()
@@ -121,7 +125,7 @@ def _check_keys(path: str | Path, top: yaml.Node) -> None:
         lines: dict[tuple[str, str], int] = {}
         for key in (child[0] for child in node.value if isinstance(child, tuple)):
             if not isinstance(key.value, str):
-                continue  # no key at all, as the loader will say
+                continue  # not a valid key; the loader reports it
             name, line = (key.tag, key.value), key.start_mark.line + 1
             if name in lines:
                 problem = f"the key {key.value:.80} is given twice, first in line {lines[name]}"
@@ -135,14 +139,14 @@ def _children(node: yaml.Node) -> list[yaml.Node]:
     return [part for pair in pairs for part in pair]
 
 
-def _written_out(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
-    """Values that a node stands for when every alias is replaced by what it names."""
+def _size_without_aliases(node: yaml.Node, known: dict[int, int], above: set[int]) -> int:
+    """Number of values in a node after every alias is replaced by its content."""
     if not isinstance(node.value, list):
         return 1
     if id(node) in above:
         raise RecursionError
     if id(node) not in known:
         above.add(id(node))
-        known[id(node)] = 1 + sum(_written_out(child, known, above) for child in _children(node))
+        known[id(node)] = 1 + sum(_size_without_aliases(child, known, above) for child in _children(node))
         above.remove(id(node))
     return known[id(node)]

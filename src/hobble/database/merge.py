@@ -20,7 +20,7 @@ import numpy as np
 
 from hobble.channels.limits import Pace
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import explained, save_npz, sync_folder
+from hobble.core.files import save_npz, sync_folder, write_error
 from hobble.core.quat import Array
 from hobble.database.buckets import INDEX, Buckets
 from hobble.database.chunks import Chunk, write_chunk
@@ -30,7 +30,7 @@ from hobble.database.precision import STORED, narrow
 from hobble.database.split import split_rows
 from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
 from hobble.rows.clip_rows import ClipRows, Outline, load_clip_rows, outline
-from hobble.rows.compose import fit_columns, of_frame, x_columns
+from hobble.rows.compose import fit_columns, frame_inputs, x_columns
 from hobble.rows.layout import RowLayout
 
 CHUNK_BYTES = 4 << 20  # what a reader takes in one go: long enough for any disk, short enough for any memory
@@ -107,7 +107,7 @@ def write_database(
         _publish(path, work, manifest)
         return manifest
     except OSError as error:
-        raise explained(error, path) from error
+        raise write_error(error, path) from error
     finally:
         shutil.rmtree(work, ignore_errors=True)
 
@@ -147,7 +147,7 @@ def _plan(
             "There is nothing to train on: no clip of the training part has a whole locomotion "
             "cycle. Add clips, or hold fewer out."
         )
-    layout = first.layout.told(channels)
+    layout = first.layout.with_channels(channels)
     values = x_columns(layout) + layout.y_size + fit_columns(layout) * pairs / rows
     chunk_rows = max(1, int(chunk_bytes / (item * values + 16)))
     each = max(1, int(BUCKET_BYTES / (chunk_rows * 4 * values)))
@@ -199,7 +199,7 @@ def _scatter(
 def _tables(clip: ClipRows, part: slice, layout: RowLayout) -> tuple[Array, Array]:
     """The frames and fits of a part of a clip's rows, raw."""
     told = {name: clip.channels[name][part] for name, _ in layout.channels}
-    frames = np.concatenate([of_frame(layout, clip.x[part], told), clip.y[part]], axis=1)
+    frames = np.concatenate([frame_inputs(layout, clip.x[part], told), clip.y[part]], axis=1)
     first = clip.first_fit[part]
     ground = slice(int(first[0]), int(first[-1] + clip.fits[part][-1]))
     return frames, np.concatenate([clip.heights[ground], clip.mean[ground, None]], axis=1)

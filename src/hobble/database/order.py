@@ -20,10 +20,17 @@ def generator(seed: int, *of: int) -> np.random.Generator:
     return np.random.default_rng([seed, *of])
 
 
-def spans(rows: int, visits: int, section: int, sections: int) -> Iterator[tuple[int, int, int]]:
-    """The parts of layers that make up a section: (layer, first place, last place + 1)."""
+def spans(
+    rows: int, visits: int, section: int, sections: int, part: tuple[int, int] | None = None
+) -> Iterator[tuple[int, int, int]]:
+    """The parts of layers that make up a section: (layer, first place, last place + 1).
+
+    part: only the samples of the section from the first to before the second of two numbers.
+    """
     total = rows * visits
     start, stop = total * section // sections, total * (section + 1) // sections
+    if part is not None:
+        start, stop = start + part[0], min(stop, start + part[1])
     while start < stop:
         layer = start // rows
         end = min(stop, (layer + 1) * rows)
@@ -67,3 +74,31 @@ def picks(count: np.ndarray, visits: int, seed: int, pass_index: int, layer: int
         ranked = np.argsort(draws[of, :fits], axis=1)
         out[of] = ranked[np.arange(len(of)), place[of]]
     return out
+
+
+def starts(count: np.ndarray) -> np.ndarray:
+    """(R,) where each row's fits begin among those of all; `count` (R,) is how many each has."""
+    return np.cumsum(count, dtype=np.int64) - count
+
+
+def shown(
+    chunks: Sequence[int],
+    rows: Sequence[int],
+    count: np.ndarray,
+    first: np.ndarray,
+    visits: int,
+    place: tuple[int, int, int, int],
+    part: slice,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of a group of chunks in the order of a layer, and the fit of each: both (n,), n of `part`.
+
+    chunks: their numbers; rows: of each. count, first: (R,) of the group's rows, as in `starts`. place: seed,
+    pass, layer and group. part: of the order.
+    """
+    seed, pass_index, layer, group = place
+    picked = [
+        picks(count[end - n : end], visits, seed, pass_index, layer, int(chunk))
+        for chunk, n, end in zip(chunks, rows, np.cumsum(rows), strict=True)
+    ]
+    some = row_order(len(count), seed, pass_index, layer, group)[part]
+    return some, first[some] + np.concatenate(picked)[some]

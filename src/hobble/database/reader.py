@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from itertools import chain, cycle
@@ -15,15 +15,16 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.core.quat import Array
 from hobble.database import order
-from hobble.database.chunks import read_chunk
 from hobble.database.manifest import STATISTICS, Manifest
-from hobble.database.precision import STORED, widen
+from hobble.database.precision import widen
 from hobble.database.statistics import Statistics
-from hobble.rows.compose import compose, fit_columns, x_columns
+from hobble.database.stretches import Stretch
+from hobble.database.window import Room, Window, load, room
+from hobble.rows.compose import compose
 from hobble.rows.layout import RowLayout
 
 Item = TypeVar("Item")
-Rooms = Iterator[Mapping[str, np.ndarray]]
+Part = tuple[Window, np.ndarray, np.ndarray]
 BLOCK_ROWS = 4096
 BLOCKS = 3  # in memory at a time: being made, waiting, in use
 
@@ -42,24 +43,6 @@ class Block(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Window:
-    """The rows of some chunks, in memory one after another.
-
-    rows: of each chunk. first: (R,) where each row's fits begin in `fits`. The rest is what chunks hold.
-    """
-
-    rows: Sequence[int]
-    first: np.ndarray
-    x: Array
-    y: Array
-    fits: Array
-    count: np.ndarray
-    clip: np.ndarray
-    frame: np.ndarray
-    phase: Array
-
-
-@dataclass(frozen=True)
 class Database:
     """A database opened for reading; see `open`."""
 
@@ -74,8 +57,9 @@ class Database:
     def open(cls, path: str | Path, memory_mb: int = 512) -> Database:
         """Open the database folder `path`.
 
-        memory_mb: most memory held at a time for its rows. A database that fits is loaded once; a larger
-        one is read again and again, chunk by chunk. Raises InputError where there is no whole database.
+        memory_mb: most memory held at a time for its rows, by each reader of a section. A database that fits
+        is loaded once; a larger one is read again and again, chunk by chunk. Raises InputError where there is
+        no whole database.
         """
         path = Path(path)
         manifest = Manifest.load(path)
@@ -118,64 +102,65 @@ class Database:
         sections: int,
         seed: int,
         block_rows: int = BLOCK_ROWS,
+        stretch: Stretch | None = None,
+        window: int | None = None,
     ) -> Iterator[Block]:
         """One section of one pass, in shuffled order, as blocks of `block_rows` rows (the last: the rest).
 
         Over the `sections` sections of a pass every (frame, fit) pair comes once (a flat row's one fit as
         often as others have fits). What comes depends on the arguments (and, where the split is larger than
         memory, on memory_mb) and never on what was read before. The next block is made in a thread
-        meanwhile. Raises InputError naming the chunk where one is damaged.
+        meanwhile. stretch: the part of the section that is read, all of it where None. window: chunks held at
+        a time, those that `window` finds where None. Raises InputError naming the chunk where one is damaged.
         """
         if not 0 <= section < sections:
             raise HobbleError(f"there is no section {section} in a pass of {sections}")
         if self.rows(split) == 0:
             return iter(())
-        spans = order.spans(self.rows(split), self.manifest.visits, section, sections)
-        window = self.window(split, block_rows)
+        total = self.section_pairs(split, section, sections)
+        stretch = stretch or Stretch(0, total, total, 0, total)
+        cut = stretch.start, stretch.stop
+        spans = order.spans(self.rows(split), self.manifest.visits, section, sections, cut)
+        window = window or self.window(split, block_rows)
         rooms = self._rooms(split, window)
         parts = chain.from_iterable(
-            self._parts(split, pass_index, seed, span, window, rooms) for span in spans
+            self._parts(split, (seed, pass_index, layer), start, stop, window, rooms)
+            for layer, start, stop in spans
         )
-        total = self.section_pairs(split, section, sections)
-        return ahead(self._composed(parts, total, block_rows))
+        return ahead(self._composed(_kept(parts, stretch), stretch.rows, block_rows))
 
     def _parts(
-        self, split: str, pass_index: int, seed: int, span: tuple[int, int, int], window: int, rooms: Rooms
-    ) -> Iterator[tuple[Window, np.ndarray, np.ndarray]]:
+        self,
+        split: str,
+        of: tuple[int, int, int],
+        start: int,
+        stop: int,
+        window: int,
+        rooms: Iterator[Room],
+    ) -> Iterator[Part]:
         """Windows, the rows of them to show in order, and the fit of each: a layer from place to place.
 
-        Windows are loaded into one of `rooms` while the one before is in use in the other, so each has to be
-        done with before the next is asked for.
+        of: seed, pass and layer. Windows are loaded into one of `rooms` while the one before is in use in the
+        other, so each has to be done with before the next is asked for.
         """
-        layer, start, stop = span
         every = range(len(self.manifest.chunks[split]))
         if window >= len(every):
             wanted: list[tuple[int, Sequence[int], int, int]] = [(0, every, start, stop)]
             windows = iter([self._whole(split)])
         else:
-            wanted = list(self._wanted(split, pass_index, seed, layer, start, stop, window))
-            windows = ahead(self._load(split, some, next(rooms)) for _, some, _, _ in wanted)
-        for group, some, low, high in wanted:
-            yield self._shown(next(windows), some, (seed, pass_index, layer), group, slice(low, high))
-
-    def _shown(
-        self, window: Window, some: Sequence[int], of: tuple[int, int, int], group: int, part: slice
-    ) -> tuple[Window, np.ndarray, np.ndarray]:
-        rows = order.row_order(sum(window.rows), *of, group)[part]
-        ends = np.cumsum(window.rows)
-        picked = [
-            order.picks(window.count[end - n : end], self.manifest.visits, *of, int(chunk))
-            for chunk, n, end in zip(some, window.rows, ends, strict=True)
-        ]
-        return window, rows, window.first[rows] + np.concatenate(picked)[rows]
+            wanted = list(self._wanted(split, of, start, stop, window))
+            windows = ahead(self.load(split, some, next(rooms)) for _, some, _, _ in wanted)
+        for group, _, low, high in wanted:
+            w, part, visits = next(windows), slice(low, high), self.manifest.visits
+            yield w, *order.shown(w.chunks, w.rows, w.count, w.first, visits, (*of, group), part)
 
     def _wanted(
-        self, split: str, pass_index: int, seed: int, layer: int, start: int, stop: int, window: int
+        self, split: str, of: tuple[int, int, int], start: int, stop: int, window: int
     ) -> Iterator[tuple[int, Sequence[int], int, int]]:
         """The groups of chunks with places start to stop of a layer, and the part of each that is meant."""
         rows = [chunk.rows for chunk in self.manifest.chunks[split]]
         done = 0
-        for group, some in enumerate(order.groups(rows, window, seed, pass_index, layer)):
+        for group, some in enumerate(order.groups(rows, window, *of)):
             n = sum(rows[i] for i in some)
             low, high = max(start - done, 0), min(stop - done, n)
             if low < high:
@@ -199,53 +184,24 @@ class Database:
         sizes = [chunk.bytes for chunk in self.manifest.chunks[split]]
         return len(sizes) if self.manifest.bytes <= memory else max(1, memory // (2 * max(sizes)))
 
-    def _rooms(self, split: str, window: int) -> Rooms:
+    def _rooms(self, split: str, window: int) -> Iterator[Room]:
         """Two rooms for windows, in turn; the memory is the same for all windows that a section reads."""
         if window >= len(self.manifest.chunks[split]):
             return iter(())
-        return cycle([self._room(split, window) for _ in range(2)])
+        return cycle([room(self.manifest, split, window) for _ in range(2)])
 
     def _whole(self, split: str) -> Window:
         if split not in self._kept:
             every = range(len(self.manifest.chunks[split]))
-            self._kept[split] = self._load(split, every, self._room(split, len(every)))
+            self._kept[split] = self.load(split, every, room(self.manifest, split, len(every)))
         return self._kept[split]
 
-    def _load(self, split: str, some: Sequence[int], room: Mapping[str, np.ndarray]) -> Window:
-        """Chunks, one after another, read straight into `room`; checksums verified the first time."""
-        chunks = [self.manifest.chunks[split][i] for i in some]
-        all_rows, all_fits = sum(c.rows for c in chunks), sum(c.fits for c in chunks)
-        tables = {name: table[: all_fits if name == "fits" else all_rows] for name, table in room.items()}
-        row = fit = 0
-        for chunk in chunks:
-            rows, fits = slice(row, row + chunk.rows), slice(fit, fit + chunk.fits)
-            parts = {name: table[fits if name == "fits" else rows] for name, table in tables.items()}
-            folder = self.path / self.manifest.folder
-            read_chunk(folder, chunk, parts, verify=chunk.file not in self._verified)
-            self._verified.add(chunk.file)
-            row, fit = rows.stop, fits.stop
-        first = np.cumsum(tables["count"], dtype=np.int64) - tables["count"]
-        return Window([c.rows for c in chunks], first, **tables)
+    def load(self, split: str, some: Sequence[int], into: Room) -> Window:
+        """Chunks of a split, one after another, read into a `hobble.database.window.room`."""
+        folder = self.path / self.manifest.folder
+        return load(folder, self.manifest.chunks[split], some, into, self._verified)
 
-    def _room(self, split: str, window: int) -> dict[str, np.ndarray]:
-        """Empty arrays for what any `window` chunks hold, in their order."""
-        chunks = self.manifest.chunks[split]
-        rows = sum(sorted(chunk.rows for chunk in chunks)[-window:])
-        fits = sum(sorted(chunk.fits for chunk in chunks)[-window:])
-        floats = STORED[self.manifest.dtype]
-        return {
-            "x": np.empty((rows, x_columns(self.layout)), floats),
-            "y": np.empty((rows, self.layout.y_size), floats),
-            "fits": np.empty((fits, fit_columns(self.layout)), floats),
-            "count": np.empty(rows, np.int32),
-            "clip": np.empty(rows, np.int32),
-            "frame": np.empty(rows, np.int32),
-            "phase": np.empty(rows, np.float32),
-        }
-
-    def _composed(
-        self, parts: Iterator[tuple[Window, np.ndarray, np.ndarray]], total: int, block_rows: int
-    ) -> Iterator[Block]:
+    def _composed(self, parts: Iterator[Part], total: int, block_rows: int) -> Iterator[Block]:
         """Blocks of `block_rows` rows out of parts of any length."""
         block, filled = self._empty(min(block_rows, total)), 0
         for window, rows, fit in parts:
@@ -276,6 +232,15 @@ class Database:
         x = np.empty((rows, self.layout.x_size), np.float32)
         y = np.empty((rows, self.layout.y_size), np.float32)
         return Block(x, y, np.empty(rows, np.float32), np.empty(rows, np.int32), np.empty(rows, np.int32))
+
+
+def _kept(parts: Iterator[Part], stretch: Stretch) -> Iterator[Part]:
+    """The samples of a stretch that are read, out of all of it."""
+    at = 0
+    for window, rows, fits in parts:
+        some = stretch.kept(at, len(rows))
+        at += len(rows)
+        yield window, rows[some], fits[some]
 
 
 def ahead(items: Iterator[Item]) -> Iterator[Item]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
-from hobble.rows.compose import lower
+from hobble.rows.compose import lower_joints
 from hobble.rows.layout import GAITS
 
 
@@ -56,7 +56,7 @@ def captured(rows: ClipRows) -> Iterator[Captured]:
     layout = rows.layout
     for chosen in unbroken(rows.frame):
         y = rows.y[chosen].astype(float)
-        lower(y, layout.y_joint_position, rows.mean[rows.first_fit[chosen]][:, None])
+        lower_joints(y, layout.y_joint_position, rows.mean[rows.first_fit[chosen]][:, None])
         local = y[:, layout.y_joint_position].reshape(len(chosen), -1, 3)
         turn, velocity = y[:, layout.y_turn][:, 0], y[:, layout.y_root_velocity]
         gait = rows.x[chosen][:, layout.x_gait].reshape(len(chosen), len(GAITS), layout.samples)
@@ -87,13 +87,13 @@ def headings(turn: Array) -> Array:
 
 def root_path(velocity: Array, turn: Array) -> Array:
     """(F, 3) where a root is that moves by velocity (F, 2), seen from itself, then turns (see headings)."""
-    steps = turned(velocity, headings(turn))
+    steps = rotate_by_yaw(velocity, headings(turn))
     out = np.zeros((len(turn), 3))
     out[1:, ::2] = np.cumsum(steps, axis=0)[:-1]
     return out
 
 
-def turned(vectors: Array, yaw: Array) -> Array:
+def rotate_by_yaw(vectors: Array, yaw: Array) -> Array:
     """Level vectors x, z (..., 2) seen from a root of yaw (...), as the world sees them."""
     sin, cos = np.sin(yaw), np.cos(yaw)
     x, z = vectors[..., 0], vectors[..., 1]
@@ -103,6 +103,6 @@ def turned(vectors: Array, yaw: Array) -> Array:
 def _accelerations(velocity: Array, turn: Array) -> Array:
     """(F,) the largest change of velocity (F, J, 3), each seen from its own root."""
     carried = velocity[:-1].copy()
-    carried[..., ::2] = turned(velocity[:-1, :, ::2], turn[:-1, None])
+    carried[..., ::2] = rotate_by_yaw(velocity[:-1, :, ::2], turn[:-1, None])
     change = np.linalg.norm(velocity[1:] - carried, axis=-1)
     return np.concatenate([[0.0], change.max(axis=1)]) if len(velocity) else np.zeros(0)

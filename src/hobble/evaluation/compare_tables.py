@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hobble.evaluation.compare import each
+from hobble.evaluation.compare_configurations import each
 from hobble.measures.given import Json, Row
 
 

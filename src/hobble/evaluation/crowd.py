@@ -16,7 +16,7 @@ from hobble.runtime.options import Runtime
 
 FPS = 60
 SPEEDS = {"walk": 2.5, "jog": 7.0}  # cm a frame asked for
-SETTLING = 0.25  # share of a stretch that is not measured: what is told and gait are still on their way
+SETTLING_SHARE = 0.25  # share of a stretch that is not measured: what is told and gait are still on their way
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Walks:
         All but the beginning where it does not get through a cycle.
         """
         start, stop = int(self.starts[stretch]), int(self.starts[stretch + 1])
-        start += round(SETTLING * (stop - start))
+        start += round(SETTLING_SHARE * (stop - start))
         turned = np.concatenate([[0.0], np.cumsum(np.mod(np.diff(self.phase[start:stop, figure]), 1.0))])
         whole = np.floor(turned[-1])
         if whole < 1:
@@ -91,7 +91,7 @@ def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
     return Walks(local, contacts, phase, root, rough, starts)
 
 
-def told(network: Network, name: str, each: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+def channel_values(network: Network, name: str, each: Sequence[Mapping[str, float]]) -> dict[str, Array]:
     """What a stretch tells its figures by channel `name`, given as column -> value; {} where the
     network is not
     told that channel."""

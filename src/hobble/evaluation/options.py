@@ -10,7 +10,7 @@ from hobble.core.section import Section
 from hobble.measures.registry import MEASURES
 
 
-def together(sections: list[type[Section]]) -> type[Section]:
+def joined_sections(sections: list[type[Section]]) -> type[Section]:
     """One section with the keys of all.
 
     Raises TypeError for a key that two of them define; a common base may define it for both.
@@ -30,4 +30,4 @@ def together(sections: list[type[Section]]) -> type[Section]:
 if TYPE_CHECKING:
     Evaluation = Section
 else:
-    Evaluation = together([one.options for one in MEASURES])
+    Evaluation = joined_sections([one.options for one in MEASURES])

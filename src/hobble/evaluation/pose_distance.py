@@ -8,18 +8,18 @@ from hobble.core.quat import Array
 
 PHASES = 24  # bins of the cycle in which poses are compared
 FPS = 60
-SETTLED = 0.1  # share of the final change within which a response counts as settled
-FELT = 0.1  # cm; a smaller change is none that could settle
+SETTLED_SHARE = 0.1  # share of the final change within which a response counts as settled
+SMALLEST_CHANGE_CM = 0.1  # cm; a smaller change is none that could settle
 
 
-def bins(phase: Array) -> np.ndarray:
+def phase_bins(phase: Array) -> np.ndarray:
     """(...) which of PHASES bins each phase falls into."""
     return np.minimum((np.asarray(phase) * PHASES).astype(int), PHASES - 1)
 
 
 def mean_cycle(local: Array, phase: Array) -> Array:
     """(PHASES, J, 3) mean pose in each phase bin of local (F, J, 3), phase (F,); a gap takes its nearest."""
-    at = bins(phase)
+    at = phase_bins(phase)
     mean = np.zeros((PHASES, *local.shape[1:]))
     seen = np.unique(at)
     for b in seen:
@@ -30,9 +30,9 @@ def mean_cycle(local: Array, phase: Array) -> Array:
     return mean
 
 
-def apart(local: Array, phase: Array, cycle: Array) -> Array:
+def distance_to_cycle(local: Array, phase: Array, cycle: Array) -> Array:
     """(F,) mean distance in cm of the joints of local (F, J, 3) from a mean cycle at the same phase."""
-    return np.linalg.norm(local - cycle[bins(phase)], axis=-1).mean(axis=-1)
+    return np.linalg.norm(local - cycle[phase_bins(phase)], axis=-1).mean(axis=-1)
 
 
 def period(phase: Array) -> int:
@@ -49,7 +49,7 @@ def settling(distance: Array, normal: float, window: int) -> float | None:
     window = min(window, len(distance))
     smooth = np.convolve(distance, np.ones(window) / window, mode="valid")
     change = abs(float(smooth[-1]) - normal)
-    if change < FELT:
+    if change < SMALLEST_CHANGE_CM:
         return None
-    out = np.abs(smooth - smooth[-1]) > SETTLED * change
+    out = np.abs(smooth - smooth[-1]) > SETTLED_SHARE * change
     return round((int(np.flatnonzero(out)[-1]) + window if np.any(out) else 0) / FPS, 5)

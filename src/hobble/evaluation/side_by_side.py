@@ -50,7 +50,9 @@ def pair(a: Json, b: Json) -> dict[str, Any]:
     return out
 
 
-def beside(measure: str, row: Json, theirs: float, ours: float | None, unit: str = "") -> dict[str, Any]:
+def published_row(
+    measure: str, row: Json, theirs: float, ours: float | None, unit: str = ""
+) -> dict[str, Any]:
     """A published figure, and ours where it was measured.
 
     row: its `configuration` and `source`; the `table` that it was printed in, and the other figure that the

@@ -16,8 +16,8 @@ from hobble.runtime.animation import ProceduralAnimation
 
 FPS = 60
 GAITS = ("walk", "jog", "crouch")
-FASTEST = 8.0  # cm a frame of a wish
-APART = 4e4  # centimetres between the places where characters start, each on ground of its own
+FASTEST_WISH = 8.0  # cm a frame of a wish
+START_SPACING_CM = 4e4  # centimetres between the places where characters start, each on ground of its own
 LIMITS = {"hips_lowest_cm": 60.0, "hips_highest_cm": 110.0, "added_turn_degrees": 30.0}
 
 
@@ -47,7 +47,7 @@ class Wishes:
         self.left -= 1
         for c in np.flatnonzero(self.left <= 0):
             going, looking = rng.uniform(-np.pi, np.pi, 2)
-            speed = 0.0 if rng.random() < 1 / 3 else rng.uniform(0.2, FASTEST)
+            speed = 0.0 if rng.random() < 1 / 3 else rng.uniform(0.2, FASTEST_WISH)
             self.velocity[c] = speed * np.array([np.sin(going), np.cos(going)])
             self.facing[c] = rng.integers(2) * np.array([np.sin(looking), np.cos(looking)])
             self.gait[c] = GAITS[rng.integers(len(GAITS))]
@@ -58,13 +58,16 @@ class Wishes:
 
 
 def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array], Array]:
-    """Ground of C kinds side by side, `APART`: some flat, most hills of 2 to 8 m that rise by up to .35."""
+    """A ground function with a different ground for each of C characters, START_SPACING_CM apart along x.
+
+    A quarter are flat; the others have hills 2 to 8 m long with slopes of up to .35.
+    """
     length = rng.uniform(200, 800, characters)
     height = rng.uniform(0.05, 0.35, characters) * length / np.pi * (rng.random(characters) > 0.25)
     pitch = 2 * np.pi / length
 
     def heights(x: Array, z: Array) -> Array:
-        k = np.clip(np.rint(x / APART), 0, characters - 1).astype(int)
+        k = np.clip(np.rint(x / START_SPACING_CM), 0, characters - 1).astype(int)
         return np.asarray(0.5 * height[k] * (np.sin(pitch[k] * x) + np.sin(pitch[k] * z)))
 
     return heights
@@ -98,7 +101,7 @@ def soak(
 ) -> dict[str, Any]:
     """The worst of characters x frames; options: of ProceduralAnimation.
 
-    `finite`; `hips_lowest_cm` and `hips_highest_cm` above the path's mean ground; `network_turn_degrees`, the
+    `finite`; `hips_lowest_cm` and `hips_highest_cm` above the ground under them; `network_turn_degrees`, the
     most that the network turned a joint in a frame, `turn_degrees` that of the pose, `added_turn_degrees`
     the most by which the pose turned further than the network in the same joint and frame; `slide_cm` a
     stance, mean; `toes_cm` and `knees_cm`, the most that these moved in a frame.
@@ -107,7 +110,7 @@ def soak(
     skeleton = network.skeleton
     assert skeleton is not None
     starts = np.zeros((characters, 3))
-    starts[:, 0] = APART * np.arange(characters)
+    starts[:, 0] = START_SPACING_CM * np.arange(characters)
     animation = ProceduralAnimation(network, characters=characters, position=starts, **options)
     ground, wishes = grounds(characters, rng), Wishes.none(characters, dict(network.layout.channels))
     hips = skeleton.role("hips")
@@ -120,7 +123,8 @@ def soak(
         wishes.renew(rng)
         pose = animation.next_pose(wishes.velocity, wishes.facing, wishes.gait, terrain=ground, **wishes.told)
         finite = finite and bool(np.isfinite(pose.positions).all() and np.isfinite(pose.rotations).all())
-        height = pose.positions[:, hips, 1] - pose.root[:, 1]
+        at = pose.positions[:, hips]
+        height = at[:, 1] - ground(at[:, 0], at[:, 2])
         low, high = min(low, float(height.min())), max(high, float(height.max()))
         now = pose.positions, pose.rotations, animation.state.joint_rotation.copy()
         if old is not None:

@@ -29,6 +29,12 @@ MOST_BOUNCE = 0.5
 JOG_FROUDE = 6.0  # above FASTEST_WALK, in Froude numbers: people walk no faster than that for long
 FASTEST_WALK = 0.5
 JOG_CONSTANT = -3.2
+# A figure that has both feet down for this share of the time, always has one down, and does not clearly
+# spring, is walking, however much it bounces, as in a happy walk.
+LEAST_DOUBLE_SUPPORT = 0.1
+NO_FLIGHT = 0.01
+CLEAR_SPRING = 0.5
+MOST_ODDS_OF_A_WALK = -1.0
 CERTAIN_ODDS = 2.0  # log odds that count as full evidence
 DATA_SET_ODDS = 1.0  # what the data set says of the clip's main gait counts for so much
 SWITCH_COST = 18.0  # frames of full evidence that a change of gait takes
@@ -72,14 +78,17 @@ def jog_odds(clip: Clip, down: np.ndarray) -> Array:
     double_support = gaussian((left & right).astype(float), 20.0)
     # Froude number: the square of the speed over gravity times the length of the leg.
     froude = _speed(clip) ** 2 / (GRAVITY * clip.skeleton.leg_length)
-    return (
-        JOG_SPRING * _spring(clip)
+    spring = _spring(clip)
+    odds = (
+        JOG_SPRING * spring
         + JOG_FLIGHT * flight
         + JOG_DOUBLE_SUPPORT * double_support
         + JOG_BOUNCE * np.minimum(_bounce(clip), MOST_BOUNCE)
         + JOG_FROUDE * np.clip(froude - FASTEST_WALK, 0.0, 1.0)
         + JOG_CONSTANT
     )
+    walks = (double_support >= LEAST_DOUBLE_SUPPORT) & (flight <= NO_FLIGHT) & (spring < CLEAR_SPRING)
+    return np.where(walks, np.minimum(odds, MOST_ODDS_OF_A_WALK), odds)
 
 
 def _evidence(clip: Clip, odds: Array) -> Array:

@@ -5,7 +5,8 @@ reads it before it plans. Beside it lie, each found by its name:
 
 - `run.py`: `run(given, options) -> Outcome`, the measuring itself (see `given`);
 - `page.py`: what the report shows of it (see `hobble.report.measured`), if anything;
-- `comparison.py`: what it says of configurations side by side (see `hobble.evaluation.compare`), if anything;
+- `comparison.py`: what it says of configurations side by side
+  (see `hobble.evaluation.compare_configurations`), if anything;
 - `comparison_page.py`: what the comparison's page shows of that (see `hobble.report.measured`), if anything.
 """
 

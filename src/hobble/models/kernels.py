@@ -41,8 +41,8 @@ def widened(half: Any) -> Any:
 
 
 @njit(parallel=True, error_model="numpy")
-def draw(mask: Any, counter: Any, keep: Any) -> Any:
-    """Fill `mask` from a counter (splitmix64: Steele et al. 2014); returns the counter of the next one."""
+def draw(mask: Any, counter: Any, keep: Any) -> None:
+    """Fill `mask` (rows, width) from a counter (splitmix64: Steele et al. 2014)."""
     rows, width = mask.shape
     scale = mask.dtype.type(1 / keep)
     bound = np.uint64(keep * 2.0**32)
@@ -52,4 +52,8 @@ def draw(mask: Any, counter: Any, keep: Any) -> Any:
             z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
             z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
             mask[row, i] = scale if (z >> np.uint64(32)) < bound else 0
-    return counter + np.uint64(rows * width) * ODD
+
+
+def further(counter: np.uint64, numbers: int) -> np.uint64:
+    """The counter of `draw` after so many numbers."""
+    return np.uint64((int(counter) + numbers * int(ODD)) % 2**64)

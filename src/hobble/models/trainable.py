@@ -13,6 +13,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+EVERY = slice(None)
+
 
 class Step(Protocol):
     """The gradient of the mean squared error on one batch.
@@ -28,8 +30,8 @@ class Step(Protocol):
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
         """Find `gradients` for x (B, X), y (B, Y), p (B,); the mean squared error, a scalar tensor."""
 
-    def masks(self, rows: int) -> list[Tensor]:
-        """Draw the dropout of a batch of `rows` rows."""
+    def masks(self, rows: int, own: slice = EVERY) -> list[Tensor]:
+        """Draw the dropout of a batch of `rows` rows; that of the rows `own`, the others are for others."""
 
     def seed(self, seed: int) -> None:
         """Begin a new sequence of dropout, 0 <= seed < 2^63."""

@@ -11,6 +11,7 @@ from hobble.core.files import write_text
 from hobble.motion.draft import draft, guessed
 from hobble.motion.find_body import Doubt, find_body
 from hobble.motion.look import look, table
+from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.source import raw_clip, rig_of
 
@@ -42,13 +43,20 @@ def main() -> int:
     many.add_argument("folder", type=Path)
     many.add_argument("--skeleton", default="holden31")
     many.add_argument("--maps", type=Path, default=SKELETONS, help="the folder of the skeleton files")
+    many.add_argument(
+        "--handedness",
+        choices=["auto", "right", "left"],
+        default="auto",
+        help="of the files' coordinates, as motion.handedness of a data set",
+    )
     given = parser.parse_args()
     try:
         if given.command == "rig":
             text = rig(given.file)
             write_text(given.to, text) if given.to else print(text, end="")
             return 0
-        seen = look(given.folder, given.maps / f"{given.skeleton}.yaml", given.maps)
+        options = ClipMotion(handedness=given.handedness)
+        seen = look(given.folder, given.maps / f"{given.skeleton}.yaml", given.maps, options)
         print(table(seen))
         return int(any(one.refused for one in seen.clips))
     except HobbleError as error:

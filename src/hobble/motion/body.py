@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
+from hobble.motion.fingers import pointing_fingers
+from hobble.motion.tree import common, path
 
 SIDES = ("left", "right")
 REACH = 0.2  # share of the trunk by which a joint may lie above the one that follows it
@@ -92,55 +94,15 @@ def body_of(parents: Sequence[int], roles: Mapping[str, int]) -> Body:
     return Body(hips, tuple(trunk), tuple(neck), roles["head"], arms, legs)
 
 
+def with_fingers(body: Body, skeleton: Skeleton) -> Body:
+    """The body with a finger of each hand (`hobble.motion.fingers`)."""
+    return replace(body, fingers=pointing_fingers(skeleton, {s: arm[3] for s, arm in body.arms.items()}))
+
+
 def body_by_roles(skeleton: Skeleton) -> Body:
     """The body of a skeleton that says what its joints are for."""
     body = body_of(skeleton.parents, {role: skeleton.role(role) for role in skeleton.roles})
     return with_fingers(body, skeleton)
-
-
-def with_fingers(body: Body, skeleton: Skeleton) -> Body:
-    """The body with a finger of each hand: the joint that is away from the wrist on the hand's longest
-    finger.
-
-    A thumb is none, nor what is longer than a forearm: that is a thing held in the hand. Fingers whose names
-    say that they are an index or a middle finger go first.
-    """
-    lengths = np.linalg.norm(skeleton.offsets, axis=-1)
-    fingers = {}
-    for side, (_, _, _, wrist) in body.arms.items():
-        fore, best = float(lengths[wrist]), 0.0
-        for end in range(len(skeleton.joints)):
-            chain = above(skeleton.parents, end)
-            chain = chain[: chain.index(wrist)][::-1] if wrist in chain[1:] else []
-            names = "".join(skeleton.joints[j] for j in chain).lower()
-            length = float(lengths[chain].sum()) + fore * ("index" in names or "middle" in names)
-            ways = np.linalg.norm(np.cumsum(skeleton.offsets[chain], axis=0), axis=-1)
-            far = [j for j, way in zip(chain, ways, strict=True) if 0.1 * fore < way < 0.7 * fore]
-            if far and "thumb" not in names and lengths[chain].sum() < fore and length > best:
-                best, fingers[side] = length, far[0]
-    return replace(body, fingers=fingers)
-
-
-def above(parents: Sequence[int], joint: int) -> list[int]:
-    """The joint and all above it, the root last."""
-    out = [joint]
-    while parents[out[-1]] >= 0:
-        out.append(parents[out[-1]])
-    return out
-
-
-def common(parents: Sequence[int], joints: Iterable[int]) -> int:
-    """The nearest joint that lies above each of `joints`, or is one of them."""
-    first, *others = (above(parents, j) for j in joints)
-    return next(j for j in first if all(j in other for other in others))
-
-
-def path(parents: Sequence[int], start: int, end: int) -> list[int]:
-    """The joints from `start` to `end`, both included: up to what they have in common, and down again."""
-    meet = common(parents, (start, end))
-    up = above(parents, start)
-    down = above(parents, end)
-    return up[: up.index(meet) + 1] + down[: down.index(meet)][::-1]
 
 
 def pairs(source: Skeleton, own: Body, target: Skeleton, theirs: Body) -> dict[str, str]:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import BinaryIO, NoReturn
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import explained, sync_folder
+from hobble.core.files import sync_folder, write_error
 from hobble.core.untrusted import printable
 from hobble.motion.read import MOST_BYTES
 
@@ -92,7 +92,7 @@ def download_clip(
     except _TooLate:
         last = _Failed(f"not done within {deadline:g} seconds")
     except OSError as error:
-        raise explained(error, path) from error
+        raise write_error(error, path) from error
     raise _refusal(url, path, folder, str(last), attempt + 1)
 
 

@@ -14,8 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.motion.body import SIDES, Body, above, common, path
-from hobble.motion.names import is_end, limb_parts, part_of, side_of
+from hobble.motion.body import SIDES, Body
+from hobble.motion.names import is_end, limb_parts, part_of, side_of, side_of_pair
+from hobble.motion.tree import above, common, path
 
 SAMPLES = 150
 ALIKE = 0.15  # by how much of its length a bone may differ from the one across the body
@@ -332,8 +333,7 @@ class _Rig:
         self, pair: _Pair, leg: list[tuple[int, int, int]], legs: list, arm: list, head: int
     ) -> tuple[int, bool]:
         """Which of the two legs is the left one, and whether names say so."""
-        votes = [[side_of(self.names[j]) for j in chain] for chain in pair.chains]
-        named = [(v.count("left") - v.count("right")) for v in votes]
+        named = self.named_sides(pair)
         if named[0] * named[1] < 0:
             return (0 if named[0] > 0 else 1), True
         up = _unit(self.at[:, head] - sum(self.at[:, j[2]] for j in leg) / 2)
@@ -343,6 +343,18 @@ class _Rig:
         if abs(turn) < 0.3:
             raise Doubt("neither names nor feet and knees tell its left side from its right")
         return (0 if turn > 0 else 1), False
+
+    def named_sides(self, pair: _Pair) -> tuple[int, int]:
+        """Of both chains, by how many joints more their names say left than right."""
+        votes = []
+        for chain, across in (pair.chains, pair.chains[::-1]):
+            sides = [side_of(self.names[j]) for j in chain]
+            if not any(sides):
+                sides = [
+                    side_of_pair(self.names[a], self.names[b]) for a, b in zip(chain, across, strict=False)
+                ]
+            votes.append(sides.count("left") - sides.count("right"))
+        return votes[0], votes[1]
 
     def _ahead(self, pair: _Pair, leg: list[tuple[int, int, int]]) -> Array:
         """(S, 3) where feet and, less, knees point."""
@@ -364,8 +376,7 @@ class _Rig:
         across = self.at[:, leg[left][0]] - self.at[:, leg[1 - left][0]]
         arms = self.at[:, arm[0][0]] - self.at[:, arm[1][0]]
         side = float(np.mean(np.sum(_unit(across) * _unit(arms), axis=-1)))
-        votes = [[side_of(self.names[j]) for j in chain] for chain in pair.chains]
-        named = [(v.count("left") - v.count("right")) for v in votes]
+        named = self.named_sides(pair)
         place = 0 if side > 0 else 1
         if abs(side) < 0.2 or (named[0] * named[1] < 0 and (named[0] > 0) != (place == 0)):
             raise Doubt("its left arm and its left leg do not lie on one side")

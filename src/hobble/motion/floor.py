@@ -16,7 +16,7 @@ CRAWLS = 15.0  # and from which on, where a figure does not stand on its toes: h
 UPRIGHT = 0.8  # height of the hips above the toes of a figure that stands, to the length of its legs
 EVEN = 12.0  # cm between high and low steps; running on flat ground gives 9, gentle bumps 14
 SLOW = 0.3  # cm a frame at 60 Hz: a toe that rises or falls faster is in the air
-FEWEST = 10  # frames from which a floor can be told
+FEWEST, SHORTEST = 4, 1 / 12  # frames, and seconds, of standing from which on a floor can be told
 
 
 def on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
@@ -28,7 +28,7 @@ def on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
     toes = [clip.skeleton.role(f"{side}_toe") for side in ("left", "right")]
     lower = clip.positions[:, toes, 1].min(axis=1)
     standing = lower[:-1][np.abs(np.diff(lower)) * clip.fps / 60.0 < SLOW]
-    if len(standing) < FEWEST:
+    if len(standing) < max(FEWEST, round(SHORTEST * clip.fps)):
         return clip, [], []
     low, usual, high = np.percentile(standing, [10, 25, 90])
     floor = float(usual) - SOLE

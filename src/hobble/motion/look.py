@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hobble.core.clip import Clip
-from hobble.core.clip_files import find_clips, orphan_notes, the_file
+from hobble.core.clip_files import find_clips, only_file, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.motion.check import worst
@@ -62,19 +62,22 @@ class Folder:
     notes: tuple[str, ...]
 
 
-def look(folder: Path, skeleton: Path, maps: Path) -> Folder:
-    """Look at each clip of a folder, or at one file. Raises HobbleError where there are none."""
-    files = [folder] if folder.is_file() else [the_file(n, f) for n, f in sorted(find_clips(folder).items())]
+def look(folder: Path, skeleton: Path, maps: Path, options: ClipMotion | None = None) -> Folder:
+    """Look at each clip of a folder, or at one file. Raises HobbleError where there are none.
+
+    options: how the files are read, as in a data set.
+    """
+    files = [folder] if folder.is_file() else [only_file(n, f) for n, f in sorted(find_clips(folder).items())]
     if not files:
         raise InputError(folder, "no .bvh files here")
-    clips = tuple(_one(file, skeleton, maps) for file in files)
-    orphans = () if folder.is_file() else tuple(orphan_notes(folder, [file.stem for file in files]))
+    clips = tuple(_one(file, skeleton, maps, options or ClipMotion()) for file in files)
+    orphans = () if folder.is_file() else tuple(unused_file_notes(folder, [file.stem for file in files]))
     return Folder(clips, (*same_notes(clips), *standing_notes(clips), *orphans))
 
 
-def _one(file: Path, skeleton: Path, maps: Path) -> Look:
+def _one(file: Path, skeleton: Path, maps: Path, options: ClipMotion) -> Look:
     try:
-        clip, report = make_clip(file, skeleton, maps, file.stem, skeleton.stem, ClipMotion())
+        clip, report = make_clip(file, skeleton, maps, file.stem, skeleton.stem, options)
     except HobbleError as error:
         return Look(file.stem, refused=str(error).split("\n")[0])
     return seen(clip, report)

@@ -23,7 +23,8 @@ from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import load_skeleton
 from hobble.motion.root import facing
 from hobble.motion.source import FOUND, Source, load_source
-from hobble.motion.stance import Spine, upright
+from hobble.motion.spine import Spine
+from hobble.motion.stance import upright
 
 SAME = 1e-3  # cm: offsets this near to the skeleton's are the skeleton's
 

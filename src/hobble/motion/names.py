@@ -76,10 +76,27 @@ def side_of(name: str) -> str | None:
     left, right = any(w in LEFT for w in found), any(w in RIGHT for w in found)
     if not left and not right:
         text = name.lower()
-        left, right = "left" in text, "right" in text
+        left, right = "left" in text or "左" in text, "right" in text or "右" in text
     if not left and not right and (glued := re.match(r"([LR])[A-Z][a-z]", name)):
         left, right = glued[1] == "L", glued[1] == "R"
     return None if left == right else "left" if left else "right"
+
+
+def side_of_pair(name: str, other: str) -> str | None:
+    """The side of a joint whose counterpart across the body has the other name; None where neither tells.
+
+    Names that only differ in one letter tell what they would not on their own.
+
+    >>> side_of_pair("lfemur", "rfemur"), side_of_pair("toe_r2", "toe_l2"), side_of_pair("armA", "armB")
+    ('left', 'right', None)
+    """
+    own, across = side_of(name), side_of(other)
+    if own is not None or across is not None:
+        return None if own == across else own or ("left" if across == "right" else "right")
+    if len(name) != len(other):
+        return None
+    unlike = [pair for pair in zip(name.lower(), other.lower(), strict=True) if pair[0] != pair[1]]
+    return {("l", "r"): "left", ("r", "l"): "right"}.get(unlike[0]) if len(unlike) == 1 else None
 
 
 def part_of(name: str) -> str | None:

@@ -59,7 +59,9 @@ class Motion(Section):
     unit: Literal["auto"] | PositiveFloat = Field("auto", description="centimetres per unit of the file")
     up: Literal["auto", "Y", "Z"] = "auto"
     handedness: Literal["auto", "right", "left"] = Field(
-        "auto", description="of the file's coordinates; a left-handed file has x negated"
+        "auto",
+        description="of the file's coordinates; a left-handed file has x negated. Names of joints tell; of a "
+        "rig whose names do not, it has to be said",
     )
     facing: Finite | None = Field(
         None, description="where the figure faces first, degrees from +Z towards +X; else as in the file"

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -31,9 +33,12 @@ from hobble.motion.rig import (
     missing_bone,
     unit_of,
 )
-from hobble.motion.stance import Spine, stands, upright
+from hobble.motion.spine import Spine
+from hobble.motion.stance import upright
+from hobble.motion.standing import stands
 
 STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
+Limb = TypeVar("Limb")
 FOUND = "found"  # what a report calls a rig that no skeleton file describes
 
 
@@ -125,7 +130,7 @@ def _unknown(
         False,
         pairs(told.clip.skeleton, told.body, target.skeleton, theirs),
     )
-    notes = decoded.notes + unsure + ([] if known else _said(rig, found))
+    notes = decoded.notes + unsure + told.notes + ([] if known else _said(found, options.handedness))
     moving = _moving(decoded, body, unit)
     return _mended(
         file,
@@ -149,23 +154,28 @@ def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: Cl
         found = find_body(rig.joints, rig.parents, raw.positions)
     except Doubt as doubt:
         raise refusal(file, rig, doubt) from None
-    found = replace(found, body=with_fingers(found.body, rig))
+    if not found.sided and options.handedness == "auto":
+        raise InputError(
+            file.path,
+            "no name tells its left side from its right, and its mirror image would move as well",
+            fix="Set motion.handedness in the data set: right, as BVH files are meant to be, or left, as "
+            "from programs with left-handed coordinates.",
+        )
+    body = found.body
     if not found.sided and options.handedness == "left":
-        body = found.body
-        arms = {a: body.arms[b] for a, b in (SIDES, SIDES[::-1])}
-        legs = {a: body.legs[b] for a, b in (SIDES, SIDES[::-1])}
-        return Found(with_fingers(replace(body, arms=arms, legs=legs), rig), False)
-    return found
+        body = replace(body, arms=_swapped(body.arms), legs=_swapped(body.legs))
+    return replace(found, body=with_fingers(body, rig))
 
 
-def _said(rig: Skeleton, found: Found) -> list[str]:
+def _swapped(limbs: Mapping[str, Limb]) -> dict[str, Limb]:
+    return {a: limbs[b] for a, b in (SIDES, SIDES[::-1])}
+
+
+def _said(found: Found, handedness: str) -> list[str]:
     """Sentences on what was found, and on what names did not tell."""
     out = ["No skeleton file describes this rig: its parts were found from structure, motion and names."]
     if not found.sided:
-        out.append(
-            "No name tells its left side from its right; its coordinates were taken to be right-handed "
-            "(motion.handedness: left overrules it)."
-        )
+        out.append(f"No name tells its left side from its right; motion.handedness: {handedness} did.")
     return out
 
 

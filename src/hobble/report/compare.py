@@ -10,7 +10,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.evaluation.captured import headings, root_path, turned, unbroken
+from hobble.evaluation.captured import headings, root_path, rotate_by_yaw, unbroken
 from hobble.figure.mesh import body, key
 from hobble.models.network import Network
 from hobble.report.scenes import FPS, UNIT, packed_motion
@@ -88,6 +88,6 @@ def in_world(points: Array, place: Array, yaw: Array, lift: Array) -> Array:
     lift: (F, 1), what was taken off heights.
     """
     out = points.copy()
-    out[..., ::2] = turned(points[..., ::2], yaw[:, None])
+    out[..., ::2] = rotate_by_yaw(points[..., ::2], yaw[:, None])
     out[..., 1] += lift
     return out + place[:, None]

@@ -139,7 +139,10 @@ def _bounds(network: Network, rows: NDArray[np.int64]) -> dict[str, Any]:
     found = Bounds.of(network)
     low, high = found.y_low[rows], found.y_high[rows]
     arrays = {"xLow": found.x_low, "xHigh": found.x_high, "yLow": low, "yHigh": high}
-    return {name: packed(a.astype(np.float32)) for name, a in arrays.items()} | {"fastest": found.fastest}
+    return {name: packed(a.astype(np.float32)) for name, a in arrays.items()} | {
+        "fastest": found.fastest,
+        "hips": list(found.hips),
+    }
 
 
 def _start(network: Network) -> dict[str, Any]:
@@ -172,5 +175,8 @@ def _constants() -> dict[str, float]:
         "fastestTurn": float(controller.FASTEST_TURN),
         "heightMix": feet.HEIGHT_MIX,
         "floating": feet.FLOATING,
+        "bodyMix": feet.BODY_MIX,
+        "bodyFree": feet.BODY_FREE,
+        "bodyFrom": feet.BODY_FROM,
         "mostAdded": feet.MOST_ADDED,
     }

@@ -49,6 +49,11 @@ def style() -> Markup:
     return trusted("page.css", (FOLDER / "page.css").read_text(encoding="utf-8"))
 
 
+def questionnaire_script() -> Markup:
+    """The script of the questionnaire, which needs no other."""
+    return trusted("questionnaire.js", (FOLDER / "questionnaire.js").read_text(encoding="utf-8"))
+
+
 def trusted(name: str, text: str) -> Markup:
     """Our own CSS or script; raises ValueError where it would end its own element."""
     if "</script" in text.lower() or "</style" in text.lower():

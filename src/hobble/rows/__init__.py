@@ -1,1 +1,1 @@
-"""Rows of X, Y and P: their blocks by name, a clip's rows, and how a row is put together."""
+"""Rows of X, Y and P: their layout, the rows of a clip, and how a row is composed."""

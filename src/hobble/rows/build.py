@@ -1,6 +1,6 @@
-"""Rows of X, Y and P for one clip: what the network sees in each frame of its cycles, and what comes next.
+"""Rows for one clip: input X, output Y and phase P of the network, for each frame of the clip's cycles.
 
-The columns and their root frames are those of Holden, Komura, Saito (2017), as in their released pipeline.
+Columns and root frames are those of the pipeline that Holden, Komura, Saito (2017) released.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ def clip_rows(
     step: int,
     facing_sigma: float,
 ) -> ClipRows:
-    """The rows of a clip's locomotion cycles, one after another, factorised.
+    """The rows of a clip's locomotion cycles, one cycle after another. See `ClipRows` for their form.
 
-    labels, terrain: the arrays that docs/artefacts.md lists for these stages. channels: name -> values (F,
-    columns). window, step, facing_sigma: frames. Past the clip's ends the root goes on as `continued` has it
-    and the gait is held. Raises InputError where the files do not belong together or a cycle lacks a frame
-    before or after it.
+    labels, terrain: arrays of these stages, see docs/artefacts.md. channels: name -> values (F, columns).
+    window, step, facing_sigma: frames. Past the ends of the clip the root moves on (`continued`) and the gait
+    is repeated. Raises InputError if the files do not belong together, or if the clip has no frame before or
+    after a cycle.
     """
     skeleton = clip.skeleton
     told = tuple((name, values.shape[1]) for name, values in channels.items())
@@ -83,7 +83,7 @@ def clip_rows(
 
 
 def cycle_frames(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frames (R,) and cycle numbers (R,) of cycles (C, 2), first to last frame inclusive, one after another.
+    """Frames (R,) and cycle numbers (R,) of cycles (C, 2); both the first and last frame belong to a cycle.
 
     >>> cycle_frames(np.array([[60, 62], [62, 63]]))
     (array([60, 61, 62, 62, 63]), array([0, 0, 0, 1, 1]))
@@ -95,7 +95,7 @@ def cycle_frames(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cycle_phase(phase: Array, cycles: np.ndarray) -> Array:
-    """Phase (R,) of the cycles' frames; that of each first and last frame is forced to 0 and 1."""
+    """Phase (R,) of the frames of the cycles. It is set to exactly 0 and 1 in their first and last frames."""
     frame, cycle = cycle_frames(cycles)
     out = phase[frame].astype(float)
     out[frame == cycles[cycle, 0]] = 0.0
@@ -104,15 +104,15 @@ def cycle_phase(phase: Array, cycles: np.ndarray) -> Array:
 
 
 def phase_change(phase: Array) -> Array:
-    """(F - 1,) cycles from each frame to the next, 1 more where phase starts anew."""
+    """(F - 1,) change of phase from each frame to the next, plus 1 where a new cycle begins."""
     change = np.diff(phase.astype(float))
     return np.where(change < 0, change + 1, change)
 
 
 def trajectory(root: RootFrames, frame: np.ndarray, seen_from: np.ndarray, offsets: range) -> list[Array]:
-    """The root's positions and directions at `frame` + offsets, from the roots `seen_from`: x, z, x, z.
+    """Root positions and directions at `frame` + offsets, in the root frames of the frames `seen_from`.
 
-    frame, seen_from: (R,). Returns four arrays (R, samples).
+    frame, seen_from: (R,). Returns four arrays (R, samples): position x and z, direction x and z.
     """
     at = frame[:, None] + np.array(offsets)
     ground = np.zeros((*at.shape, 3))
@@ -123,8 +123,7 @@ def trajectory(root: RootFrames, frame: np.ndarray, seen_from: np.ndarray, offse
 
 
 def gait_columns(gait: Array, frame: np.ndarray, offsets: range) -> Array:
-    """(R, gaits * samples): for each gait (column of `gait`, (F, gaits)) its share at every sample, held
-    past the ends."""
+    """(R, gaits * samples) share of each gait at every sample; gait: (F, gaits), repeated past the ends."""
     at = np.clip(frame[:, None] + np.array(offsets), 0, len(gait) - 1)
     return np.swapaxes(gait[at], 1, 2)
 
@@ -148,18 +147,18 @@ def _check(
     lengths = {"labels": len(labels["phase"]), **{name: len(values) for name, values in channels.items()}}
     for what, length in lengths.items():
         if length != len(clip):
-            raise InputError(where, f"{what} of {length} frames for a clip of {len(clip)}")
+            raise InputError(where, f"{what} have {length} frames, the clip has {len(clip)}")
     for channel_name, values in channels.items():
         columns = len(channel(channel_name).columns(clip.skeleton))
         if values.shape[1] != columns:
-            problem = f"{channel_name} of {values.shape[1]} columns for a skeleton of {columns}"
+            problem = f"{channel_name} has {values.shape[1]} columns where the skeleton needs {columns}"
             raise InputError(where, problem)
     if not np.array_equal(terrain["frame"], frame):
         raise InputError(
             where,
-            "terrain was fitted to other cycles than the labels have",
+            "terrain was fitted to other cycles than those of the labels",
             fix="Make both again from the same clip.",
         )
     if len(frame) and (frame.min() < 1 or frame.max() + 2 > len(clip)):
         outside = int(frame.min() if frame.min() < 1 else frame.max())
-        raise InputError(where, "a cycle has no frame before it or none after it", frame=outside)
+        raise InputError(where, "the clip has no frame before or after a cycle", frame=outside)

@@ -1,4 +1,4 @@
-"""The rows of one clip: what depends on the frame once, what depends on the terrain fit once per fit."""
+"""The rows of one clip. Data of a frame is stored once, data of a terrain fit once for each fit."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
-from hobble.rows.compose import body_columns, compose, of_frame
+from hobble.rows.compose import body_columns, compose, frame_inputs
 from hobble.rows.layout import RowLayout
 
-CHANNEL = "channel_"  # before the names of the channels' arrays in a file
-HINT = "Delete it; the next run makes it again."
+CHANNEL_PREFIX = "channel_"  # of the names of channel arrays in a file
+DELETE_IT = "Delete it; the next run makes it again."
 
 
 @dataclass(frozen=True)
 class ClipRows:
-    """R rows of a clip, factorised. S is the sum of `fits`.
+    """R rows of a clip with S terrain fits in all.
 
     x: (R, columns of X without terrain and channels); y: (R, Y). Joint heights are above the world's zero.
-    p: (R,) phase. channels: name -> (R, its columns). frame, cycle, fits: (R,) int; `fits` counts the terrain
-    fits of a row.
-    heights: (S, 3 * samples) less the mean of their centre ones; mean: (S,) that mean, to be taken off the
-    joint heights. The fits of a row lie together, in the order of the rows.
-    visits: how often each row counts in a pass over the data; a row of one fit is used with it so often.
-    layout: of the rows with every channel of the data set.
+    p: (R,) phase. channels: name -> (R, columns of the channel).
+    frame, cycle: (R,) int. fits: (R,) number of terrain fits of each row; S is their sum.
+    heights: (S, 3 * samples) ground heights minus `mean`. mean: (S,) mean height of the centre samples, to be
+    subtracted from the joint heights. Fits are in the order of the rows.
+    visits: how often a row is used in a pass over the data, however many fits it has.
+    layout: of rows with every channel of the data set.
     """
 
     clip: str
@@ -52,11 +52,11 @@ class ClipRows:
 
     @property
     def first_fit(self) -> np.ndarray:
-        """(R,) where each row's fits begin in `heights` and `mean`."""
+        """(R,) index of each row's first fit in `heights` and `mean`."""
         return np.cumsum(self.fits) - self.fits
 
     def check(self, where: str | Path) -> None:
-        """Raise InputError, naming `where`, unless all shapes agree, fits are there and values are finite."""
+        """Check shapes, fits and finite values. Raises InputError, which names `where`."""
         layout, rows, fits = self.layout, len(self.p), int(np.sum(self.fits))
         expected = {
             "x": (rows, body_columns(layout)),
@@ -68,12 +68,14 @@ class ClipRows:
             "mean": (fits,),
         }
         if set(self.channels) != set(dict(layout.channels)):
-            raise InputError(where, "it has other channels than its layout says", fix=HINT)
+            raise InputError(where, "its channels differ from those of its layout", fix=DELETE_IT)
         tables = {name: getattr(self, name) for name in expected} | dict(self.channels)
         expected |= {name: (rows, columns) for name, columns in layout.channels}
         for name, shape in expected.items():
             if tables[name].shape != shape:
-                raise InputError(where, f"{name} is {tables[name].shape} where {shape} belongs", fix=HINT)
+                raise InputError(
+                    where, f"{name} is {tables[name].shape} where {shape} belongs", fix=DELETE_IT
+                )
         if rows and np.min(self.fits) < 1:
             frame = int(self.frame[np.argmin(self.fits)])
             raise InputError(where, "a row has no terrain fit", frame=frame)
@@ -87,9 +89,9 @@ class ClipRows:
 
 
 class Pairs(NamedTuple):
-    """n (frame, fit) pairs as the original has its rows, float32: x (n, X), y (n, Y), p (n,).
+    """n (frame, fit) pairs, float32: x (n, X), y (n, Y), p (n,). The original's rows are such pairs.
 
-    row: (n,) index of the row; weight: (n,) 1 / fits of the row, so that every frame counts the same.
+    row: (n,) index of the row. weight: (n,) 1 / fits of the row, so that every frame has the same weight.
     """
 
     x: Array
@@ -100,9 +102,9 @@ class Pairs(NamedTuple):
 
 
 def expanded(rows: ClipRows, layout: RowLayout, batch: int = 2048) -> Iterator[Pairs]:
-    """A clip's (frame, fit) pairs in raw units, `batch` or so at a time, laid out as `layout`.
+    """Yield a clip's (frame, fit) pairs in raw units, about `batch` at a time.
 
-    layout: the rows' own, or one with fewer of its channels.
+    layout: that of the rows, or one with fewer channels.
     """
     first = rows.first_fit
     start = 0
@@ -115,24 +117,24 @@ def expanded(rows: ClipRows, layout: RowLayout, batch: int = 2048) -> Iterator[P
 
 
 def pairs(rows: ClipRows, layout: RowLayout, row: np.ndarray, fit: np.ndarray) -> Pairs:
-    """The pairs of rows `row` (n,) with the fits `fit` (n,) of `heights`, in raw units."""
+    """Pairs in raw units of the rows `row` (n,) with the fits `fit` (n,), which index `heights`."""
     x = np.empty((len(row), layout.x_size), np.float32)
     y = rows.y[row].astype(np.float32)
     told = {name: rows.channels[name][row] for name, _ in layout.channels}
-    compose(layout, of_frame(layout, rows.x[row], told), rows.heights[fit], rows.mean[fit, None], x, y)
+    compose(layout, frame_inputs(layout, rows.x[row], told), rows.heights[fit], rows.mean[fit, None], x, y)
     return Pairs(x, y, rows.p[row], row, 1.0 / rows.fits[row])
 
 
 def save_clip_rows(path: str | Path, rows: ClipRows) -> None:
-    """Write rows as one npz, floats as float32."""
+    """Write rows as an npz with float32 values."""
     floats = {n: getattr(rows, n).astype(np.float32) for n in ("x", "y", "p", "heights", "mean")}
-    floats |= {CHANNEL + name: values.astype(np.float32) for name, values in rows.channels.items()}
+    floats |= {CHANNEL_PREFIX + name: values.astype(np.float32) for name, values in rows.channels.items()}
     integers = {n: getattr(rows, n).astype(np.int32) for n in ("frame", "cycle", "fits")}
     save_npz(
         path,
         clip=np.array(rows.clip),
         layout=np.array(json.dumps(rows.layout.to_dict(), sort_keys=True)),
-        skeleton=np.array(json.dumps(rows.skeleton)),  # not sorted: its joints are in the columns' order
+        skeleton=np.array(json.dumps(rows.skeleton)),  # not sorted: joints are in the order of the columns
         visits=np.array(rows.visits),
         **floats,
         **integers,
@@ -140,7 +142,7 @@ def save_clip_rows(path: str | Path, rows: ClipRows) -> None:
 
 
 class Outline(NamedTuple):
-    """What a merge needs to know of a clip's rows before it reads them. fits: (R,)."""
+    """The small part of a clip's rows that a merge reads first. fits: (R,)."""
 
     layout: RowLayout
     skeleton: Mapping[str, Any]
@@ -149,7 +151,7 @@ class Outline(NamedTuple):
 
 
 def outline(source: ClipRows | str | Path) -> Outline:
-    """The outline of rows, or of a file of them, of which only a few kilobytes are read."""
+    """The outline of rows or of a file of rows. Reads only a few kilobytes of the file."""
     if isinstance(source, ClipRows):
         return Outline(source.layout, source.skeleton, source.fits, source.visits)
     data = load_npz(source, ("layout", "skeleton", "fits", "visits"))
@@ -157,21 +159,21 @@ def outline(source: ClipRows | str | Path) -> Outline:
         layout = RowLayout.from_dict(json.loads(str(data["layout"])))
         return Outline(layout, json.loads(str(data["skeleton"])), data["fits"], int(data["visits"]))
     except (TypeError, ValueError) as error:
-        raise InputError(source, f"not a file of rows ({error})", fix=HINT) from error
+        raise InputError(source, f"not a file of rows ({error})", fix=DELETE_IT) from error
 
 
 def load_clip_rows(path: str | Path) -> ClipRows:
-    """Read what `save_clip_rows` wrote; raises InputError where it is damaged or of another layout."""
+    """Read what `save_clip_rows` wrote. Raises InputError if the file is damaged or inconsistent."""
     data: dict[str, Any] = load_npz(path)
     try:
         data["clip"] = str(data["clip"])
         data["layout"] = RowLayout.from_dict(json.loads(str(data["layout"])))
         data["skeleton"] = json.loads(str(data["skeleton"]))
         data["visits"] = int(data["visits"])
-        named = [key for key in data if key.startswith(CHANNEL)]
-        data["channels"] = {key.removeprefix(CHANNEL): data.pop(key) for key in named}
+        named = [key for key in data if key.startswith(CHANNEL_PREFIX)]
+        data["channels"] = {key.removeprefix(CHANNEL_PREFIX): data.pop(key) for key in named}
         rows = ClipRows(**data)
     except (KeyError, TypeError, ValueError) as error:
-        raise InputError(path, f"not a file of rows ({error})", fix=HINT) from error
+        raise InputError(path, f"not a file of rows ({error})", fix=DELETE_IT) from error
     rows.check(path)
     return rows

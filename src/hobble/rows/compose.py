@@ -1,7 +1,6 @@
-"""How a row is put together: the columns of a frame, what the body is told, and the ground of one terrain
-fit.
+"""Composes rows from the columns of a frame, the channels, and the heights of one terrain fit.
 
-One composition for numpy's arrays and PyTorch's tensors, raw or standardised. `n` is a number of rows.
+Works for numpy arrays and PyTorch tensors, raw or standardised. `n` is the number of rows.
 """
 
 from __future__ import annotations
@@ -19,37 +18,37 @@ TERRAIN = "terrain"
 
 
 def body_columns(layout: RowLayout) -> int:
-    """Columns of X without the terrain and without channels."""
+    """Number of columns of X without terrain and channels."""
     return x_columns(layout) - sum(columns for _, columns in layout.channels)
 
 
 def body_layout(layout: RowLayout) -> RowLayout:
-    """The blocks of X in the order of BODY, without channels."""
+    """The same layout without channels, with the blocks of X in the order of BODY."""
     return replace(layout, channels=(), order=())
 
 
 def x_columns(layout: RowLayout) -> int:
-    """Columns of X without the terrain: those of a frame."""
+    """Number of columns of X without terrain. They depend only on the frame."""
     return layout.x_size - 3 * layout.samples
 
 
 def fit_columns(layout: RowLayout) -> int:
-    """Columns of a database's `fits`: the heights, then the lift."""
+    """Number of columns of `fits` in a database: heights, then the mean height (lift)."""
     return 3 * layout.samples + 1
 
 
 def joint_heights(joints: slice) -> slice:
-    """The heights in a block of joint positions."""
+    """The columns of the heights in a block of joint positions."""
     return slice(joints.start + 1, joints.stop, 3)
 
 
-def of_frame(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> Array:
-    """(n, X without the terrain) in the layout's order.
+def frame_inputs(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> Array:
+    """(n, X without terrain), in the order of the layout.
 
-    body: (n, body columns), the blocks of X but for terrain and channels, in the order of BODY. channels:
-    name -> (n, its columns).
+    body: (n, body_columns), the blocks of X without terrain and channels, in the order of BODY.
+    channels: name -> (n, columns of the channel).
     """
-    if not layout.order:  # the channels stand behind
+    if not layout.order:  # the channels come last
         return np.concatenate([body, *(channels[name] for name, _ in layout.channels)], axis=1)
     bare = without_terrain(body_layout(layout))
     source = {name: body[:, block] for name, block in bare.items()} | dict(channels)
@@ -57,7 +56,7 @@ def of_frame(layout: RowLayout, body: Array, channels: Mapping[str, Array]) -> A
 
 
 def without_terrain(layout: RowLayout) -> dict[str, slice]:
-    """The blocks of X as they lie where the terrain is taken out."""
+    """The blocks of X, by name, after the terrain columns are removed."""
     terrain = layout.x_terrain
     width = terrain.stop - terrain.start
     return {
@@ -77,21 +76,22 @@ def compose(
     x_std: Any = None,
     y_std: Any = None,
 ) -> None:
-    """Fill x (n, X), and take from the joint heights of x and y (n, Y) what the ground is higher.
+    """Fill x (n, X), and subtract the mean ground height from the joint heights of x and y (n, Y).
 
-    frames: (n, X without the terrain), ground: (n, 3 * samples), both in the units of x. lift: (n, 1) cm, or
-    None for nothing. x_std, y_std: (X,), (Y,) what standardised rows were divided by; None for raw ones.
+    frames: (n, X without terrain), ground: (n, 3 * samples), both in the units of x. lift: (n, 1) mean ground
+    height in cm, or None to subtract nothing. x_std (X,), y_std (Y,): standard deviations by which
+    standardised rows were divided; None for raw rows.
     """
     terrain = layout.x_terrain
     x[:, : terrain.start] = frames[:, : terrain.start]
     x[:, terrain.stop :] = frames[:, terrain.start :]
     x[:, terrain] = ground
     if lift is not None:
-        lower(x, layout.x_joint_position, lift, x_std)
-        lower(y, layout.y_joint_position, lift, y_std)
+        lower_joints(x, layout.x_joint_position, lift, x_std)
+        lower_joints(y, layout.y_joint_position, lift, y_std)
 
 
-def lower(values: Any, joints: slice, by: Any, std: Any = None) -> None:
-    """Take `by` (n, 1) cm from the heights in the block `joints` of values (n, columns)."""
+def lower_joints(values: Any, joints: slice, by: Any, std: Any = None) -> None:
+    """Subtract `by` (n, 1) cm from the heights in the block `joints` of values (n, columns), in place."""
     heights = joint_heights(joints)
     values[:, heights] -= by if std is None else by / std[heights]

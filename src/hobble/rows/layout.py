@@ -1,4 +1,4 @@
-"""Where everything stands in a row: columns by name, of the skeleton, the window and the channels."""
+"""The columns of a row by name. They depend on the skeleton, the window and the channels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hobble.channels import formerly
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 CONTACTS = ("left_heel", "left_toe", "right_heel", "right_toe")
 SIDES = ("left", "centre", "right")
-# Blocks of X that every network has, in the order of the original.
+# The blocks of X that every network has, in the original's order.
 BODY = ("position", "direction", "gait", "joint_position", "joint_velocity", "terrain")
 
 
@@ -20,11 +20,11 @@ BODY = ("position", "direction", "gait", "joint_position", "joint_velocity", "te
 class RowLayout:
     """The columns of X and Y for J joints, a window of `window` frames to each side, and channels.
 
-    With 31 joints, window 60, step 10: X has 342 columns (372 with a channel of 30) and Y 311. Every block is
-    a slice. Blocks that hold vectors are joint-major: x, y, z of joint 0, then joint 1, ...; trajectory
-    blocks are component-major: x of every sample, then z of every sample.
-    channels: (name, columns) of what the body is told. order: the blocks of X by name, in column order;
-    empty: those of BODY, then the channels. Raises ValueError where `order` names other blocks.
+    With 31 joints, window 60 and step 10, X has 342 columns (372 with a channel of 30) and Y has 311. Every
+    block is a slice. Joint blocks hold x, y, z of joint 0, then of joint 1, and so on. Trajectory blocks hold
+    x of every sample, then z of every sample.
+    channels: (name, number of columns). order: names of the blocks of X in column order; empty for BODY, then
+    the channels. Raises ValueError if `order` is not exactly these blocks.
     """
 
     joints: int
@@ -39,7 +39,7 @@ class RowLayout:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> RowLayout:
-        """The inverse of `to_dict`; files older than channels have columns under an old key."""
+        """The inverse of `to_dict`. Files from before channels have their columns under an old key."""
         known = {key: data[key] for key in ("joints", "window", "step") if key in data}
         channels = dict(data.get("channels", {}))
         for key in set(data) - {"joints", "window", "step", "channels", "order"}:
@@ -49,16 +49,13 @@ class RowLayout:
         return cls(**known, channels=pairs, order=tuple(data.get("order", ())))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for a file."""
+        """Plain data for `from_dict`."""
         own = {"order": list(self.order)} if self.order else {}
         sizes = {"joints": self.joints, "window": self.window, "step": self.step}
         return {**sizes, "channels": [list(pair) for pair in self.channels], **own}
 
-    def told(self, names: Iterable[str]) -> RowLayout:
-        """The same layout with those of its channels alone, in the order of `names`.
-
-        Raises KeyError for a channel that it does not have.
-        """
+    def with_channels(self, names: Iterable[str]) -> RowLayout:
+        """The same layout with only the channels `names`, in that order. Raises KeyError if it lacks one."""
         size = dict(self.channels)
         kept = tuple((name, size[name]) for name in names)
         order = tuple(name for name in self.order if name in BODY or name in dict(kept))
@@ -66,7 +63,7 @@ class RowLayout:
 
     @property
     def offsets(self) -> range:
-        """Frames of the trajectory samples relative to the present one: -60, -50, ..., 50."""
+        """Frame offsets of the trajectory samples: -60, -50, ..., 50."""
         return range(-self.window, self.window, self.step)
 
     @property
@@ -98,22 +95,22 @@ class RowLayout:
 
     @property
     def x_position(self) -> slice:
-        """Trajectory x of every sample, then z; root frame of the present frame, cm."""
+        """Trajectory positions, x then z, in the root frame of this frame, cm."""
         return self._x["position"]
 
     @property
     def x_direction(self) -> slice:
-        """Trajectory facing direction, x then z."""
+        """Trajectory facing directions, x then z."""
         return self._x["direction"]
 
     @property
     def x_gait(self) -> slice:
-        """Six blocks of samples, in the order of GAITS."""
+        """Gait shares: the samples of each gait, in the order of GAITS."""
         return self._x["gait"]
 
     @property
     def x_joint_position(self) -> slice:
-        """Joint positions of the previous frame in its root frame, y less the mean terrain height."""
+        """Joint positions of the previous frame in its root frame, y minus the mean terrain height."""
         return self._x["joint_position"]
 
     @property
@@ -123,16 +120,16 @@ class RowLayout:
 
     @property
     def x_terrain(self) -> slice:
-        """Heights: +X side (left), centre, other side; less the mean of the centre ones."""
+        """Ground heights to the left (+X), in the centre and to the right, minus the mean of the centre."""
         return self._x["terrain"]
 
     def x_channel(self, name: str) -> slice:
-        """The columns of a channel; raises KeyError where there is none of that name."""
+        """The columns of a channel. Raises KeyError if there is no such channel."""
         return self._x[name]
 
     @property
     def x_size(self) -> int:
-        """Columns of X."""
+        """Number of columns of X."""
         return max(block.stop for block in self._x.values())
 
     @property
@@ -147,46 +144,46 @@ class RowLayout:
 
     @property
     def y_phase_change(self) -> slice:
-        """Cycles a frame."""
+        """Change of phase, cycles a frame."""
         return slice(3, 4)
 
     @property
     def y_contacts(self) -> slice:
-        """In the order of CONTACTS, 0 or 1."""
+        """Contacts in the order of CONTACTS, 0 or 1."""
         return slice(4, 8)
 
     @property
     def y_position(self) -> slice:
-        """Future trajectory x then z, root frame of the next frame."""
+        """Future trajectory positions, x then z, in the root frame of the next frame."""
         return slice(8, 8 + 2 * self.future)
 
     @property
     def y_direction(self) -> slice:
-        """Future facing direction x then z."""
+        """Future facing directions, x then z."""
         return slice(8 + 2 * self.future, 8 + 4 * self.future)
 
     @property
     def y_joint_position(self) -> slice:
-        """Joint positions of the present frame, root frame, y less the mean terrain height."""
+        """Joint positions of this frame in its root frame, y minus the mean terrain height."""
         return slice(self.y_direction.stop, self.y_direction.stop + 3 * self.joints)
 
     @property
     def y_joint_velocity(self) -> slice:
-        """Joint velocities of the present frame."""
+        """Joint velocities of this frame, cm a frame."""
         return slice(self.y_joint_position.stop, self.y_joint_position.stop + 3 * self.joints)
 
     @property
     def y_joint_rotation(self) -> slice:
-        """Joint rotations of the present frame in the root frame: axis times half the angle."""
+        """Joint rotations of this frame in its root frame: axis times half the angle."""
         return slice(self.y_joint_velocity.stop, self.y_joint_velocity.stop + 3 * self.joints)
 
     @property
     def y_size(self) -> int:
-        """Columns of Y."""
+        """Number of columns of Y."""
         return self.y_joint_rotation.stop
 
     def blocks(self, prefix: str) -> dict[str, slice]:
-        """Every block of "x" or "y" by name, in column order: {"position": slice(0, 24), ...}."""
+        """All blocks of X ("x") or Y ("y") by name, in column order: {"position": slice(0, 24), ...}."""
         if prefix == "x":
             return {name: block for name, block in self._x.items() if block.stop > block.start}
         names = [n for n in vars(type(self)) if n.startswith("y_") and n != "y_size"]

@@ -206,13 +206,14 @@ class ProceduralAnimation:
             for name, given in told.items()
             if given is not None
         ]
-        before = None if self._terrain[1] is None else Kept(self.state)
+        made = self._controller
+        before = None if self._terrain[1] is None else Kept(self.state, made.root, made.yaw)
         try:
             for columns, values in targets:
                 self.state.told_target[:, columns] = values
             if self._limited:
                 self._holder.hold(self.state.told, velocity, shares)
-            self._controller.frame(velocity, direction, strafe, shares, self._terrain[1])
+            made.frame(velocity, direction, strafe, shares, self._terrain[1])
         except BaseException:
             if before is not None:  # without a ground of the caller's own nothing in a frame can fail
                 before.restore()

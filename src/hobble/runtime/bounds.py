@@ -24,13 +24,17 @@ WILD = 1e8  # nothing in a row is as large; a state that is, is as good as not f
 
 @dataclass(frozen=True)
 class Bounds:
-    """x_low, x_high (X,), y_low, y_high (Y,) float32; fastest: cm a frame that a joint may move."""
+    """x_low, x_high (X,), y_low, y_high (Y,) float32; fastest: cm a frame that a joint may move.
+
+    hips: lowest and highest in training, cm above the ground; no bounds where the file does not tell.
+    """
 
     x_low: Array = field(repr=False)
     x_high: Array = field(repr=False)
     y_low: Array = field(repr=False)
     y_high: Array = field(repr=False)
     fastest: float
+    hips: tuple[float, float] = (-WILD, WILD)
 
     @classmethod
     def of(cls, network: Network) -> Bounds:
@@ -48,7 +52,10 @@ class Bounds:
             x_low[layout.x_channel(name)], x_high[layout.x_channel(name)] = -WILD, WILD
         y_low, on = seen.y_low - y_more, layout.y_phase_change
         y_low[on] = np.maximum(y_low[on], np.minimum(seen.y_low[on], 0.0))  # a gait does not run backwards
-        return cls(x_low, x_high, y_low, seen.y_high + y_more, FASTER * seen.fastest)
+        assert network.skeleton is not None
+        height = layout.y_joint_position.start + 3 * network.skeleton.role("hips") + 1
+        hips = float(seen.y_low[height]), float(seen.y_high[height])
+        return cls(x_low, x_high, y_low, seen.y_high + y_more, FASTER * seen.fastest, hips)
 
 
 @njit
@@ -72,12 +79,13 @@ def keep_within(rows: Any, low: Any, high: Any, wild: Any) -> bool:
 @njit
 def unsound(
     position: Any, direction: Any, gait: Any, joints: Any, velocities: Any, rotations: Any, told: Any,
-    target: Any, facing: Any, owed: Any, hold: Any, lift: Any, added: Any, memory: Any, phase: Any, wild: Any,
+    target: Any, facing: Any, owed: Any, hold: Any, lift: Any, body: Any, added: Any, memory: Any, phase: Any,
+    wild: Any,
 ) -> bool:  # fmt: skip
     """Whether a number of a character's state is not finite or too large; `wild` (C,) says of which."""
     any_wild = False
     for c in range(phase.shape[0]):
-        sound = abs(phase[c]) < WILD
+        sound = abs(phase[c]) < WILD and abs(body[c]) < WILD
         sound &= _sound(position[c]) and _sound(direction[c]) and _sound(gait[c]) and _sound(joints[c])
         sound &= _sound(velocities[c]) and _sound(rotations[c]) and _sound(told[c]) and _sound(target[c])
         sound &= _sound(facing[c]) and _sound(owed[c]) and _sound(hold[c]) and _sound(lift[c])

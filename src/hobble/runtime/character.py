@@ -20,8 +20,9 @@ class Character:
     joint_rotation: (C, J, 4) world: the network's own copy. phase: (C,). told, told_target: (C, K) every
     channel's columns side by side.
     target_velocity, target_direction: (C, 2); strafe: (C,); owed: (C, 2) of `trajectory.follow_wish`.
-    foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2), foot_added (C, 2, 2, 4): of `feet`. memory: (C,
-    M) what the network keeps of it, of `Network.memory`.
+    foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2), foot_added (C, 2, 2, 4),
+    body_lift (C,): of `feet`. placed: (C,) whether joints have been lifted to the ground of the start.
+    memory: (C, M) what the network keeps of it, of `Network.memory`.
     """
 
     position: Array
@@ -43,20 +44,22 @@ class Character:
     foot_hold: Array
     foot_lift: Array
     foot_added: Array
+    body_lift: Array
+    placed: np.ndarray
     memory: Array
 
 
 class Kept:
-    """What a character is now, to be put back where the frame that follows fails."""
+    """What a character is now, with its root and yaw, to be put back where the frame that follows fails."""
 
-    def __init__(self, state: Character) -> None:
-        self._state = state
-        self._arrays = {field.name: getattr(state, field.name).copy() for field in fields(state)}
+    def __init__(self, state: Character, *more: Array) -> None:
+        arrays = (*(getattr(state, field.name) for field in fields(state)), *more)
+        self._arrays = [(array, array.copy()) for array in arrays]
 
     def restore(self) -> None:
         """Write it back, into the arrays in which it was."""
-        for name, array in self._arrays.items():
-            getattr(self._state, name)[...] = array
+        for array, before in self._arrays:
+            array[...] = before
 
 
 def start(network: Network, characters: int, position: Array, yaw: Array) -> Character:
@@ -97,6 +100,8 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         foot_hold=np.zeros((count, 2, 2)),
         foot_lift=np.zeros((count, 2)),
         foot_added=np.tile([1.0, 0.0, 0.0, 0.0], (count, 2, 2, 1)),
+        body_lift=np.zeros(count),
+        placed=np.zeros(count, bool),
         memory=np.zeros((count, network.memory)),
     )
 

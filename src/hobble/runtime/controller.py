@@ -91,7 +91,9 @@ class Controller:
         self._legs = feet.leg_joints(network.skeleton)
         self._carried = feet.carried(network.skeleton, self._legs)
         self._sole = feet.sole_heights(network, self._legs)
-        self._foot_ground = np.zeros((count, 4))
+        self._hips = network.skeleton.role("hips")
+        self._standing = np.append(self._legs[:, 2:].reshape(-1), self._hips)
+        self._under = np.zeros((count, len(self._standing)))
         self._warned = False
 
     def frame(
@@ -108,8 +110,8 @@ class Controller:
         c = self.character
         if unsound(
             c.position, c.direction, c.gait, c.joint_position, c.joint_velocity, c.joint_rotation, c.told,
-            c.target_velocity, c.target_direction, c.owed, c.foot_hold, c.foot_lift, c.foot_added, c.memory,
-            c.phase, self._wild,
+            c.target_velocity, c.target_direction, c.owed, c.foot_hold, c.foot_lift, c.body_lift,
+            c.foot_added, c.memory, c.phase, self._wild,
         ):  # fmt: skip
             self._restore("the state")
         self._prepare(wish_velocity, wish_direction, wish_strafe, wish_gait, ground)
@@ -137,9 +139,6 @@ class Controller:
         for part in fields(fresh):
             if part.name != "told_target":
                 getattr(self.character, part.name)[some] = getattr(fresh, part.name)
-        lifted = self.root[some, 1]
-        self.character.joint_position[some, :, 1] += lifted[:, None]
-        self.character.root_height[some] = lifted
 
     def _warn(self, what: str) -> None:
         if not self._warned:
@@ -166,6 +165,11 @@ class Controller:
             level = self._points.reshape(-1, 2)
             c.ground[:] = _heights(ground, level[:, 0], level[:, 1]).reshape(c.ground.shape)
         trajectory.stand_on(c.ground, c.root_height)
+        if not c.placed.all():  # where a figure starts the ground may be anywhere
+            new = ~c.placed
+            c.joint_position[new, :, 1] += c.root_height[new, None]
+            self.root[new, 1] = c.root_height[new]
+            c.placed[:] = True
 
     def _input(self) -> None:
         c = self.character
@@ -182,13 +186,17 @@ class Controller:
             self.pose_position, self.pose_rotation,
         )  # fmt: skip
         if ground is not None:
-            points = self.pose_position[:, self._legs[:, 2:].reshape(-1)]
-            at = np.ascontiguousarray(points).reshape(-1, 3)
-            self._foot_ground[:] = _heights(ground, at[:, 0], at[:, 2]).reshape(self._foot_ground.shape)
+            at = np.ascontiguousarray(self.pose_position[:, self._standing]).reshape(-1, 3)
+            self._under[:] = _heights(ground, at[:, 0], at[:, 2]).reshape(self._under.shape)
         else:
-            self._foot_ground[:] = 0.0
+            self._under[:] = 0.0
+        contacts = self.layout.y_contacts.start
+        feet.carry_body(
+            self.y, contacts, self._under, self._hips, *self.bounds.hips, self._legs, self._sole,
+            c.body_lift, self.pose_position,
+        )  # fmt: skip
         feet.place_feet(
-            self.y, self.layout.y_contacts.start, self._foot_ground, self.foot_locking, self._legs,
+            self.y, contacts, self._under, self.foot_locking, self._legs,
             self._carried, self._sole, c.foot_lock, c.foot_hold, c.foot_lift, c.foot_added,
             self.pose_position, self.pose_rotation,
         )  # fmt: skip

@@ -18,6 +18,9 @@ HEIGHT_MIX = 0.5
 # Radians a frame that placing a foot may turn thigh and shank further than the network does. One frame in
 # 2,000 needs more, where a leg snapped by up to 148 degrees; now the foot arrives some frames later.
 MOST_ADDED = float(np.radians(28))
+BODY_MIX = 0.15  # a frame, of what the whole figure is still to be raised or lowered by
+BODY_FREE = 3.0  # centimetres that standing feet may be off the ground before the figure follows
+BODY_FROM = 0.3  # sum of the contacts of both feet below which nothing is known of the ground
 FLOATING = 3.0  # centimetres above SOLE that a standing foot may be, as rigs differ
 SOLE = (5.0, 4.0)  # centimetres of heel and toe joint above the ground under a standing foot
 
@@ -156,6 +159,44 @@ def bend(position: Any, rotation: Any, hip: int, knee: int, heel: int, shift: An
 
 
 @njit
+def sunk(position: Any, heel: int, toe: int, ground_heel: float, ground_toe: float, sole: Any) -> float:
+    """Centimetres that a foot of a pose (J, 3) is in the ground; below 0, how far it is above."""
+    heel_sunk = ground_heel + sole[0] - position[heel, 1]
+    toe_sunk = ground_toe + sole[1] - position[toe, 1]
+    return max(heel_sunk, toe_sunk)
+
+
+@njit
+def carry_body(
+    y: Any, first: int, ground: Any, hips: int, hips_low: float, hips_high: float, legs: Any, sole: Any,
+    lift: Any, position: Any,
+) -> None:  # fmt: skip
+    """Raise or lower whole figures, positions (C, J, 3), so that they stand on the ground that is under them.
+
+    The network knows the ground by the mean height along two seconds of path. On a hill of a few metres this
+    is 30 cm off, and a network that saw gentler hills does not make up for it: legs fold, or hang in the air.
+    So the figure goes where its standing feet say, and its hips stay as far above the ground as they were in
+    training. ground: (C, 5) heights under the feet as of `place_feet`, then under the hips; hips_low,
+    hips_high: the range of the hips; lift: (C,) cm that the figure is raised by, kept from frame to frame;
+    the rest as of `place_feet`.
+    """
+    for c in range(position.shape[0]):
+        wanted, weight = 0.0, 0.0
+        for f in range(2):
+            under = ground[c, 2 * f], ground[c, 2 * f + 1]
+            rise = sunk(position[c], legs[f, 2], legs[f, 3], under[0], under[1], sole)
+            stands = min(max(y[c, first + 2 * f], y[c, first + 2 * f + 1], 0.0), 1.0)
+            wanted += stands * (max(rise - BODY_FREE, 0.0) + min(rise + BODY_FREE, 0.0))
+            weight += stands
+        if weight > BODY_FROM:
+            lift[c] += BODY_MIX * (wanted / weight - lift[c])
+        above = position[c, hips, 1] - ground[c, 4]
+        lift[c] = min(max(lift[c], hips_low - above), hips_high - above)
+        for j in range(position.shape[1]):
+            position[c, j, 1] += lift[c]
+
+
+@njit
 def place_feet(
     y: Any, first: int, ground: Any, locking: bool, legs: Any, below: Any, sole: Any,
     lock: Any, hold: Any, lift: Any, added: Any, position: Any, rotation: Any,
@@ -163,9 +204,9 @@ def place_feet(
     """Hold feet in contact and keep feet out of the ground; changes the pose and the state of the feet.
 
     y: (C, outputs), whose columns from `first` on are the contacts of left heel, left toe, right heel, right
-    toe. ground: (C, 4) heights under them. legs: (2, 4) of `leg_joints`; below: (2, J) bool of `carried`;
-    sole: (2,) of `sole_heights`. lock (C, 2) share of the hold; hold (C, 2, 2) x, z where the toe landed;
-    lift (C, 2) smoothed rise of the heel; added (C, 2, 2, 4) of `bend`.
+    toe. ground: (C, 4 or more) heights under them. legs: (2, 4) of `leg_joints`; below: (2, J) bool of
+    `carried`; sole: (2,) of `sole_heights`. lock (C, 2) share of the hold; hold (C, 2, 2) x, z where the
+    toe landed; lift (C, 2) smoothed rise of the heel; added (C, 2, 2, 4) of `bend`.
     """
     shift = np.zeros(3)
     for c in range(position.shape[0]):
@@ -184,10 +225,8 @@ def place_feet(
                 lock[c, f] = 1.0
             else:
                 lock[c, f] = max(0.0, lock[c, f] - RELEASE)
-            heel_sunk = ground[c, 2 * f] + sole[0] - position[c, heel, 1]
-            toe_sunk = ground[c, 2 * f + 1] + sole[1] - position[c, toe, 1]
             # Up out of the ground; down to it too for a foot that should stand and floats.
-            rise = max(heel_sunk, toe_sunk)
+            rise = sunk(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
             rise = max(rise, 0.0) + lock[c, f] * min(rise + FLOATING, 0.0)
             lift[c, f] += HEIGHT_MIX * (rise - lift[c, f])
             shift[0], shift[1], shift[2] = lock[c, f] * away_x, lift[c, f], lock[c, f] * away_z

@@ -1,1 +1,1 @@
-"""Ground under the clips: heightmaps, patches drawn from them, and the ten that fit each locomotion cycle."""
+"""Ground under the clips: heightmaps, patches cut from them, and the ten patches that fit each cycle best."""

@@ -1,4 +1,4 @@
-"""The terrain of one clip: heights at the trajectory's sample points under each cycle, for each fit."""
+"""The terrain of one clip: ground heights at the trajectory samples under each cycle, for each fit."""
 
 from __future__ import annotations
 
@@ -15,24 +15,25 @@ from hobble.core.errors import InputError
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import RootFrames, continued, root_frames
-from hobble.terrain.feet import Feet, Mask, feet_of, held_up
 from hobble.terrain.ground import Ground, fit_cycle, flat_ground
 from hobble.terrain.options import Fitting, Sampling
 from hobble.terrain.patches import Patches
 from hobble.terrain.picture import Picture, picture_cycles, picture_of
+from hobble.terrain.soles import Feet, Mask, find_soles, held_above_other
 
 log = logging.getLogger("hobble.terrain")
 
 
 @dataclass(frozen=True)
 class ClipFits:
-    """The fits of C cycles, R rows in all; row r has fits[r] = K fits, whose heights lie together.
+    """The terrain fits of a clip with C cycles and R rows. Row r has fits[r] fits.
 
-    frame, cycle, fits: (R,). heights: (sum of fits, 36): to the left, centre, to the right of 12 samples, cm
-    in the clip's world. patch, error: (C, 10); -1 and 0 on flat ground. foot_error: (C, 10, 2) mean and
-    largest distance of a foot in contact from its ground. foot_below: (C, 10) how far the lowest foot is
-    below the ground, contact or not, 0 where none is. heel_height, toe_height: of the joints above their
-    soles.
+    frame, cycle, fits: (R,). heights: (sum of fits, 36) cm in the clip's world, for 12 samples to the left,
+    in the centre and to the right; the fits of a row are consecutive.
+    patch, error: (C, 10) patch of each fit and its error; -1 and 0 on flat ground.
+    foot_error: (C, 10, 2) mean and largest distance of a foot in contact from the ground, cm.
+    foot_below: (C, 10) how far the lowest foot, in contact or not, is below the ground, cm; at least 0.
+    heel_height, toe_height: height of these joints above their soles, cm.
     """
 
     frame: np.ndarray = field(repr=False)
@@ -59,7 +60,7 @@ def clip_fits(
     """Fit the ground under every cycle of a clip.
 
     labels: `contacts` (F, 4) and `cycles` (C, 2). ground: "flat", "rocky", "jumpy" or "beam".
-    Raises InputError where the labels do not belong to the clip.
+    Raises InputError if the labels do not belong to the clip.
     """
     cycles, contacts = np.asarray(labels["cycles"], int), np.asarray(labels["contacts"], bool)
     window = sampling.window
@@ -71,14 +72,14 @@ def clip_fits(
         )
     root = continued(root_frames(clip, sampling.facing_sigma), window)
     samples = sample_points(root, sampling.terrain_side)
-    feet = _feet(clip, contacts, cycles, window, ground == "flat", options)
+    feet = _standing_feet(clip, contacts, cycles, window, ground == "flat", options)
     offsets = np.arange(-window, window, sampling.step)
     heights: list[Array] = [np.zeros((0, 3 * len(offsets)))]
     fitted, pictures = [], []
     shown = picture_cycles(len(cycles))
     for c, (start, end) in enumerate(cycles):
-        around = _around(start, end, window, len(clip))
-        fit = _ground(feet, around, samples[:, window:-window], patches, ground, options)
+        around = _fitted_frames(start, end, window, len(clip))
+        fit = _fit_ground(feet, around, samples[:, window:-window], patches, ground, options)
         heights.append(heights_under(fit, samples, start + window, end + window, offsets))
         fitted.append((fit, feet.soles[around], feet.contacts[around]))
         if c in shown and np.any(heights[-1]):
@@ -89,35 +90,37 @@ def clip_fits(
         cycle=cycle,
         fits=np.array([len(fit.chosen) for fit, _, _ in fitted], np.int32)[cycle],
         heights=np.concatenate(heights).astype(np.float32),
-        **_accounts(fitted, options.fits),
+        **_fit_statistics(fitted, options.fits),
         heel_height=feet.heel_height,
         toe_height=feet.toe_height,
         pictures=tuple(pictures),
     )
-    _warn(clip.name, fits, options.deepest)
+    _warn_if_off_ground(clip.name, fits, options.deepest)
     return fits
 
 
-def _warn(name: str, fits: ClipFits, deepest: float | None) -> None:
-    """Say it where the ground is not where the feet are."""
+def _warn_if_off_ground(name: str, fits: ClipFits, deepest: float | None) -> None:
+    """Log a warning if the feet are far from the ground."""
     if deepest is None or not len(fits.patch):
         return
     mean, below = float(fits.foot_error[..., 0].mean()), float(fits.foot_below.max())
     if max(mean, below) > 1.001 * deepest:
-        text = "%s: feet in contact are %.2f cm from their ground on average, the deepest foot %.2f cm in it"
+        text = "%s: feet in contact are %.2f cm from the ground on average; the lowest is %.2f cm below it"
         log.warning(text, name, mean, below)
 
 
-def _feet(clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: Fitting) -> Feet:
-    """Soles, and contacts that are on the ground.
+def _standing_feet(
+    clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: bool, options: Fitting
+) -> Feet:
+    """The soles of a clip, and which of them stand on the ground.
 
-    On flat ground a heel that is held up, still, over its standing toe may not be. Where no foot stands all
-    through a cycle, its lowest points count as contacts.
+    On flat ground a heel in contact that is more than `held_up` above its toe does not count. If a cycle has
+    no contact at all, the lowest 5 % of its sole positions count.
     """
     counted = np.zeros(len(clip), bool)
     for start, end in cycles:
-        counted[_around(start, end, window, len(clip))] = True
-    feet = feet_of(
+        counted[_fitted_frames(start, end, window, len(clip))] = True
+    feet = find_soles(
         clip,
         contacts,
         np.flatnonzero(counted),
@@ -129,26 +132,26 @@ def _feet(clip: Clip, contacts: Mask, cycles: np.ndarray, window: int, flat: boo
     )
     contacts = feet.contacts.copy()
     if flat and options.held_up is not None:
-        contacts &= ~held_up(feet, options.held_up)
+        contacts &= ~held_above_other(feet, options.held_up)
     for start, end in cycles:
-        around = _around(start, end, window, len(clip))
+        around = _fitted_frames(start, end, window, len(clip))
         if not contacts[around].any():
-            log.warning("%s: no foot stands in frames %d to %d; the lowest count", clip.name, start, end)
+            text = "%s: no contact in frames %d to %d; the lowest positions of the feet are used"
+            log.warning(text, clip.name, start, end)
             height = feet.soles[around][..., 1]
             contacts[around] = height <= np.quantile(height, 0.05)
     return replace(feet, contacts=contacts)
 
 
-def _around(start: int, end: int, window: int, frames: int) -> slice:
-    """The frames that a cycle is fitted over: its own, both ends included, and a window to each side, of
-    those that the clip has."""
+def _fitted_frames(start: int, end: int, window: int, frames: int) -> slice:
+    """The frames that a cycle is fitted to: start to end inclusive, plus the window, within the clip."""
     return slice(max(start - window, 0), min(end + window + 1, frames))
 
 
-def _ground(
+def _fit_ground(
     feet: Feet, around: slice, samples: Array, patches: Patches, kind: str, options: Fitting
 ) -> Ground:
-    """The fits of the cycle that, with its window, takes the frames `around`."""
+    """The fits of one cycle. around: its frames, with the window on both sides."""
     soles, contacts = feet.soles[around], feet.contacts[around]
     smoothing, deepest = options.smoothing, options.deepest
     if kind == "flat":
@@ -171,8 +174,8 @@ def _ground(
     )
 
 
-def _accounts(fitted: Sequence[tuple[Ground, Array, Mask]], fits: int) -> dict[str, Any]:
-    """What is told of every fit of every cycle; a single fit is told as often as the others' `fits`."""
+def _fit_statistics(fitted: Sequence[tuple[Ground, Array, Mask]], fits: int) -> dict[str, Any]:
+    """Patch and errors of each fit of each cycle, for `ClipFits`. A single fit is repeated `fits` times."""
     patch, error = np.zeros((len(fitted), fits), np.int32), np.zeros((len(fitted), fits), np.float32)
     foot_error, foot_below = np.zeros((*error.shape, 2), np.float32), np.zeros_like(error)
     for c, (ground, soles, contacts) in enumerate(fitted):
@@ -185,13 +188,13 @@ def _accounts(fitted: Sequence[tuple[Ground, Array, Mask]], fits: int) -> dict[s
 
 
 def sample_points(root: RootFrames, side: float) -> Array:
-    """(3, F, 2) x and z of the points `side` cm to the left of the root, at it, and to the right of it."""
+    """(3, F, 2) x and z of the points `side` cm to the left of the root, at the root, and to its right."""
     left = root.direction[:, [2, 0]] * np.array([1.0, -1.0])
     return np.stack([root.position + side * left, root.position, root.position - side * left])
 
 
 def heights_under(ground: Ground, samples: Array, start: int, end: int, offsets: np.ndarray) -> Array:
-    """(rows of the cycle times fits, 3 times samples); every point of the path is looked at once."""
+    """Heights (rows of the cycle * fits, 3 * samples). Each point of the path is looked up only once."""
     first, last = start + offsets[0], end + offsets[-1]
     points = samples[:, first : last + 1]
     heights = ground.at(points.reshape(-1, 2)).reshape(-1, 3, points.shape[1])
@@ -213,21 +216,21 @@ def _check(clip: Clip, cycles: np.ndarray, contacts: Mask) -> None:
     if contacts.shape != (len(clip), 4):
         raise InputError(
             clip.name,
-            f"labels have contacts of shape {contacts.shape} for {len(clip)} frames",
+            f"the contacts have shape {contacts.shape}, but the clip has {len(clip)} frames",
             fix="Make both again from the same clip.",
         )
     for start, end in cycles:
         if not 0 <= start < end < len(clip):
             raise InputError(
                 clip.name,
-                f"the cycle of frames {start} to {end} does not lie in the clip's {len(clip)}",
+                f"a cycle has frames {start} to {end}, but the clip has {len(clip)} frames",
                 frame=int(start),
                 fix="Make both again from the same clip.",
             )
 
 
 def save_fits(path: str | Path, fits: ClipFits) -> None:
-    """Write the fits as one npz, with what a `Picture` holds under picture0_x, picture0_z, ..., ...."""
+    """Write the fits as one npz. The pictures are in picture0_x, picture0_z, ..., picture1_x."""
     arrays = {f.name: np.asarray(getattr(fits, f.name)) for f in fields(fits) if f.name != "pictures"}
     for k, picture in enumerate(fits.pictures):
         arrays |= {f"picture{k}_{f.name}": np.asarray(getattr(picture, f.name)) for f in fields(picture)}

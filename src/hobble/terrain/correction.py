@@ -1,7 +1,7 @@
-"""What a patch still lacks after it was chosen: the ground is bent so that it meets the feet.
+"""Corrects the chosen patch so that the ground meets the feet.
 
-First the original's way: the residual at the contacts is added as a surface of radial basis functions. Then,
-where a foot is still below the ground, the ground is dug out around it.
+First, as in the original, a surface of radial basis functions is fitted to the residual at the contacts and
+added. Then the ground is lowered around feet that are still below it.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.terrain.feet import Mask
+from hobble.terrain.soles import Mask
 
-STEEPNESS = 2.0  # cm of height per cm: the walls of what is dug out
-LESS_SMOOTH = 8  # times, by a quarter each, a surface is made anew that leaves too much
+WALL_STEEPNESS = 2.0  # of the walls of a pit, cm per cm
+MAX_REFITS = 8  # a surface that leaves too much residual is fitted again with a quarter of the smoothing
 
 
 @dataclass(frozen=True)
 class Stances:
-    """Contacts gathered into N points: a foot that stands for 30 frames is one point that counts 30 times.
+    """Contacts of feet, gathered into N points. A foot that stands for several frames is one point.
 
-    place: (N, 2) x and z; height: (N,) of the sole; count: (N,) frames.
+    place: (N, 2) x and z, cm. height: (N,) of the sole, cm. count: (N,) number of frames, used as a weight.
     """
 
     place: Array = field(repr=False)
@@ -29,10 +29,10 @@ class Stances:
     count: Array = field(repr=False)
 
 
-def stances(soles: Array, contacts: Mask, longest: int) -> Stances:
-    """Gather the runs of each joint in which `contacts` is true, cut into pieces of at most `longest` frames.
+def gather_stances(soles: Array, contacts: Mask, longest: int) -> Stances:
+    """Average the sole of each joint over each run of contact frames; longer runs are cut.
 
-    soles: (T, 4, 3). contacts: (T, 4) bool.
+    soles: (T, 4, 3). contacts: (T, 4) bool. longest: most frames of one point.
     """
     frame, joint = np.nonzero(contacts)
     order = np.lexsort((frame, joint))
@@ -49,8 +49,8 @@ def stances(soles: Array, contacts: Mask, longest: int) -> Stances:
     return Stances(np.stack([mean[0], mean[2]], axis=1), mean[1], count.astype(float))
 
 
-def together(a: Stances, b: Stances) -> Stances:
-    """The points of both."""
+def joined(a: Stances, b: Stances) -> Stances:
+    """The points of `a`, then those of `b`."""
     return Stances(
         np.concatenate([a.place, b.place]),
         np.concatenate([a.height, b.height]),
@@ -59,10 +59,10 @@ def together(a: Stances, b: Stances) -> Stances:
 
 
 @dataclass(frozen=True)
-class Bend:
-    """A surface of radial basis functions phi(r) = r / spread about N places.
+class Surface:
+    """A surface of radial basis functions phi(r) = r / spread around N places.
 
-    places: (N, 2) x and z. weights: (N,). spread: the mean distance of the places, cm.
+    places: (N, 2) x and z, cm. weights: (N,). spread: mean distance between the places, cm.
     """
 
     places: Array = field(repr=False)
@@ -76,44 +76,48 @@ class Bend:
         return distance_sum(*_columns(points), *_columns(self.places), self.weights / self.spread)
 
 
-def bends(
+def fit_surfaces(
     points: Stances, residual: Array, smoothing: float, most: float | None = None, standing: int | None = None
-) -> list[Bend]:
-    """The surfaces through each row of `residual` (K, N) at N points, regularised by `smoothing`.
+) -> list[Surface]:
+    """One surface for each row of `residual` (K, N) at N points, regularised by `smoothing`.
 
-    A point that counts m times has a diagonal of smoothing / m, and weighs m in the mean distance: that is
-    exactly what m points at one place come to. most: a surface that leaves more than this at the points on
-    average (cm), as under feet that stand half a metre beside a beam, is smoothed less. standing: only the
-    first so many points are looked at for that.
+    A point with count m has the diagonal smoothing / m and the weight m in the mean distance. This gives
+    exactly the surface of m points at one place.
+    most: if a surface leaves more than this on average at the points (cm), for example under feet that stand
+    half a metre beside a beam, it is fitted again with less smoothing. standing: the average is over only the
+    first `standing` points.
     """
     apart = distances(points.place, points.place)
     spread = float(points.count @ apart @ points.count / points.count.sum() ** 2)
     if spread < 1e-6:
-        return [Bend(points.place[:1], np.zeros(1), 1.0)] * len(residual)
+        return [Surface(points.place[:1], np.zeros(1), 1.0)] * len(residual)
     diagonal = smoothing / points.count
     weights = np.linalg.solve(apart / spread - np.diag(diagonal), residual.T).T
     share = points.count[:standing] / points.count[:standing].sum()
     rough = np.arange(len(residual)) if most is not None else np.zeros(0, int)
-    for _ in range(LESS_SMOOTH):
-        left = np.sum(np.abs(weights[rough] * diagonal)[:, :standing] * share, axis=1)  # of the residual
+    for _ in range(MAX_REFITS):
+        left = np.sum(np.abs(weights[rough] * diagonal)[:, :standing] * share, axis=1)  # mean residual, cm
         rough = rough[left > (most or 0.0)]
         if not len(rough):
             break
         diagonal = diagonal / 4
         weights[rough] = np.linalg.solve(apart / spread - np.diag(diagonal), residual[rough].T).T
-    return [Bend(points.place, w, spread) for w in weights]
+    return [Surface(points.place, w, spread) for w in weights]
 
 
 @dataclass(frozen=True)
 class Pits:
-    """Cones that the ground is dug out to: N places (N, 2), heights (N,) and steepness (N,) in cm per cm."""
+    """Cones, open at the top, that cut into the ground.
+
+    places: (N, 2) x and z of the tips, cm. heights: (N,) of the tips, cm. steepness: (N,) cm per cm.
+    """
 
     places: Array = field(repr=False)
     heights: Array = field(repr=False)
     steepness: Array = field(repr=False)
 
     def of(self, ground: Array, points: Array) -> Array:
-        """Ground (M,) at points (M, 2), lowered to the cones where it is above them."""
+        """Heights (M,) of the ground at points (M, 2), lowered to the cones where it is above them."""
         from hobble.terrain.kernels import lowest_cone
 
         if not len(self.places):
@@ -122,19 +126,19 @@ class Pits:
         return np.minimum(ground, cones)
 
 
-def pits(soles: Array, standing: Stances, depth: float) -> Pits:
-    """What lets soles (N, 3) be no more than `depth` cm below the ground.
+def dig_pits(soles: Array, standing: Stances, depth: float) -> Pits:
+    """Pits that leave soles (N, 3) no more than `depth` cm below the ground.
 
-    As steep as they must be to leave alone the ground under feet that stand beside them, on a step say.
+    Their walls are steep enough that the ground under other standing feet, such as on a step, stays.
     """
     places, heights = soles[:, [0, 2]], soles[:, 1] + depth
     apart = np.maximum(distances(places, standing.place), 1e-3)
     needed = ((standing.height - heights[:, None]) / apart).max(axis=1)
-    return Pits(places, heights, np.maximum(needed, STEEPNESS))
+    return Pits(places, heights, np.maximum(needed, WALL_STEEPNESS))
 
 
 def distances(a: Array, b: Array) -> Array:
-    """(M, 2) and (N, 2) -> (M, N)."""
+    """Distances (M, N) between points a (M, 2) and b (N, 2)."""
     x, z = a[:, None, 0] - b[None, :, 0], a[:, None, 1] - b[None, :, 1]
     return np.sqrt(x * x + z * z)
 

@@ -1,6 +1,6 @@
-"""Generated ground: fractal noise, hills, stairs, slopes, boxes and beams, seeded.
+"""Generated ground: fractal noise, hills, stairs, slopes, boxes and beams, from a seed.
 
-Heights are such that most patches of five by five metres stay within half a metre of their mean.
+Heights are chosen so that most patches of 5 x 5 m stay within 50 cm of their mean.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ CELLS = 400
 
 
 def generate(kind: str, seed: int, cell: float) -> Array:
-    """Heights (400, 400) in cm of one kind of ground; `cell` in cm. Equal seeds give equal ground."""
+    """Heights (400, 400) of one kind of ground, cm. cell: width of a cell, cm. Equal seeds, equal ground."""
     rng = np.random.default_rng([zlib.crc32(kind.encode()), seed])
     return KINDS[kind](rng, cell)
 
 
 def fractal(rng: np.random.Generator, cell: float) -> Array:
-    """Noise whose amplitude falls with the square of its frequency: rough soil, no wave longer than 8 m."""
+    """Noise with an amplitude of 1 / frequency², like rough soil; waves longer than 8 m get no larger."""
     frequency = np.hypot(np.fft.fftfreq(CELLS, cell)[:, None], np.fft.rfftfreq(CELLS, cell))
     amplitude = 1 / np.maximum(frequency, 1 / 800) ** 2
     amplitude[0, 0] = 0
@@ -42,7 +42,7 @@ def hills(rng: np.random.Generator, cell: float) -> Array:
 
 
 def stairs(rng: np.random.Generator, cell: float) -> Array:
-    """Flights of three to five steps up and down again between landings, in lanes side by side."""
+    """Lanes side by side with flights of 3 to 5 steps up, a landing, the flight down again, and so on."""
     heights = np.zeros((CELLS, CELLS))
     along = np.arange(CELLS) * cell
     lane = 0
@@ -67,7 +67,7 @@ def stairs(rng: np.random.Generator, cell: float) -> Array:
 
 
 def slope(rng: np.random.Generator, cell: float) -> Array:
-    """Ramps of up to 12 degrees that bend every one to four metres, with a fall of up to 5 degrees across."""
+    """Ramps of 2 to 12 degrees that change every 1 to 4 m, tilted sideways by up to 5 degrees."""
     along = np.arange(CELLS) * cell
     knots, levels = [0.0], [0.0]
     while knots[-1] < along[-1]:
@@ -80,7 +80,7 @@ def slope(rng: np.random.Generator, cell: float) -> Array:
 
 
 def boxes(rng: np.random.Generator, cell: float) -> Array:
-    """Boxes of 5 to 45 cm to step and jump on, on a floor that is otherwise flat."""
+    """Boxes 5 to 45 cm high on a flat floor, to step and jump on."""
     heights = np.zeros((CELLS, CELLS))
     for _ in range(110):
         rows, columns = (rng.uniform(40, 180, 2) / cell).astype(int)
@@ -90,7 +90,7 @@ def boxes(rng: np.random.Generator, cell: float) -> Array:
 
 
 def beams(rng: np.random.Generator, cell: float) -> Array:
-    """Beams 20 to 35 cm wide, 45 to 55 cm above the floor, lying across one another."""
+    """Crossing beams, 20 to 35 cm wide and 45 to 55 cm above the floor."""
     x, z = _grid(cell)
     heights = np.zeros_like(x)
     for _ in range(9):

@@ -1,4 +1,4 @@
-"""The ground under one cycle: the patches that fit it best, each bent to meet the feet."""
+"""The ground under one cycle: the patches that fit it best, corrected to meet the feet."""
 
 from __future__ import annotations
 
@@ -8,23 +8,32 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.terrain.correction import Bend, Pits, Stances, bends, distances, pits, stances, together
-from hobble.terrain.feet import Mask
+from hobble.terrain.correction import (
+    Pits,
+    Stances,
+    Surface,
+    dig_pits,
+    distances,
+    fit_surfaces,
+    gather_stances,
+    joined,
+)
 from hobble.terrain.patches import Patches
+from hobble.terrain.soles import Mask
 
-PIECE = 8  # frames of a stance that are one point
-FINE_PIECE = 4  # likewise of a foot that is below the ground
-BESIDE = (35.0, 50.0)  # cm from the path, to each side
-NEAREST = 25.0  # cm that these keep from the rest of the path
+STANCE_PIECE = 8  # most frames of a stance that become one point
+COVERED_PIECE = 4  # the same for feet below the ground
+BESIDE_CM = (35.0, 50.0)  # distances from the path at which a beam must have no ground
+PATH_CLEARANCE_CM = 25.0  # such points closer than this to another part of the path are left out
 
 
 @dataclass(frozen=True)
 class Ground:
-    """K fits of one cycle: functions of the ground's x and z.
+    """The ground of K fits of one cycle.
 
-    patches: None for flat ground. chosen, error: (K,) patches and their errors, the best first. centre: (2,)
-    where the patches lie. level: (K,) what is added to a patch. surfaces: for each fit what is added to meet
-    the feet. dug: for each fit what is dug out of it.
+    patches: None for flat ground. chosen, error: (K,) the patches and their errors, best first.
+    centre: (2,) x and z of the middle of the patches. level: (K,) height added to each patch, cm.
+    surfaces: for each fit, the surface that is added to meet the feet. dug: for each fit, the pits in it.
     """
 
     patches: Patches | None = field(repr=False)
@@ -32,11 +41,11 @@ class Ground:
     error: Array
     centre: Array = field(repr=False)
     level: Array = field(repr=False)
-    surfaces: Sequence[Bend] = field(default=(), repr=False)
+    surfaces: Sequence[Surface] = field(default=(), repr=False)
     dug: Sequence[Pits] = field(default=(), repr=False)
 
     def at(self, points: Array) -> Array:
-        """Heights (K, M) at world points (M, 2) x and z, cm."""
+        """Heights (K, M), cm, at world points (M, 2), x and z."""
         heights = np.tile(self.level[:, None], len(points))
         if self.patches is not None:
             heights += self.patches.at(self.chosen, self.patches.cells(points, self.centre))
@@ -47,7 +56,7 @@ class Ground:
         return heights
 
     def above(self, soles: Array) -> Array:
-        """How far the ground is above each sole (..., 3), (K, ...), cm; below it where negative."""
+        """(K, ...) height of the ground above each sole (..., 3), cm. Negative: the sole is above it."""
         heights = self.at(soles[..., [0, 2]].reshape(-1, 2))
         return heights.reshape(-1, *soles.shape[:-1]) - soles[..., 1]
 
@@ -64,14 +73,17 @@ def fit_cycle(
     smoothing: float,
     deepest: float | None,
 ) -> Ground:
-    """Fit the ground under one cycle and the window about it.
+    """Fit the ground under one cycle and its window.
 
-    soles: (T, 4, 3) of heels and toes, cm. contacts: (T, 4) bool, some of them true. path: (T, 2) x and z
-    of the root; sides: (T, 2) the unit vector to the left. kind: "rocky", "jumpy" or "beam", what the error
-    asks for besides. smoothing: of the residual's radial basis functions. deepest: no foot may go further
-    below the ground (cm); None asks nothing.
+    soles: (T, 4, 3) of heels and toes, cm. contacts: (T, 4) bool, at least one true. path: (T, 2) x and z of
+    the root. sides: (T, 2) unit vectors to the left. kind: "rocky", "jumpy" or "beam"; the last two add terms
+    to the error. smoothing: of the residual's radial basis functions. deepest: how far a foot may be below
+    the ground, cm; None for no limit.
     """
-    from hobble.terrain.search import Footing, best_patches  # compiled: flat clips need none of it
+    from hobble.terrain.search import (  # loads compiled code, which flat clips don't need
+        Footing,
+        best_patches,
+    )
 
     where, height = soles[..., [0, 2]], soles[..., 1]
     centre, level = where[contacts].mean(axis=0), height[contacts].mean()
@@ -88,14 +100,13 @@ def fit_cycle(
 def flat_ground(
     soles: Array, contacts: Mask, level: str, *, smoothing: float, deepest: float | None, bent: bool
 ) -> Ground:
-    """Flat ground: one fit. It lies at zero or, if `level` is "feet", at the mean height of soles in contact.
+    """Flat ground, with one fit.
 
-    That is as in the original, whose stretch of frames has no velocity in the last: the contacts of the frame
-    before count there once more.
+    level: "zero", or "feet" for the mean height of the soles in contact, as in the original. The original
+    has no velocity in the last frame, so the contacts of the frame before it are used there.
 
-    If `bent`: where a foot is further below it than `deepest` (cm) it is dug out, and where the feet in
-    contact are further from it than that on average, since the floor or the capture was uneven, it is bent
-    to meet them.
+    bent: correct the ground. If the feet in contact are more than `deepest` cm from it on average (an uneven
+    floor or capture), a surface is added. Otherwise pits are dug under feet more than `deepest` below it.
     """
     heights = soles[..., 1]
     held = np.concatenate([contacts[:-1], contacts[-2:-1]])
@@ -105,24 +116,24 @@ def flat_ground(
         return plain
     if np.abs(heights[contacts] - zero).mean() > deepest:
         return meet_feet(plain, soles, contacts, smoothing, deepest)
-    return replace(plain, dug=_dug(plain, soles, stances(soles, contacts, PIECE), deepest))
+    return replace(plain, dug=_dug(plain, soles, gather_stances(soles, contacts, STANCE_PIECE), deepest))
 
 
 def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, deepest: float | None) -> Ground:
-    """Add the surface of what is left between the ground and the feet in contact, as smooth as leaves no more
-    than half of `deepest` on average.
+    """Correct the ground so that it meets the feet in contact.
 
-    Feet that are then below the ground (by more than half of `deepest`) join those points, and the surface is
-    made again; where it still covers a foot by more than `deepest` it is dug out.
+    A surface is fitted to the residual at the contacts, smooth but with at most deepest / 2 left on average.
+    Feet that are then more than deepest / 2 below the ground are added to its points, and it is fitted again.
+    Feet that are still more than `deepest` below the ground get pits.
     """
-    standing = stances(soles, contacts, PIECE)
+    standing = gather_stances(soles, contacts, STANCE_PIECE)
     residual = standing.height - plain.at(standing.place)
     most = None if deepest is None else deepest / 2
-    ground = replace(plain, surfaces=bends(standing, residual, smoothing, most))
+    ground = replace(plain, surfaces=fit_surfaces(standing, residual, smoothing, most))
     if deepest is None:
         return ground
     surfaces = [
-        _joined(plain, k, standing, stances(soles, c & ~contacts, FINE_PIECE), smoothing, most)
+        _refitted(plain, k, standing, gather_stances(soles, c & ~contacts, COVERED_PIECE), smoothing, most)
         if c.any()
         else same
         for k, (c, same) in enumerate(zip(ground.above(soles) > deepest / 2, ground.surfaces, strict=True))
@@ -132,22 +143,22 @@ def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, dee
 
 
 def _dug(ground: Ground, soles: Array, standing: Stances, deepest: float) -> list[Pits]:
-    """For each fit what lets through the feet that are further below it than `deepest`, to half of that."""
-    return [pits(soles[covered], standing, deepest / 2) for covered in ground.above(soles) > deepest]
+    """For each fit, pits for the feet more than `deepest` below it. They leave them deepest / 2 below."""
+    return [dig_pits(soles[covered], standing, deepest / 2) for covered in ground.above(soles) > deepest]
 
 
-def _joined(
+def _refitted(
     plain: Ground, k: int, standing: Stances, covered: Stances, smoothing: float, most: float | None
-) -> Bend:
-    """The surface of fit k through the feet in contact and through those that it covered."""
-    points = together(standing, covered)
+) -> Surface:
+    """The surface of fit k, fitted to the feet in contact and to the feet that were below the ground."""
+    points = joined(standing, covered)
     residual = points.height - plain.at(points.place)[k]
-    return bends(points, residual[None], smoothing, most, len(standing.count))[0]
+    return fit_surfaces(points, residual[None], smoothing, most, len(standing.count))[0]
 
 
 def beside_path(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:
-    """(N, 4) cells of points beside the path, where a beam has no ground, and of their points on the path."""
-    off = np.concatenate([path + sign * d * sides for d in BESIDE for sign in (1, -1)])
-    on = np.tile(path, (2 * len(BESIDE), 1))
-    free = distances(off, path).min(axis=1) > NEAREST
+    """(N, 4) points beside the path, where a beam has no ground, and their points on the path, in cells."""
+    off = np.concatenate([path + sign * d * sides for d in BESIDE_CM for sign in (1, -1)])
+    on = np.tile(path, (2 * len(BESIDE_CM), 1))
+    free = distances(off, path).min(axis=1) > PATH_CLEARANCE_CM
     return np.concatenate([patches.cells(off[free], centre), patches.cells(on[free], centre)], axis=1)

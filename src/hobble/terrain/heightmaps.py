@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,15 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz
+from hobble.core.files import load_npy, load_npz
 from hobble.core.quat import Array
-from hobble.core.untrusted import read_text
+from hobble.core.untrusted import printable, read_text
 from hobble.terrain import options
 from hobble.terrain.generate import generate
 
-MOST_CELLS = 1 << 26  # of a map: 8192 squared, half a gigabyte; 322 m a side at 3.9 cm a cell
-MOST_TEXT = 1 << 28  # of a map as text, which takes some eight times that while it is read
-
+MAX_CELLS = 1 << 26  # of a map: 8192 x 8192, 512 MB, 322 x 322 m with cells of 3.9 cm
+MAX_TEXT_BYTES = 1 << 28  # of a map as text
+MAX_LINE_LETTERS = 1 << 20  # of a line of it
+MAX_HEIGHT = 1e7  # cm, 100 km, as for the ground of a character
 
 ESRI_HEADER = {
     "ncols",
@@ -29,13 +31,17 @@ ESRI_HEADER = {
     "cellsize",
     "nodata_value",
 }
-IMAGES = {".png": ("PNG",), ".tif": ("TIFF",), ".tiff": ("TIFF",)}  # a suffix, and what the file must be
-GDAL_NODATA = 42113  # the tag of a TIFF in which GDAL says, as text, what stands for no data
+IMAGE_FORMATS = {
+    ".png": ("PNG",),
+    ".tif": ("TIFF",),
+    ".tiff": ("TIFF",),
+}  # a suffix, and what the file must be
+GDAL_NODATA = 42113  # the TIFF tag with the value that means "no data", as text
 
 
 @dataclass(frozen=True)
 class Heightmap:
-    """Heights (rows, columns) in cm, a cell being `cell` centimetres wide; nan where the map has a hole."""
+    """Heights (rows, columns), cm, nan in holes. cell: width of a cell, cm."""
 
     name: str
     heights: Array = field(repr=False)
@@ -47,9 +53,9 @@ def heightmaps(
 ) -> list[Heightmap]:
     """The heightmaps that a data set lists.
 
-    entries: with `cell` and `height_scale` where they differ from the general ones. files: those of the
-    entries of kind `file`, in their order. cell: cm a cell. height_scale: what the heights of files are
-    multiplied by to make them cm. Raises InputError for a file that cannot be used.
+    entries: may have their own `cell` and `height_scale`. files: the files of the entries of kind `file`, in
+    the same order. cell: width of a cell, cm. height_scale: factor that makes cm of the heights in files.
+    Raises InputError for a file that cannot be used.
     """
     given = iter(files)
     out = []
@@ -59,6 +65,12 @@ def heightmaps(
         if entry.kind == "file":
             path = next(given)
             heights = read_heights(path) * (scale or height_scale)
+            if (highest := float(np.nanmax(np.abs(heights)))) > MAX_HEIGHT:
+                raise InputError(
+                    path,
+                    f"a height of {highest:.4g} cm; {MAX_HEIGHT:g} at most",
+                    fix="Set height_scale of this map, or say in the file what stands for no data.",
+                )
             out.append(Heightmap(str(path), heights, width))
         elif entry.kind == "elevation":
             out.append(Heightmap("elevation", elevation(width) * (scale or 1.0), width))
@@ -70,10 +82,11 @@ def heightmaps(
 
 
 def elevation(cell: float) -> Array:
-    """The elevation model of a real landscape that matplotlib carries, true to scale: cm.
+    """The elevation model of a real landscape from matplotlib's sample data, reduced in size, cm.
 
-    Its 3 arc seconds are 92.6 m north to south and 74.3 m east to west at 36.6 degrees north; columns are
-    resampled so that cells are square, and one cell becomes `cell` centimetres. Slopes reach 36 degrees.
+    One cell of 3 arc seconds is 92.6 m north to south and 74.3 m east to west at 36.6 degrees north. The
+    columns are resampled so that cells are square. Then lengths and heights are scaled by the same factor so
+    that a cell is `cell` cm wide. Slopes reach 36 degrees.
     """
     import matplotlib
 
@@ -89,22 +102,24 @@ def elevation(cell: float) -> Array:
 
 
 def read_heights(path: str | Path) -> Array:
-    """Heights (rows, columns) as a file has them: a text matrix, an image, a NumPy array.
+    """Heights (rows, columns) from a file, in the file's unit; nan in holes.
 
-    .txt .csv .dat .asc: numbers in rows, apart by spaces, commas or semicolons, after the header of an ESRI
-    grid if there is one. .npy; .npz: its only array of two dimensions, or the one called `heights` or
-    `elevation`. .png .tif .tiff: grey values, of up to 32 bits. What a GeoTIFF or a grid calls no data is a
-    hole. Raises InputError.
+    .txt .csv .dat .asc: rows of numbers separated by spaces, commas or semicolons, with or without the header
+    of an ESRI grid. .npy. .npz: its only 2D array, or the array called `heights` or `elevation`.
+    .png .tif .tiff: grey values of up to 32 bits. The "no data" value of a GeoTIFF or grid marks a hole.
+    Raises InputError if the file cannot be used.
     """
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no such heightmap", fix="See terrain.heightmaps of the data set.")
-    readers = {".npz": _npz, ".npy": _npy, **dict.fromkeys(IMAGES, _image)}
+    readers = {".npz": _npz, ".npy": load_npy, **dict.fromkeys(IMAGE_FORMATS, _image)}
     heights = np.asarray(readers.get(path.suffix.lower(), _text)(path))
     if heights.ndim != 2 or min(heights.shape) < 2:
-        raise InputError(path, f"a heightmap has rows and columns, this has shape {heights.shape}")
+        raise InputError(path, f"a heightmap needs rows and columns, but this has shape {heights.shape}")
     if heights.dtype.kind not in "fiub":
-        raise InputError(path, f"heights are numbers, not {heights.dtype}")
+        raise InputError(path, f"heights must be numbers, not {heights.dtype}")
+    if heights.size > MAX_CELLS:
+        raise InputError(path, f"{heights.size} heights, more than {MAX_CELLS}")
     heights = heights.astype(float)
     if not np.isfinite(heights).any():
         raise InputError(path, "holds no finite height")
@@ -112,9 +127,12 @@ def read_heights(path: str | Path) -> Array:
 
 
 def _text(path: Path) -> Array:
-    rows: list[list[float]] = []
+    rows: list[Array] = []
     header: dict[str, float] = {}
-    for number, line in enumerate(read_text(path, MOST_TEXT).splitlines(), 1):
+    cells = 0
+    for number, line in enumerate(io.StringIO(read_text(path, MAX_TEXT_BYTES), newline=None), 1):
+        if len(line) > MAX_LINE_LETTERS:
+            raise InputError(path, f"a line of more than {MAX_LINE_LETTERS} letters", line=number)
         words = line.split("#")[0].replace(",", " ").replace(";", " ").split()
         if not words:
             continue
@@ -122,29 +140,21 @@ def _text(path: Path) -> Array:
             if not rows and words[0].lower() in ESRI_HEADER:
                 header[words[0].lower()] = float(" ".join(words[1:]))
                 continue
-            rows.append([float(word) for word in words])
+            rows.append(np.array([float(word) for word in words]))
         except ValueError as error:
             raise InputError(
                 path, f"not a number: {str(error).split(':')[-1].strip()}", line=number
             ) from error
         if len(rows[-1]) != len(rows[0]):
-            problem = f"{len(rows[-1])} heights where the rows above have {len(rows[0])}"
+            problem = f"{len(rows[-1])} heights, but the rows above have {len(rows[0])}"
             raise InputError(path, problem, line=number)
+        cells += len(rows[-1])
+        if cells > MAX_CELLS:
+            raise InputError(path, f"more than {MAX_CELLS} heights", line=number)
     if not rows:
         raise InputError(path, "holds no heights")
     heights, nothing = np.array(rows), header.get("nodata_value")
     return heights if nothing is None else np.where(heights == nothing, np.nan, heights)
-
-
-def _npy(path: Path) -> Array:
-    try:
-        # Mapped, so that a header that promises more than the file holds takes no memory.
-        heights = np.lib.format.open_memmap(path, mode="r")  # never a pickle or an archive
-        if heights.size > MOST_CELLS:
-            raise InputError(path, f"{heights.size} heights, more than {MOST_CELLS}")
-        return np.array(heights)
-    except (ValueError, OSError, EOFError, AttributeError, TypeError) as error:
-        raise InputError(path, f"not an array file ({error})") from error
 
 
 def _npz(path: Path) -> Array:
@@ -154,24 +164,26 @@ def _npz(path: Path) -> Array:
             return arrays[name]
     raise InputError(
         path,
-        f"which array holds the heights? There are: {', '.join(arrays) or 'none of two dimensions'}",
+        f"which array holds the heights? There are: {printable(', '.join(arrays)) or 'none with two axes'}",
         fix="Name it `heights`.",
     )
 
 
 def _image(path: Path) -> Array:
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
     try:
-        # Of the other formats some run programs: Ghostscript for what begins as PostScript does.
-        with Image.open(path, formats=IMAGES[path.suffix.lower()]) as image:
-            if image.width * image.height > MOST_CELLS:
-                raise InputError(path, f"{image.width} x {image.height} cells, more than {MOST_CELLS}")
+        # Only these formats: for others Pillow may start programs, such as Ghostscript for PostScript.
+        with Image.open(path, formats=IMAGE_FORMATS[path.suffix.lower()]) as image:
+            if image.width * image.height > MAX_CELLS:
+                raise InputError(path, f"{image.width} x {image.height} cells, more than {MAX_CELLS}")
             grey = image if image.mode in ("L", "I", "F", "I;16", "I;16B", "1") else image.convert("L")
             heights = np.asarray(grey, float)
             nothing = getattr(image, "tag_v2", {}).get(GDAL_NODATA)
             return heights if nothing is None else np.where(heights == float(nothing), np.nan, heights)
-    except (UnidentifiedImageError, Image.DecompressionBombError, OSError, SyntaxError, ValueError) as error:
-        wide = "Numbers of 64 bits are not read from a TIFF; save them as 32 bits or as .npy."
+    except InputError:
+        raise
+    except Exception as error:  # Pillow's decoders raise many kinds of error for a damaged file
+        wide = "64-bit numbers in a TIFF cannot be read. Save them as 32 bits or as .npy."
         fix = wide if path.suffix.lower() in (".tif", ".tiff") else None
-        raise InputError(path, f"not an image that can be read ({error})", fix=fix) from error
+        raise InputError(path, f"not an image that can be read ({printable(error)})", fix=fix) from error

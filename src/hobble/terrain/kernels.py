@@ -1,12 +1,12 @@
-"""Compiled loops: bilinear heights of patches, the extent and the error of a patch, sums over distances.
+"""Compiled loops: heights, extents and errors of patches, and sums over distances.
 
 A patch is a view of a heightmap. Its cell (u, v), counted from the middle of the patch along the world's x
-and z, shows the map at row, column = A (u, v, 1). Maps of any size lie one after another in one float32
-array; `starts` and `shapes` say where. All loops are over plain arrays, so that one compiled version serves
-every data set. They are in one file because what numba compiled and kept is only made anew when the file
-of the function that was called has changed. Only the functions called from outside are kept, and what they
-call is forced into them: as functions of their own, those would be compiled apart from them the first time
-and along with them when they come from disk, and sums would be rounded in another order.
+and z, is at row, column = A (u, v, 1) of the map. All maps are stored one after another in one float32 array.
+`starts` and `shapes` say where. All arguments are plain arrays, so one compiled version serves all data sets.
+
+Everything is in one file because numba renews its cache only if the file of the called function changes. Only
+functions that other modules call are cached, and helpers are inlined in them. Separately compiled helpers
+would round sums in another order when they come from the cache.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hobble.core.compiled import njit
 DOWN_WEIGHT = 0.1
 JUMP_HEIGHT = 5.0
 BEAM_HEIGHT = 40.0
-FAST = {"reassoc", "contract", "nsz", "nnan"}  # lets sums be vectorised; no height is nan
+FAST = {"reassoc", "contract", "nsz", "nnan"}  # allows vectorised sums; heights are never nan
 ONE = np.uint32(1)
 
 
@@ -29,7 +29,7 @@ def height(heights, rows, columns, r, c):
     j = min(np.int32(c), np.int32(columns - 2))
     fr = r - np.float32(i)
     fc = c - np.float32(j)
-    k = np.uint32(i * np.int32(columns) + j)  # unsigned: no test for negative indices
+    k = np.uint32(i * np.int32(columns) + j)  # unsigned, so that numba does not test for negative indices
     below = k + np.uint32(columns)
     near = heights[k] + fc * (heights[k + ONE] - heights[k])
     far = heights[below] + fc * (heights[below + ONE] - heights[below])
@@ -38,14 +38,14 @@ def height(heights, rows, columns, r, c):
 
 @njit(inline="always", cache=False)
 def map_of(heights, starts, shapes, m):
-    """The cells of map m, its rows and its columns."""
+    """The cells of map m, and its numbers of rows and columns."""
     rows, columns = shapes[m, 0], shapes[m, 1]
     return heights[starts[m] : starts[m] + rows * columns], rows, columns
 
 
 @njit
 def view_heights(heights, starts, shapes, which, affine, mean, points):
-    """Heights (P, N) of P patches at the same N points (N, 2), in cells from the middle, inside the patch."""
+    """Heights (P, N) of P patches at the same points (N, 2), in cells from the middle, inside the patch."""
     out = np.empty((len(which), len(points)), np.float32)
     for p in range(len(which)):
         cells, rows, columns = map_of(heights, starts, shapes, which[p])
@@ -60,11 +60,10 @@ def view_heights(heights, starts, shapes, which, affine, mean, points):
 
 @njit
 def view_extents(heights, starts, shapes, which, affine, size, highest):
-    """Mean height of each of P views over its `size` x `size` cells, and whether no cell is further from it
-    than `highest`.
+    """Mean height (P,) of P views of `size` x `size` cells, and (P,) whether each stays close to its mean.
 
-    Returns mean (P,), passes (P,). A view whose coarse cells differ by more than twice `highest` cannot pass
-    and is not looked at any further; its mean is 0.
+    A view passes if all its cells are within `highest` of the mean. First only every eighth row and column is
+    read. If these cells differ by more than 2 * highest, the view is skipped and its mean is 0.
     """
     mean = np.zeros(len(which), np.float32)
     passes = np.zeros(len(which), np.bool_)
@@ -105,7 +104,7 @@ def view_extents(heights, starts, shapes, which, affine, size, highest):
 
 @njit(fastmath=FAST)
 def distance_sum(x, z, place_x, place_z, weights):
-    """(M,): at each point x, z (M,) the sum of its distances from N places, weighed by `weights` (N,)."""
+    """(M,) at each point x, z (M,), the sum of its distances from N places, weighted by `weights` (N,)."""
     out = np.empty(len(x))
     for m in range(len(x)):
         total = 0.0
@@ -118,7 +117,7 @@ def distance_sum(x, z, place_x, place_z, weights):
 
 @njit(fastmath=FAST)
 def lowest_cone(x, z, place_x, place_z, heights, steepness):
-    """(M,): at each point x, z (M,) the lowest of the cones that rise by `steepness` (N,) from N places."""
+    """(M,) at each point x, z (M,), the height of the lowest of N cones, which rise by `steepness` (N,)."""
     out = np.empty(len(x))
     for m in range(len(x)):
         lowest = np.inf
@@ -131,9 +130,9 @@ def lowest_cone(x, z, place_x, place_z, heights, steepness):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _down_means(heights, rows, columns, a, points):
-    """How far the patch is above the first foot in contact; mean, mean square of how much further above all.
+    """Height of the patch above the first foot in contact; mean and mean square of the others minus this one.
 
-    That keeps the numbers small for a patch that fits, and so exact in single precision.
+    Subtracting the first keeps the numbers small, so that single precision is enough.
     """
     u, v, foot = points
     (ru, rv, r0), (cu, cv, c0) = a
@@ -151,7 +150,7 @@ def _down_means(heights, rows, columns, a, points):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _up_sum(heights, rows, columns, a, offset, points, jumps):
-    """Sum of squares of how far the ground is above feet that are up, or too far below them in jumps."""
+    """Sum of squared heights of the ground above feet in the air; for jumps also of ground too far below."""
     u, v, foot = points
     (ru, rv, r0), (cu, cv, c0) = a
     lowest = -np.float32(JUMP_HEIGHT) if jumps else -np.float32(1e9)
@@ -167,7 +166,7 @@ def _up_sum(heights, rows, columns, a, offset, points, jumps):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _beside_sum(heights, rows, columns, a, points):
-    """Sum of squares of how far the ground beside the path is above BEAM_HEIGHT below the path."""
+    """Sum of squares of the height by which ground beside the path is above (path - BEAM_HEIGHT)."""
     u, v, path_u, path_v = points
     (ru, rv, r0), (cu, cv, c0) = a
     squares = np.float32(0)
@@ -184,16 +183,16 @@ def _beside_sum(heights, rows, columns, a, points):
 
 @njit(forceinline=True, cache=False)
 def _error(heights, rows, columns, a, tables, jumps, limit):
-    """The error of one patch, or infinity as soon as it is known to lie above `limit`."""
-    down, up_head, up_rest, beside = tables
+    """The error of one patch, or infinity as soon as it is known to exceed `limit`."""
+    down, up_first, up_rest, beside = tables
     first, offset, squares = _down_means(heights, rows, columns, a, down)
     error = DOWN_WEIGHT * max(squares - offset * offset, 0.0)
     if error > limit:
         return np.inf
     offset = np.float32(first + offset)
-    count = len(up_head[0]) + len(up_rest[0])
+    count = len(up_first[0]) + len(up_rest[0])
     if count:
-        squares = _up_sum(heights, rows, columns, a, offset, up_head, jumps)
+        squares = _up_sum(heights, rows, columns, a, offset, up_first, jumps)
         if error + squares / count > limit:
             return np.inf
         squares += _up_sum(heights, rows, columns, a, offset, up_rest, jumps)
@@ -204,7 +203,7 @@ def _error(heights, rows, columns, a, tables, jumps, limit):
 
 
 @njit(inline="always", cache=False)
-def _terms(a):
+def _map_to_cells(a):
     return (a[0, 0], a[0, 1], a[0, 2]), (a[1, 0], a[1, 1], a[1, 2])
 
 
@@ -214,18 +213,18 @@ def view_errors(heights, starts, shapes, which, affine, tables, jumps):
     out = np.empty(len(which))
     for p in range(len(which)):
         cells, rows, columns = map_of(heights, starts, shapes, which[p])
-        out[p] = _error(cells, rows, columns, _terms(affine[p]), tables, jumps, np.inf)
+        out[p] = _error(cells, rows, columns, _map_to_cells(affine[p]), tables, jumps, np.inf)
     return out
 
 
 @njit
 def search_views(heights, starts, shapes, which, affine, tables, jumps, count):
-    """Indices and errors (count,) of the views of lowest error, the best first; of equal ones the first."""
+    """Indices and errors (count,) of the views with the lowest errors, best first, ties by index."""
     best = np.full(count, -1)
     errors = np.full(count, np.inf)
     for p in range(len(which)):
         cells, rows, columns = map_of(heights, starts, shapes, which[p])
-        error = _error(cells, rows, columns, _terms(affine[p]), tables, jumps, errors[-1])
+        error = _error(cells, rows, columns, _map_to_cells(affine[p]), tables, jumps, errors[-1])
         if error < errors[-1]:
             k = count - 1
             while k > 0 and errors[k - 1] > error:

@@ -15,20 +15,20 @@ class Heightmap(Section):
     kind: Literal["fractal", "hills", "stairs", "slope", "boxes", "beams", "elevation", "file"]
     path: Inside | None = Field(None, description="for kind: file; relative to the mocap folder")
     seed: int = 0
-    cell: PositiveFloat | None = Field(None, description="centimetres a cell, where not terrain.cell")
+    cell: PositiveFloat | None = Field(None, description="width of a cell, cm, instead of terrain.cell")
     height_scale: PositiveFloat | None = Field(
-        None, description="for files instead of terrain.height_scale; other kinds are multiplied by it"
+        None, description="factor on the heights; for files it replaces terrain.height_scale"
     )
 
     @model_validator(mode="after")
     def _path_for_files(self) -> Heightmap:
         if (self.kind == "file") != (self.path is not None):
-            raise ValueError("`path` goes with `kind: file`, and only with it")
+            raise ValueError("`path` is required for `kind: file` and not allowed for other kinds")
         return self
 
 
 class Drawing(Section):
-    """How patches are drawn from heightmaps: what the rule `terrain_patches` reads."""
+    """How patches are drawn from heightmaps, for the rule `terrain_patches`."""
 
     heightmaps: tuple[Heightmap, ...] = Field(
         default_factory=lambda: tuple(
@@ -37,44 +37,54 @@ class Drawing(Section):
         )
     )
     patches: Positive = 20_000
-    cell: PositiveFloat = Field(3.937007874, description="centimetres a cell")
-    size: Annotated[int, Field(gt=0, le=2048)] = Field(128, description="cells a side of a patch")
-    height_scale: PositiveFloat = 3.0
-    highest: PositiveFloat = Field(50.0, description="a patch that goes further from its mean is dropped")
+    cell: PositiveFloat = Field(3.937007874, description="width of a cell, cm")
+    size: Annotated[int, Field(gt=0, le=2048)] = Field(128, description="width of a patch, cells")
+    height_scale: PositiveFloat = Field(3.0, description="factor that makes cm of the heights in files")
+    highest: PositiveFloat = Field(
+        50.0, description="patches with a height further than this from their mean are dropped, cm"
+    )
     seed: int = 1
 
     @model_validator(mode="after")
     def _some_ground(self) -> Drawing:
         if not self.heightmaps:
-            raise ValueError("`heightmaps` names none, so that there is no ground to draw patches from")
+            raise ValueError("`heightmaps` is empty, so there is no ground to draw patches from")
         return self
 
 
 class Fitting(Section):
-    """How patches are fitted under the cycles of a clip: what the rule `terrain_fits` reads."""
+    """How patches are fitted under the cycles of a clip, for the rule `terrain_fits`."""
 
-    fits: Positive = Field(10, description="fits kept for each cycle; a flat cycle has one, counted so often")
-    smoothing: Annotated[float, Field(ge=0)] = Field(0.1, description="regularisation of the residual's RBF")
-    heel_height: Literal["auto"] | Finite = Field(
-        "auto", description="of the heel joint above its sole, cm; the original has 5, `auto` asks the clip"
+    fits: Positive = Field(
+        10, description="fits of each cycle; a flat cycle has one, which is used this many times"
     )
-    toe_height: Literal["auto"] | Finite = Field("auto", description="likewise; the original has 4")
-    sole: Finite = Field(4.0, description="`auto` on ground that is not flat: below the toe joint, cm")
+    smoothing: Annotated[float, Field(ge=0)] = Field(
+        0.1, description="regularisation of the radial basis functions"
+    )
+    heel_height: Literal["auto"] | Finite = Field(
+        "auto", description="height of the heel joint above its sole, cm; `auto`: from the clip; original: 5"
+    )
+    toe_height: Literal["auto"] | Finite = Field(
+        "auto", description="height of the toe joint above its sole, cm; `auto`: from the clip; original: 4"
+    )
+    sole: Finite = Field(
+        4.0, description="what `auto` takes for the toe joint on ground that is not flat, cm"
+    )
     deepest: PositiveFloat | None = Field(
-        1.0, description="no foot goes further below the ground, cm; null as in the original: not looked at"
+        1.0, description="how far a foot may be below the ground, cm; null: no limit, as in the original"
     )
     bend_flat: bool = Field(
-        True, description="let flat ground give way where feet are off by more than `deepest`; else level"
+        True, description="correct flat ground where feet are more than `deepest` off; false: keep it level"
     )
     flat_level: Literal["zero", "feet"] = Field(
         "zero",
-        description="where flat ground lies; `feet` as in the original: at the mean height of the soles in "
-        "contact, for each cycle",
+        description="height of flat ground: zero, or the mean height of the soles in contact in each cycle, "
+        "as in the original",
     )
     held_up: PositiveFloat | None = Field(
         2.0,
-        description="a heel that keeps still so far above its standing toe is not on flat ground, cm; null "
-        "as in the original: not looked at",
+        description="on flat ground a heel this far above its toe in contact does not count as contact, cm; "
+        "null: no such rule, as in the original",
     )
 
 
@@ -84,12 +94,12 @@ class Terrain(Drawing, Fitting):
     @model_validator(mode="after")
     def _enough_patches(self) -> Terrain:
         if self.patches < self.fits:
-            raise ValueError(f"`patches` ({self.patches}) are fewer than the `fits` of a cycle ({self.fits})")
+            raise ValueError(f"`patches` ({self.patches}) must not be fewer than `fits` ({self.fits})")
         return self
 
 
 class Sampling(Section):
-    """Where rows want heights: those keys of the section `database` that decide it."""
+    """The keys of the section `database` that decide at which points rows need ground heights."""
 
     window: Positive
     step: Positive

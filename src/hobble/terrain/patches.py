@@ -1,7 +1,7 @@
 """Patches of ground: views of a few heightmaps, drawn at random.
 
-A patch is not stored as cells: it is a heightmap and the affine map that takes the patch's cells to cells of
-the heightmap, with the mean height to take off. Twenty thousand of them are 1 MB where their cells were 600.
+A patch does not store its cells. It stores which heightmap it is from, the affine map from its cells to those
+of the heightmap, and its mean height, which is subtracted. 20,000 patches take 1 MB; their cells took 600 MB.
 """
 
 from __future__ import annotations
@@ -17,19 +17,20 @@ from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
 from hobble.terrain.heightmaps import Heightmap
 
-BATCH = 1_000
-HOLE = 1e9
-FEWEST = 1 / 1_000  # of the crops of a map have to pass
+VIEWS_PER_DRAW = 1_000
+HOLE_HEIGHT = 1e9
+FEWEST_PASSING = 1 / 1_000  # share of a map's random views that have to pass
 
 
 @dataclass(frozen=True)
 class Patches:
     """P views of M heightmaps.
 
-    heights: all maps one after another, row by row, cm, float32. starts: (M,) where each begins. shapes: (M,
-    2) rows and columns. names: (M,). which: (P,) the map of each view. affine: (P, 2, 3): row, column of the
-    map = affine (u, v, 1) for the cell (u, v) from the middle of the patch, u along the world's x, v along z.
-    mean: (P,) height to take off. cell: centimetres a cell of the patch. size: cells a side.
+    heights: all maps one after another, row by row, cm, float32. starts: (M,) index of each map's first cell.
+    shapes: (M, 2) rows and columns. names: (M,). which: (P,) map of each view. affine: (P, 2, 3); row, column
+    of the map = affine (u, v, 1), where (u, v) is a cell counted from the middle of the patch, u along the
+    world's x, v along z. mean: (P,) height to subtract, cm. cell: width of a patch's cell, cm. size: width of
+    a patch, cells.
     """
 
     heights: Array = field(repr=False)
@@ -47,21 +48,20 @@ class Patches:
 
     @property
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """What the compiled loops take, in their order."""
+        """The arrays in the order in which the compiled loops take them."""
         return self.heights, self.starts, self.shapes, self.which, self.affine, self.mean
 
     def cells(self, points: Array, centre: Array) -> Array:
-        """World points (N, 2) x and z in cm, as cells (N, 2) from the middle of a patch that lies at
-        `centre` (2,).
+        """World points (N, 2), x and z in cm, as cells from the middle of a patch at `centre` (2,).
 
-        Beyond its edge a patch goes on as at its edge.
+        Points outside the patch become the nearest cell of its edge.
         """
         half = self.size // 2
         cells = (np.asarray(points) - centre) / self.cell
         return np.clip(cells, -half, self.size - 1 - half).astype(np.float32)
 
     def at(self, chosen: Sequence[int] | np.ndarray, cells: Array) -> Array:
-        """Heights (K, N) of the K chosen patches at cells (N, 2) from their middle, cm."""
+        """Heights (K, N), cm, of the K chosen patches at cells (N, 2) from their middle."""
         from hobble.terrain.kernels import view_heights
 
         k = np.asarray(chosen, int)
@@ -72,14 +72,14 @@ class Patches:
 def draw_patches(
     maps: Sequence[Heightmap], *, count: int, cell: float, size: int, highest: float, seed: int
 ) -> Patches:
-    """Draw `count` patches of `size` x `size` cells of `cell` centimetres, shared evenly among the maps.
+    """Draw `count` patches of `size` x `size` cells, `cell` cm wide, equally many from each map.
 
-    Each is a crop at a random place, flipped at random and turned by up to 90 degrees either way. One that
-    goes further than `highest` from its mean is dropped and drawn again. Raises InputError naming a map
-    that is too small, or from which (almost) nothing passes.
+    Each is a view at a random place, flipped at random and turned by up to 90 degrees either way. A view with
+    a height more than `highest` cm from its mean is dropped and drawn again. Raises InputError for a map
+    that is too small, or if fewer than one in a thousand of its views pass.
     """
     if not maps:
-        raise HobbleError("terrain.heightmaps names no heightmap, so there is nothing to draw patches from.")
+        raise HobbleError("terrain.heightmaps is empty, so there is nothing to draw patches from.")
     shares = [count // len(maps) + (i < count % len(maps)) for i in range(len(maps))]
     drawn = [
         _draw_from(heightmap, share, cell, size, highest, np.random.default_rng([seed, i]))
@@ -102,7 +102,7 @@ def draw_patches(
 def _draw_from(
     heightmap: Heightmap, share: int, cell: float, size: int, highest: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """`share` views (share, 2, 3) of one map that pass, and their means (share,)."""
+    """`share` views (share, 2, 3) of one map that pass, and their mean heights (share,)."""
     from hobble.terrain.kernels import view_extents
 
     one = _with_holes_marked(heightmap, cell).astype(np.float32)
@@ -116,25 +116,24 @@ def _draw_from(
         affines.append(affine[keep])
         means.append(mean[keep])
         found += len(keep)
-        drawn += BATCH
-        if found < share and found < FEWEST * drawn:
-            passed = f"{found} of {drawn} crops" if found else f"none of {drawn} crops"
+        drawn += VIEWS_PER_DRAW
+        if found < share and found < FEWEST_PASSING * drawn:
             raise InputError(
                 heightmap.name,
-                f"{passed} of {size} cells stays within {highest:g} cm of its mean",
+                f"{found or 'none'} of {drawn} views of {size} cells stay within {highest:g} cm of the mean",
                 fix="Lower its height_scale, or leave this heightmap out.",
             )
     return np.concatenate(affines), np.concatenate(means)
 
 
 def save_patches(path: str | Path, patches: Patches) -> None:
-    """Write the heightmaps and the views of them as one npz."""
+    """Write the heightmaps and their views as one npz."""
     arrays = {n: getattr(patches, n) for n in ("heights", "shapes", "names", "which", "affine", "mean")}
     save_npz(path, **arrays, cell=np.array(patches.cell), size=np.array(patches.size))
 
 
 def load_patches(path: str | Path) -> Patches:
-    """Read what `save_patches` wrote; raises InputError where it is damaged."""
+    """Read what `save_patches` wrote. Raises InputError if it is damaged."""
     data = load_npz(path)
     try:
         cell, size = float(data.pop("cell")), int(data.pop("size"))
@@ -146,15 +145,17 @@ def load_patches(path: str | Path) -> Patches:
 
 
 def _with_holes_marked(heightmap: Heightmap, cell: float) -> Array:
-    """Heights with holes (nan), and what is so near that a patch's cells may pass by on both sides, so high
-    that no patch passes that shows them."""
+    """Heights in which holes (nan) and their surroundings are so high that no view with a hole passes.
+
+    The surroundings count because the cells of a patch may be wider apart than a hole.
+    """
     holes = np.isnan(heightmap.heights)
     if not holes.any():
         return heightmap.heights
     from scipy.ndimage import maximum_filter
 
     reach = 1 + int(np.ceil(cell / heightmap.cell))
-    return np.where(maximum_filter(holes, 2 * reach + 1), HOLE, heightmap.heights)
+    return np.where(maximum_filter(holes, 2 * reach + 1), HOLE_HEIGHT, heightmap.heights)
 
 
 def _starts(shapes: np.ndarray) -> np.ndarray:
@@ -163,13 +164,13 @@ def _starts(shapes: np.ndarray) -> np.ndarray:
 
 
 def _views(rng: np.random.Generator, heightmap: Heightmap, cell: float, size: int) -> Array:
-    """BATCH views (BATCH, 2, 3) of a map, every cell inside it."""
+    """At most VIEWS_PER_DRAW random views (N, 2, 3) that lie inside the map."""
     scale = cell / heightmap.cell
     half = size // 2
     corners = np.array([[a, b] for a in (-half, size - 1 - half) for b in (-half, size - 1 - half)])
-    angle = rng.uniform(-np.pi / 2, np.pi / 2, BATCH)
-    flips = rng.choice([-1.0, 1.0], (BATCH, 2))
-    place = rng.uniform(size=(BATCH, 2))
+    angle = rng.uniform(-np.pi / 2, np.pi / 2, VIEWS_PER_DRAW)
+    flips = rng.choice([-1.0, 1.0], (VIEWS_PER_DRAW, 2))
+    place = rng.uniform(size=(VIEWS_PER_DRAW, 2))
     c, s = np.cos(angle), np.sin(angle)
     turn = scale * np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2) * flips[:, None]
     reach = np.einsum("nij,kj->nki", turn, corners)
@@ -181,7 +182,7 @@ def _views(rng: np.random.Generator, heightmap: Heightmap, cell: float, size: in
         raise InputError(
             heightmap.name,
             f"{rows} x {columns} cells are too few for patches of {needed} x {needed}",
-            fix="Give a larger map, a larger cell of this map, or a smaller terrain.size.",
+            fix="Use a larger map, a larger `cell` for this map, or a smaller terrain.size.",
         )
     centre = low + place * (high - low)
     return np.concatenate([turn, centre[..., None]], axis=-1)[fits].astype(np.float32)

@@ -1,4 +1,4 @@
-"""What a picture of a fit needs: the ground as a grid, the feet over time, the figure at three moments."""
+"""Data for a picture of a fit: the ground as a grid, the feet over time, and three poses."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.terrain.feet import Feet, Mask
 from hobble.terrain.ground import Ground
+from hobble.terrain.soles import Feet, Mask
 
-GRID = 24
-MARGIN = 60.0
+GRID_POINTS = 24
+MARGIN_CM = 60.0
 MOST = 2
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One fit, the best, of one cycle; centimetres in the clip's world.
+    """The best fit of one cycle, in centimetres in the clip's world.
 
-    x, z: (G,) of the grid; ground: (G, G) heights at x[i], z[j]. soles: (T, 4, 3), contacts: (T, 4). pose:
-    (3, J, 3) joints at the beginning, the middle and the end of the cycle; parents: (J,).
+    x, z: (G,) of the grid. ground: (G, G) heights at x[i], z[j]. soles: (T, 4, 3). contacts: (T, 4).
+    pose: (3, J, 3) joint positions at a quarter, half and three quarters of the frames. parents: (J,).
     """
 
     cycle: int
@@ -35,17 +35,20 @@ class Picture:
 
 
 def picture_cycles(cycles: int) -> set[int]:
-    """Which cycles of a clip are shown: one from its first half and one from its second."""
+    """The cycles of a clip that get a picture: one from the first half and one from the second."""
     return {cycles // 4, (3 * cycles) // 4} if cycles > 1 else set(range(cycles))
 
 
 def picture_of(clip: Clip, cycle: int, ground: Ground, feet: Feet, around: slice) -> Picture:
-    """The best fit of a cycle, whose frames with the window on either side are `around`."""
+    """The picture of the best fit of a cycle. around: its frames, with the window on both sides."""
     soles = feet.soles[around]
-    low, high = soles[..., [0, 2]].min(axis=(0, 1)) - MARGIN, soles[..., [0, 2]].max(axis=(0, 1)) + MARGIN
-    x, z = np.linspace(low[0], high[0], GRID), np.linspace(low[1], high[1], GRID)
+    low, high = (
+        soles[..., [0, 2]].min(axis=(0, 1)) - MARGIN_CM,
+        soles[..., [0, 2]].max(axis=(0, 1)) + MARGIN_CM,
+    )
+    x, z = np.linspace(low[0], high[0], GRID_POINTS), np.linspace(low[1], high[1], GRID_POINTS)
     points = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-    heights = ground.at(points)[0].reshape(GRID, GRID)
+    heights = ground.at(points)[0].reshape(GRID_POINTS, GRID_POINTS)
     frames = np.linspace(around.start, around.stop - 1, 5).astype(int)[1:4]
     return Picture(
         cycle,

@@ -1,8 +1,7 @@
-"""The search for the patches that fit a cycle best: every patch is tried, most are given up early.
+"""Finds the patches that fit a cycle best. It tries every patch, but stops early for most.
 
-The error of a patch is a sum of terms that only grow as more points are looked at (the spread about the mean
-of the points so far never exceeds that of all of them), so a patch whose partial sum is above the worst of
-the best so far can be left: what comes out is exactly what trying every patch at every point would give.
+The error of a patch is a sum of terms that only grow with more points. So a patch can be skipped as soon as
+its partial sum exceeds the worst of the best errors so far. The result is the same as that of a full search.
 """
 
 from __future__ import annotations
@@ -15,17 +14,19 @@ from hobble.core.quat import Array
 from hobble.terrain.kernels import search_views, view_errors
 from hobble.terrain.patches import Patches
 
-HEAD = 128  # points after which most patches can be given up
-GOLDEN = 0.6180339887498949
+FIRST_POINTS = 128  # points in the air that are tried first; most patches can be skipped after these
+GOLDEN_RATIO = 0.6180339887498949
 
 
 @dataclass(frozen=True)
 class Footing:
-    """What the ground under a cycle has to fit, in patch cells from its middle: u along x, v along z.
+    """The points that the ground under a cycle has to fit.
 
-    down, up: (N, 3) u, v and height in cm of the soles of feet in contact and of the others, less the mean
-    height of those in contact. jumps: whether the ground stays near the feet that are up. beside: (N, 4) u, v
-    of a point off the path, and u, v of the point of the path it belongs to; empty but for beams.
+    u, v are cells from the middle of the patch, along x and z.
+    down, up: (N, 3) u, v and height of soles in contact and in the air, cm above the mean in contact.
+    jumps: the ground must not be far below feet in the air.
+    beside: (N, 4) u, v of a point beside the path, and u, v of its point on the path; empty unless the ground
+    is a beam.
     """
 
     down: Array = field(repr=False)
@@ -35,7 +36,7 @@ class Footing:
 
 
 def best_patches(patches: Patches, footing: Footing, count: int) -> tuple[np.ndarray, Array]:
-    """Indices (count,) of the patches of lowest error, the best first, and their errors (count,) in cm2."""
+    """Indices (count,) of the patches with the lowest errors, best first, and these errors (count,), cm²."""
     found: tuple[np.ndarray, Array] = search_views(  # type: ignore[call-arg]
         *patches.arrays[:-1], _columns(footing), footing.jumps, count
     )
@@ -43,7 +44,7 @@ def best_patches(patches: Patches, footing: Footing, count: int) -> tuple[np.nda
 
 
 def patch_errors(patches: Patches, footing: Footing) -> Array:
-    """The error (P,) of every patch, in cm2: what `best_patches` finds the lowest of."""
+    """The errors (P,) of all patches, cm²; `best_patches` finds the lowest."""
     errors: Array = view_errors(  # type: ignore[call-arg]
         *patches.arrays[:-1], _columns(footing), footing.jumps
     )
@@ -51,9 +52,9 @@ def patch_errors(patches: Patches, footing: Footing) -> Array:
 
 
 def _columns(footing: Footing) -> tuple[tuple[Array, ...], ...]:
-    """The columns of the points in contact, of the first HEAD that are up, of the rest, of those beside."""
-    spread = (np.arange(len(footing.up)) * GOLDEN) % 1.0  # so that the first few stand for all
+    """Columns of four tables: in contact, the first FIRST_POINTS in the air, the rest in the air, beside."""
+    spread = (np.arange(len(footing.up)) * GOLDEN_RATIO) % 1.0  # so that the first points cover all frames
     order = np.argsort(spread, kind="stable")
     up = footing.up[order]
-    tables = footing.down, up[:HEAD], up[HEAD:], footing.beside
+    tables = footing.down, up[:FIRST_POINTS], up[FIRST_POINTS:], footing.beside
     return tuple(tuple(np.ascontiguousarray(column, np.float32) for column in t.T) for t in tables)

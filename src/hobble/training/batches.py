@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,61 +11,107 @@ from torch import Tensor
 
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
+from hobble.database.stretches import Stretch
+from hobble.training.processes import ALONE, Processes
 
 TRAIN = "train"
 LOOK_EVERY = 2048  # samples between looks at the losses: an accelerator is not waited for at each small batch
 DIVERGED = 100.0  # predicting nothing but the mean has an error of 1
 NAMED = 8  # clips that a message names
 
+Piece = tuple[Tensor, Tensor, Tensor, np.ndarray, np.ndarray]  # the first five of a batch
+
 
 class Batch(NamedTuple):
-    """n samples on the training's device: x (n, X), y (n, Y), p (n,); clip and frame (n,) as in a `Block`."""
+    """n samples on the training's device: x (n, X), y (n, Y), p (n,); clip and frame (n,) as in a `Block`.
+
+    whole: samples of the batch over all processes; these n, maybe none, are those of one process.
+    """
 
     x: Tensor
     y: Tensor
     p: Tensor
     clip: np.ndarray
     frame: np.ndarray
+    whole: int
 
 
 class HostRows:
-    """The training rows of a database, read and composed by its own reader, then sent to `device`."""
+    """The training rows of a database, read and composed by its own reader, then sent to `device`.
 
-    def __init__(self, database: Database, device: torch.device) -> None:
+    processes, stretches: who shares a batch, and from how many places of a section it is taken.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        device: torch.device,
+        processes: Processes = ALONE,
+        stretches: int | None = None,
+    ) -> None:
         self.database, self.device = database, device
+        self.processes, self.stretches = processes, stretches
 
     def batches(self, pass_index: int, section: int, sections: int, seed: int, size: int) -> Iterator[Batch]:
         """The samples of one section in consecutive batches of `size`.
 
         Only the last may be shorter; it is trained like the others (a loss is a mean over its rows), so that
         a section sees each of its samples once and leaves nothing over for the next: a checkpoint between
-        the two is complete.
+        the two is complete. Of each batch there are the rows of this process.
         """
+        place = (pass_index, section, sections, seed)
+        # By the whole batch: the order of the rows depends on it, and must not on the number of processes.
+        window = self.database.window(TRAIN, self.database.block_rows(size))
+        total = self.database.section_pairs(TRAIN, section, sections)
+        sharing = self.processes.sharing(total, size, self.stretches)
+        read = [self._pieces(place, stretch, window) for stretch in sharing.read()]
+        for whole, _ in sharing.sizes():
+            # Those of a short batch fill its first places, so the later stretches have none left for it.
+            pieces = [piece for one in read if (piece := next(one, None)) is not None]
+            piece = pieces[0] if len(pieces) == 1 else _joined(pieces, self._nothing)
+            yield Batch(*piece, whole)
+
+    def _pieces(self, place: tuple[int, int, int, int], stretch: Stretch, window: int) -> Iterator[Piece]:
+        """What one stretch gives to one batch after another."""
+        size = stretch.high - stretch.low
         rows = self.database.block_rows(size)
-        for block in self.database.blocks(TRAIN, pass_index, section, sections, seed, rows):
+        for block in self.database.blocks(TRAIN, *place, rows, stretch, window):
             x, y, p = (torch.from_numpy(array).to(self.device) for array in block[:3])
             for start in range(0, len(p), size):
                 part = slice(start, start + size)
-                yield Batch(x[part], y[part], p[part], block.clip[part], block.frame[part])
+                yield x[part], y[part], p[part], block.clip[part], block.frame[part]
+
+    @property
+    def _nothing(self) -> Piece:
+        """No rows."""
+        layout, none = self.database.layout, np.empty(0, np.int32)
+        x, y = (torch.empty(0, size, device=self.device) for size in (layout.x_size, layout.y_size))
+        return x, y, x[:, 0], none, none
+
+
+def _joined(pieces: Sequence[Piece], nothing: Piece) -> Piece:
+    x, y, p, clip, frame = zip(nothing, *pieces, strict=True)
+    return torch.cat(x), torch.cat(y), torch.cat(p), np.concatenate(clip), np.concatenate(frame)
 
 
 class Watch:
     """Adds up the losses of a section, and stops the training where it diverges.
 
-    where: the pass and section, as a person would say it. clips: names by index.
+    where: the pass and section, as a person would say it. clips: names by index. processes: all of them stop
+    together, with the message of the one that has the rows at fault.
     """
 
-    def __init__(self, where: str, clips: tuple[str, ...]) -> None:
-        self.where, self.clips = where, clips
+    def __init__(self, where: str, clips: tuple[str, ...], processes: Processes = ALONE) -> None:
+        self.where, self.clips, self.processes = where, clips, processes
         self.seen, self.samples, self._batches, self._total, self._new = 0, 0, 0, 0.0, 0
         self._waiting: list[tuple[Tensor, Batch]] = []
         self._worst: tuple[float, int, Batch] | None = None
 
     def add(self, loss: Tensor, batch: Batch) -> None:
-        """Note a batch and its loss, a scalar on any device."""
+        """Note a batch and its loss over all processes, a scalar on any device."""
         self._waiting.append((loss, batch))
-        self.seen += len(batch.p)
-        self._new += len(batch.p)
+        self.seen += batch.whole
+        self._new += batch.whole
         if self._new >= LOOK_EVERY:
             self._look()
 
@@ -87,24 +133,28 @@ class Watch:
                 raise HobbleError(self._message("its error is not a finite number", self._batches, batch))
             if loss > DIVERGED and (self._worst is None or loss > self._worst[0]):
                 self._worst = (loss, self._batches, batch)
-            self.samples += len(batch.p)
-            self._total += loss * len(batch.p)
+            self.samples += batch.whole
+            self._total += loss * batch.whole
         self._waiting.clear()
         self._new = 0
 
     def _message(self, what: str, number: int, batch: Batch) -> str:
         text = f"training diverged in {self.where}, batch {number}: {what}"
+        return self.processes.best_told(*self._explained(text, batch))
+
+    def _explained(self, text: str, batch: Batch) -> tuple[str, bool]:
+        """The text with what the batch says about it, and whether that is the cause."""
         x, y, p = (part.isfinite().cpu().numpy() for part in batch[:3])
         bad = ~(x.all(1) & y.all(1) & p)
         if bad.any():
             places = zip(batch.clip[bad], batch.frame[bad], strict=True)
             rows = _some([f"{self.clips[clip]} frame {frame}" for clip, frame in places])
-            return f"{text}, since rows of the database are not: {rows}. Look at the clip there."
+            return f"{text}, since rows of the database are not: {rows}. Look at the clip there.", True
         names = _some([self.clips[clip] for clip in np.unique(batch.clip)])
         return (
             f"{text}. The batch holds frames of {names}. The last checkpoint is kept. "
             "Lower training.learning_rate, or look for broken frames in these clips."
-        )
+        ), False
 
 
 def _some(names: list[str]) -> str:

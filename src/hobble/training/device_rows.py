@@ -9,12 +9,13 @@ import torch
 from torch import Tensor
 
 from hobble.database import order
-from hobble.database.chunks import read_chunk
 from hobble.database.manifest import Manifest
-from hobble.database.precision import STORED
 from hobble.database.reader import Database
+from hobble.database.stretches import Sharing, Stretch
+from hobble.database.window import room
 from hobble.rows.compose import compose, fit_columns, x_columns
 from hobble.training.batches import TRAIN, Batch, HostRows
+from hobble.training.processes import ALONE, Processes
 
 AT_ONCE = 4096  # rows composed in one go: few launches, 10 MB
 OF_MEMORY = 0.6  # of the device's; the rest is for the network and its buffers
@@ -27,8 +28,15 @@ class DeviceRows:
     and which of its fits comes next is found on the host, and sent once a section.
     """
 
-    def __init__(self, database: Database, device: torch.device) -> None:
+    def __init__(
+        self,
+        database: Database,
+        device: torch.device,
+        processes: Processes = ALONE,
+        stretches: int | None = None,
+    ) -> None:
         self.database, self.device = database, device
+        self.processes, self.stretches = processes, stretches
         manifest = database.manifest
         self.chunks = manifest.chunks[TRAIN]
         rows, fits = sum(c.rows for c in self.chunks), sum(c.fits for c in self.chunks)
@@ -40,56 +48,71 @@ class DeviceRows:
         self.phase = torch.empty(rows, device=device)
         self.count, self.clip, self.frame = (np.empty(rows, np.int32) for _ in range(3))
         self._upload()
-        self.first = np.cumsum(self.count, dtype=np.int64) - self.count
+        self.first = order.starts(self.count)
         s = database.statistics
         self.x_std, self.y_std = (torch.from_numpy(std).to(device) for std in (s.x_std, s.y_std))
 
     def _upload(self) -> None:
         row = fit = 0
-        for chunk in self.chunks:
+        into = room(self.database.manifest, TRAIN, 1)
+        for number, chunk in enumerate(self.chunks):
             rows, fits = slice(row, row + chunk.rows), slice(fit, fit + chunk.fits)
-            tables = {"x": self.x[rows], "y": self.y[rows], "fits": self.fits[fits]}
-            stored = STORED[self.database.manifest.dtype]
-            parts = {name: np.empty(table.shape, stored) for name, table in tables.items()} | {
-                "count": self.count[rows],
-                "clip": self.clip[rows],
-                "frame": self.frame[rows],
-                "phase": np.empty(chunk.rows, np.float32),
-            }
-            read_chunk(self.database.path / self.database.manifest.folder, chunk, parts)
-            for name, table in tables.items():
-                table.copy_(torch.from_numpy(parts[name]).view(table.dtype))
-            self.phase[rows] = torch.from_numpy(parts["phase"]).to(self.device)
+            read = self.database.load(TRAIN, [number], into)
+            for table, values in (
+                (self.x[rows], read.x),
+                (self.y[rows], read.y),
+                (self.fits[fits], read.fits),
+                (self.phase[rows], read.phase),
+            ):
+                table.copy_(torch.from_numpy(values).view(table.dtype))
+            self.count[rows], self.clip[rows], self.frame[rows] = read.count, read.clip, read.frame
             row, fit = rows.stop, fits.stop
 
     def batches(self, pass_index: int, section: int, sections: int, seed: int, size: int) -> Iterator[Batch]:
         """As `hobble.training.batches.HostRows.batches`."""
-        places = list(self._places(pass_index, section, sections, seed))
-        rows, fits = (np.concatenate(part) for part in zip(*places, strict=True))
+        total = self.database.section_pairs(TRAIN, section, sections)
+        sharing = self.processes.sharing(total, size, self.stretches)
+        rows, fits = self._read(sharing, (pass_index, section, sections, seed))
         sent, fits_sent = (torch.from_numpy(part).to(self.device) for part in (rows, fits))
-        step = size * max(1, AT_ONCE // size)
-        for at in range(0, len(rows), step):
+        own = len(sharing.own)
+        step = own * max(1, AT_ONCE // own)
+        sizes = sharing.sizes()
+        for at in range(0, max(len(rows), 1), step):
             x, y, p = self._composed(sent[at : at + step], fits_sent[at : at + step])
             of_host = rows[at : at + step]
             clip, frame = self.clip[of_host], self.frame[of_host]
-            for start in range(0, len(p), size):
-                part = slice(start, start + size)
-                yield Batch(x[part], y[part], p[part], clip[part], frame[part])
+            for start in range(0, len(p), own):
+                part = slice(start, start + own)
+                yield Batch(x[part], y[part], p[part], clip[part], frame[part], next(sizes)[0])
+        for whole, _ in sizes:  # the last batch is too short to reach this process
+            yield Batch(x[:0], y[:0], p[:0], clip[:0], frame[:0], whole)
+
+    def _read(self, sharing: Sharing, place: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
+        """Rows and fits that this process reads of a section, batch after batch."""
+        places, batches = [], []
+        for stretch in sharing.read():
+            parts = list(self._places(*place, stretch))
+            rows, fits = (np.concatenate(part) for part in zip(*parts, strict=True))
+            some = stretch.kept(0, len(rows))
+            places.append((rows[some], fits[some]))
+            batches.append(np.arange(len(places[-1][0])) // (stretch.high - stretch.low))
+        rows, fits = (np.concatenate(part) for part in zip(*places, strict=True))
+        if len(batches) == 1:
+            return rows, fits
+        turn = np.argsort(np.concatenate(batches), kind="stable")
+        return rows[turn], fits[turn]
 
     def _places(
-        self, pass_index: int, section: int, sections: int, seed: int
+        self, pass_index: int, section: int, sections: int, seed: int, stretch: Stretch
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Rows and fits of a section in their order, a layer at a time."""
-        visits = self.database.manifest.visits
-        ends = np.cumsum([chunk.rows for chunk in self.chunks])
-        for layer, start, stop in order.spans(len(self.count), visits, section, sections):
-            of = (seed, pass_index, layer)
-            rows = order.row_order(len(self.count), *of, 0)[start:stop]
-            picked = [
-                order.picks(self.count[end - chunk.rows : end], visits, *of, number)
-                for number, (chunk, end) in enumerate(zip(self.chunks, ends, strict=True))
-            ]
-            yield rows, self.first[rows] + np.concatenate(picked)[rows]
+        """Rows and fits of a stretch in their order, a layer at a time; all chunks are one group."""
+        visits, cut = self.database.manifest.visits, (stretch.start, stretch.stop)
+        every, of_each = range(len(self.chunks)), [chunk.rows for chunk in self.chunks]
+        nothing = np.empty(0, np.int64)
+        yield nothing, nothing
+        for layer, start, stop in order.spans(len(self.count), visits, section, sections, cut):
+            place = (seed, pass_index, layer, 0)
+            yield order.shown(every, of_each, self.count, self.first, visits, place, slice(start, stop))
 
     def _composed(self, rows: Tensor, fits: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """x (n, X), y (n, Y) and p (n,), composed where they lie."""
@@ -101,11 +124,12 @@ class DeviceRows:
         return x, y, self.phase[rows]
 
 
-def rows_for(database: Database, device: torch.device) -> HostRows | DeviceRows:
+def rows_for(
+    database: Database, device: torch.device, processes: Processes = ALONE, stretches: int | None = None
+) -> HostRows | DeviceRows:
     """The training rows on an accelerator where they have room there, else composed by the host."""
-    if device.type == "cuda" and fits_on(device, database.manifest):
-        return DeviceRows(database, device)
-    return HostRows(database, device)
+    on_device = device.type == "cuda" and fits_on(device, database.manifest)
+    return (DeviceRows if on_device else HostRows)(database, device, processes, stretches)
 
 
 def fits_on(device: torch.device, manifest: Manifest) -> bool:

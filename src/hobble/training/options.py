@@ -9,12 +9,12 @@ from pydantic import Field, model_validator
 from hobble.core.section import Positive, PositiveFloat, Section, Share
 
 
-class Training(Section):
-    """The original recipe; a pass is every (frame, fit) pair once, in `sections` sections."""
+class Recipe(Section):
+    """What is learnt and how; a pass is every (frame, fit) pair once, in `sections` sections."""
 
     passes: Positive = 20
     sections: Positive = 10
-    batch: Positive = 32
+    batch: Positive = Field(32, description="samples of a step, over all processes together")
     learning_rate: PositiveFloat = 1e-4
     schedule: Literal["constant", "cosine"] = Field(
         "constant", description="of the learning rate; cosine falls to 0 at the end of the last pass"
@@ -28,7 +28,9 @@ class Training(Section):
         1, description="frames over which errors of the network stay in the pose that it is given; 1: none"
     )
     seed: int = 1
-    memory_mb: Positive = Field(512, description="largest part of the database held in memory")
+    memory_mb: Positive = Field(
+        512, description="largest part of the database held in memory, by each process"
+    )
     continues: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")] | None = Field(
         None, description="a configuration whose last checkpoint is the start"
     )
@@ -38,11 +40,59 @@ class Training(Section):
         description="factors of the products; auto: bfloat16 from batch 256 on where it is fast, below "
         "it tf32 on CUDA; a CPU has no tf32 and takes float32",
     )
+    stretches: Positive | None = Field(
+        None,
+        description="parts of a section from which each batch is taken, side by side; as many as processes "
+        "where there is none, so that each reads a part of its own",
+    )
 
     @model_validator(mode="after")
-    def _can_go_on(self) -> Training:
+    def _can_go_on(self) -> Recipe:
         if self.continues and self.schedule != "constant":
             raise ValueError(
                 "`continues` needs `schedule: constant`; after another there is nothing to go on with"
+            )
+        if self.stretches and self.stretches > self.batch:
+            raise ValueError(f"`stretches` ({self.stretches}) is above `batch` ({self.batch})")
+        return self
+
+
+class Machines(Section):
+    """Where it runs: `nodes` machines, on each a process for each of its GPUs, or so many on its CPU.
+
+    No part of the recipe: with another number of them a training goes on from its checkpoint.
+    """
+
+    nodes: Annotated[int, Field(gt=0, le=10_000)] = 1
+    gpus: Annotated[int, Field(ge=0, le=1_000)] = Field(
+        0, description="of each node, with a process each; 0: `processes` on its CPU"
+    )
+    processes: Annotated[int, Field(gt=0, le=1_000)] = Field(1, description="on each node, where `gpus` is 0")
+
+    @property
+    def each(self) -> int:
+        """Processes on each node."""
+        return self.gpus or self.processes
+
+    @property
+    def count(self) -> int:
+        """Processes on all nodes."""
+        return self.nodes * self.each
+
+
+class Training(Machines, Recipe):
+    """The original recipe, on one machine."""
+
+    @model_validator(mode="after")
+    def _have_work(self) -> Training:
+        if self.gpus and self.processes > 1:
+            raise ValueError(
+                "give `gpus` or `processes`, not both: there is one process for each GPU of a node"
+            )
+        if self.gpus and self.device == "cpu":
+            raise ValueError("`gpus` needs `device: cuda` or `auto`")
+        if self.count > self.batch:
+            raise ValueError(
+                f"{self.count} processes share a batch of {self.batch}: each needs one sample of it at least"
             )
         return self

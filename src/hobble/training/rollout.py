@@ -22,12 +22,14 @@ class RollOut:
     past a row is learnt by heart, and held-out clips fare worse.)
 
     frames: how long a roll-out is; its first pose is the recorded one, so 1 changes nothing. batch: the most
-    rows of a batch.
+    rows of a batch. first: the place of the first of them, where other processes have those before.
     """
 
-    def __init__(self, database: Database, frames: int, batch: int, device: torch.device) -> None:
+    def __init__(
+        self, database: Database, frames: int, batch: int, device: torch.device, first: int = 0
+    ) -> None:
         layout, s = database.layout, database.statistics
-        self.frames = frames
+        self.frames, self.first = frames, first
         self.x_place, self.x_speed = layout.x_joint_position, layout.x_joint_velocity
         self.y_place, self.y_speed = layout.y_joint_position, layout.y_joint_velocity
         # Standard deviations of Y in those of X.
@@ -64,6 +66,6 @@ class RollOut:
         self.place[:rows] = met(self.place[:rows], made)
         torch.mul(speed, self.speed_of_speed, out=self.speed[:rows])
         self.batches += 1
-        ended = slice(self.batches % self.frames, None, self.frames)
+        ended = slice((self.batches - self.first) % self.frames, None, self.frames)
         self.place[ended] = 0
         self.speed[ended] = 0

@@ -18,6 +18,7 @@ from hobble.training.device_rows import rows_for
 from hobble.training.held_out import HeldOut
 from hobble.training.history import duration
 from hobble.training.options import Training
+from hobble.training.processes import ALONE, Processes
 from hobble.training.rollout import RollOut
 from hobble.training.schedule import share
 from hobble.training.start import begin, recipe_hash, step_for, use_threads
@@ -35,59 +36,63 @@ def train(
     threads: int = 1,
     start: Path | None = None,
     code: str | None = None,
+    processes: Processes = ALONE,
 ) -> State:
     """Train to `training.passes` passes over the database's training clips; returns where that ends.
 
     network, training: those sections of a configuration. checkpoints: a folder in which the run keeps its
     state, by the hash of all that determines it; a run that finds its own there goes on from it. start: a
-    checkpoint to begin from where there is none yet; a run from another start is another run. The result
-    depends on the arguments and the number of threads, never on interruptions. Raises HobbleError where an
-    error is no finite number, naming the batch (the last checkpoint stays), and where there are fewer samples
-    than sections.
+    checkpoint to begin from where there is none yet; a run from another start is another run. processes: who
+    trains together, each calling this; the first reads and writes checkpoints and keeps the history. The
+    result depends on the arguments and the number of threads, never on interruptions. Raises HobbleError
+    where an error is no finite number, naming the batch (the last checkpoint stays), and where there are
+    fewer samples than sections.
     """
     use_threads(threads)
     pairs, sections = database.pairs(TRAIN), training.sections
     if pairs < sections:
         raise HobbleError(f"{pairs} samples to train on are fewer than training.sections, {sections}")
     recipe = recipe_hash(network, training, database, code)
-    state, path = begin(database, network, training, recipe, Path(checkpoints), start)
+    state, path = begin(database, network, training, recipe, Path(checkpoints), start, processes)
+    if not processes.first:
+        _run(state, database, training, processes, None)
+        return state
     with Saver(path) as saver:
-        _run(state, database, training, saver)
+        _run(state, database, training, processes, Record(state, database, training, saver))
     return state
 
 
-def _run(state: State, database: Database, training: Training, saver: Saver) -> None:
+def _run(
+    state: State, database: Database, training: Training, processes: Processes, record: Record | None
+) -> None:
     passes, sections, seed = training.passes, training.sections, training.seed
-    device = state.network.flat.device
+    device, batch_size = state.network.flat.device, training.batch
     step = step_for(state.network, training)
-    update = update_for(step, state.adam, training.batch)
-    rows = rows_for(database, device)
-    held_out = HeldOut(database, device, database.pairs(TRAIN) // sections)
-    roll_out = RollOut(database, training.rollout, training.batch, device)
+    update = update_for(step, state.adam, batch_size, processes)
+    rows = rows_for(database, device, processes, training.stretches)
+    places = processes.places(batch_size)
+    roll_out = RollOut(database, training.rollout, len(places), device, places.start)
     pairs = database.pairs(TRAIN)
-    progress = Progress(state, passes * pairs)
     for turn in range(state.sections, passes * sections):
         pass_index, section = divmod(turn, sections)
         where = f"pass {pass_index + 1} of {passes}, section {section + 1} of {sections}"
-        watch = Watch(where, database.clips)
+        watch = Watch(where, database.clips, processes)
         step.seed(section_seed(seed, turn))
         roll_out.begin()
-        for batch in rows.batches(pass_index, section, sections, seed, training.batch):
+        for batch in rows.batches(pass_index, section, sections, seed, batch_size):
             roll_out.add(batch.x)
             rate = share(training, (state.samples + watch.seen) / pairs)
-            watch.add(update(*batch[:3], rate), batch)
+            watch.add(update(batch.x, batch.y, batch.p, rate, batch.whole), batch)
             roll_out.remember(step.error)
-            progress.bar.update(len(batch.p))
+            if record:
+                record.bar.update(batch.whole)
         train_mse = watch.mean()
+        processes.check_same(state.network.flat)
         state.sections, state.samples = turn + 1, state.samples + watch.samples
-        state.seconds = progress.seconds()
-        errors = held_out.errors(state.network)
-        state.keep_best(errors[0])
-        state.history.append([pass_index + 1, section + 1, state.samples, state.seconds, train_mse, *errors])
-        saver.save(pack(state))
-        progress.report(where, state)
-    progress.bar.close()
-    saver.wait()
+        if record:
+            record.section(where, [pass_index + 1, section + 1], train_mse)
+    if record:
+        record.close()
 
 
 def section_seed(seed: int, turn: int) -> int:
@@ -95,21 +100,38 @@ def section_seed(seed: int, turn: int) -> int:
     return int(np.random.SeedSequence([seed, 1, turn]).generate_state(1, np.uint64)[0] >> 1)
 
 
-class Progress:
-    """A bar on a terminal, a line for each section in the log."""
+class Record:
+    """What is kept of a training, and how it goes: errors, history, checkpoints, a bar, a line a section."""
 
-    def __init__(self, state: State, goal: int) -> None:
-        self.goal, self.first, self.before = goal, state.samples, state.seconds
+    def __init__(self, state: State, database: Database, training: Training, saver: Saver) -> None:
+        self.state, self.saver = state, saver
+        pairs = database.pairs(TRAIN)
+        self.held_out = HeldOut(database, state.network.flat.device, pairs // training.sections)
+        self.goal, self.first, self.before = training.passes * pairs, state.samples, state.seconds
         self.began = time.perf_counter()
-        self.bar = tqdm(total=goal, initial=state.samples, unit=" samples", unit_scale=True, disable=None)
+        self.bar = tqdm(
+            total=self.goal, initial=state.samples, unit=" samples", unit_scale=True, disable=None
+        )
 
-    def seconds(self) -> float:
-        """Seconds spent on the training, those before an interruption included."""
-        return self.before + time.perf_counter() - self.began
+    def section(self, where: str, place: list[int], train_mse: float) -> None:
+        """Measure the network after a section, note it and save all; `place`: pass and section from 1."""
+        state = self.state
+        state.seconds = self.before + time.perf_counter() - self.began
+        errors = self.held_out.errors(state.network)
+        state.keep_best(errors[0])
+        state.history.append([*place, state.samples, state.seconds, train_mse, *errors])
+        self.saver.save(pack(state))
+        self._report(where)
 
-    def report(self, where: str, state: State) -> None:
+    def close(self) -> None:
+        """Return when all is on disk."""
+        self.bar.close()
+        self.saver.wait()
+
+    def _report(self, where: str) -> None:
         """Say how it goes: speed, time left, errors."""
-        speed = (state.samples - self.first) / (self.seconds() - self.before)
+        state, seconds = self.state, time.perf_counter() - self.began
+        speed = (state.samples - self.first) / seconds
         left = duration((self.goal - state.samples) / speed)
         train, held_out = state.history[-1][4:6]
         errors = f"error {train:.4f}, held out {held_out:.4f}"

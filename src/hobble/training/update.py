@@ -7,6 +7,7 @@ from torch import Tensor
 
 from hobble.models.trainable import Step
 from hobble.training.optimiser import Adam
+from hobble.training.processes import ALONE, Processes
 
 CAPTURED_UP_TO = 1024  # rows of a batch: from there on the products outlast the launches
 WARM_UP = 3  # runs before a capture, in which libraries choose their algorithms and take their memory
@@ -18,11 +19,46 @@ class Update:
     def __init__(self, step: Step, adam: Adam) -> None:
         self.step, self.adam = step, adam
 
-    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float) -> Tensor:
-        """Train on x (B, X), y (B, Y), p (B,) at `share` of the learning rate; the loss, a scalar tensor."""
+    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, whole: int | None = None) -> Tensor:
+        """Train on x (B, X), y (B, Y), p (B,) at `share` of the learning rate; the loss, a scalar tensor.
+
+        whole: rows of the batch over all processes, where there are several.
+        """
         loss = self.step(x, y, p, self.step.masks(len(x)))
         self.adam.step(self.step.gradients, share)
         return loss
+
+
+class SharedUpdate(Update):
+    """The same by several processes, each of which has some rows of the batch, maybe none.
+
+    The loss is a mean over the rows of the batch. So each process's gradient and loss count by its share of
+    those rows, and their sum over the processes is that of the whole batch. One message holds both.
+    """
+
+    def __init__(self, step: Step, adam: Adam, processes: Processes, batch: int) -> None:
+        super().__init__(step, adam)
+        self.processes, self.own = processes, processes.places(batch)
+        self.sent = torch.empty(len(adam.network.flat) + 1, dtype=adam.network.flat.dtype)
+        self.sent = self.sent.to(adam.network.flat.device)
+        self.gradients = adam.network.views(self.sent[:-1])
+
+    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, whole: int | None = None) -> Tensor:
+        """As in `Update`; the loss is that of the whole batch."""
+        whole = whole or len(p)
+        masks = self.step.masks(whole, slice(self.own.start, self.own.stop))
+        if len(p):
+            loss = self.step(x, y, p, masks)
+            for sent, gradient in zip(self.gradients, self.step.gradients, strict=True):
+                sent.copy_(gradient.view(sent.shape))
+            self.sent[-1] = loss
+            self.sent.mul_(len(p) / whole)
+        else:
+            self.sent.zero_()
+            self.step.error = self.step.error[:0]
+        self.processes.sum(self.sent)
+        self.adam.step(self.gradients, share)
+        return self.sent[-1].clone()
 
 
 class CapturedUpdate(Update):
@@ -59,7 +95,7 @@ class CapturedUpdate(Update):
         self.adam.move(self.step.gradients, self.numbers)
         return loss
 
-    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float) -> Tensor:
+    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, whole: int | None = None) -> Tensor:
         """As in `Update`."""
         if len(p) != len(self.p):
             return super().__call__(x, y, p, share)
@@ -73,8 +109,10 @@ class CapturedUpdate(Update):
         return self.loss.clone()
 
 
-def update_for(step: Step, adam: Adam, rows: int) -> Update:
-    """Captured where that is possible and pays: on CUDA, for small batches."""
+def update_for(step: Step, adam: Adam, rows: int, processes: Processes = ALONE) -> Update:
+    """Captured where that is possible and pays: on CUDA, for small batches of one process."""
+    if not processes.alone:
+        return SharedUpdate(step, adam, processes, rows)
     if adam.network.flat.device.type == "cuda" and rows <= CAPTURED_UP_TO:
         return CapturedUpdate(step, adam, rows)
     return Update(step, adam)

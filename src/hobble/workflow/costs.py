@@ -1,4 +1,4 @@
-"""Where each stage's benchmark files and artefacts lie, for the account of what a configuration cost."""
+"""Folders of each stage's benchmark files and artefacts, for the summary of time, memory and disk."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from pathlib import Path
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.configurations import Configurations
 
-OF_DATASET = ("synthetic", "motion", "labels", "channels", "terrain", "database")
+DATASET_STAGES = ("synthetic", "motion", "labels", "channels", "terrain", "database")
 
 Places = dict[str, list[str]]
 
 
 def stages(configurations: Configurations, name: str) -> dict[str, Places]:
-    """Stage -> its "benchmarks" and its "files" (folders), of configuration `name`."""
+    """Stage -> folders of its "benchmarks" and its "files", for configuration `name`."""
     dataset = configurations.dataset(name)
     root, own = Path(DATASETS, dataset), Path("results", name)
     source = Path(DATASETS, configurations.catalogue.dataset(dataset).source or dataset)
-    out = {stage: _places(root, stage, stage) for stage in OF_DATASET}
+    out = {stage: _places(root, stage, stage) for stage in DATASET_STAGES}
     out["synthetic"] = _places(source, "synthetic", "synthetic")
     out["database"]["files"] = [str(root / "database/clips"), configurations.database(name)]
     out["training"] = _places(Path("results", configurations.owner(name)), "training", "network")

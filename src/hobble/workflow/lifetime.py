@@ -1,8 +1,8 @@
-"""Who a run's lock belongs to, and that no job outlives the Snakemake that started it.
+"""Clears locks of killed runs, and ends all jobs together with their run.
 
-Snakemake's lock says nothing of its owner, so that after a kill it stays until a person clears it; and on
-SIGINT or SIGTERM Snakemake waits for the jobs that run. So a run notes beside its lock which process it is,
-ends its jobs when it is told to end, and each job looks now and then whether its run is still there.
+Snakemake's lock does not say which process it belongs to, so after a kill it stays until a person removes it.
+And on SIGINT or SIGTERM Snakemake waits for running jobs. So a run writes its process id next to its lock and
+ends its jobs on these signals. Each job checks regularly whether its run still exists.
 """
 
 from __future__ import annotations
@@ -22,35 +22,40 @@ from typing import Any
 
 LOCKS = Path(".snakemake/locks")  # Snakemake removes the folder when it unlocks
 OWNER = "owner.json"
-RUN = "HOBBLE_RUN"  # in a job's environment: the process of its run, and when that began
-LOOK = 0.5  # seconds between a job's looks at its run
-GRACE = 2.0  # seconds that a job has for tidying up after SIGTERM
+RUN_VARIABLE = "HOBBLE_RUN"  # environment variable of a job: process id and start time of its run
+CHECK_SECONDS = 0.5  # how often a job checks that its run exists
+GRACE_SECONDS = 2.0  # time for a job to clean up after SIGTERM
 
 
-def announce() -> None:
-    """Say in the environment, which jobs inherit, which process the run is."""
-    os.environ[RUN] = f"{os.getpid()} {_began(os.getpid())}"
+def set_run_variable() -> None:
+    """Put this process id and its start time into the environment, which jobs inherit."""
+    os.environ[RUN_VARIABLE] = this_process()
 
 
-def own_lock(locks: Path = LOCKS) -> None:
-    """Note beside the lock that Snakemake has just taken whose it is."""
+def this_process() -> str:
+    """Id and start time of this process, in the form of RUN_VARIABLE."""
+    return f"{os.getpid()} {_start_time(os.getpid())}"
+
+
+def record_lock_owner(locks: Path = LOCKS) -> None:
+    """Write the owner of the lock that Snakemake has just taken next to the lock."""
     if locks.is_dir():
-        owner = {"host": platform.node(), "pid": os.getpid(), "began": _began(os.getpid())}
+        owner = {"host": platform.node(), "pid": os.getpid(), "began": _start_time(os.getpid())}
         with contextlib.suppress(OSError):
             (locks / OWNER).write_text(json.dumps(owner), encoding="utf-8")
 
 
 def clear_stale_lock(locks: Path = LOCKS) -> bool:
-    """Take away a lock whose owner was a process of this machine and is no more; True where there was one."""
+    """Remove a lock if its owner was a process of this machine and has ended. Returns whether it did."""
     try:
         text = (locks / OWNER).read_text(encoding="utf-8")
         owner = json.loads(text)
         host, pid, began = owner["host"], int(owner["pid"]), str(owner["began"])
     except (OSError, ValueError, TypeError, KeyError):
         return False
-    if host != platform.node() or _lives(pid, began):
+    if host != platform.node() or _is_alive(pid, began):
         return False
-    # Renamed first, so that of two runs that begin at once only one takes it away.
+    # Rename it first, so that only one of two runs that start together removes it.
     stale = locks.with_name(f"{locks.name}.stale.{os.getpid()}")
     try:
         os.rename(locks, stale)
@@ -65,22 +70,22 @@ def clear_stale_lock(locks: Path = LOCKS) -> bool:
         return False
 
 
-def end_jobs_with_run() -> None:
-    """On SIGINT or SIGTERM end the jobs that run, and then Snakemake as by Ctrl-C: with no lock left."""
+def end_jobs_on_signal() -> None:
+    """On SIGINT or SIGTERM end the running jobs, then Snakemake as if by Ctrl-C, which removes its lock."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
     for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, signal.SIG_IGN)  # once is enough: what follows takes seconds at most
-    threading.Thread(target=end_below, args=(os.getpid(),), daemon=True).start()
+        signal.signal(each, signal.SIG_IGN)  # ignore further signals; stopping takes only seconds
+    threading.Thread(target=end_children, args=(os.getpid(),), daemon=True).start()
     raise KeyboardInterrupt
 
 
-def end_below(pid: int, grace: float = GRACE) -> None:
-    """End every process below one: SIGTERM, and SIGKILL for those still there after `grace` seconds."""
-    import psutil  # which Snakemake needs too; it takes longer to import than all of a job's frame
+def end_children(pid: int, grace: float = GRACE_SECONDS) -> None:
+    """End all descendants of a process with SIGTERM, and after `grace` seconds with SIGKILL."""
+    import psutil  # a dependency of Snakemake; imported here because it is slow to import
 
     with contextlib.suppress(psutil.NoSuchProcess):
         below = psutil.Process(pid).children(recursive=True)
@@ -105,14 +110,14 @@ def _runs(process: Any) -> bool:
 
 @contextlib.contextmanager
 def ends_with_run() -> Iterator[None]:
-    """While it lasts, this job ends tidily on SIGINT and SIGTERM, and soon after its run."""
+    """Within this context the job ends cleanly on SIGINT and SIGTERM, and soon after its run ends."""
     before = {}
     with contextlib.suppress(ValueError):  # not in the main thread, as in a test
         for number in (signal.SIGINT, signal.SIGTERM):
-            before[number] = signal.signal(number, _leave)
+            before[number] = signal.signal(number, _exit)
     done = threading.Event()
-    if run := os.environ.get(RUN):
-        threading.Thread(target=_watch, args=(run, done), daemon=True).start()
+    if run := os.environ.get(RUN_VARIABLE):
+        threading.Thread(target=_exit_with_run, args=(run, done), daemon=True).start()
     try:
         yield
     finally:
@@ -121,33 +126,33 @@ def ends_with_run() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _leave(number: int, frame: FrameType | None) -> None:
-    raise SystemExit(128 + number)  # past every `except Exception`, through every `finally`
+def _exit(number: int, frame: FrameType | None) -> None:
+    raise SystemExit(128 + number)  # not caught by `except Exception`, and runs every `finally`
 
 
-def _watch(run: str, done: threading.Event) -> None:
-    """End this process when its run is no more; by SIGKILL where compiled code lets no signal through."""
+def _exit_with_run(run: str, done: threading.Event) -> None:
+    """End this process when its run has ended. If compiled code blocks SIGTERM, use SIGKILL."""
     pid, _, began = run.partition(" ")
-    while not done.wait(LOOK):
-        if not _lives(int(pid), began):
+    while not done.wait(CHECK_SECONDS):
+        if not _is_alive(int(pid), began):
             os.kill(os.getpid(), signal.SIGTERM)
-            if not done.wait(GRACE):
+            if not done.wait(GRACE_SECONDS):
                 os.kill(os.getpid(), signal.SIGKILL)
 
 
-def _lives(pid: int, began: str) -> bool:
-    """Whether process `pid` runs and is the one that began then, as another may bear its number by now."""
+def _is_alive(pid: int, began: str) -> bool:
+    """Whether process `pid` runs and started at `began`. Another process may have got its number since."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
         return False
     except OSError:
         return True  # another user's
-    return _began(pid) == began
+    return _start_time(pid) == began
 
 
-def _began(pid: int) -> str:
-    """When a process began, in ticks since the machine did; "" for a zombie, "?" where no /proc tells."""
+def _start_time(pid: int) -> str:
+    """Start time of a process in clock ticks since boot; "" for a zombie, "?" if /proc does not have it."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:

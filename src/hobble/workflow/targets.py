@@ -1,4 +1,4 @@
-"""What can be told of the targets on a command line before Snakemake plans: mistakes end the run here."""
+"""Checks the targets of a command line before Snakemake plans, and ends the run if there are mistakes."""
 
 from __future__ import annotations
 
@@ -16,28 +16,29 @@ from hobble.workflow.project import Project
 if TYPE_CHECKING:
     from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 
-PAGE = "page"  # under results/: what all reports share
+INJURY = "injury"  # the channel that the questionnaire asks about
+PAGE = "page"  # the folder in results/ with the files that all reports share
 
 
 def check(project: Project, targets: Iterable[str]) -> None:
-    """Validate every configuration, data set and skeleton that the targets need, and what they ask of them.
+    """Validate the targets, and every configuration, data set and skeleton that they need.
 
-    Raises HobbleError.
+    Raises HobbleError for the first mistake.
     """
     for target in list(targets) or ["results/holden/report.html"]:
         _, name, folder, file, *_ = (*Path(target).parts, "", "", "")
         if name == "datasets":
-            _dataset(project, folder)
+            _check_dataset(project, folder)
         elif name == COMPARE:
             for one in project.comparison.names():
-                _configuration(project, one)
+                _check_configuration(project, one)
         elif name and name != PAGE:
-            _configuration(project, name)
-            _asked(project, name, folder, file)
+            _check_configuration(project, name)
+            _check_possible(project, name, folder, file)
 
 
 def notes(project: Project, targets: Iterable[str]) -> list[str]:
-    """What a person should know of the folders of the data sets that the targets need, each once."""
+    """Notes on unused files in the folders of the data sets that the targets need."""
     names = []
     for target in list(targets) or ["results/holden/report.html"]:
         _, name, folder, *_ = (*Path(target).parts, "", "")
@@ -50,24 +51,24 @@ def notes(project: Project, targets: Iterable[str]) -> list[str]:
     return [f"data set {name}: {note}" for name in dict.fromkeys(names) for note in project.clips.notes(name)]
 
 
-def _configuration(project: Project, name: str) -> None:
+def _check_configuration(project: Project, name: str) -> None:
     model = project.catalogue.configuration(name)
     for other in filter(None, (model.network_of, model.training.continues)):
         if other == name:
-            raise HobbleError(f"configuration {name} cannot go on from itself")
+            raise HobbleError(f"configuration {name} cannot continue from itself")
         project.catalogue.configuration(other)
     if model.training.continues:
-        _goes_on(project, name, model)
-    _dataset(project, model.dataset)
+        _check_continues(project, name, model)
+    _check_dataset(project, model.dataset)
     project.datasets.selected(model.dataset, model.channels)
     refuse_copies(project.clips, project.datasets, model.dataset, tuple(model.channels))
 
 
-def _goes_on(project: Project, name: str, model: Configuration) -> None:
-    """A training goes on with a network of the same shape, and counts its passes in sections."""
+def _check_continues(project: Project, name: str, model: Configuration) -> None:
+    """Check that a training can continue from another: same network, same sections, more passes."""
     begun = model.training.continues
     if project.configurations.is_built(name):
-        raise HobbleError(f"configuration {name} is built at once, so it cannot go on from {begun}")
+        raise HobbleError(f"configuration {name} is not trained, so it cannot continue from {begun}")
     assert begun is not None
     start = project.catalogue.configuration(begun)
     for key, mine, of_start in (
@@ -77,35 +78,34 @@ def _goes_on(project: Project, name: str, model: Configuration) -> None:
     ):
         if mine != of_start:
             raise HobbleError(
-                f"configuration {name} goes on from {begun}, so its {key} has to be {of_start}, not {mine}"
+                f"configuration {name} continues from {begun}, so its {key} must be {of_start}, not {mine}"
             )
     if model.training.passes < start.training.passes:
         raise HobbleError(
-            f"configuration {name} goes on from {begun}, which ends after {start.training.passes} passes, to "
-            f"training.passes: {model.training.passes}; give more"
+            f"configuration {name} continues from {begun}, which has {start.training.passes} passes. Its "
+            f"training.passes must not be fewer, but it is {model.training.passes}"
         )
 
 
-def _dataset(project: Project, name: str) -> None:
+def _check_dataset(project: Project, name: str) -> None:
     model = project.catalogue.dataset(name)
     skeleton = project.catalogue.skeleton(model.skeleton)
-    for clip, entry in project.clips.own(name).items():
+    for clip, entry in project.clips.listed(name).items():
         project.clips.rig_files(name, clip)
-        _entry(f"data set {name}: clips.{clip}", entry)
-    _hurt(name, model, [f"{a}-{b}" for a, b in skeleton.links])
-    project.datasets.told.check(name)
-    project.datasets.selected(name, project.datasets.told.channels(name))
+        _check_entry(f"data set {name}: clips.{clip}", entry)
+    _check_hurt(name, model, [f"{a}-{b}" for a, b in skeleton.links])
+    project.datasets.channel_sources.check(name)
+    project.datasets.selected(name, project.datasets.channel_sources.channels(name))
     if model.mirror:
-        _mirrored(model.skeleton, skeleton)
+        _check_mirror(model.skeleton, skeleton)
 
 
-def _entry(where: str, entry: ClipEntry) -> None:
-    """What a clip's entry asks of the walker: what it can do."""
-    # Imported where there is something to check: it brings numpy, which takes longer than all else here.
+def _check_entry(where: str, entry: ClipEntry) -> None:
+    """Check what a clip's entry says for the synthetic walker."""
     if entry.injured is not None:
         check_link(entry.injured, where)
     if entry.recipe is not None:
-        from hobble.synthetic.recipes import RECIPES
+        from hobble.synthetic.recipes import RECIPES  # imports numpy, which takes longer than all the rest
 
         if entry.recipe not in RECIPES:
             raise InputError(
@@ -115,13 +115,13 @@ def _entry(where: str, entry: ClipEntry) -> None:
             )
 
 
-def _hurt(name: str, model: Dataset, links: Sequence[str]) -> None:
-    """What a data set says of hurt versions: links that there are."""
+def _check_hurt(name: str, model: Dataset, links: Sequence[str]) -> None:
+    """Check that the links of a data set's section `hurt` exist."""
     if model.hurt is None or not model.hurt.versions:
         return
     if not links:
         raise HobbleError(
-            f"data set {name}: hurt: skeleton {model.skeleton} has no links. List `links` there."
+            f"data set {name}: hurt: skeleton {model.skeleton} has no `links`. Add them to its file."
         )
     if odd := [link for link in model.hurt.links if link not in links]:
         raise HobbleError(
@@ -129,8 +129,8 @@ def _hurt(name: str, model: Dataset, links: Sequence[str]) -> None:
         )
 
 
-def _mirrored(name: str, skeleton: SkeletonFile) -> None:
-    """Raise HobbleError for a skeleton that has no mirror image."""
+def _check_mirror(name: str, skeleton: SkeletonFile) -> None:
+    """Raise HobbleError for a skeleton that cannot be mirrored."""
     from hobble.core.skeleton import Skeleton
     from hobble.motion.mirror import mirror_skeleton
 
@@ -139,17 +139,22 @@ def _mirrored(name: str, skeleton: SkeletonFile) -> None:
     _ = rig.mirror_links
 
 
-def _asked(project: Project, name: str, folder: str, file: str) -> None:
-    """What no network of this configuration could give, though it were trained."""
+def _check_possible(project: Project, name: str, folder: str, file: str) -> None:
+    """Raise HobbleError for a target that this configuration cannot have, before anything is trained."""
     owner = project.catalogue.configuration(name).network_of or name
     if folder == "stimuli" and not project.catalogue.configuration(owner).channels:
         raise HobbleError(
-            f"results/{name}/stimuli: the network of configuration {owner} is told nothing, so that there is "
-            "one walk to show. Ask for those of a configuration that has `channels`."
+            f"results/{name}/stimuli: configuration {owner} has no `channels`, so it has only one walk to "
+            "show. Use a configuration with channels."
+        )
+    if folder == "questionnaire" and INJURY not in project.catalogue.configuration(owner).channels:
+        raise HobbleError(
+            f"results/{name}/questionnaire: the network of configuration {owner} is not told what hurts. Ask "
+            f"for that of a configuration with `channels: [{INJURY}]`."
         )
     stem, _, suffix = file.rpartition(".")
     if folder == "export" and suffix == "onnx" and stem not in get_args(PhaseMode):
         raise HobbleError(
-            f"results/{name}/export/{file}: there are {', '.join(get_args(PhaseMode))}, as in "
+            f"results/{name}/export/{file}: the phase modes are {', '.join(get_args(PhaseMode))}, as in "
             f"results/{name}/export/cubic.onnx"
         )

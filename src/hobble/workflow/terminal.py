@@ -1,6 +1,6 @@
-"""What a run says on the terminal: one line of progress, each failure once, and a summary at the end.
+"""The terminal output of a run: one line of progress, each failure once, and a summary at the end.
 
-Snakemake hands over what it would say (`snakemake_logger_plugin_hobble`); `snakemake -p` says all of it.
+`snakemake_logger_plugin_hobble` passes Snakemake's log records to it. `snakemake -p` prints them all instead.
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-EVERY = 10.0  # seconds between lines of progress where they go to a file
-WIDTH = 100  # columns of the line that is written over
-MOST_NAMED = 20  # failures that the summary names
-TAIL = 1 << 16  # bytes at the end of a job's log in which its message stands
+PROGRESS_SECONDS = 10.0  # between lines of progress in a file
+WIDTH = 100  # columns of the line of progress on a terminal
+MAX_FAILURES_LISTED = 20  # in the summary
+TAIL_BYTES = 1 << 16  # the end of a job's log, in which its error message is searched
 MESSAGE = re.compile(r"^\S+ \S+ ERROR (.*)$", re.M)
-# What Snakemake says and a person need not read: it is said in fewer words here.
+# Messages of Snakemake that are not shown, because this module reports the same in fewer words.
 JOB_ENDED = re.compile(r"CalledProcessError|Command 'set -euo pipefail|returned non-zero exit status")
 SUPERFLUOUS = re.compile(
     r"Exiting because a job execution failed|Look below for error messages|^Shutting down|"
     r"^At least one job did not complete|^WorkflowError:\s*At least one job did not complete"
 )
-SAID = re.compile(r"^Nothing to be done|^Reasons:|^This was a dry-run|^Unlocking|^Touching|^Error")
-STOPPED = "Terminating processes on user request"
-SEE_JOBS = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
+PASSED_ON = re.compile(r"^Nothing to be done|^Reasons:|^This was a dry-run|^Unlocking|^Touching|^Error")
+STOP_MESSAGE = "Terminating processes on user request"
+JOB_HINT = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
 
 
 @dataclass(frozen=True)
 class Job:
-    """A job as it is named to a person."""
+    """The names of a job that are printed. about: its wildcards."""
 
     rule: str
     about: str
@@ -45,7 +45,10 @@ class Job:
 
 
 class Terminal:
-    """One run's talk. live: the last line is written over, as on a terminal; else lines come now and then."""
+    """The output of one run.
+
+    live: overwrite the line of progress, as on a terminal. Otherwise print a line every PROGRESS_SECONDS.
+    """
 
     def __init__(
         self, stream: TextIO, live: bool, dryrun: bool = False, now: Callable[[], float] = time.monotonic
@@ -56,10 +59,10 @@ class Terminal:
         self.running: dict[int, Job] = {}
         self.failed: list[Job] = []
         self.done = self.total = 0
-        self.stopped = self.told = self.shown = self.closed = False
+        self.stopped = self.announced = self.shown = self.closed = False
 
     def take(self, record: logging.LogRecord) -> None:
-        """Say what there is to say of a record of Snakemake's logger."""
+        """Print what a record of Snakemake's logger needs."""
         event = str(getattr(record, "event", None) or "")
         handle = getattr(self, f"_{event}", None)
         if handle is not None:
@@ -68,7 +71,7 @@ class Terminal:
             self._words(record)
 
     def close(self) -> None:
-        """The summary, where jobs have run; once, though logging closes handlers again at exit."""
+        """Print the summary if jobs have run. Only once: logging calls this again at exit."""
         self._wipe()
         if self.closed or self.dryrun or not (self.jobs or self.failed):
             return
@@ -77,28 +80,28 @@ class Terminal:
         count = f"{self.done} of {self.total or len(self.jobs)} jobs done in {took}"
         if self.failed:
             self._line(f"{count}, {len(self.failed)} failed:")
-            for job in self.failed[:MOST_NAMED]:
+            for job in self.failed[:MAX_FAILURES_LISTED]:
                 self._line(f"  {job.name}: {job.log}")
-            if len(self.failed) > MOST_NAMED:
-                self._line(f"  and {len(self.failed) - MOST_NAMED} more")
-            self._line("The same command goes on from here once this is put right.")
+            if len(self.failed) > MAX_FAILURES_LISTED:
+                self._line(f"  and {len(self.failed) - MAX_FAILURES_LISTED} more")
+            self._line("When this is fixed, the same command continues from here.")
         elif self.stopped:
-            self._line(f"{count}, then stopped. The same command goes on from here.")
+            self._line(f"{count}, then stopped. The same command continues from here.")
         else:
             self._line(f"{count}.")
 
-    # Snakemake's events, by their names
+    # One method for each of Snakemake's events, named after it
 
     def _run_info(self, data: Mapping[str, Any]) -> None:
         stats = data.get("stats") or {}
         self.total = stats.get("total", self.total)
-        if self.dryrun and not self.told:
+        if self.dryrun and not self.announced:
             self._line(str(data["msg"]))
-        elif not self.told:
+        elif not self.announced:
             rules = Counter({rule: n for rule, n in stats.items() if rule != "total"})
             most = ", ".join(f"{n} {rule}" for rule, n in rules.most_common(6))
             self._line(f"{self.total} jobs: {most}{', ...' if len(rules) > 6 else ''}")
-        self.told = True
+        self.announced = True
 
     def _job_info(self, data: Mapping[str, Any]) -> None:
         about = " ".join(str(value) for value in dict(data.get("wildcards") or {}).values())
@@ -121,7 +124,7 @@ class Terminal:
             self.stream.write(f"\r\x1b[K{line[:WIDTH]}")
             self.stream.flush()
             self.shown = True
-        elif self.now() - self.last >= EVERY:
+        elif self.now() - self.last >= PROGRESS_SECONDS:
             self.last = self.now()
             self._line(line)
 
@@ -133,19 +136,19 @@ class Terminal:
         if self.stopped:
             return
         self.failed.append(job)
-        if not _message(job.log):  # else the job has said it itself
-            self._line(f"{job.name}: ended without a message, killed perhaps. Its log: {job.log}")
+        if not _message(job.log):  # otherwise the job has printed its message
+            self._line(f"{job.name}: ended without a message; it may have been killed. Its log: {job.log}")
 
     def _words(self, record: logging.LogRecord) -> None:
         text = str(record.msg or "").strip()
-        if STOPPED in text:
+        if STOP_MESSAGE in text:
             self.stopped = True
-            self._line("Stopping the jobs that run.")
+            self._line("Stopping the running jobs.")
         elif record.levelno >= logging.ERROR:
             if not (JOB_ENDED.search(text) or SUPERFLUOUS.search(text)) and text:
                 self._line(text)
-        elif record.levelno >= logging.WARNING or SAID.search(text):
-            self._line(SEE_JOBS.sub("", text))
+        elif record.levelno >= logging.WARNING or PASSED_ON.search(text):
+            self._line(JOB_HINT.sub("", text))
 
     def _line(self, text: str) -> None:
         self._wipe()
@@ -159,11 +162,11 @@ class Terminal:
 
 
 def _message(log: str) -> str:
-    """The last error in a job's log, "" where there is none."""
+    """The last error in a job's log, or "" if there is none."""
     try:
         with open(Path(log), "rb") as file:
             file.seek(0, 2)
-            file.seek(max(0, file.tell() - TAIL))
+            file.seek(max(0, file.tell() - TAIL_BYTES))
             found = MESSAGE.findall(file.read().decode(errors="replace"))
     except OSError:
         return ""

@@ -162,6 +162,19 @@ def test_windows_are_of_one_hurt_walking_ahead(hurtable) -> None:
     assert module.WINDOW == 60
 
 
+def test_without_side_a_leg_is_not_told_from_the_other(holden31: Skeleton) -> None:
+    parts = module.sides_of(holden31)
+    assert parts("LeftUpLeg-LeftLeg") == parts("RightUpLeg-RightLeg") == ("thigh",)
+    assert parts("RightLeg-RightFoot and LeftForeArm-LeftHand") == ("forearm", "shank")
+    assert parts(HEALTHY) == () != parts("LowerBack-Spine")
+    hurt = ["LeftLeg-LeftFoot", "LeftLeg-LeftFoot", "RightUpLeg-RightLeg", HEALTHY]
+    named = ["RightLeg-RightFoot", "LeftLeg-LeftFoot", "LeftLeg-LeftFoot", HEALTHY]
+    windows = [Window("a", link, 5.0, {}, 0) for link in hurt]
+    found = module._confusion(sorted(set(named)), windows, named, parts)
+    assert found["right"] == 0.5
+    assert found["right_without_side"] == 0.75
+
+
 def test_what_is_judged_was_not_learnt() -> None:
     """Windows that nothing but their label tells apart are named by chance."""
     rng = np.random.default_rng(6)
@@ -169,7 +182,7 @@ def test_what_is_judged_was_not_learnt() -> None:
         Window("a", f"{n % 2}", 5.0, {f"{d}": float(v) for d, v in enumerate(rng.normal(size=60))}, n // 10)
         for n in range(40)
     ]
-    found = module._cross_validated(windows)
+    found = module._cross_validated(windows, lambda name: (name,))
     assert found["windows"] == 40
     assert found["right"] < 0.8
     leaked = learn(module.table(windows), [w.hurt for w in windows]).names(module.table(windows))

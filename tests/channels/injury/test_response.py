@@ -116,7 +116,7 @@ def test_every_link_is_swept_and_those_never_hurt_are_marked(hurtable) -> None:
     assert len(result["rows"]) == 2 * 30 * 11
     assert len(result["back"]) == 2 * 30 * 10
     assert [r["link"] for r in result["responses"] if r["trained"]] == 2 * hurt
-    assert {(r["first"], r["second"]) for r in result["second"]} == {tuple(hurt), tuple(hurt[::-1])}
+    assert [(r["first"], r["second"]) for r in result["second"]] == [tuple(hurt)]  # two thighs: one first
     assert {r["link"] for r in result["into_a_jog"]} == {None, *hurtable.channels["injury"]}
     assert set(result["summary"]) == set(result["summary_untrained"]) == set(GAITS)
 
@@ -127,7 +127,7 @@ def test_the_same_numbers_each_time(hurtable) -> None:
 
 def test_a_second_injury_adds_to_the_first(hurtable) -> None:
     """Both lower the head: by the same again, whatever the first is."""
-    other = "RightUpLeg-RightLeg"
+    other = "RightLeg-RightFoot"
     found = second_injuries(slowing(hurtable, (KNEE, other)), [KNEE, other], 2.0, RUNTIME)
     assert [(r["first"], r["second"]) for r in found] == [(KNEE, other), (other, KNEE)]
     for row in found:

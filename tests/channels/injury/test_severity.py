@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hobble.channels import Source
 from hobble.channels.files import load_values, save_values, write_report
+from hobble.channels.injury.channel import CHANNEL
 from hobble.channels.injury.severity import (
     clip_severity,
     mirror_severity,
@@ -140,6 +143,18 @@ def test_the_status_of_a_data_set_holds_all_the_while(clip):
 def test_a_wrong_status_of_a_data_set_names_the_clip(clip):
     with pytest.raises(InputError, match=r"status of walk.*no such link: LeftUpLeg-LeftArm"):
         clip_severity(clip, None, "LeftUpLeg-LeftArm[4]", motion())
+
+
+def test_on_a_skeleton_without_links_a_clip_is_hurt_and_has_no_column(clip):
+    """A data set of another figure may list the same clips: the hurt ones are left out of its networks."""
+    figure = replace(clip, skeleton=replace(clip.skeleton, links=()))
+    severity, warnings = clip_severity(figure, None, f"{THIGH}[4]", motion())
+    assert (severity.shape, warnings) == ((300, 0), [])
+    said = Source("walk", {}, f"{THIGH}[4]", {}, ())
+    CHANNEL.check(said, figure.skeleton)
+    assert not CHANNEL.is_neutral(said)
+    with pytest.raises(InputError, match="no such link"):
+        CHANNEL.check(Source("walk", {}, "Thigh[4]", {}, ()), clip.skeleton)
 
 
 def test_a_healthy_clip_is_all_zero(clip):

@@ -14,7 +14,7 @@ from pydantic import Field
 from hobble.channels.channel import Channel, Rig, Source
 from hobble.core.errors import InputError
 from hobble.core.section import Inside, Section
-from hobble.core.untrusted import MOST_TEXT, printable, read_bytes
+from hobble.core.untrusted import MAX_TEXT_BYTES, printable, read_bytes
 
 if TYPE_CHECKING:
     from hobble.core.clip import Clip
@@ -42,6 +42,7 @@ class Diagnosis(Channel):
     value = "amount"
     highest = 1.0
     rate = 1.0
+    slows = True
     Options = Table
 
     def columns(self, rig: Rig) -> tuple[str, ...]:
@@ -90,7 +91,7 @@ def read_table(path: str) -> dict[str, str]:
     clip that is there twice with different ones.
     """
     reader = csv.DictReader(
-        io.StringIO(read_bytes(path, MOST_TEXT).decode("utf-8-sig", "replace"), newline="")
+        io.StringIO(read_bytes(path, MAX_TEXT_BYTES).decode("utf-8-sig", "replace"), newline="")
     )
     if missing := [name for name in COLUMNS if name not in (reader.fieldnames or ())]:
         fix = f"Its first line has to name them: {','.join(COLUMNS)}."

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from hobble.channels.channel import Channel, Rig, Source
-from hobble.core.untrusted import MOST_TEXT, read_bytes
+from hobble.core.untrusted import MAX_TEXT_BYTES, read_bytes
 
 if TYPE_CHECKING:
     from hobble.core.clip import Clip
@@ -43,10 +43,13 @@ class Injury(Channel):
             return not hurts(str(source.value))
         if source.entry.get("injured"):  # the embedded walker is asked to limp, and writes the file itself
             return False
-        return not any(hurts(read_bytes(file, MOST_TEXT).decode("latin-1")) for file in source.files)
+        return not any(hurts(read_bytes(file, MAX_TEXT_BYTES).decode("latin-1")) for file in source.files)
 
     def check(self, source: Source, rig: Rig) -> None:
-        """The status of an entry has to follow the grammar of a status file."""
+        """The status of an entry has to follow the grammar of a status file.
+
+        Where the skeleton names no links it only says that the clip is hurt, so that it is left out.
+        """
         from hobble.channels.injury.status import parse_links
         from hobble.core.errors import InputError
 
@@ -55,7 +58,8 @@ class Injury(Channel):
         where = f"{source.clip}.channels.{self.name}"
         if not isinstance(source.value, str):
             raise InputError(where, "is no text", fix="Write Joint-Joint[severity];")
-        parse_links(source.value, self.columns(rig), where)
+        if links := self.columns(rig):
+            parse_links(source.value, links, where)
 
     def read(self, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
         """See `clip_severity`."""

@@ -73,6 +73,8 @@ def clip_severity(
     less is a warning.
     """
     links = clip.skeleton.link_names
+    if not links:  # a figure that nobody said where to hurt: there is no column to fill
+        return np.zeros((len(clip), 0), np.float32), []
     if status is not None:
         where = f"status of {clip.name} in the data set's configuration"
         everywhere = Spell(1, len(clip), parse_links(status, links, where))

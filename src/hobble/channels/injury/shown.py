@@ -46,8 +46,9 @@ PRESETS = {
     "Bad back": {"lower back": 8},
     "Knee and back": {"left thigh": 7, "left shank": 7, "lower back": 7},
 }
-SEVERITY = 8.0  # of the loops of a questionnaire
-# The study of Quentin Ferre (2019) showed thirteen walks, and asked which part is hurt; nothing is coloured.
+SEVERITY = 8.0  # of the loops
+# Loops in which one part hurts, or several, without colour. The films of the questionnaire, in which
+# something begins to hurt, are those of `study/films.py`.
 STUDY: dict[str, tuple[str, ...]] = {
     "healthy": (),
     "left-thigh": ("left thigh",),

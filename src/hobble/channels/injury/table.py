@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hobble.channels.injury.status import Spell, Status, check_link, check_severity, write_status
-from hobble.core.clip_files import find_clips, the_file
+from hobble.core.clip_files import find_clips, only_file
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_text
 
@@ -103,7 +103,7 @@ def write_statuses(table: str | Path, folder: str | Path, links: Sequence[str]) 
     rows = read_table(table, links)
     folder = Path(folder)
     there = find_clips(folder)
-    files = {row.clip: the_file(row.clip, there[row.clip]) for row in rows if row.clip in there}
+    files = {row.clip: only_file(row.clip, there[row.clip]) for row in rows if row.clip in there}
     frames = {clip: bvh_frames(file) for clip, file in files.items()}
     written = []
     for clip, status in statuses(rows, frames, table).items():

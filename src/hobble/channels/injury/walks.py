@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from hobble.core.quat import Array
-from hobble.evaluation.crowd import told
+from hobble.evaluation.crowd import channel_values
 from hobble.models.network import Network
 
 INJURY = "injury"  # the channel
@@ -23,4 +23,4 @@ def hurt_links(network: Network) -> tuple[str, ...]:
 
 def severities(network: Network, each: Sequence[Mapping[str, float]]) -> dict[str, Array]:
     """What a stretch tells figures given as link -> severity."""
-    return told(network, INJURY, each)
+    return channel_values(network, INJURY, each)

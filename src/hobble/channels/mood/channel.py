@@ -35,6 +35,7 @@ class Mood(Channel):
     value = "amount"
     highest = 1.0
     rate = 1.0
+    slows = True  # sad people walk at half the speed
     Options = Patterns
 
     def columns(self, rig: Rig) -> tuple[str, ...]:

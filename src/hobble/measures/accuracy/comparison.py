@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from hobble.evaluation.measured import Measured
-from hobble.evaluation.side_by_side import SideBySide, beside, pair
+from hobble.evaluation.configuration_results import ConfigurationResults
+from hobble.evaluation.side_by_side import SideBySide, pair, published_row
 from hobble.measures.accuracy.run import SPLITS, clip_rows
 from hobble.measures.given import Json
 
 NAME = "accuracy"
 
 
-def compared(all_measured: Sequence[Measured], published: Json) -> SideBySide:
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
     """What each measured, eq. 3.2 of each pair, and the published errors with ours."""
     return SideBySide(
         entries=[{"dataset": m.dataset, **m.found(NAME), "configuration": m.name} for m in all_measured],
@@ -36,7 +36,7 @@ def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
     return {NAME: rows}
 
 
-def accuracy_differences(all_measured: Sequence[Measured]) -> list[dict[str, Any]]:
+def accuracy_differences(all_measured: Sequence[ConfigurationResults]) -> list[dict[str, Any]]:
     """Eq. 3.2 of each pair: over each split, and for each clip that both were measured on."""
     out = []
     for a, b in combinations(all_measured, 2):
@@ -47,7 +47,7 @@ def accuracy_differences(all_measured: Sequence[Measured]) -> list[dict[str, Any
     return out
 
 
-def _of_splits(measured: Measured) -> dict[str, Any]:
+def _of_splits(measured: ConfigurationResults) -> dict[str, Any]:
     """Split -> its errors over all frames, and the `means` of its clips."""
     found = measured.found(NAME)
     return {split: {**found[split], "means": clip_means(found, split)} for split in SPLITS}
@@ -58,25 +58,25 @@ def clip_means(found: Json, split: str) -> list[float]:
     return [c["mean"] for c in found["clips"] if c["split"] == split and c["mean"] is not None]
 
 
-def _splits(all_measured: Sequence[Measured], published: Json) -> list[dict[str, Any]]:
+def _splits(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
     found = {m.name: m for m in all_measured}
     out = []
     for row in published["accuracy"]:
         m = found.get(row["configuration"])
         for split in SPLITS:
             ours = m.found(NAME)[split]["mean_of_clips"] if m else None
-            out.append(beside(f"relative error, {split} clips", row, row["mean"], ours))
+            out.append(published_row(f"relative error, {split} clips", row, row["mean"], ours))
             if "sd" in row:
                 in_text = {**row, "table": None}
                 means = clip_means(m.found(NAME), split) if m else []
                 sd = float(np.std(means)) if len(means) > 1 else None
                 out.append(
-                    beside(f"standard deviation of the means of {split} clips", in_text, row["sd"], sd)
+                    published_row(f"standard deviation of the means of {split} clips", in_text, row["sd"], sd)
                 )
     return out
 
 
-def _published_clips(all_measured: Sequence[Measured], published: Json) -> list[dict[str, Any]]:
+def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
     """Single clips that were published, where a clip of ours has the name."""
     out = []
     for row in published["clips"]:
@@ -86,9 +86,9 @@ def _published_clips(all_measured: Sequence[Measured], published: Json) -> list[
                     for source in ("segerstedt", "release"):
                         named = {"configuration": m.name, "source": source}
                         what = f"relative error, {clip['clip']}"
-                        out.append(beside(what, named, row[source], clip["mean"]))
+                        out.append(published_row(what, named, row[source], clip["mean"]))
     return out
 
 
-def _clips(measured: Measured) -> dict[str, Any]:
+def _clips(measured: ConfigurationResults) -> dict[str, Any]:
     return {entry["clip"]: entry for entry in measured.found(NAME)["clips"]}

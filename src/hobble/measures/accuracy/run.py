@@ -155,7 +155,7 @@ def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[
 def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
     """Raise InputError, naming `where`, unless the network has learnt rows of this layout."""
     layout = network.layout
-    bare = rows.layout.told(()) == replace(layout, channels=(), order=())
+    bare = rows.layout.with_channels(()) == replace(layout, channels=(), order=())
     if not bare or not set(layout.channels) <= set(rows.layout.channels):
         raise InputError(where, f"its rows ({rows.layout}) are not those the network has learnt ({layout})")
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from hobble.evaluation.compare_tables import flat
-from hobble.evaluation.measured import Measured
+from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.evaluation.series import line
-from hobble.evaluation.side_by_side import SideBySide, beside, pair
+from hobble.evaluation.side_by_side import SideBySide, pair, published_row
 from hobble.measures.given import Json
 
 NAME = "responsivity"
@@ -20,7 +20,7 @@ COUNTS = ("true", "table_6_1", "table_6_1_as_printed")
 FLOAT = 4  # bytes of a stored weight
 
 
-def compared(all_measured: Sequence[Measured], published: Json) -> SideBySide:
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
     """The laps of each mode, the counts of Table 6.1, and times beside the published ones."""
     about = {m.name: _sizes(m) for m in all_measured}
     return SideBySide(
@@ -44,13 +44,13 @@ def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def by_mode(measured: Measured) -> list[dict[str, Any]]:
+def by_mode(measured: ConfigurationResults) -> list[dict[str, Any]]:
     """The responsivity of each phase mode that was run."""
     found = measured.found(NAME)
     return [{**entry, "configuration": measured.name} for entry in found.get("modes", [found])]
 
 
-def _sizes(measured: Measured) -> dict[str, Any]:
+def _sizes(measured: ConfigurationResults) -> dict[str, Any]:
     """Computations as Table 6.1 counts them, None without layers, and bytes that each mode keeps in memory.
 
     exact: the mode without loss.
@@ -64,7 +64,7 @@ def _sizes(measured: Measured) -> dict[str, Any]:
     }
 
 
-def time_differences(all_measured: Sequence[Measured]) -> list[dict[str, Any]]:
+def time_differences(all_measured: Sequence[ConfigurationResults]) -> list[dict[str, Any]]:
     """Eq. 3.2 of the frame times of each pair, in the modes that both were run in."""
     out = []
     for a, b in combinations(all_measured, 2):
@@ -83,7 +83,7 @@ def time_differences(all_measured: Sequence[Measured]) -> list[dict[str, Any]]:
     return out
 
 
-def fits(all_measured: Sequence[Measured], published: Mapping[str, Any]) -> list[dict[str, Any]]:
+def fits(all_measured: Sequence[ConfigurationResults], published: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Lines of milliseconds a frame over computations: of ours for each mode and step, and as published.
 
     `computations` says which of the counts, `step` what of a frame: the mean of `total`, as published, or of
@@ -143,32 +143,34 @@ def _published_sizes(about: Mapping[str, Json], published: Json) -> list[dict[st
     for row in published["computations"]:
         counts = about.get(row["configuration"], {}).get("computations") or {}
         printed = {**row, "table": "6.1"}
-        out.append(beside("computations of Table 6.1", printed, row["table_6_1"], counts.get(COUNTS[2])))
-        out.append(beside("parameters of a phase", row, row["parameters"], counts.get("true")))
+        out.append(
+            published_row("computations of Table 6.1", printed, row["table_6_1"], counts.get(COUNTS[2]))
+        )
+        out.append(published_row("parameters of a phase", row, row["parameters"], counts.get("true")))
     for row in published["stages"]:
         if row["stage"] == "training" and "bytes" in row:
             ours = about.get(row["configuration"], {}).get("weights_bytes", {}).get("constant")
-            out.append(beside("weights of 50 phases", row, row["bytes"], ours, "bytes"))
+            out.append(published_row("weights of 50 phases", row, row["bytes"], ours, "bytes"))
     return out
 
 
-def _published_times(all_measured: Sequence[Measured], published: Json) -> list[dict[str, Any]]:
+def _published_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
     found = {m.name: m for m in all_measured}
     out = []
     for row in published["responsivity"]:
         m = found.get(row["configuration"])
         ours = m.found(NAME)["milliseconds"]["total"] if m else None
-        out.append(beside("a frame", row, row["milliseconds"], ours, "ms"))
+        out.append(published_row("a frame", row, row["milliseconds"], ours, "ms"))
         if "sd" in row:
             in_text = {**row, "table": None}
             means = lap_means(m.found(NAME)) if m else []
             sd = float(np.std(means)) if len(means) > 1 else None
-            out.append(beside("standard deviation of the means of laps", in_text, row["sd"], sd, "ms"))
+            out.append(published_row("standard deviation of the means of laps", in_text, row["sd"], sd, "ms"))
     for row in published["modes"]:
         m = found.get(row["configuration"])
         times = {e["mode"]: e["milliseconds"]["predict"] for e in by_mode(m)} if m else {}
         what = f"a prediction, {row['mode']}"
-        out.append(beside(what, row, row["milliseconds"], times.get(row["mode"]), "ms"))
+        out.append(published_row(what, row, row["milliseconds"], times.get(row["mode"]), "ms"))
     return out
 
 

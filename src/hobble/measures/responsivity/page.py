@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hobble.measures.given import Json
-from hobble.report.charts import Chart, Trace, axis, mark
+from hobble.report.charts import Chart, Trace, axis, line, mark
 from hobble.report.formats import number
 from hobble.report.gather import Material
 from hobble.report.parts import Numbers, Part, Section, Words
@@ -28,6 +28,7 @@ STEPS = {
 }
 
 FEWEST_STEPS = 10  # under so many, what the feet did says nothing
+OFF = 50.0  # cm from the line between two waypoints, beyond which a run has left it
 FRAME_BUDGET_MS = 1000 / 60
 TRACK = "The character is led around a track of six waypoints, walking, side-stepping, jogging and crouching."
 
@@ -40,6 +41,7 @@ def section(found: Json, material: Material) -> Section:
         [
             Part(0, Words(TRACK) if followed else None),
             Part(10, Numbers(followed) if followed else None),
+            Part(15, track_chart(found)),
             Part(20, lap_chart(found, material)),
             Part(30, speed_published(found, material), open=True, short=True),
             Part(60, lap_table(found, material.name)),
@@ -118,6 +120,67 @@ def lap_chart(found: Json, material: Material) -> Chart | None:
         choose="Looked up by" if len(options) > 1 else None,
         options=options,
     )
+
+
+def track_chart(found: Json) -> Chart | None:
+    """The track from above with the runs drawn over it, and where they left it."""
+    track, runs = found.get("track") or {}, found.get("runs") or []
+    if not runs or not track.get("x"):
+        return None
+    ends = [f"{i}, {gait}" for i, gait in enumerate(track["gaits"])]
+    along = {"x": [*track["x"], track["x"][0]], "z": [*track["z"], track["z"][0]]}
+    traces = [line("track", along["x"], along["z"], "@faint", dash="dash", width=1.2, hoverinfo="skip")]
+    for run in runs:
+        name = "runs" if run is runs[0] else f"lap {run['lap']}"
+        shown = {"legendgroup": "runs", "showlegend": run is runs[0]}
+        traces.append(line(name, run["x"], run["z"], "@accent", width=1.5, hoverinfo="skip", **shown))
+    off = [(x, z, cm, r["lap"]) for r in runs for x, z, cm in zip(r["x"], r["z"], r["off_cm"], strict=True)]
+    left = [row for row in off if row[2] > OFF]
+    if left:
+        traces.append(_left(left))
+    traces.append(
+        {
+            "type": "scatter",
+            "mode": "markers+text",
+            "name": "waypoints",
+            "x": track["x"],
+            "y": track["z"],
+            "text": ends,
+            "textposition": "top center",
+            "textfont": {"size": 11, "color": "@soft"},
+            "marker": {"symbol": "circle-open", "size": 12, "color": "@ink"},
+            "hoverinfo": "skip",
+        }
+    )
+    most = max(row[2] for row in off)
+    where = f"red where they were more than {OFF:.0f} cm from it" if left else "none was further from it than"
+    return Chart(
+        "track",
+        "The track and the runs around it",
+        "From above. Straight lines join the waypoints; each is named by its number and the gait on the way "
+        f"to it. The runs lie over them, {where}{'' if left else f' {OFF:.0f} cm'}; the furthest was "
+        f"{most:.0f} cm. Only the first laps are drawn. A waypoint counts as reached within a metre.",
+        traces,
+        {
+            "xaxis": axis("x, m", constrain="domain", zeroline=False),
+            "yaxis": axis("z, m", scaleanchor="x", autorange="reversed", zeroline=False),
+        },
+        height=520,
+    )
+
+
+def _left(places: list[tuple[float, float, float, int]]) -> Trace:
+    """Where runs left the track: x, z, cm and lap of each place."""
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": f"more than {OFF:.0f} cm off",
+        "x": [x for x, *_ in places],
+        "y": [z for _, z, *_ in places],
+        "customdata": [[cm, lap] for *_, cm, lap in places],
+        "marker": {"size": 6, "color": "@hurt-high"},
+        "hovertemplate": "lap %{customdata[1]}: %{customdata[0]:.0f} cm off<extra></extra>",
+    }
 
 
 def _lap_bars(entry: dict[str, Any]) -> list[Trace]:

@@ -21,6 +21,7 @@ from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
 
 FPS = 60
+RUNS, EVERY = 5, 15  # laps whose way is kept, and frames from one place of it to the next
 WARM_UP = 60  # frames before the first lap, not measured: compiled code is loaded then
 
 
@@ -45,6 +46,7 @@ def responsivity(
     percentile of the total, and the mean of a whole call.
     `largest_turn_degrees` is of the pose as drawn, `asked_turn_degrees` of what the network predicted, both
     from a frame to the next; in `turns_held_back` frames the runtime let a joint turn less than was asked.
+    `runs`: where the first RUNS laps of the runtime's own mode led.
     """
     own = network.mode(runtime.mode)
     beside = min(laps, laps_beside or laps)
@@ -58,6 +60,7 @@ def responsivity(
         )
         for mode in dict.fromkeys((*map(network.mode, network.modes if modes is None else modes), own))
     }
+    runs = {mode: entry.pop("runs") for mode, entry in found.items()}
     return {
         "configuration": configuration,
         "track": {
@@ -65,7 +68,11 @@ def responsivity(
             "metres": round(
                 sum(np.hypot(*(np.subtract(a.position, b.position))) for a, b in _closed(track)) / 100, 3
             ),
+            "gaits": [waypoint.gait for waypoint in track],
+            "x": [waypoint.position[0] / 100 for waypoint in track],
+            "z": [waypoint.position[1] / 100 for waypoint in track],
         },
+        "runs": runs[own],
         "parameters": parameter_counts(network.sizes) if network.sizes else None,
         "stored": {mode: network.stored(mode) for mode in network.modes},
         "exact": network.mode(None),
@@ -83,11 +90,12 @@ def _laps(
     for _ in range(WARM_UP):
         animation.next_pose()
     animation.reset()
-    results, times = [], []
+    results, times, runs = [], [], []
     for number in range(1, laps + 1):
-        lap, seconds = _lap(animation, number, int(lap_seconds * FPS))
+        lap, seconds, run = _lap(animation, number, int(lap_seconds * FPS))
         results.append(lap)
         times.append(seconds)
+        runs.append(run)
         if not lap["finished"]:
             animation.reset()
     return {
@@ -103,6 +111,7 @@ def _laps(
         "asked_turn_degrees": max(lap["asked_turn_degrees"] for lap in results),
         "turns_held_back": sum(lap["turns_held_back"] for lap in results),
         "milliseconds": _milliseconds(np.concatenate(times)),
+        "runs": runs[:RUNS],
     }
 
 
@@ -151,15 +160,17 @@ def run(given: Given, options: Options) -> Outcome:
     return Outcome(result, {"laps": lap_rows(result)}, "; ".join(says))
 
 
-def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[dict[str, Any], Array]:
-    """One lap, and its times (F, steps + 1) in seconds, the whole call last."""
+def _lap(
+    animation: ProceduralAnimation, number: int, longest: int
+) -> tuple[dict[str, Any], Array, dict[str, Any]]:
+    """One lap, its times (F, steps + 1) in seconds, the whole call last, and the run: see `_run`."""
     follower, skeleton = animation.follower, animation.skeleton
     assert follower is not None
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
     start = int(follower.reached[0])
     goal = start + len(follower.track)
     positions, rotations, contacts, off = [], [], [], []
-    asked, taken = [], []
+    asked, taken, places = [], [], []
     times: list[tuple[float, ...]] = []
     while follower.reached[0] < goal and len(times) < longest:
         before = perf_counter()
@@ -172,6 +183,7 @@ def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[dic
         taken.append(animation.state.joint_rotation[0].copy())
         contacts.append(pose.contacts)
         off.append(follower.off_path[0])
+        places.append(np.array(pose.root)[[0, 2]])
     slide = foot_slide(np.array(positions), np.array(contacts))
     seconds = np.array(times)
     lap = {
@@ -189,7 +201,22 @@ def _lap(animation: ProceduralAnimation, number: int, longest: int) -> tuple[dic
         "turns_held_back": _held_back(np.array(asked), np.array(taken)),
         "milliseconds": _milliseconds(seconds),
     }
-    return lap, seconds
+    return lap, seconds, _run(number, np.array(places), np.array(off))
+
+
+def _run(number: int, places: Array, off: Array) -> dict[str, Any]:
+    """Where a lap led: `x`, `z`, m, and `off_cm` from the line between waypoints, every EVERY frames.
+
+    places: (F, 2), cm; off: (F,), cm, the largest since the last one that is kept.
+    """
+    kept = range(0, len(places), EVERY)
+    return {
+        "lap": number,
+        "seconds_between": EVERY / FPS,
+        "x": np.round(places[kept, 0] / 100, 2).tolist(),
+        "z": np.round(places[kept, 1] / 100, 2).tolist(),
+        "off_cm": [round(float(off[max(0, f - EVERY + 1) : f + 1].max()), 1) for f in kept],
+    }
 
 
 def _held_back(asked: Array, taken: Array) -> int:

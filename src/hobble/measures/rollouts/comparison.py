@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from hobble.evaluation.measured import Measured
+from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.evaluation.side_by_side import SideBySide
 from hobble.measures.accuracy.run import SPLITS
 from hobble.measures.given import Json
@@ -13,7 +13,7 @@ from hobble.measures.given import Json
 NAME = "rollouts"
 
 
-def compared(all_measured: Sequence[Measured], published: Json) -> SideBySide:
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
     """An entry for each configuration and length."""
     return SideBySide(
         entries=[

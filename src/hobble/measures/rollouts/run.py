@@ -19,7 +19,7 @@ import numpy as np
 from hobble.character.rule import met, moving, phase_change
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
-from hobble.evaluation.captured import turned, unbroken
+from hobble.evaluation.captured import rotate_by_yaw, unbroken
 from hobble.measures.accuracy.run import (
     SPLITS,
     check_layout,
@@ -35,7 +35,7 @@ from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
 from hobble.rows.layout import GAITS, RowLayout
 
 LENGTHS = (1, 10, 60, 300)  # frames
-OVERLAP = 10  # roll-outs of one length that every frame lies in
+OVERLAP = 4  # roll-outs of one length that every frame lies in
 BATCH = 1024  # roll-outs side by side
 
 log = logging.getLogger("hobble")
@@ -159,7 +159,7 @@ def _carried(place: Array, asked: Inputs, at: np.ndarray) -> Array:
     """Joints (n, J, 3) in the root frame of frames at - 1, as seen from those at `at`."""
     out = place.copy()
     level = place[..., ::2] - asked.velocity[at - 1][:, None]
-    out[..., ::2] = turned(level, asked.turn[at - 1][:, None])
+    out[..., ::2] = rotate_by_yaw(level, asked.turn[at - 1][:, None])
     return out
 
 

@@ -10,9 +10,10 @@ import torch
 from torch import Tensor
 
 from hobble.core.compiled import njit
-from hobble.models.kernels import bits, draw, rounded, team, widened
+from hobble.models.kernels import bits, draw, further, rounded, team, widened
 from hobble.models.mann.step import Step
 from hobble.models.mann.trainable import TrainableMann
+from hobble.models.trainable import EVERY
 
 
 class FusedStep(Step):
@@ -27,13 +28,15 @@ class FusedStep(Step):
         """Begin a new sequence of dropout masks, 0 <= seed < 2^63."""
         self.counter = np.uint64(seed)
 
-    def masks(self, rows: int) -> list[Tensor]:
+    def masks(self, rows: int, own: slice = EVERY) -> list[Tensor]:
         """As in `Step`, from another generator; valid until the next call."""
+        first, stop, _ = own.indices(rows)
         masks = []
         for number, width in enumerate(self.widths):
-            masks.append(self._buffer(f"mask {number}", rows, width))
-            team(rows * width)
-            self.counter = np.uint64(draw(masks[-1].numpy(), self.counter, self.keep))
+            masks.append(self._buffer(f"mask {number}", stop - first, width))
+            team((stop - first) * width)
+            draw(masks[-1].numpy(), further(self.counter, first * width), self.keep)
+            self.counter = further(self.counter, rows * width)
         return masks
 
     def prepared(self, number: int, x: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:

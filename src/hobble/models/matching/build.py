@@ -16,7 +16,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.matching.features import columns_and_weights
 from hobble.models.matching.options import MatchingOptions
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
-from hobble.rows.compose import compose, of_frame
+from hobble.rows.compose import compose, frame_inputs
 from hobble.rows.layout import RowLayout
 
 
@@ -76,7 +76,9 @@ def build(
     xs, ys, phases, lefts = [], [], [], []
     for path in clips:
         rows = load_clip_rows(path)
-        if rows.layout.told(()) != layout.told(()) or not set(layout.channels) <= set(rows.layout.channels):
+        if rows.layout.with_channels(()) != layout.with_channels(()) or not set(layout.channels) <= set(
+            rows.layout.channels
+        ):
             raise InputError(path, f"its rows ({rows.layout}) are not those of the database ({layout})")
         x, y = on_mean_ground(rows, layout)
         one, left = in_runs(rows)
@@ -110,7 +112,7 @@ def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
     ground = np.add.reduceat(rows.heights, rows.first_fit, axis=0) / count
     lift = np.add.reduceat(rows.mean, rows.first_fit)[:, None] / count
     told = {name: rows.channels[name] for name, _ in layout.channels}
-    compose(layout, of_frame(layout, rows.x, told), ground, lift, x, y)
+    compose(layout, frame_inputs(layout, rows.x, told), ground, lift, x, y)
     return x, y
 
 

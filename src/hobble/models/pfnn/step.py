@@ -16,6 +16,7 @@ from torch import Tensor
 
 from hobble.models.pfnn.trainable import TrainablePfnn, coefficients, expand
 from hobble.models.products import product
+from hobble.models.trainable import EVERY
 
 
 class Step:
@@ -67,10 +68,10 @@ class Step:
         """Begin a new sequence of dropout masks, 0 <= seed < 2^63."""
         self.generator.manual_seed(seed)
 
-    def masks(self, rows: int) -> list[Tensor]:
+    def masks(self, rows: int, own: slice = EVERY) -> list[Tensor]:
         """What each layer's inputs (rows, in) are multiplied by: 0 for those dropped, 1 / keep for others."""
         flat, widths = self.network.flat, self.network.sizes[:-1]
-        drawn = torch.rand(rows, sum(widths), generator=self.generator, device=flat.device)
+        drawn = torch.rand(rows, sum(widths), generator=self.generator, device=flat.device)[own]
         return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(widths, dim=1))
 
     def coefficients(self, p: Tensor) -> Tensor:

@@ -14,7 +14,7 @@ from hobble.models.pfnn.fused import FusedStep
 from hobble.models.pfnn.step import Step as BlendedStep
 from hobble.models.plain.network import OF_PHASE
 from hobble.models.products import product
-from hobble.models.trainable import Step, Trainable, uniform_start
+from hobble.models.trainable import EVERY, Step, Trainable, uniform_start
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,9 @@ class _OfPhase:
         """As in `Step`."""
         return super().__call__(with_phase(x, p), y, p, masks)  # type: ignore[misc]
 
-    def masks(self, rows: int) -> list[Tensor]:
+    def masks(self, rows: int, own: slice = EVERY) -> list[Tensor]:
         """As in `Step`; the phase is never dropped, no more than where control points follow it."""
-        masks: list[Tensor] = super().masks(rows)  # type: ignore[misc]
+        masks: list[Tensor] = super().masks(rows, own)  # type: ignore[misc]
         masks[0][:, -OF_PHASE:] = 1
         return masks
 

@@ -10,7 +10,7 @@ const KEPT = 1200; // frames that can be saved as motion
 
 export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = false } = {}) => {
   const figure = createFigure(view, spec.body, placed(spec)?.regions || [], { ghost }), rig = createRig(spec), stood = [false, false];
-  const lab = createLab(spec.legs), actor = { spec, figure, rig, lab, place, falls: 0, milliseconds: 0, frames: [] };
+  const lab = createLab(spec.legs), actor = { spec, figure, rig, lab, place, watch: null, falls: 0, milliseconds: 0, frames: [] };
   let trail = [], floor = () => 0;
 
   actor.start = (height) => {
@@ -18,6 +18,7 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
     actor.character = createCharacter(spec, place);
     actor.frames = [];
     lab.clear();
+    actor.watch?.clear();
     trail = [];
   };
   const sole = (j) => { const [x, z] = [rig.places[3 * j], rig.places[3 * j + 2]]; return [x, floor(x, z), z]; };
@@ -39,6 +40,7 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
       stood[f] = down;
     });
     lab.add(rig.places, [0, 1].map((f) => c.contacts[2 * f] > .5 || c.contacts[2 * f + 1] > .5));
+    actor.watch?.add(rig.places);
     if (!c.pose.every(Number.isFinite)) { actor.falls++; actor.start(floor); } // a network that has learnt nothing runs away
   };
   const drawGround = (way) => {

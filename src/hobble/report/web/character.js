@@ -19,7 +19,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     gait: filled(T * G, 0), ground: filled(S * 3, 0), height: 0, phase: 0, joints: filled(3 * J, 0),
     velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), told: filled(L, 0), wished: filled(L, 0),
     velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, owed: [0, 0], lock: [0, 0],
-    hold: [[0, 0], [0, 0]], lift: [0, 0], added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
+    hold: [[0, 0], [0, 0]], lift: [0, 0], raised: 0, placed: false, added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
     memory: filled(spec.network.memory ?? 0, 0),
   };
   // The rotation at `i` of the outputs, an axis times half the angle, turned about Y with the root; into q.
@@ -176,6 +176,11 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       c.ground[3 * s + 2] = ground(c.px[i] - a, c.pz[i] + b);
       c.height += c.ground[3 * s + 1] / S;
     }
+    if (!c.placed) { // where it starts the ground may be anywhere
+      for (let j = 1; j < 3 * J; j += 3) c.joints[j] += c.height;
+      c.root[1] = c.height;
+      c.placed = true;
+    }
     columns.forEach(({ rate }, l) => { c.told[l] += min(max(c.wished[l] - c.told[l], -rate), rate); });
   };
   const input = () => {
@@ -233,6 +238,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     c.pose.set(c.joints);
     settle();
     for (let i = 0; i < 4; i++) c.contacts[i] = y[Y.contacts + i];
+    carryBody(ground);
     for (let f = 0; f < 2; f++) placeFoot(f, ground);
   };
   const update = (y, wish) => {
@@ -273,8 +279,31 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
 
   // Feet in contact are held where they landed and kept out of the ground; the leg bends to reach.
 
+  const joint = (j) => c.pose.subarray(3 * j, 3 * j + 3);
+  // How far a foot is in the ground; below 0, above it.
+  const sunk = (f, ground) => {
+    const [heel, toe] = [2, 3].map((i) => {
+      const [px, py, pz] = joint(spec.legs[f][i]);
+      return ground(px, pz) + spec.sole[i - 2] - py;
+    });
+    return max(heel, toe);
+  };
+  // The figure goes up or down to where its standing feet say, its hips as far above the ground as in training.
+  const hips = spec.names.indexOf(spec.roles.hips);
+  const carryBody = (ground) => {
+    let wanted = 0, weight = 0;
+    for (let f = 0; f < 2; f++) {
+      const rise = sunk(f, ground), stands = min(max(c.contacts[2 * f], c.contacts[2 * f + 1], 0), 1);
+      wanted += stands * (max(rise - k.bodyFree, 0) + min(rise + k.bodyFree, 0));
+      weight += stands;
+    }
+    if (weight > k.bodyFrom) c.raised += k.bodyMix * (wanted / weight - c.raised);
+    const [hx, hy, hz] = joint(hips), above = hy - ground(hx, hz), [low, high] = spec.bounds.hips;
+    c.raised = min(max(c.raised, low - above), high - above);
+    for (let j = 1; j < 3 * J; j += 3) c.pose[j] += c.raised;
+  };
   const placeFoot = (f, ground) => {
-    const [hip, knee, heel, toe] = spec.legs[f], at = (j) => c.pose.subarray(3 * j, 3 * j + 3), point = at(toe);
+    const [hip, knee, heel, toe] = spec.legs[f], point = joint(toe);
     let away = [c.hold[f][0] - point[0], c.hold[f][1] - point[2]];
     const far = c.lock[f] * hypot(...away);
     if (!spec.footLocking) c.lock[f] = 0;
@@ -285,13 +314,12 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       }
       c.lock[f] = 1;
     } else c.lock[f] = max(0, c.lock[f] - k.release);
-    const sunk = [heel, toe].map((j, i) => ground(at(j)[0], at(j)[2]) + spec.sole[i] - at(j)[1]);
-    const up = max(...sunk), rise = max(up, 0) + c.lock[f] * min(up + k.floating, 0);
+    const up = sunk(f, ground), rise = max(up, 0) + c.lock[f] * min(up + k.floating, 0);
     c.lift[f] += k.heightMix * (rise - c.lift[f]);
     away = away.map((v) => v * c.lock[f]);
-    const before = Array.from(at(heel));
-    bend(at(hip), at(knee), at(heel), [away[0], c.lift[f], away[1]], hip, knee, c.added[f]);
-    const moved = at(heel).map((v, i) => v - before[i]);
+    const before = Array.from(joint(heel));
+    bend(joint(hip), joint(knee), joint(heel), [away[0], c.lift[f], away[1]], hip, knee, c.added[f]);
+    const moved = joint(heel).map((v, i) => v - before[i]);
     for (const j of spec.carried[f]) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
   };
   // `held` turned to `aim`, by mostAdded at most; whether that was too little.

@@ -23,7 +23,7 @@ ${shader.fragmentShader}`
         reflectedLight.directDiffuse *= mix(.7, 1., vShade);`);
     if (ghost) {
       shader.fragmentShader = shader.fragmentShader.replace("#include <opaque_fragment>", `
-        diffuseColor.a *= mix(.16, .85, pow(1. - abs(dot(normalize(vViewPosition), normal)), 1.7));
+        diffuseColor.a *= mix(.34, .9, pow(1. - abs(dot(normalize(vViewPosition), normal)), 1.7));
         #include <opaque_fragment>`);
     }
   };

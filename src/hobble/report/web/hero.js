@@ -85,8 +85,8 @@ const createHero = (spec, asked) => {
     const say = () => {
       words.part.textContent = part;
       words.much.textContent = `${dial.value} of ${one.highest}`;
-      if (dial.value) line.replaceChildren("One network, one wish: walk on. The solid figure is told that its ", words.part, " hurts, ", words.much, "; its ghost is told nothing.");
-      else line.replaceChildren("One network, one wish: walk on. Nothing hurts, and both figures walk alike.");
+      if (dial.value) line.replaceChildren("A neural network walks both figures, and both are asked to walk on. Only the solid one is told that its ", words.part, " hurts, ", words.much, ".");
+      else line.replaceChildren("A neural network walks both figures, and both are asked to walk on. Nothing hurts, so they walk alike.");
       chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
     };
     const hurt = () => {

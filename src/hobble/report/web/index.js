@@ -11,8 +11,10 @@ import "./walking.js";
 import { player } from "./play.js";
 import { createLab } from "./lab.js";
 import { openClip } from "./captured.js";
+import { measureWalk, profile } from "./cycles.js";
+import { createGrader, createWatch } from "./recogniser.js";
 import "./fits.js";
 import "./strips.js";
 import "./page.js";
 
-globalThis.Hobble = { bvh, character: createCharacter, chase: createChase, colour, csv, drawAll, hero, lab: createLab, material, openClip, player, rig: createRig };
+globalThis.Hobble = { bvh, character: createCharacter, chase: createChase, colour, csv, drawAll, grader: createGrader, hero, lab: createLab, material, measureWalk, openClip, player, profile, rig: createRig, watch: createWatch };

@@ -9,7 +9,7 @@ export const palette = () => {
   return {
     dark, body: dark ? [176, 184, 192] : [214, 214, 210], low: rgb("hurt-low"), high: rgb("hurt-high"),
     line: rgb("faint"), ink: rgb("ink"), accent: rgb("accent"), predicted: rgb("predicted"), second: rgb("g3"),
-    ground: rgb("ground"), sky: rgb("sky"), zenith: rgb("zenith"), ghost: dark ? [150, 190, 205] : [96, 130, 146],
+    ground: rgb("ground"), sky: rgb("sky"), zenith: rgb("zenith"), ghost: dark ? [196, 226, 238] : [96, 130, 146],
   };
 };
 

@@ -1,10 +1,15 @@
 // What is read off a character while it is played: phase, contacts, gait, speed, milliseconds.
 import { drawLab } from "./lab.js";
 import { palette } from "./paint.js";
+import { createWatch, SECONDS } from "./recogniser.js";
 
 const FEET = ["left heel", "left toe", "right heel", "right toe"];
 const COLOURS = { stand: "g0", walk: "g1", jog: "g2", crouch: "g3", jump: "g4", bump: "g5" };
+const JUDGED = 600; // ms between two answers of the recogniser
 const NS = "http://www.w3.org/2000/svg";
+
+// Between two pictures, so that none comes late for it.
+const idle = (act) => (globalThis.requestIdleCallback ? requestIdleCallback(act, { timeout: 1000 }) : setTimeout(act));
 
 const make = (parent, tag, className = "", text = "") => {
   const element = document.createElement(tag);
@@ -22,7 +27,7 @@ export const createPanel = (host, actor, title = "") => {
     make(part, "dt", "", label);
     return make(part, "dd");
   };
-  const speed = row("Speed"), phase = row("Phase"), down = row("On the ground"), gait = row("Gait"), lab = row("Stance and knees, 4 s"), steps = row("Steps"), cost = row("A frame");
+  const speed = row("Speed"), phase = row("Phase"), down = row("On the ground"), gait = row("Gait"), lab = row("Stance and knees, 4 s"), steps = row("Steps"), looks = spec.recogniser ? row(`Looks like, last ${SECONDS} s`) : null, cost = row("A frame");
   const chart = make(lab, "canvas", "lab"), bends = make(lab, "span", "words"), lengths = make(steps, "span", "words");
   chart.setAttribute("role", "img");
   chart.setAttribute("aria-label", "When each foot stood, left above right, and how its knee was bent");
@@ -42,7 +47,12 @@ export const createPanel = (host, actor, title = "") => {
     piece.style.background = `var(--${COLOURS[name] || "g0"})`;
     return piece;
   });
-  const note = make(box, "p", "note");
+  const note = make(box, "p", "note"), said = looks && make(looks, "span", "said"), sure = looks && make(looks, "span", "words");
+  let judged = 0;
+  if (looks) {
+    actor.watch = createWatch(spec);
+    looks.title = "What people who limp looked like says of this walk, beside the healthy walk of the same figure. It is not told what hurts.";
+  }
 
   return {
     box,
@@ -60,6 +70,15 @@ export const createPanel = (host, actor, title = "") => {
       bends.textContent = `knees ${knees.map((k) => `${(k.at(-1) ?? 0).toFixed(0)}°`).join(" and ")}, left and right`;
       lengths.textContent = `left ${cm(made[0])}, right ${cm(made[1])}`;
       cost.textContent = `${actor.milliseconds.toFixed(1)} ms${drawing ? `, drawing ${drawing.toFixed(1)} ms` : ""}`;
+      const now = performance.now();
+      if (looks && now - judged > JUDGED) {
+        judged = now;
+        idle(() => {
+          const { text, share } = actor.watch.say();
+          said.textContent = share === undefined ? "" : text;
+          sure.textContent = share === undefined ? text : `${Math.round(100 * share)} % sure`;
+        });
+      }
       note.textContent = actor.falls ? `fell over ${actor.falls === 1 ? "once" : `${actor.falls} times`} and stood up again` : "";
     },
   };

@@ -108,10 +108,10 @@ const createPlay = (stage, playables) => {
   find("play-reset").addEventListener("click", () => { start(); view.orbit.reset(); });
   ground.addEventListener("change", start);
   chosen.forEach((select) => select && select.addEventListener("change", cast));
-  find("play-share").addEventListener("click", (event) => {
+  find("play-share").addEventListener("click", () => {
     history.replaceState(null, "", address());
     if (navigator.clipboard) navigator.clipboard.writeText(location.href).catch(() => {});
-    event.currentTarget.textContent = "The address bar has it";
+    told.say("The address bar has a link to this figure, as it is hurt and on this ground.");
   });
   const named = (i) => `${names.length > 1 ? chosen[i].value : material.name}-played`;
   player.motion = (i = 0) => bvh(player.actors[i].spec, player.actors[i].frames);

@@ -12,7 +12,7 @@ import numpy as np
 from hobble.channels.injury.walks import INJURY
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.captured import captured, turned
+from hobble.evaluation.captured import captured, rotate_by_yaw
 from hobble.evaluation.crowd import FPS
 from hobble.gait.cycles import Walk, joined, measure
 from hobble.gait.people import people
@@ -104,5 +104,5 @@ def _walked(rows: ClipRows, links: Sequence[str], skeleton: Skeleton) -> list[Li
 def _placed(local: Array, root: Array, yaw: Array) -> Array:
     """(F, J, 3) in the world, of positions in a root frame at `root` (F, 3) that faces `yaw` (F,)."""
     out = local.copy()
-    out[..., ::2] = turned(local[..., ::2], yaw[:, None])
+    out[..., ::2] = rotate_by_yaw(local[..., ::2], yaw[:, None])
     return out + root[:, None]

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from hobble.channels.injury.recognition.run import rows
-from hobble.evaluation.measured import Measured
-from hobble.evaluation.side_by_side import SideBySide, beside
+from hobble.evaluation.configuration_results import ConfigurationResults
+from hobble.evaluation.side_by_side import SideBySide, published_row
 from hobble.measures.given import Json
 
 NAME = "recognition"
 
 
-def compared(all_measured: Sequence[Measured], published: Json) -> SideBySide:
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
     """What each found, with the share that people named right beside it."""
     return SideBySide(
         entries=[{**m.found(NAME), "configuration": m.name} for m in all_measured],
@@ -27,16 +27,19 @@ def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
     return {NAME: [{"configuration": name, **row} for name, row in found]}
 
 
-def _beside_people(measured: Measured, people: Json) -> list[dict[str, Any]]:
+def _beside_people(measured: ConfigurationResults, people: Json) -> list[dict[str, Any]]:
     found = measured.found(NAME)
     if not found["applies"]:
         return []
     named, generated = {**people, "configuration": measured.name}, found["generated"]
-    shares = {"all severities": generated["right"]}
+    shares = {
+        "all severities": generated["right"],
+        "all severities, left and right taken for the same": generated["right_without_side"],
+    }
     hurt = [row for row in generated["by_severity"] if row["severity"] > 0]
     shares |= {f"severity {row['severity']:g}": row["right"] for row in hurt}
     return [
-        beside(
+        published_row(
             f"hurt part named right, {which} (published: by people)",
             named,
             people["share"],

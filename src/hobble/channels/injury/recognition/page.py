@@ -32,7 +32,11 @@ def recognition_chart(found: Json) -> Chart | None:
         named = list(dict.fromkeys(name for row in confusion.values() for name in row))
         hurt = list(confusion)
         share = [[confusion[h].get(n, 0) / max(1, sum(confusion[h].values())) for n in named] for h in hurt]
-        title = f"{label}: {100 * table['right']:.0f} % right" if table.get("right") is not None else label
+        title = label
+        if table.get("right") is not None:
+            title += f": {100 * table['right']:.0f} % right"
+        if table.get("right_without_side") is not None:
+            title += f", {100 * table['right_without_side']:.0f} % without side"
         options[title] = [
             {
                 "type": "heatmap",

@@ -7,7 +7,7 @@ the share that people got right when shown figures (Ferre 2019).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -25,6 +25,7 @@ from hobble.evaluation.crowd import FPS, Stretch
 from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
+from hobble.hurt.parts import part_of_link
 from hobble.measures.given import Given, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -40,6 +41,7 @@ SPEEDS = (1.8, 2.2, 2.6)  # cm a frame asked for
 WALKED_IN, SHOWN = 4 * FPS, 6 * FPS  # frames of a generated walk that are left out, and that are looked at
 AHEAD = 0.9  # share of the root's speed that goes forward in a window that counts as walking
 LEAST = 0.5  # cm a frame
+Plain = Callable[[str], tuple[str, ...]]  # see `sides_of`
 REASON = "this network has no severity inputs"
 TOO_FEW = "fewer than two parts are hurt in the captured clips, or none of them walks"
 
@@ -69,8 +71,9 @@ def recognition(
     splits: clip -> "train" or "held_out". people: the published share. Returns `classes`; `captured`:
     `cross_validated` (a quarter of every stretch left out in turn) and `held_out`; `generated`: windows of
     walks with each class's link at severities 3, 5, 7 and 10, and `by_walk`, where each walk is named once.
-    All have `windows` (or `walks`), the share `right`, `by_severity`, and the `confusion`: counts of
-    hurt -> named. `applies` is false, with a `reason`, for networks and clips with which it cannot be tried.
+    All have `windows` (or `walks`), the share `right`, `right_without_side`, `by_severity`, and the
+    `confusion`: counts of hurt -> named. `applies` is false, with a `reason`, for networks and clips with
+    which it cannot be tried.
     """
     head: dict[str, Any] = {"configuration": configuration, "people": people}
     if not links_of(network) or network.skeleton is None:
@@ -81,6 +84,7 @@ def recognition(
     if len(classes) < 2:
         return {**head, "applies": False, "reason": TOO_FEW}
     judge = learn(table(known), [w.hurt for w in known])
+    sided = sides_of(network.skeleton)
     walks = generated(network, [c for c in classes if c != HEALTHY], HEALTHY in classes, runtime)
     return {
         **head,
@@ -89,10 +93,10 @@ def recognition(
         "features": list(known[0].values),
         "chance": round(1 / len(classes), 5),
         "captured": {
-            "cross_validated": _cross_validated(known),
-            "held_out": _judged(judge, [w for w in windows if splits[w.clip] == "held_out"]),
+            "cross_validated": _cross_validated(known, sided),
+            "held_out": _judged(judge, [w for w in windows if splits[w.clip] == "held_out"], sided),
         },
-        "generated": {**_judged(judge, walks), "by_walk": _by_walk(judge, walks)},
+        "generated": {**_judged(judge, walks, sided), "by_walk": _by_walk(judge, walks, sided)},
     }
 
 
@@ -139,6 +143,19 @@ def generated(network: Network, classes: Sequence[str], healthy: bool, runtime: 
     return out
 
 
+def sides_of(skeleton: Skeleton) -> Plain:
+    """A function from a class to the same class without left and right, as people were asked: of one link,
+    "LeftLeg-LeftFoot", the parts of the body that it is in, ("shank",)."""
+    pairs = dict(zip(skeleton.link_names, skeleton.links, strict=True))
+
+    def parts(name: str) -> tuple[str, ...]:
+        if name == HEALTHY:
+            return ()
+        return tuple(sorted({part_of_link(skeleton, pairs[link]).name for link in name.split(" and ")}))
+
+    return parts
+
+
 def table(windows: Sequence[Window]) -> Array:
     """(n, D) features."""
     return np.array([list(w.values.values()) for w in windows])
@@ -177,7 +194,7 @@ def _values(skeleton: Skeleton, local: Array, contacts: Array, root: Array, span
     return features(skeleton, local[span], contacts[span], root[span])
 
 
-def _cross_validated(windows: Sequence[Window]) -> dict[str, Any]:
+def _cross_validated(windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
     """Each part of the clips judged by what was learnt from the others."""
     judged: list[Window] = []
     named: list[str] = []
@@ -187,14 +204,14 @@ def _cross_validated(windows: Sequence[Window]) -> dict[str, Any]:
         if asked and len({w.hurt for w in rest}) > 1:
             named += learn(table(rest), [w.hurt for w in rest]).names(table(asked))
             judged += asked
-    return _confusion(sorted({w.hurt for w in windows}), judged, named)
+    return _confusion(sorted({w.hurt for w in windows}), judged, named, sided)
 
 
-def _judged(judge: Discriminant, windows: Sequence[Window]) -> dict[str, Any]:
-    return _confusion(judge.classes, windows, judge.names(table(windows)) if windows else [])
+def _judged(judge: Discriminant, windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
+    return _confusion(judge.classes, windows, judge.names(table(windows)) if windows else [], sided)
 
 
-def _by_walk(judge: Discriminant, windows: Sequence[Window]) -> dict[str, Any]:
+def _by_walk(judge: Discriminant, windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
     """Each walk named once, by what all its windows say together."""
     scores = judge.scores(table(windows))
     walks, named = [], []
@@ -202,11 +219,15 @@ def _by_walk(judge: Discriminant, windows: Sequence[Window]) -> dict[str, Any]:
         mine = [i for i, w in enumerate(windows) if w.clip == walk]
         walks.append(windows[mine[0]])
         named.append(judge.classes[int(np.argmax(scores[mine].sum(axis=0)))])
-    return _confusion(judge.classes, walks, named, "walks")
+    return _confusion(judge.classes, walks, named, sided, "walks")
 
 
 def _confusion(
-    classes: Sequence[str], windows: Sequence[Window], named: Sequence[str], what: str = "windows"
+    classes: Sequence[str],
+    windows: Sequence[Window],
+    named: Sequence[str],
+    sided: Plain,
+    what: str = "windows",
 ) -> dict[str, Any]:
     """Counts hurt -> named, a row for each class that is asked about and a column for each that is known."""
     counts = {h: dict.fromkeys(classes, 0) for h in sorted({w.hurt for w in windows})}
@@ -217,6 +238,9 @@ def _confusion(
     return {
         what: len(windows),
         "right": _share([r for some in right.values() for r in some]),
+        "right_without_side": _share(
+            [sided(w.hurt) == sided(name) for w, name in zip(windows, named, strict=True)]
+        ),
         "by_severity": [
             {"severity": s, what: len(some), "right": _share(some)} for s, some in sorted(right.items())
         ],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from hobble.evaluation.measured import Measured
+from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.evaluation.side_by_side import SideBySide
 from hobble.measures.given import Json
 
@@ -13,11 +13,11 @@ NAME = "injury"
 KEPT = ("applies", "reason", "summary")
 
 
-def compared(all_measured: Sequence[Measured], published: Json) -> SideBySide:
+def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
     """Whether each can be hurt, and the means over its links."""
     return SideBySide(entries=[_entry(m) for m in all_measured])
 
 
-def _entry(measured: Measured) -> dict[str, Any]:
+def _entry(measured: ConfigurationResults) -> dict[str, Any]:
     found = measured.found(NAME)
     return {"configuration": measured.name, **{key: found[key] for key in KEPT if key in found}}

@@ -38,9 +38,9 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
     return Chart(
         "second-injury",
         "A second injury over a first",
-        "Down: the first injury, at severity 7; across: the second, at 10. How far the second takes the walk "
-        "from that of the first alone, and how much that is of what it does to a healthy body. Pale is a "
-        "second injury that the first one hides.",
+        "Down: the first injury, at severity 7, one link of each part of the body. Across: the second, at "
+        "10. How far the second takes the walk from that of the first alone, and how much that is of what it "
+        "does to a healthy body. A pale field is a second injury that the first one hides.",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},

@@ -15,7 +15,7 @@ import numpy as np
 from hobble.channels.injury.walks import severities
 from hobble.evaluation.crowd import FPS, Stretch, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
-from hobble.evaluation.pose_distance import apart, mean_cycle, period, settling
+from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle, period, settling
 from hobble.evaluation.spearman import spearman
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
@@ -65,11 +65,11 @@ class Sweep:
                 "severity": float(severity),
             }
             row |= gait_measures(self.skeleton, local, walks.contacts[span, figure], walks.root[span, figure])
-            row["from_healthy"] = float(np.mean(apart(local, phase, cycles[0])))
-            row["from_worst"] = float(np.mean(apart(local, phase, cycles[worst])))
+            row["from_healthy"] = float(np.mean(distance_to_cycle(local, phase, cycles[0])))
+            row["from_worst"] = float(np.mean(distance_to_cycle(local, phase, cycles[worst])))
             # How far the walk is, at the same severity, from what it was on the way up.
             same = cycles[step if step <= worst else 2 * worst - step]
-            row["from_way_up"] = float(np.mean(apart(local, phase, same)))
+            row["from_way_up"] = float(np.mean(distance_to_cycle(local, phase, same)))
             row["largest_acceleration"] = float(walks.acceleration[span, figure].max())
             rows.append({k: round(v, 5) if isinstance(v, float) else v for k, v in row.items()})
         return rows
@@ -105,7 +105,7 @@ class Sweep:
         local, phase = walks.local[:, figure], walks.phase[:, figure]
         healthy = walks.measured(1, figure)
         cycle = mean_cycle(local[healthy], phase[healthy])
-        distance = apart(local, phase, cycle)
+        distance = distance_to_cycle(local, phase, cycle)
         normal = float(np.mean(distance[healthy]))
         (a, b), (c, d) = (walks.starts[2:4], walks.starts[3:5])
         late = slice((a + b) // 2, b)

@@ -13,16 +13,18 @@ from hobble.core.quat import Array
 from hobble.core.section import Section
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import Captured, captured_clips
-from hobble.evaluation.crowd import FPS, Stretch, told
+from hobble.evaluation.crowd import FPS, Stretch, channel_values
 from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
 from hobble.measures.given import Given, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network
+from hobble.rows.layout import GAITS
 from hobble.runtime.options import Runtime
 
 MOOD = "mood"  # the channel
+WALK = GAITS.index("walk")
 NONE = "none"
 WINDOW, STEP = 60, 15  # frames: about a cycle
 AHEAD, LEAST = (
@@ -30,11 +32,9 @@ AHEAD, LEAST = (
     0.5,
 )  # share of the speed that goes forward in a window; its least, cm a frame
 WALKED_IN, SHOWN = 4 * FPS, 6 * FPS  # frames of a generated walk that are left out, and that are looked at
-PACES = (0.85, 1.0, 1.15)  # of the middle speed of the captured walks, asked of every mood alike
+PACES = (0.85, 1.0, 1.15)  # of the middle speed of captured walks in no mood, asked of every mood alike
+ASKED = 120.0  # cm a second, where nobody was captured walking in no mood
 VALUES = (0.5, 1.0)
-# cm a frame, at which people run: a Froude number of .5 with a leg of .9 m. The label of a happy walk,
-# which bounces, may say otherwise.
-FASTEST = 3.5
 MIRROR = "_mirror"
 REASON = "this network is told no moods"
 TOO_FEW = "the clips walk in fewer than two moods"
@@ -71,7 +71,7 @@ def response(
         return {"applies": False, "reason": TOO_FEW}
     windows = [w for w in windows if w.mood in (*known, NONE) and w.walks]
     judge = learn(_table(windows), [w.mood for w in windows])
-    speed = float(np.median([w.values["speed"] for w in windows])) / FPS
+    speed = float(np.median([w.values["speed"] for w in windows if w.mood == NONE] or [ASKED])) / FPS
     figures = [
         {},
         *({mood: v} for v in VALUES for mood in known),
@@ -116,7 +116,7 @@ def captured_windows(clip: Captured, network: Network) -> list[Window]:
         if clip.velocity[span, 1].mean() < AHEAD * speed or speed < LEAST or len(moods) > 1:
             continue
         mood = moods[0] if moods else NONE
-        walks = bool(speed < FASTEST)
+        walks = bool(clip.gait[span, WALK].mean() > 0.5)
         out.append(
             _window(
                 network.skeleton,
@@ -137,7 +137,7 @@ def generated(
     """The windows of each figure's walks straight ahead at all PACES; figures: mood -> value."""
     assert network.skeleton is not None
     asked = [(i, figure, pace) for i, figure in enumerate(figures) for pace in PACES]
-    values = told(network, MOOD, [figure for _, figure, _ in asked])
+    values = channel_values(network, MOOD, [figure for _, figure, _ in asked])
     script = Stretch(WALKED_IN + SHOWN, ["walk"] * len(asked), values, [speed * pace for *_, pace in asked])
     walks = run_walks(network, [script], runtime)
     out: list[list[Window]] = [[] for _ in figures]

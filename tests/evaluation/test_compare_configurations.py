@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
-from hobble.evaluation.compare import compare
+from hobble.evaluation.compare_configurations import compare
 from hobble.evaluation.compare_tables import tables
-from hobble.evaluation.measured import read_measured
+from hobble.evaluation.configuration_results import read_results
 from hobble.evaluation.series import difference, line
 from hobble.evaluation.tables import write_csv
 from hobble.measures.responsivity.run import parameter_counts
@@ -28,7 +28,12 @@ SIZES = {
 }
 MODES = ("constant", "cubic")
 ROLLED = {split: {"frames": 5, "last_cm": 2.0} for split in ("train", "held_out")}
-JUDGED = {"windows": 4, "right": 0.75, "confusion": {"knee": {"knee": 3, "healthy": 1}}}
+JUDGED = {
+    "windows": 4,
+    "right": 0.75,
+    "right_without_side": 0.8,
+    "confusion": {"knee": {"knee": 3, "healthy": 1}},
+}
 RECOGNISED = {
     "applies": True,
     "captured": {"cross_validated": JUDGED, "held_out": JUDGED},
@@ -110,7 +115,7 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
 @pytest.fixture
 def compared(tmp_path: Path, published: dict[str, Any]) -> dict[str, Any]:
     clips = {"holden": {"a": 0.04, "b": 0.02}, "holden-xl": {"a": 0.03, "b": 0.02}, "ava": {"b": 0.05}}
-    found = [read_measured(n, left_behind(tmp_path, n, clips[n], s)) for n, s in SIZES.items()]
+    found = [read_results(n, left_behind(tmp_path, n, clips[n], s)) for n, s in SIZES.items()]
     return compare(found, published)
 
 
@@ -222,6 +227,7 @@ def test_tables_hold_the_same_whatever_columns_each_has(compared, tmp_path) -> N
     named = [r for r in rows["published"] if r["measure"].startswith("hurt part")]
     assert [(r["configuration"], r["published"], r["ours"]) for r in named] == [
         ("ava", "0.82", "0.5"),
+        ("ava", "0.82", "0.8"),
         ("ava", "0.82", "0.9"),
     ]
     last = rows["training"][-2:]
@@ -232,7 +238,7 @@ def test_tables_hold_the_same_whatever_columns_each_has(compared, tmp_path) -> N
 
 def test_published_clips_stand_beside_ours_of_the_same_name(tmp_path, published) -> None:
     clips = {"LocomotionFlat04_000": 0.03, "LocomotionFlat04_000_mirror": 0.07, "walk": 0.05}
-    found = compare([read_measured("a", left_behind(tmp_path, "a", clips, SIZES["holden"]))], published)
+    found = compare([read_results("a", left_behind(tmp_path, "a", clips, SIZES["holden"]))], published)
     rows = [r for r in found["beside"] if "LocomotionFlat04" in r["measure"]]
     assert [(r["source"], r["published"], r["ours"]) for r in rows] == [
         ("segerstedt", 0.0448, 0.03),
@@ -254,7 +260,7 @@ def test_published_times_and_sizes_stand_beside_what_they_are_of(compared) -> No
 
 def test_one_configuration_alone(tmp_path, published) -> None:
     found = compare(
-        [read_measured("holden", left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"]))], published
+        [read_results("holden", left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"]))], published
     )
     assert found["difference"] == []
     assert found["milliseconds"]["fit"][0]["slope"] is None
@@ -265,7 +271,7 @@ def test_a_damaged_history_is_named(tmp_path) -> None:
     files = left_behind(tmp_path, "holden", {"a": 0.1}, SIZES["holden"])
     files["history"].write_text("pass,train_mse\n1,half\n")
     with pytest.raises(InputError, match=r"history\.csv"):
-        read_measured("holden", files)
+        read_results("holden", files)
 
 
 NUMBER = st.floats(-1e3, 1e3)

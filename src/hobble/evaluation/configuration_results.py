@@ -15,7 +15,7 @@ from hobble.measures.given import Json
 
 
 @dataclass(frozen=True)
-class Measured:
+class ConfigurationResults:
     """What one configuration left behind: its resolved configuration, its costs, its history.
 
     measured: measurement -> its JSON.
@@ -41,7 +41,7 @@ class Measured:
         return next((s[key] for s in self.pipeline["stages"] if s["stage"] == stage), None)
 
 
-def read_measured(name: str, files: Mapping[str, str | Path]) -> Measured:
+def read_results(name: str, files: Mapping[str, str | Path]) -> ConfigurationResults:
     """Read one configuration's files: `configuration`, `pipeline`, `history`, and one for each measurement.
 
     Raises InputError naming the file that cannot be read.
@@ -49,7 +49,9 @@ def read_measured(name: str, files: Mapping[str, str | Path]) -> Measured:
     paths = dict(files)
     resolved = yaml.safe_load(Path(paths.pop("configuration")).read_text(encoding="utf-8"))
     history, pipeline = _history(paths.pop("history")), read_json(paths.pop("pipeline"))
-    return Measured(name, resolved, {key: read_json(path) for key, path in paths.items()}, pipeline, history)
+    return ConfigurationResults(
+        name, resolved, {key: read_json(path) for key, path in paths.items()}, pipeline, history
+    )
 
 
 def _history(path: str | Path) -> dict[str, list[float | None]]:

@@ -12,14 +12,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
-from hobble.evaluation.measured import Measured
-from hobble.evaluation.side_by_side import SideBySide, beside
+from hobble.evaluation.configuration_results import ConfigurationResults
+from hobble.evaluation.side_by_side import SideBySide, published_row
 from hobble.measures.given import Json
 from hobble.measures.registry import MEASURES
-from hobble.models import options
+from hobble.models import network_options
 
 
-def compare(all_measured: Sequence[Measured], published: Json) -> dict[str, Any]:
+def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> dict[str, Any]:
     """compare.json: lists with an entry for each configuration, in their order.
 
     `configurations`: what sets each apart; `training`, `stages`: how it came about; under the name of each
@@ -59,10 +59,10 @@ def each(function: str) -> Iterator[tuple[str, Callable[..., Any]]]:
             yield one.name, found
 
 
-def describe(measured: Measured, found: Iterable[SideBySide]) -> dict[str, Any]:
+def describe(measured: ConfigurationResults, found: Iterable[SideBySide]) -> dict[str, Any]:
     """What sets a configuration apart: its data, network, training, and what the measurements say of it."""
     model = measured.resolved["configuration"]
-    hidden = options(model["network"]).hidden
+    hidden = network_options(model["network"]).hidden
     about = {key: value for one in found for key, value in one.about.get(measured.name, {}).items()}
     return {
         "configuration": measured.name,
@@ -76,7 +76,7 @@ def describe(measured: Measured, found: Iterable[SideBySide]) -> dict[str, Any]:
     }
 
 
-def stage_sizes(all_measured: Sequence[Measured], published: Json) -> list[dict[str, Any]]:
+def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
     """Published bytes of the database and of the patches, with ours."""
     found = {m.name: m for m in all_measured}
     out = []
@@ -84,19 +84,19 @@ def stage_sizes(all_measured: Sequence[Measured], published: Json) -> list[dict[
         m = found.get(row["configuration"])
         if row["stage"] == "database":
             ours = (m.pipeline.get("database") or {}).get("bytes") if m else None
-            out.append(beside("database", row, row["bytes"], ours, "bytes"))
+            out.append(published_row("database", row, row["bytes"], ours, "bytes"))
         elif row["stage"] == "terrain":
             ours = m.of_stage("terrain", "bytes") if m else None
-            out.append(beside("patches", row, row["bytes"], ours, "bytes"))
+            out.append(published_row("patches", row, row["bytes"], ours, "bytes"))
     return out
 
 
-def stage_times(all_measured: Sequence[Measured], published: Json) -> list[dict[str, Any]]:
+def stage_times(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
     """Published seconds of whole stages, with ours."""
     found = {m.name: m for m in all_measured}
     out = []
     for row in published["stages"]:
         m = found.get(row["configuration"])
         ours = m.of_stage(row["stage"], "seconds") if m else None
-        out.append(beside(f"{row['stage']}, time", row, row["seconds"], ours, "s"))
+        out.append(published_row(f"{row['stage']}, time", row, row["seconds"], ours, "s"))
     return out

@@ -1,4 +1,4 @@
-"""Where the soles of the feet are, and when they stand on the ground."""
+"""Positions of the soles of the feet, and when they are on the ground."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from hobble.core.skeleton import Skeleton
 
 Mask = NDArray[np.bool_]
 
-ROLES = ("left_heel", "left_toe", "right_heel", "right_toe")
-HEEL = np.array([True, False, True, False])
+FOOT_ROLES = ("left_heel", "left_toe", "right_heel", "right_toe")
+IS_HEEL = np.array([True, False, True, False])
 
 
 @dataclass(frozen=True)
 class Feet:
-    """The four contact joints over F frames.
+    """The four contact joints over F frames, in the order of FOOT_ROLES.
 
-    soles: (F, 4, 3) positions less the height of the joint above its sole, cm. contacts: (F, 4) bool.
-    heel_height, toe_height: what was taken off.
+    soles: (F, 4, 3) positions of the joints, lowered to the sole, cm. contacts: (F, 4) bool.
+    heel_height, toe_height: height of the joints above the sole, cm.
     """
 
     soles: Array = field(repr=False)
@@ -31,7 +31,7 @@ class Feet:
     toe_height: float
 
 
-def feet_of(
+def find_soles(
     clip: Clip,
     contacts: Mask,
     frames: np.ndarray,
@@ -44,45 +44,45 @@ def feet_of(
 ) -> Feet:
     """The soles of a clip. A height of "auto" is found from the clip or its skeleton.
 
-    frames: those that count, (N,). On flat ground, which lies at zero, "auto" is the median height of the
-    joints in contact, or a little less where that keeps every foot from going further than `deepest` (cm)
-    below the ground. Elsewhere the toe joint is `sole` cm above the ground, and the heel as much higher as in
-    the skeleton's rest pose.
+    frames: (N,) the frames to look at. On flat ground, which is at height 0, "auto" is the median height of
+    the joints in contact. It is up to `deepest` cm less if that keeps all feet within `deepest` below the
+    ground. On other ground the toe joint is `sole` cm above its sole, and the heel joint is higher by the
+    difference in the rest pose.
     """
-    joints = clip.positions[:, [clip.skeleton.role(role) for role in ROLES]].copy()
+    joints = clip.positions[:, [clip.skeleton.role(role) for role in FOOT_ROLES]].copy()
     found: list[float] = []
-    for wanted, columns in ((heel_height, HEEL), (toe_height, ~HEEL)):
+    for wanted, columns in ((heel_height, IS_HEEL), (toe_height, ~IS_HEEL)):
         heights, down = joints[frames][:, columns, 1], contacts[frames][:, columns]
         if wanted != "auto":
             found.append(float(wanted))
         elif flat and down.any():
             found.append(_flat_height(heights, down, deepest))
         else:
-            found.append(sole + (heel_above_toe(clip.skeleton) if columns is HEEL else 0.0))
-    joints[..., 1] -= np.where(HEEL, *found)
+            found.append(sole + (heel_above_toe(clip.skeleton) if columns is IS_HEEL else 0.0))
+    joints[..., 1] -= np.where(IS_HEEL, *found)
     return Feet(joints, contacts, *found)
 
 
-def held_up(feet: Feet, least: float) -> Mask:
-    """(F, 4) whether a joint is more than `least` cm above the other of its foot, which is in contact."""
+def held_above_other(feet: Feet, least: float) -> Mask:
+    """(F, 4) whether a joint is more than `least` cm above the other joint of its foot, which has contact."""
     other = [1, 0, 3, 2]
     height = feet.soles[..., 1]
     return (height - height[:, other] > least) & feet.contacts[:, other]
 
 
 def _flat_height(heights: Array, down: Array, deepest: float | None) -> float:
-    """The median height in contact; up to `deepest` less where that keeps every foot above -deepest."""
+    """The median height in contact, or up to `deepest` less if that keeps every foot above -deepest."""
     median = float(np.median(heights[down]))
     wanted = float(heights.min()) + (deepest or 0.0)
     return wanted if deepest is not None and median - deepest <= wanted < median else median
 
 
 def heel_above_toe(skeleton: Skeleton) -> float:
-    """How much higher the heel joint is than the toe joint in the rest pose, cm, both sides together."""
+    """Height of the heel joint above the toe joint in the rest pose, cm, mean of both sides."""
     from hobble.core.skeleton import forward_kinematics
 
     rest = np.zeros((1, len(skeleton.joints), 4))
     rest[..., 0] = 1
     _, positions = forward_kinematics(skeleton, rest, np.zeros((1, 3)))
-    heights = positions[0, [skeleton.role(role) for role in ROLES], 1]
-    return float(heights[HEEL].mean() - heights[~HEEL].mean())
+    heights = positions[0, [skeleton.role(role) for role in FOOT_ROLES], 1]
+    return float(heights[IS_HEEL].mean() - heights[~IS_HEEL].mean())

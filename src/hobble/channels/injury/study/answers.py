@@ -1,0 +1,98 @@
+"""Answers to the questionnaire: read from the files that its page saves, and checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hobble.core.errors import InputError
+from hobble.core.files import read_json
+from hobble.core.untrusted import printable
+
+FLUID = range(1, 6)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What hurt in one film that people were asked about."""
+
+    number: int
+    kind: str
+    parts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Study:
+    """The films of a questionnaire. name: what its answers carry. parts: what could be ticked."""
+
+    name: str
+    configuration: str
+    parts: tuple[str, ...]
+    films: tuple[Shown, ...]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one person said of one film."""
+
+    film: int
+    parts: tuple[str, ...]
+    fluid: int
+
+
+def read_study(path: str | Path) -> Study:
+    """films.json, as the rule `questionnaire` writes it. Raises InputError."""
+    data = _object(path, read_json(path))
+    try:
+        films = tuple(Shown(row["film"], row["kind"], tuple(row["parts"])) for row in data["films"])
+        return Study(data["study"], data["configuration"], tuple(data["parts"]), films)
+    except (KeyError, TypeError) as error:
+        fix = "Give the films.json that lies beside questionnaire.html."
+        raise InputError(path, f"is no list of films: {printable(repr(error))}", fix=fix) from None
+
+
+def read_answers(path: str | Path, study: Study) -> list[Answer]:
+    """What one person answered, in the order in which the films were shown.
+
+    Raises InputError that names the answer: for another study's file, a film that is missing or there twice,
+    a part that could not be ticked, a number that is not from 1 to 5.
+    """
+    data = _object(path, read_json(path))
+    if data.get("study") != study.name:
+        raise InputError(
+            path,
+            f"answers another questionnaire ({printable(data.get('study'), 40)}) than that of {study.name}",
+            fix="Give the films.json of the questionnaire that was answered.",
+        )
+    rows = data.get("answers")
+    if not isinstance(rows, list):
+        raise InputError(path, "has no list `answers`")
+    answers = [_answer(path, i, row, study) for i, row in enumerate(rows, 1)]
+    numbers = [answer.film for answer in answers]
+    if twice := sorted({n for n in numbers if numbers.count(n) > 1}):
+        raise InputError(path, f"film {twice[0]} is answered twice")
+    if missing := [film.number for film in study.films if film.number not in numbers]:
+        raise InputError(path, f"film {missing[0]} is not answered", fix="Answer all films and save again.")
+    return answers
+
+
+def _answer(path: str | Path, number: int, row: Any, study: Study) -> Answer:
+    where = f"answer {number}"
+    if not isinstance(row, dict):
+        raise InputError(path, f"{where} is no answer: {printable(row, 40)}")
+    film, parts, fluid = row.get("film"), row.get("parts"), row.get("fluid")
+    if film not in [shown.number for shown in study.films] or isinstance(film, bool):
+        raise InputError(path, f"{where}: there is no film {printable(film, 40)}")
+    if not isinstance(parts, list) or (odd := [part for part in parts if part not in study.parts]):
+        said = printable(parts if not isinstance(parts, list) else odd[0], 40)
+        raise InputError(path, f"{where}: no such part: {said}", fix=f"There are {', '.join(study.parts)}.")
+    if not isinstance(fluid, int) or isinstance(fluid, bool) or fluid not in FLUID:
+        raise InputError(path, f"{where}: `fluid` is {printable(fluid, 40)}, but it is a number from 1 to 5")
+    return Answer(film, tuple(dict.fromkeys(parts)), fluid)
+
+
+def _object(path: str | Path, data: Any) -> dict[str, Any]:
+    if not isinstance(data, dict):
+        raise InputError(path, "holds no keys and values", fix="Give the file that the page saved.")
+    return data

@@ -1,0 +1,136 @@
+"""The thirteen films: something begins to hurt while a healthy character walks; in some the gait changes too.
+
+Quentin Ferre (2019) showed four with one part hurt, five with several and four with a change of gait, each
+with the transition from healthy to hurt. Which parts hurt in each we do not know; his clips hurt thigh, shank
+and forearm, and so do these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hobble.channels.injury.shown import OTHERS, way
+from hobble.channels.injury.shown import PARTS as SLIDERS
+from hobble.channels.injury.walks import INJURY, hurt_links
+from hobble.channels.injury.walks import links as links_of
+from hobble.core.errors import HobbleError
+from hobble.core.quat import Array
+from hobble.models.network import Network
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.options import Runtime
+
+FPS = 60
+SEVERITY = 10.0  # as in the study
+SPEEDS = {"walk": 2.5, "jog": 6.0}  # cm a frame, asked for
+WALKED_IN = 4.0  # seconds before a film begins
+HEALTHY, HURT, CHANGED = 3.0, 7.0, 5.0  # seconds that are shown; where the gait changes it does so half-way
+ONE, SEVERAL, GAIT = "one part", "several parts", "change of gait"
+# What a person may tick: the parts that are hurt in some film, on both sides, and parts that never are.
+SIDED = ("thigh", "shank", "foot", "upper arm", "forearm")
+PARTS = (*(f"{side} {part}" for side in ("left", "right") for part in SIDED), "lower back", "neck")
+
+
+@dataclass(frozen=True)
+class Film:
+    """One film. number: from 1, in the order of the tables. gaits: the one it begins with and the last."""
+
+    number: int
+    kind: str
+    parts: tuple[str, ...]
+    gaits: tuple[str, str] = ("walk", "walk")
+
+    @property
+    def seconds(self) -> float:
+        """How long it is."""
+        return HEALTHY + HURT + (CHANGED if self.gaits[0] != self.gaits[1] else 0.0)
+
+
+FILMS = (
+    Film(1, ONE, ("left thigh",)),
+    Film(2, ONE, ("right thigh",)),
+    Film(3, ONE, ("left shank",)),
+    Film(4, ONE, ("left forearm",)),
+    Film(5, SEVERAL, ("left thigh", "left shank")),
+    Film(6, SEVERAL, ("right thigh", "left shank")),
+    Film(7, SEVERAL, ("left shank", "left forearm")),
+    Film(8, SEVERAL, ("right thigh", "right forearm")),
+    Film(9, SEVERAL, ("right thigh", "left shank", "left forearm")),
+    Film(10, GAIT, ("left shank",), ("walk", "jog")),
+    Film(11, GAIT, ("right thigh",), ("walk", "jog")),
+    Film(12, GAIT, ("left forearm",), ("walk", "jog")),
+    Film(13, GAIT, ("left shank", "left forearm"), ("jog", "walk")),
+)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a film shows at 60 Hz: positions (F, J, 3), cm, and rotations (F, J, 4); from_healthy: mean
+    distance (cm) of the joints from those of the same character that is told nothing, while it hurts."""
+
+    positions: Array
+    rotations: Array
+    from_healthy: float
+
+
+def without_side(part: str) -> str:
+    """ "left thigh" and "right thigh" are "thigh"."""
+    return part.removeprefix("left ").removeprefix("right ")
+
+
+def part_links(network: Network, parts: Sequence[str]) -> list[str]:
+    """The link that each part is: of those in it the uppermost that was hurt in training, or the uppermost.
+
+    Raises HobbleError for a network that is not told what hurts, or a figure that has no such part.
+    """
+    known, hurt = links_of(network), hurt_links(network)
+    if network.skeleton is None or not known:
+        raise HobbleError("this network is not told what hurts; make the films of a configuration that is")
+    ends = {label: roles for label, *roles in (*SLIDERS, *OTHERS)}
+    out = []
+    for part in parts:
+        there = [link for link in way(network.skeleton, *ends[part]) if link in known]
+        if not there:
+            raise HobbleError(
+                f"the figure of this network has no {part} that can hurt, which a film of it needs"
+            )
+        out.append(next((link for link in there if link in hurt), there[0]))
+    return out
+
+
+def acted(network: Network, film: Film, runtime: Runtime) -> Motion:
+    """The character in a film. It walks straight on; what hurts begins to hurt after HEALTHY seconds."""
+    told = dict.fromkeys(part_links(network, film.parts), SEVERITY)
+    hurt, well = _walked(network, film, told, runtime), _walked(network, film, {}, runtime)
+    begun = round(HEALTHY * FPS)
+    apart = np.linalg.norm(_local(hurt[0]) - _local(well[0]), axis=-1)[begun:].mean()
+    return Motion(*hurt, float(apart))
+
+
+def wish(film: Film, frame: int) -> tuple[bool, str]:
+    """Whether it hurts at a frame of a film, and which gait is asked for then."""
+    hurts = frame >= HEALTHY * FPS
+    changed = frame >= (HEALTHY + HURT) * FPS - CHANGED * FPS / 2
+    return hurts, film.gaits[1] if changed else film.gaits[0]
+
+
+def _walked(network: Network, film: Film, told: dict[str, float], runtime: Runtime) -> tuple[Array, Array]:
+    animation = ProceduralAnimation(network, **dict(runtime))
+    before, frames = round(WALKED_IN * FPS), round(film.seconds * FPS)
+    positions, rotations = [], []
+    for frame in range(-before, frames):
+        hurts, gait = wish(film, frame)
+        pose = animation.next_pose(
+            np.array([0.0, SPEEDS[gait]]), None, gait, **{INJURY: told if hurts else {}}
+        )
+        if frame >= 0:
+            positions.append(pose.positions)
+            rotations.append(pose.rotations)
+    return np.array(positions), np.array(rotations)
+
+
+def _local(positions: Array) -> Array:
+    """Positions over the origin."""
+    return positions - positions[:, :1] * [1.0, 0.0, 1.0]

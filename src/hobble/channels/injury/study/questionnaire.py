@@ -1,0 +1,120 @@
+"""The page of the questionnaire, with its films in it, and the file that says what hurts in each."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from hobble.channels.injury.study.films import FILMS, FPS, PARTS, SEVERITY, Film, Motion, acted, part_links
+from hobble.channels.injury.walks import hurt_links
+from hobble.core.files import write_json, write_text
+from hobble.core.skeleton import Skeleton
+from hobble.core.smooth import gaussian
+from hobble.figure.mesh import body
+from hobble.models.network import Network
+from hobble.report.formats import embedded
+from hobble.report.raster import Camera, Studio
+from hobble.report.stimuli import FELT
+from hobble.report.templates import questionnaire_script, style, template
+from hobble.runtime.export import jointed
+from hobble.runtime.options import Runtime
+
+STRIDE = 2  # frames of the motion to one of the film
+SIZE = 420  # pixels a side
+QUALITY = 55
+STEADY = 25.0  # frames, sigma with which the camera's way is smoothed
+LOOK_AT, DISTANCE = 82.0, 400.0  # cm: how high the camera looks, and from how far
+
+
+def write_questionnaire(
+    network: Network,
+    folder: str | Path,
+    runtime: Runtime,
+    configuration: str,
+    films: Sequence[Film] = FILMS,
+    size: int = SIZE,
+) -> dict[str, Any]:
+    """Write questionnaire.html, which asks, and films.json, which the tables need; returns the latter.
+
+    The page names no film by what hurts in it. Raises HobbleError for a network that is not told what hurts.
+    """
+    folder = Path(folder)
+    for film in films:
+        part_links(network, film.parts)
+    assert network.skeleton is not None
+    folder.mkdir(parents=True, exist_ok=True)
+    studio, rows, shown = Studio(body(network.skeleton)), [], []
+    for film in films:
+        motion = acted(network, film, runtime)
+        data = encoded(pictures(studio, network.skeleton, motion, size))
+        shown.append({"film": film.number, "webp": base64.b64encode(data).decode("ascii")})
+        rows.append(_row(network, film, motion))
+    study = hashlib.sha256(json.dumps([rows, shown]).encode()).hexdigest()[:12]
+    told = {
+        "study": study,
+        "configuration": configuration,
+        "severity": SEVERITY,
+        "parts": PARTS,
+        "films": rows,
+    }
+    page = template("questionnaire.html.j2").render(
+        style=style(),
+        script=questionnaire_script(),
+        embedded=embedded({"study": study, "parts": PARTS, "films": shown, "size": size}),
+        count=len(films),
+    )
+    write_text(folder / "questionnaire.html", page)
+    write_json(folder / "films.json", told)
+    return told
+
+
+def _row(network: Network, film: Film, motion: Motion) -> dict[str, Any]:
+    links = part_links(network, film.parts)
+    return {
+        "film": film.number,
+        "kind": film.kind,
+        "parts": list(film.parts),
+        "gaits": list(dict.fromkeys(film.gaits)),
+        "links": links,
+        "never_told": [link for link in links if link not in hurt_links(network)],
+        "seconds": film.seconds,
+        "from_healthy_cm": round(motion.from_healthy, 2),
+    }
+
+
+def doubts(told: dict[str, Any]) -> list[str]:
+    """What whoever asks people has to know of the films: those in which nothing can be seen."""
+    same = [str(row["film"]) for row in told["films"] if row["from_healthy_cm"] < FELT]
+    never = sorted({link for row in told["films"] for link in row["never_told"]})
+    out = [f"film {', '.join(same)}: nothing hurts that can be seen (less than {FELT} cm)."] if same else []
+    return out + ([f"Never hurt in training: {', '.join(never)}."] if never else [])
+
+
+def pictures(studio: Studio, skeleton: Skeleton, motion: Motion, size: int) -> list[NDArray[np.uint8]]:
+    """The pictures (size, size, 3) of a film; the camera goes along evenly, and nothing is coloured."""
+    keep = body(skeleton).bones
+    world, places = jointed(skeleton, motion.positions, motion.rotations)
+    path = gaussian(motion.positions[:, 0], STEADY)
+    path[:, 1] = LOOK_AT
+    return [
+        studio.draw(places[f, keep], world[f, keep], Camera(path[f], distance=DISTANCE, size=size))
+        for f in range(0, len(places), STRIDE)
+    ]
+
+
+def encoded(frames: Sequence[NDArray[np.uint8]]) -> bytes:
+    """An animated WebP that is played once."""
+    images = [Image.fromarray(frame) for frame in frames]
+    out = io.BytesIO()
+    options: dict[str, Any] = {"quality": QUALITY, "method": 3, "duration": round(1000 * STRIDE / FPS)}
+    images[0].save(out, "WEBP", save_all=True, append_images=images[1:], loop=1, **options)
+    return out.getvalue()

@@ -1,0 +1,110 @@
+"""The tables of the study from people's answers: III to XV for the thirteen films, XVI for all of them.
+
+Of Quentin Ferre's tables it is known how many there are, and that 82 % of hurt parts were named; a table for
+each film and one for all is our reading of that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.channels.injury.study.answers import Answer, Shown, Study
+from hobble.channels.injury.study.films import without_side
+from hobble.core.files import write_text
+from hobble.evaluation.tables import write_csv
+
+NUMERALS = ("III", "IV", "V", "VI", "VII", "VIII", "IX", "X", "XI", "XII", "XIII", "XIV", "XV", "XVI")
+ALL = "all"
+Rows = list[dict[str, Any]]
+
+
+def tables(study: Study, people: Sequence[Sequence[Answer]]) -> dict[str, Rows]:
+    """Numeral -> rows. people: the answers of each. The last of the tables is of all films together."""
+    of = {film.number: [a for some in people for a in some if a.film == film.number] for film in study.films}
+    named = [*NUMERALS, *(f"XVI+{i}" for i in range(1, len(study.films)))]
+    out = {named[i]: film_rows(study, film, of[film.number]) for i, film in enumerate(study.films)}
+    out[named[len(study.films)]] = summary_rows(study, of)
+    return out
+
+
+def film_rows(study: Study, film: Shown, answers: Sequence[Answer]) -> Rows:
+    """How many ticked each part of one film: `people`, and their `share`. hurts: whether the part did."""
+    return [
+        {
+            "part": part,
+            "hurts": part in film.parts,
+            "people": (ticked := sum(part in a.parts for a in answers)),
+            "share": _ratio(ticked, len(answers)),
+        }
+        for part in study.parts
+    ]
+
+
+def summary_rows(study: Study, of: Mapping[int, Sequence[Answer]]) -> Rows:
+    """A row for each film, for each kind of film, and for all; see `scores`."""
+    rows = [
+        {"film": str(film.number), "kind": film.kind, "parts": ", ".join(film.parts)}
+        | scores([(film, a) for a in of[film.number]])
+        for film in study.films
+    ]
+    for kind in [*dict.fromkeys(film.kind for film in study.films), ALL]:
+        some = [(f, a) for f in study.films if kind in (f.kind, ALL) for a in of[f.number]]
+        rows.append({"film": ALL, "kind": kind, "parts": ""} | scores(some))
+    return rows
+
+
+def scores(answers: Sequence[tuple[Shown, Answer]]) -> dict[str, Any]:
+    """What people saw, of pairs of a film and an answer.
+
+    seen: share of the parts that hurt that were ticked; seen_without_side: with left and right taken for the
+    same. wrong: parts ticked in an answer that do not hurt, on average. exact: share of the answers that tick
+    just the parts that hurt. fluid: mean of the marks from 1 to 5; fluid_sd: their standard deviation.
+    """
+    seen = sum(part in a.parts for film, a in answers for part in film.parts)
+    sides = [({without_side(p) for p in f.parts}, {without_side(p) for p in a.parts}) for f, a in answers]
+    fluid = [a.fluid for _, a in answers]
+    return {
+        "answers": len(answers),
+        "seen": _ratio(seen, sum(len(film.parts) for film, _ in answers)),
+        "seen_without_side": _ratio(sum(len(f & a) for f, a in sides), sum(len(f) for f, _ in sides)),
+        "wrong": _ratio(sum(part not in film.parts for film, a in answers for part in a.parts), len(answers)),
+        "exact": _ratio(sum(set(film.parts) == set(a.parts) for film, a in answers), len(answers)),
+        "exact_without_side": _ratio(sum(f == a for f, a in sides), len(answers)),
+        "fluid": round(float(np.mean(fluid)), 5) if fluid else None,
+        "fluid_sd": round(float(np.std(fluid, ddof=1)), 5) if len(fluid) > 1 else None,
+    }
+
+
+def write_tables(folder: str | Path, study: Study, made: Mapping[str, Rows], published: float) -> None:
+    """Write table-III.csv and so on, and tables.md, in which they can all be read."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    text = [f"# What people saw in the films of {study.configuration}\n"]
+    for (numeral, rows), film in zip(made.items(), [*study.films, None], strict=True):
+        write_csv(folder / f"table-{numeral}.csv", rows)
+        hurt = f"film {film.number}, {film.kind}: {', '.join(film.parts)}" if film else "all films"
+        text += [f"## Table {numeral}: {hurt}\n", _markdown(rows), ""]
+    text.append(f"`seen` beside Quentin Ferre (2019): {100 * published:.0f} % named what hurts.\n")
+    write_text(folder / "tables.md", "\n".join(text))
+
+
+def _markdown(rows: Rows) -> str:
+    """Rows of equal keys as a table."""
+    lines = [list(rows[0]), ["---"] * len(rows[0]), *([_cell(v) for v in row.values()] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else ""
+    return f"{value:.2f}" if isinstance(value, float) else str(value)
+
+
+def _ratio(part: float, whole: float) -> float | None:
+    return round(part / whole, 5) if whole else None

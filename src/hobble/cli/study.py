@@ -1,0 +1,39 @@
+"""Tables III to XVI of the injury study from people's answers to its questionnaire.
+
+hobble study results/limp/questionnaire/films.json ANSWERS.json ... --out FOLDER
+
+The page results/<configuration>/questionnaire/questionnaire.html saves a file of answers for each person.
+This writes a table for each film (how many ticked each part), one for all films, and tables.md with all.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from hobble.channels.injury.study.answers import read_answers, read_study
+from hobble.channels.injury.study.tables import scores, tables, write_tables
+from hobble.core.untrusted import read_yaml
+from hobble.report.gather import PUBLISHED
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What `hobble study` takes."""
+    parser.add_argument("films", type=Path, help="films.json beside the questionnaire")
+    parser.add_argument("answers", type=Path, nargs="+", help="files that the page saved, one a person")
+    parser.add_argument("--out", type=Path, default=Path("tables"), help="folder of the tables (tables)")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the tables and print what all films together say; returns the exit status."""
+    study = read_study(options.films)
+    people = [read_answers(path, study) for path in options.answers]
+    theirs = read_yaml(PUBLISHED)["recognition"]["share"]
+    write_tables(options.out, study, tables(study, people), theirs)
+    film = {film.number: film for film in study.films}
+    all_of = scores([(film[answer.film], answer) for some in people for answer in some])
+    print(f"{len(people)} people, {all_of['answers']} answers. Tables: {options.out}/tables.md")
+    seen, sides = (100 * all_of[key] for key in ("seen", "seen_without_side"))
+    print(f"Parts that hurt and were ticked: {seen:.0f} %, without side {sides:.0f} %", end=" ")
+    print(f"(Ferre 2019: {100 * theirs:.0f} %). Fluid: {all_of['fluid']:.2f} of 5.")
+    return 0

@@ -1,0 +1,76 @@
+"""Rows of some chunks in memory, and the one place that loads them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.database import order
+from hobble.database.chunks import Chunk, read_chunk
+from hobble.database.manifest import Manifest
+from hobble.database.precision import STORED
+from hobble.rows.compose import fit_columns, x_columns
+
+Room = Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Window:
+    """The rows of some chunks, in memory one after another.
+
+    chunks: their numbers in the split. rows: of each chunk. first: (R,) where each row's fits begin in
+    `fits`. The rest is what chunks hold.
+    """
+
+    chunks: Sequence[int]
+    rows: Sequence[int]
+    first: np.ndarray
+    x: Array
+    y: Array
+    fits: Array
+    count: np.ndarray
+    clip: np.ndarray
+    frame: np.ndarray
+    phase: Array
+
+
+def room(manifest: Manifest, split: str, most: int) -> dict[str, np.ndarray]:
+    """Empty arrays for what any `most` chunks of a split hold, in the order of their tables."""
+    chunks = manifest.chunks[split]
+    rows = sum(sorted(chunk.rows for chunk in chunks)[-most:])
+    fits = sum(sorted(chunk.fits for chunk in chunks)[-most:])
+    floats = STORED[manifest.dtype]
+    return {
+        "x": np.empty((rows, x_columns(manifest.layout)), floats),
+        "y": np.empty((rows, manifest.layout.y_size), floats),
+        "fits": np.empty((fits, fit_columns(manifest.layout)), floats),
+        "count": np.empty(rows, np.int32),
+        "clip": np.empty(rows, np.int32),
+        "frame": np.empty(rows, np.int32),
+        "phase": np.empty(rows, np.float32),
+    }
+
+
+def load(
+    folder: Path, chunks: Sequence[Chunk], some: Sequence[int], into: Room, verified: set[str]
+) -> Window:
+    """The chunks numbered `some`, one after another, read straight into a room.
+
+    verified: files whose checksum was found right before; it is not looked at again, and those that are right
+    are added. Raises InputError naming the file where one is damaged.
+    """
+    wanted = [chunks[i] for i in some]
+    all_rows, all_fits = sum(c.rows for c in wanted), sum(c.fits for c in wanted)
+    tables = {name: table[: all_fits if name == "fits" else all_rows] for name, table in into.items()}
+    row = fit = 0
+    for chunk in wanted:
+        rows, fits = slice(row, row + chunk.rows), slice(fit, fit + chunk.fits)
+        parts = {name: table[fits if name == "fits" else rows] for name, table in tables.items()}
+        read_chunk(folder, chunk, parts, verify=chunk.file not in verified)
+        verified.add(chunk.file)
+        row, fit = rows.stop, fits.stop
+    return Window(some, [c.rows for c in wanted], order.starts(tables["count"]), **tables)

@@ -1,0 +1,86 @@
+"""How the joints of a body are turned in a zero pose that stands, and what it knows better than motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.quat import Array
+from hobble.motion.body import SIDES
+from hobble.motion.flat_feet import stands
+from hobble.motion.orient import apart, frame, off, pointed, snapped, unit
+from hobble.motion.seen import LEFT, Seen
+
+UP = np.array([0.0, 1.0, 0.0])
+# Degrees between what zero pose and motion say of a joint, from which on the motion is believed.
+TRUSTED = 30.0
+SHRUG = 12.0  # degrees from the chest, on average, up to which clavicles are at rest as in the zero pose
+LIMP = 60.0  # and hands from their forearms
+
+
+def from_rest(seen: Seen, rest: Array) -> dict[int, Array]:
+    """Frames of all joints from a rest pose (J, 3) that stands; limbs by where they point in it."""
+    body = seen.body
+    across = [rest[side["left"][k]] - rest[side["right"][k]] for side, k in ((body.legs, 0), (body.arms, 1))]
+    left = unit(unit(across[0]) + unit(across[1]))
+    middle = [
+        0.5 * (rest[side["left"][k]] + rest[side["right"][k]]) for side, k in ((body.legs, 0), (body.arms, 1))
+    ]
+    upward = rest[body.head] - rest[body.hips]
+    whole = snapped(
+        frame(upward if upward @ (middle[1] - middle[0]) > 0 else middle[1] - middle[0], UP, left, LEFT)
+    )
+    frames = dict.fromkeys((body.hips, *body.trunk, *body.neck, body.head), whole)
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        clavicle, shoulder, elbow, wrist = body.arms[side]
+        if clavicle is not None:
+            frames[clavicle] = whole
+        for start, end in ((shoulder, elbow), (elbow, wrist)):
+            frames[start] = pointed(whole, sign * LEFT, seen.bone(start, end))
+        frames[wrist] = seen.hand(side, frames[elbow], sign)
+        hip, knee, heel, toe = body.legs[side]
+        for start, end in ((hip, knee), (knee, heel)):
+            frames[start] = pointed(whole, -UP, seen.bone(start, end))
+        frames[heel] = whole
+        if toe is not None:
+            frames[toe] = whole
+    return frames
+
+
+def add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: Seen) -> None:
+    """Put into `frames` what the zero pose knows better."""
+    body = seen.body
+    if apart(zero[body.head], frames[body.head]) < TRUSTED:
+        frames[body.head] = zero[body.head]
+    for side in SIDES:
+        clavicle, _, _, wrist = body.arms[side]
+        if clavicle is not None and apart(frames[body.chest], frames[clavicle]) < SHRUG:
+            frames[clavicle] = frames[body.chest]
+        if apart(zero[wrist], frames[wrist]) < LIMP:
+            frames[wrist] = zero[wrist]
+        heel, toe = body.legs[side][2:]
+        frames[heel] = _foot(frames[heel], zero[heel], seen, side)
+        if toe is not None:
+            frames[toe] = _foot(frames[toe], zero[toe], seen, side)
+
+
+def _foot(standing: Array, zero: Array, seen: Seen, side: str) -> Array:
+    """How a foot is turned: as it stands, but as steep as in the zero pose, where the two agree at all.
+
+    Feet of a rig whose legs are splayed in the zero pose are rolled and point outward there; a patient's foot
+    may never be flat.
+    """
+    if not stands(seen, side):
+        return zero
+    heel, toe = seen.body.legs[side][2:]
+    if toe is None:
+        return zero if apart(standing, zero) < TRUSTED else standing
+    bone = seen.bone(heel, toe)
+    if apart(standing, zero) > TRUSTED + 60:
+        return standing
+    wanted, found = (quat.rotate(quat.inv(frame), bone) for frame in (zero, standing))
+    if off(wanted, found) > TRUSTED:
+        return standing
+    across, level = found[0], float(np.hypot(wanted[0], wanted[2]))
+    wanted = np.array([across, wanted[1], np.sqrt(max(level**2 - across**2, 0.0))])
+    return quat.mul(standing, quat.between(wanted, found))

@@ -1,0 +1,66 @@
+"""How a part of a body is turned, from the directions of its bones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.quat import Array
+
+
+def unit(v: Array) -> Array:
+    """Vectors (..., 3) at length 1."""
+    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
+
+
+def off(a: Array, b: Array) -> float:
+    """Degrees between two vectors."""
+    return float(np.degrees(np.arccos(np.clip(unit(a) @ unit(b), -1.0, 1.0))))
+
+
+def frame(first: Array, axis: Array, second: Array, other: Array) -> Array:
+    """(4,) the rotation that takes `axis` to `first` and `other`, as near as it can, to `second`."""
+    return quat.from_matrix(_axes(first, second) @ _axes(axis, other).T)
+
+
+def _axes(first: Array, second: Array) -> Array:
+    x = unit(first)
+    y = unit(second - x * (second @ x))
+    if np.linalg.norm(y) < 0.5:
+        y = unit(np.eye(3)[int(np.argmin(np.abs(x)))] - x * x[int(np.argmin(np.abs(x)))])
+    return np.stack([x, y, np.cross(x, y)], axis=1)
+
+
+def snapped(frame: Array) -> Array:
+    """Whole axes where the frame is within 20 degrees of them."""
+    axes = quat.to_matrix(frame)
+    whole = np.round(axes)
+    if np.all(np.abs(whole).sum(axis=0) == 1) and np.sum(axes * whole, axis=0).min() > np.cos(np.radians(20)):
+        return quat.from_matrix(whole)
+    return frame
+
+
+def pointed(whole: Array, axis: Array, bone: Array) -> Array:
+    """A frame turned by the least amount so that its `axis` lies along the bone."""
+    return quat.mul(quat.between(quat.rotate(whole, axis), bone), whole)
+
+
+def robust(vectors: Array) -> Array:
+    """Mean (3,) of vectors (S, 3) without those far off their median."""
+    off = np.linalg.norm(vectors - np.median(vectors, axis=0), axis=-1)
+    return vectors[off <= 3 * np.median(off) + 1e-9].mean(axis=0)
+
+
+def mean(turns: Array) -> Array:
+    """Mean rotation (4,) of (S, 4), without those far off it."""
+    for _ in range(2):
+        _, vectors = np.linalg.eigh(turns.T @ turns)
+        mean = vectors[:, -1]
+        off = quat.angle(turns, mean)
+        turns = turns[off <= 2.5 * np.median(off) + 1e-9]
+    return mean
+
+
+def apart(a: Array, b: Array) -> float:
+    """Degrees between two rotations."""
+    return float(np.degrees(quat.angle(a, b)))

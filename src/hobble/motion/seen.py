@@ -1,0 +1,79 @@
+"""What is seen of a body in some frames of its motion: its bones, its fronts, its feet that stand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.quat import Array
+from hobble.motion.body import Body
+from hobble.motion.orient import pointed, robust, unit
+from hobble.motion.spine import SHORT, Spine
+
+LEFT = np.array([1.0, 0.0, 0.0])
+FLEXED = 0.05  # mean sine of the bend of a knee or an elbow from which on it tells where the front is
+
+
+class Seen:
+    """What is seen of a body in the frames that are looked at: bones, fronts, and how its joints are turned.
+
+    A joint's frame is the rotation (4,) from the axes of a figure that stands facing +Z, arms out, to the
+    joint's own: its world rotation times it is how far the part is turned from that stance.
+
+    positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds: (S, J) cm a second. ends: where the
+    end site of an ankle is, if it has one. spine: where the bones of a trunk point in that stance.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        positions: Array,
+        rotations: Array,
+        speeds: Array,
+        ends: Mapping[str, tuple[float, float, float] | None],
+        spine: Spine,
+    ) -> None:
+        self.body, self.at, self.turned, self.speeds = body, positions, rotations, speeds
+        self.ends, self.spine = ends, spine
+        self.hips_left = self.line(body.legs["right"][0], body.legs["left"][0])
+        self.chest_left = self.line(body.arms["right"][1], body.arms["left"][1])
+
+    def line(self, start: int, end: int) -> Array:
+        """(S, 3) unit vectors from joint to joint."""
+        return unit(self.at[:, end] - self.at[:, start])
+
+    def local(self, joint: int, vectors: Array) -> Array:
+        """The mean of world vectors (S, 3) as the joint has them, (3,)."""
+        own = quat.rotate(quat.inv(self.turned[:, joint]), vectors)
+        return robust(own)
+
+    def bone(self, start: int, end: int) -> Array:
+        """(3,) the bone to `end` as `start` has it."""
+        return self.local(start, self.at[:, end] - self.at[:, start])
+
+    def length(self, *joints: int) -> float:
+        """Of the way from joint to joint."""
+        ways = (self.at[:, b] - self.at[:, a] for a, b in pairwise(joints))
+        return sum(float(np.median(np.linalg.norm(way, axis=-1))) for way in ways)
+
+    def first_long(self, joint: int, following: Sequence[int]) -> Array:
+        """(3,) the bone to the first of the following joints that is not in the same place."""
+        bones = [self.bone(joint, end) for end in following]
+        return next((bone for bone in bones if np.linalg.norm(bone) > SHORT), bones[-1])
+
+    def hinge(self, start: int, middle: int, end: int, otherwise: Array) -> Array:
+        """(S, 3) about what a limb bends, a knee to the body's left; `otherwise` where it hardly bends."""
+        axis = np.cross(self.line(start, middle), self.line(middle, end))
+        own = self.local(start, axis)
+        if np.linalg.norm(own) < FLEXED:
+            return otherwise
+        return quat.rotate(self.turned[:, start], np.broadcast_to(unit(own), axis.shape))
+
+    def hand(self, side: str, straight: Array, sign: float) -> Array:
+        """The frame of a hand: as its forearm's, but pointing where its fingers are."""
+        if side not in self.body.fingers:
+            return straight
+        return pointed(straight, sign * LEFT, self.bone(self.body.arms[side][3], self.body.fingers[side]))

@@ -1,0 +1,100 @@
+"""A clip told anew on the joints of its body alone, each turned from a rest pose that stands."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hobble.core import quat
+from hobble.core.clip import Clip
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton, local_rotations
+from hobble.motion.body import SIDES, Body
+from hobble.motion.seen import LEFT
+from hobble.motion.tree import above
+
+MOVES = 0.1  # cm
+BALL = np.array([0.0, -0.045, 0.14])  # from the ankle, to the length of the leg, of a foot without toes
+
+
+def told_anew(clip: Clip, body: Body, joints: list[int], frames: dict[int, Array]) -> tuple[Clip, Body]:
+    """The clip on those joints alone, each turned from its new rest pose; and the body by its new indices."""
+    skeleton = clip.skeleton
+    joints = [
+        body.hips,
+        *sorted((j for j in joints if j != body.hips), key=lambda j: _depth(skeleton, body, j)),
+    ]
+    new = {old: i for i, old in enumerate(joints)}
+    parents = [-1, *(new[_carrier(skeleton.parents, body, old, new)] for old in joints[1:])]
+    own = np.stack([frames[j] for j in joints])
+    turned = quat.mul(clip.global_rotations[:, joints], own)
+    for side, finger in body.fingers.items():
+        wrist = body.arms[side][3]
+        out = quat.rotate(turned[:, new[wrist]], LEFT if side == "left" else -LEFT)
+        hand = clip.positions[:, finger] - clip.positions[:, wrist]
+        turned[:, new[wrist]] = quat.mul(quat.between(out, hand), turned[:, new[wrist]])
+    places = clip.positions[:, joints]
+    arms = quat.rotate(quat.inv(turned[:, parents]), places - places[:, parents])
+    arms[:, 0] = 0.0
+    offsets = np.median(arms, axis=0)
+    moving = np.abs(arms - offsets).max() > MOVES
+    moved = body.renumbered(new)
+    names = tuple(skeleton.joints[j] for j in joints)
+    made = Skeleton(skeleton.name, names, tuple(parents), offsets, roles=moved.roles(names))
+    rotations = quat.continuous(local_rotations(made, turned))
+    return Clip(clip.name, made, clip.fps, rotations, places[:, 0], arms if moving else None), moved
+
+
+def _depth(skeleton: Skeleton, body: Body, joint: int) -> int:
+    depth = 0
+    while joint != body.hips:
+        joint = _carrier(skeleton.parents, body, joint, body.joints)
+        depth += 1
+    return depth
+
+
+def _carrier(parents: Sequence[int], body: Body, joint: int, among: Collection[int]) -> int:
+    """What a part of the body hangs from; of any other joint, the nearest of `among` above it."""
+    chain = (body.hips, *body.trunk, *body.neck, body.head)
+    if joint in chain:
+        return chain[chain.index(joint) - 1]
+    for side in SIDES:
+        for start, limb in ((body.chest, body.arms[side]), (body.hips, body.legs[side])):
+            parts = (start, *(j for j in limb if j is not None))
+            if joint in parts[1:]:
+                return parts[parts.index(joint) - 1]
+    return next((j for j in above(parents, joint)[1:] if j in among), body.hips)
+
+
+def with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, Body]:
+    """The clip with a ball on every foot, and their frames: where a rig has none, where a body has it."""
+    without = [side for side in SIDES if body.legs[side][3] is None]
+    if not without:
+        return clip, body
+    skeleton = clip.skeleton
+    names, parents, offsets = list(skeleton.joints), list(skeleton.parents), list(skeleton.offsets)
+    legs = dict(body.legs)
+    p = clip.positions
+    for side in without:
+        hip, knee, heel, _ = body.legs[side]
+        thigh, shank = (
+            float(np.median(np.linalg.norm(p[:, b] - p[:, a], axis=-1)))
+            for a, b in ((hip, knee), (knee, heel))
+        )
+        frames[len(names)] = frames[heel]
+        legs[side] = (hip, knee, heel, len(names))
+        names.append(f"{names[heel]}_ball")
+        parents.append(heel)
+        offsets.append(quat.rotate(frames[heel], BALL * (thigh + shank)))
+    still = np.broadcast_to(quat.IDENTITY, (len(clip), len(without), 4))
+    moved = clip.translations
+    if moved is not None:
+        tail = np.broadcast_to(np.array(offsets[-len(without) :]), (len(clip), len(without), 3))
+        moved = np.concatenate([moved, tail], axis=1)
+    grown = replace(skeleton, joints=tuple(names), parents=tuple(parents), offsets=np.array(offsets))
+    made = replace(
+        clip, skeleton=grown, rotations=np.concatenate([clip.rotations, still], axis=1), translations=moved
+    )
+    return made, replace(body, legs=legs)

@@ -1,0 +1,103 @@
+// The cycles of a walk and their numbers, as `hobble.gait.cycles` and `hobble.gait.profile` find them. A foot lands where
+// its ankle is furthest ahead of the hips.
+import { LIMBS, MIDDLE, SIDES, TURNS_ROUND, median, mirroredSignals, signals } from "./signals.js";
+
+const SAMPLES = 50;
+const SCALARS = ["stride_seconds", "speed_per_leg", "left_strike_phase", "stance_share_R", "stance_share_L", "step_R", "step_L", "step_width"];
+const CURVES = [...SIDES.flatMap((side) => LIMBS.map((limb) => `${limb}_${side}`)), ...MIDDLE];
+const SLOW = .35; // of the walking speed: a slower ankle stands
+const [SHORTEST, LONGEST] = [.4, 3.5]; // s, a cycle
+const LEAST_TRAVEL = .2; // leg lengths in a cycle; less is standing
+const LEAST_SWING = .12; // leg lengths that an ankle goes back and forth, or it makes no step
+const OF_RANGE = .4; // of the ankle's range within the longest cycle: lesser turns of it are no step
+const STRAIGHT = 25; // degrees that the path turns in a cycle at most
+const AHEAD = .7; // mean cosine between facing and travel; less is a walk backward or sideways
+
+const mean = (values) => values.reduce((a, b) => a + b, 0) / values.length;
+const range = (values) => Math.max(...values) - Math.min(...values);
+
+// Largest minus least value within `reach` frames to either side of one.
+const around = (values, i, reach) => {
+  let low = Infinity, high = -Infinity;
+  for (let k = Math.max(0, i - reach), end = Math.min(values.length, i + reach + 1); k < end; k++) {
+    if (values[k] < low) low = values[k];
+    if (values[k] > high) high = values[k];
+  }
+  return high - low;
+};
+
+// Frames where an ankle, leg lengths ahead of the hips, is furthest ahead.
+export const landings = (forward, fps) => {
+  const reach = Math.floor(LONGEST * fps / 2), found = [];
+  let high = 0, low = 0, rising = true;
+  forward.forEach((value, i) => {
+    const least = Math.max(LEAST_SWING, OF_RANGE * around(forward, i, reach));
+    if (rising) {
+      if (value > forward[high]) high = i;
+      if (forward[high] - value >= least) { found.push(high); rising = false; low = i; }
+    } else {
+      if (value < forward[low]) low = i;
+      if (value - forward[low] >= least) { rising = true; high = i; }
+    }
+  });
+  return found.filter((i) => i > 0);
+};
+
+const cycle = (seen, a, other, b) => {
+  const { fps, curves, hips } = seen, seconds = (b - a) / fps, part = (values) => values.slice(a, b);
+  const speed = Math.hypot(hips[b][0] - hips[a][0], hips[b][1] - hips[a][1]) / seconds;
+  const apart = (f) => curves.ankle_forward_R[f] - curves.ankle_forward_L[f];
+  const standing = (side) => mean(part(seen.ankleSpeed[side]).map((v) => Number(v < SLOW * speed)));
+  const width = mean([a, other].map((f) => seen.across.L[f] - seen.across.R[f]));
+  const scalars = [seconds, speed, (other - a) / (b - a), standing("R"), standing("L"), apart(a), -apart(other), width];
+  const sampled = (values) => Array.from({ length: SAMPLES }, (_, k) => {
+    const t = a + (b - a) * k / SAMPLES, f = Math.min(Math.floor(t), b - 1);
+    return values[f] + (t - f) * (values[f + 1] - values[f]);
+  });
+  return { start: a, end: b, scalars, curves: CURVES.map((name) => sampled(curves[name])) };
+};
+
+const cycles = (seen) => {
+  const [right, left] = ["R", "L"].map((side) => landings(seen.curves[`ankle_forward_${side}`], seen.fps)), out = [];
+  for (let i = 1; i < right.length; i++) {
+    const [a, b] = [right[i - 1], right[i]], between = left.filter((f) => a < f && f < b);
+    if (between.length !== 1 || b - a < SHORTEST * seen.fps || b - a > LONGEST * seen.fps) continue;
+    let travel = 0;
+    for (let f = a; f < b; f++) travel += Math.hypot(seen.hips[f + 1][0] - seen.hips[f][0], seen.hips[f + 1][1] - seen.hips[f][1]);
+    const straight = Math.abs(seen.heading[b] - seen.heading[a]) <= STRAIGHT;
+    if (travel >= LEAST_TRAVEL && straight && mean(seen.ahead.slice(a, b)) >= AHEAD) out.push(cycle(seen, a, between[0], b));
+  }
+  return out;
+};
+
+// The cycles in which a figure walks straight ahead: of the right leg, and of the left as seen in a mirror.
+export const measureWalk = (spec, frames, fps = 60) => {
+  if (frames.length < SHORTEST * fps) return { right: [], left: [] };
+  const seen = signals(spec, frames, fps);
+  return { right: cycles(seen), left: cycles(mirroredSignals(seen)) };
+};
+
+const ofCycles = (some) => {
+  const out = {};
+  SCALARS.forEach((name, s) => { out[name] = median(some.map(({ scalars }) => scalars[s])); });
+  CURVES.forEach((name, c) => {
+    const curve = Array.from({ length: SAMPLES }, (_, k) => median(some.map(({ curves }) => curves[c][k])));
+    out[`range ${name}`] = range(curve);
+    out[`mean ${name}`] = mean(curve);
+  });
+  return out;
+};
+
+const mirroredProfile = (values) => Object.fromEntries(Object.keys(values).map((name) => {
+  if (name === "left_strike_phase") return [name, 1 - values[name]];
+  if (TURNS_ROUND.some((curve) => name === `mean ${curve}`)) return [name, -values[name]];
+  const across = name.endsWith("_R") ? `${name.slice(0, -1)}L` : name.endsWith("_L") ? `${name.slice(0, -1)}R` : name;
+  return [name, values[across]];
+}));
+
+// A walk in numbers: medians over its cycles, both legs in equal parts; null where one leg has no cycle.
+export const profile = ({ right, left }) => {
+  if (!right.length || !left.length) return null;
+  const [a, b] = [ofCycles(right), mirroredProfile(ofCycles(left))];
+  return Object.fromEntries(Object.keys(a).map((name) => [name, (a[name] + b[name]) / 2]));
+};

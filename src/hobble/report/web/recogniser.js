@@ -1,0 +1,109 @@
+// What a walk looks like beside the same figure's healthy one: what hurts, on which side, how likely. It is
+// `hobble.gait.features` and `hobble.gait.graded` once more; what was learnt of people's walks lies in the page.
+import { measureWalk, profile } from "./cycles.js";
+import { bytes } from "./numbers.js";
+
+const LEAST_RANGE = 3; // degrees; a joint that moves less keeps still, and a share of nothing would be anything
+const MOST = 5; // times: larger shares say no more
+export const SECONDS = 3; // that are looked at: within two, half of all limps have no whole cycle of both legs
+
+const clip = (v, low, high) => Math.min(Math.max(v, low), high);
+
+// Some twenty numbers that tell impairments apart, by name, in the order in which Python has them.
+export const features = (walk, healthy) => {
+  const change = (name) => walk[name] - healthy[name], sides = (name) => change(`${name}_R`) - change(`${name}_L`);
+  const share = (name) => Math.min(Math.max(walk[`range ${name}`], LEAST_RANGE) / Math.max(healthy[`range ${name}`], LEAST_RANGE), MOST);
+  const out = {
+    "stance L - R": -sides("stance_share"),
+    "left landing": change("left_strike_phase"),
+    "step R - L": sides("step"),
+    "step width": change("step_width"),
+    "range hip_abduction R - L": sides("range hip_abduction"),
+    "range ankle_height R - L": sides("range ankle_height"),
+  };
+  for (const part of ["knee_flexion", "hip_flexion"]) out[`range ${part} R - L`] = share(`${part}_R`) - share(`${part}_L`);
+  out["range arm_forward R - L"] = clip(Math.log(share("arm_forward_R") / share("arm_forward_L")), -Math.log(MOST), Math.log(MOST));
+  for (const part of ["knee_flexion", "hip_flexion", "hip_abduction"]) for (const side of "RL") out[`mean ${part} ${side}`] = change(`mean ${part}_${side}`);
+  for (const part of ["trunk_forward", "trunk_left", "pelvis_left_up"]) for (const kind of ["range", "mean"]) out[`${kind} ${part}`] = change(`${kind} ${part}`);
+  return out;
+};
+
+// Lower triangle of a symmetric matrix (D, D), row by row.
+const cholesky = (matrix, D) => {
+  const low = new Float64Array(D * D);
+  for (let i = 0; i < D; i++) {
+    for (let j = 0; j <= i; j++) {
+      let sum = matrix[i * D + j];
+      for (let k = 0; k < j; k++) sum -= low[i * D + k] * low[j * D + k];
+      low[i * D + j] = i === j ? Math.sqrt(sum) : sum / low[j * D + j];
+    }
+  }
+  return low;
+};
+
+// learnt: of `hobble.report.recogniser`. recognise(walk, healthy): {label, side, strength, distance, probabilities, sides}.
+export const createGrader = (learnt) => {
+  const D = learnt.features.length, healthy = new Float64Array(bytes(learnt.healthySpread)), densities = [];
+  const numbers = (text) => new Float64Array(bytes(text));
+  const add = (mean, spread, s, kind) => {
+    const factor = cholesky(healthy.map((v, i) => v + s * s * (spread ? spread[i] : 0)), D);
+    let top = kind ? -Math.log(learnt.kinds.length * learnt.strengths.length) : 0;
+    for (let i = 0; i < D; i++) top -= Math.log(factor[i * D + i]);
+    densities.push({ mean: mean ? mean.map((v) => s * v) : new Float64Array(D), factor, top, kind, s });
+  };
+  add(null, null, 0, null);
+  for (const kind of learnt.kinds) {
+    const [mean, spread] = [numbers(kind.mean), numbers(kind.spread)];
+    for (const s of learnt.strengths) add(mean, spread, s, kind);
+  }
+  const square = ({ mean, factor }, x) => { // by forward substitution
+    const z = new Float64Array(D);
+    let sum = 0;
+    for (let i = 0; i < D; i++) {
+      let v = x[i] - mean[i];
+      for (let k = 0; k < i; k++) v -= factor[i * D + k] * z[k];
+      z[i] = v / factor[i * D + i];
+      sum += z[i] * z[i];
+    }
+    return sum;
+  };
+  return (walk, beside) => {
+    const seen = features(walk, beside), x = learnt.features.map((name) => seen[name]);
+    const squares = densities.map((density) => square(density, x)), scores = densities.map(({ top }, i) => top - .5 * squares[i]);
+    const best = Math.max(...scores), likely = scores.map((score) => Math.exp(score - best)), whole = likely.reduce((a, b) => a + b);
+    const sides = learnt.kinds.map(() => 0), strengths = learnt.kinds.map(() => 0);
+    densities.forEach(({ kind, s }, i) => {
+      if (!kind) return;
+      const k = learnt.kinds.indexOf(kind);
+      sides[k] += likely[i] / whole;
+      strengths[k] += s * likely[i] / whole;
+    });
+    const probabilities = { normal: likely[0] / whole };
+    learnt.kinds.forEach(({ label }, k) => { probabilities[label] = (probabilities[label] || 0) + sides[k]; });
+    const label = Object.keys(probabilities).reduce((a, b) => (probabilities[b] > probabilities[a] ? b : a));
+    const of = learnt.kinds.map((kind, k) => k).filter((k) => learnt.kinds[k].label === label);
+    const k = of.length ? of.reduce((a, b) => (sides[b] > sides[a] ? b : a)) : -1;
+    return {
+      label, kind: k < 0 ? null : learnt.kinds[k], strength: k < 0 ? 0 : strengths[k] / sides[k],
+      distance: Math.sqrt(squares[scores.indexOf(best)] / D), probabilities, sides,
+    };
+  };
+};
+
+// Watches a character that is played. add(places): a frame; say(): what its last SECONDS look like, {text, share} or {text}.
+export const createWatch = (spec) => {
+  const { learnt, healthy } = spec.recogniser, grade = createGrader(learnt), most = 60 * SECONDS;
+  let frames = [];
+  return {
+    add(places) { frames.push(Float32Array.from(places)); if (frames.length > most) frames.shift(); },
+    clear() { frames = []; },
+    say() {
+      if (frames.length < most) return { text: "watching" };
+      const walk = profile(measureWalk(spec, frames));
+      if (!walk) return { text: "walk straight on to be judged" };
+      const { kind, probabilities, sides } = grade(walk, healthy);
+      const share = kind ? sides[learnt.kinds.indexOf(kind)] : probabilities.normal;
+      return { text: kind ? kind.words : "nothing hurts", share };
+    },
+  };
+};

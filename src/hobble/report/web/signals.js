@@ -1,0 +1,116 @@
+// A walking body in curves over time, as `hobble.gait.signals` has them: those that the recogniser reads. Degrees and
+// leg lengths; angles against the vertical and the direction of travel.
+import { cross, dot, minus } from "./numbers.js";
+
+export const SIDES = ["L", "R"];
+const NAMES = { L: "left", R: "right" };
+export const LIMBS = ["hip_flexion", "hip_abduction", "knee_flexion", "ankle_height", "ankle_forward", "arm_forward"];
+export const MIDDLE = ["trunk_forward", "trunk_left", "pelvis_left_up"];
+export const TURNS_ROUND = ["trunk_left", "pelvis_left_up"]; // negated in a mirror
+const TRAVEL = .5; // s, sigma of the smoothing after which the hips' velocity is the direction of travel
+
+const degrees = (a, b) => Math.atan2(a, b) * 180 / Math.PI;
+const scaled = (v, least = 1e-9) => { const n = Math.max(Math.hypot(...v), least); return v.map((x) => x / n); };
+export const median = (values) => {
+  const sorted = [...values].sort((a, b) => a - b), n = sorted.length;
+  return n % 2 ? sorted[(n - 1) / 2] : (sorted[n / 2 - 1] + sorted[n / 2]) / 2;
+};
+
+// Weighted mean of vectors of three with a Gaussian of `sigma` frames, cut off at four of them, the ends held.
+export const gaussian = (rows, sigma) => {
+  const reach = Math.floor(4 * sigma + .5), n = rows.length, padded = new Float64Array(3 * (n + 2 * reach)), weights = new Float64Array(2 * reach + 1);
+  let whole = 0;
+  for (let i = -reach; i <= reach; i++) whole += weights[i + reach] = Math.exp(-.5 * (i / sigma) ** 2);
+  for (let i = 0; i < n + 2 * reach; i++) padded.set(rows[Math.min(n - 1, Math.max(0, i - reach))], 3 * i);
+  return rows.map((_, f) => {
+    let x = 0, y = 0, z = 0;
+    for (let i = 0, k = 3 * f; i < weights.length; i++, k += 3) {
+      const w = weights[i];
+      x += w * padded[k];
+      y += w * padded[k + 1];
+      z += w * padded[k + 2];
+    }
+    return [x / whole, y / whole, z / whole];
+  });
+};
+
+// Change from frame to frame: half of that over two frames inside, of one frame at the ends.
+const gradient = (rows) => rows.map((row, f) => {
+  const a = Math.max(0, f - 1), b = Math.min(rows.length - 1, f + 1);
+  return row.map((_, k) => (rows[b][k] - rows[a][k]) / (b - a));
+});
+
+const bend = (a, b, c) => {
+  const u = minus(b, a), v = minus(c, b);
+  return degrees(Math.hypot(...cross(u, v)), dot(u, v));
+};
+
+// spec: `names`, `roles`. frames: the places of all joints (3 J) of each frame, cm, Y up.
+export const signals = (spec, frames, fps = 60) => {
+  const joint = (role) => spec.names.indexOf(spec.roles[role]);
+  const at = Object.fromEntries(Object.keys(spec.roles).map((role) => {
+    const j = 3 * joint(role);
+    return [role, frames.map((p) => [p[j], p[j + 1], p[j + 2]])];
+  }));
+  const ahead = gaussian(gradient(at.hips), TRAVEL * fps).map(([x, , z]) => scaled([x, 0, z]));
+  const left = ahead.map((a) => cross([0, 1, 0], a));
+  const bone = (a, b) => median(at[a].map((p, f) => Math.hypot(...minus(p, at[b][f]))));
+  const leg = ["left", "right"].reduce((sum, side) => sum + bone(`${side}_hip`, `${side}_knee`) + bone(`${side}_knee`, `${side}_heel`), 0) / 2;
+  const top = ["neck", "chest", "head"].find((role) => role in spec.roles);
+  const curves = {}, F = frames.map((_, f) => f);
+  for (const side of SIDES) {
+    const of = (part) => at[`${NAMES[side]}_${part}`], out = side === "L" ? left : left.map((v) => v.map((x) => -x));
+    const hand = of("elbow") || of("wrist"), thigh = F.map((f) => minus(of("knee")[f], of("hip")[f]));
+    Object.assign(curves, {
+      [`hip_flexion_${side}`]: F.map((f) => degrees(dot(thigh[f], ahead[f]), -thigh[f][1])),
+      [`hip_abduction_${side}`]: F.map((f) => degrees(dot(thigh[f], out[f]), -thigh[f][1])),
+      [`knee_flexion_${side}`]: F.map((f) => bend(of("hip")[f], of("knee")[f], of("heel")[f])),
+      [`ankle_height_${side}`]: F.map((f) => of("heel")[f][1] / leg),
+      [`ankle_forward_${side}`]: F.map((f) => dot(minus(of("heel")[f], at.hips[f]), ahead[f]) / leg),
+      [`arm_forward_${side}`]: F.map((f) => {
+        if (!hand) return 0;
+        const arm = minus(hand[f], of("shoulder")[f]);
+        return degrees(dot(arm, ahead[f]), -arm[1]);
+      }),
+    });
+  }
+  const trunk = F.map((f) => minus(at[top][f], at.hips[f]));
+  const pelvis = F.map((f) => minus(at.left_hip[f], at.right_hip[f])), shoulders = F.map((f) => minus(at.left_shoulder[f], at.right_shoulder[f]));
+  curves.trunk_forward = F.map((f) => degrees(dot(trunk[f], ahead[f]), trunk[f][1]));
+  curves.trunk_left = F.map((f) => degrees(dot(trunk[f], left[f]), trunk[f][1]));
+  curves.pelvis_left_up = F.map((f) => degrees(pelvis[f][1], Math.hypot(dot(pelvis[f], left[f]), dot(pelvis[f], ahead[f]))));
+  const across = F.map((f) => { const [a, b] = [scaled(pelvis[f]), scaled(shoulders[f])]; return a.map((v, i) => v + b[i]); });
+  const facing = gaussian(across.map((v) => cross(v, [0, 1, 0])), TRAVEL * fps).map((v) => scaled(v));
+  const speed = (points) => gradient(points).map(([x, , z]) => Math.hypot(x, z) * fps / leg);
+  return {
+    fps, leg, curves,
+    heading: unwrapped(ahead.map(([x, , z]) => Math.atan2(x, z))).map((v) => v * 180 / Math.PI),
+    ahead: F.map((f) => dot(facing[f], ahead[f])),
+    hips: at.hips.map(([x, , z]) => [x / leg, z / leg]),
+    ankleSpeed: Object.fromEntries(SIDES.map((side) => [side, speed(at[`${NAMES[side]}_heel`])])),
+    across: Object.fromEntries(SIDES.map((side) => [side, F.map((f) => dot(minus(at[`${NAMES[side]}_heel`][f], at.hips[f]), left[f]) / leg)])),
+  };
+};
+
+// Angles without jumps of a whole turn.
+const unwrapped = (angles) => {
+  let turns = 0;
+  return angles.map((angle, i) => {
+    if (i) turns -= Math.round((angle - angles[i - 1]) / (2 * Math.PI));
+    return angle + 2 * Math.PI * turns;
+  });
+};
+
+// The same walk seen in a mirror: left and right swapped.
+export const mirroredSignals = (seen) => {
+  const curves = {}, other = { L: "R", R: "L" };
+  for (const limb of LIMBS) for (const side of SIDES) curves[`${limb}_${side}`] = seen.curves[`${limb}_${other[side]}`];
+  for (const name of MIDDLE) curves[name] = TURNS_ROUND.includes(name) ? seen.curves[name].map((v) => -v) : seen.curves[name];
+  return {
+    ...seen, curves,
+    heading: seen.heading.map((v) => -v),
+    hips: seen.hips.map(([x, z]) => [-x, z]),
+    ankleSpeed: { L: seen.ankleSpeed.R, R: seen.ankleSpeed.L },
+    across: { L: seen.across.R.map((v) => -v), R: seen.across.L.map((v) => -v) },
+  };
+};

@@ -1,0 +1,65 @@
+"""Compares the memory and time that rules request with what their jobs used.
+
+The requests come from the text of a dry run, the use from the logs and benchmarks of a finished run.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from hobble.report.pipeline import read_benchmark
+from hobble.workflow.demands import ENGINE_MB
+
+JOB_BLOCK = re.compile(r"^ *(?:local)?rule (\w+):\n((?: +\w+: .*\n)+)", re.M)
+MEMORY_LINE = re.compile(r"took (\d+) MB of memory at most")
+
+
+@dataclass(frozen=True)
+class JobResources:
+    """What one job requests and, if it has run, what it used.
+
+    requested_mb, used_mb: MB of memory; the used memory comes from the log and excludes Snakemake's own.
+    requested_s, used_s: seconds; the used time comes from the benchmark file. None if the run has no record.
+    """
+
+    rule: str
+    log: str
+    requested_mb: int
+    requested_s: int
+    used_mb: float | None = None
+    used_s: float | None = None
+
+    @property
+    def memory_share(self) -> float:
+        """Used memory, with Snakemake's own, divided by the requested memory."""
+        return ((self.used_mb or 0) + ENGINE_MB) / self.requested_mb
+
+    @property
+    def time_share(self) -> float:
+        """Used time divided by the requested time."""
+        return (self.used_s or 0) / self.requested_s
+
+
+def planned_jobs(plan: str) -> Iterator[JobResources]:
+    """The jobs in the text of a dry run. Raises KeyError for a job without memory or time."""
+    for rule, block in JOB_BLOCK.findall(plan):
+        of = dict(line.strip().split(": ", 1) for line in block.splitlines())
+        asks = dict(part.split("=", 1) for part in of["resources"].split(", "))
+        yield JobResources(rule, of["log"], int(asks["mem_mb"]), 60 * int(asks["runtime"]))
+
+
+def with_use(jobs: Iterator[JobResources], run: Path) -> Iterator[JobResources]:
+    """The same jobs with what they used in the run of folder `run`. Jobs that did not run are left out."""
+    for job in jobs:
+        log = run / job.log
+        benchmark = run / job.log.replace("/logs/", "/benchmarks/", 1).removesuffix(".log")
+        if log.is_file():
+            took = MEMORY_LINE.findall(log.read_text(encoding="utf-8", errors="replace"))
+            rows = read_benchmark(f"{benchmark}.tsv") if Path(f"{benchmark}.tsv").is_file() else []
+            memory = float(took[-1]) if took else None
+            yield JobResources(
+                job.rule, job.log, job.requested_mb, job.requested_s, memory, rows[-1]["s"] if rows else None
+            )

@@ -1,0 +1,160 @@
+"""The questionnaire's films and tables: answers that are made up, whose tables are known."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hobble.channels.injury.study.answers import Answer, Study, read_answers, read_study
+from hobble.channels.injury.study.films import FILMS, FPS, GAIT, ONE, PARTS, SEVERAL, wish
+from hobble.channels.injury.study.tables import NUMERALS, tables
+from hobble.cli.__main__ import main
+from hobble.core.errors import InputError
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """films.json as the rule writes it."""
+    films = [{"film": f.number, "kind": f.kind, "parts": list(f.parts)} for f in FILMS]
+    told = {"study": "abc", "configuration": "limp", "parts": PARTS, "films": films}
+    (tmp_path / "films.json").write_text(json.dumps(told))
+    return tmp_path
+
+
+@pytest.fixture
+def study(folder: Path) -> Study:
+    return read_study(folder / "films.json")
+
+
+def write(folder: Path, name: str, says: Callable[[Any], tuple[list[str], int]], **changed: Any) -> Path:
+    """The answers of a person who says of each film what `says` does, shown last film first."""
+    answers = [dict(zip(("parts", "fluid"), says(f), strict=True)) | {"film": f.number} for f in FILMS[::-1]]
+    data = {"study": "abc", "person": name, "order": [], "answers": answers} | changed
+    path = folder / f"{name}.json"
+    path.write_text(json.dumps(data))
+    return path
+
+
+def test_the_thirteen_are_those_of_the_study() -> None:
+    assert Counter(film.kind for film in FILMS) == {ONE: 4, SEVERAL: 5, GAIT: 4}
+    assert [film.number for film in FILMS] == list(range(1, 14))
+    assert len({(film.parts, film.gaits) for film in FILMS}) == 13
+    for film in FILMS:
+        assert set(film.parts) <= set(PARTS)
+        assert (len(film.parts) == 1) if film.kind == ONE else True
+        assert (len(film.parts) > 1) if film.kind == SEVERAL else True
+        assert (film.gaits[0] != film.gaits[1]) == (film.kind == GAIT)
+    assert any("forearm" in part for film in FILMS for part in film.parts)
+
+
+@pytest.mark.parametrize("film", FILMS)
+def test_each_begins_healthy_hurts_and_changes_its_gait_while_it_hurts(film) -> None:
+    told = [wish(film, f) for f in range(round(film.seconds * FPS))]
+    hurts = [hurt for hurt, _ in told]
+    assert hurts.index(True) == 3 * FPS
+    assert all(hurts[3 * FPS :])
+    gaits = [gait for _, gait in told]
+    assert (gaits[0], gaits[-1]) == film.gaits
+    assert len(set(gaits[: 5 * FPS])) == 1, "two seconds hurt before the gait changes"
+
+
+def right(film) -> tuple[list[str], int]:
+    return list(film.parts), 5
+
+
+def mirrored(film) -> tuple[list[str], int]:
+    swap = {"left": "right", "right": "left"}
+    return [f"{swap[part.split()[0]]} {part.split(' ', 1)[1]}" for part in film.parts], 3
+
+
+def back(film) -> tuple[list[str], int]:
+    return ["lower back"], 1
+
+
+def test_tables_of_people_whose_answers_are_known(folder: Path, study: Study) -> None:
+    """One names everything, one confuses the sides, one always says the back."""
+    people = [read_answers(write(folder, says.__name__, says), study) for says in (right, mirrored, back)]
+    made = tables(study, people)
+    assert tuple(made) == NUMERALS
+    for numeral, film in zip(NUMERALS, FILMS, strict=False):
+        rows = {row["part"]: row for row in made[numeral]}
+        assert {part for part, row in rows.items() if row["hurts"]} == set(film.parts)
+        opposite = mirrored(film)[0]
+        for part, row in rows.items():
+            expected = (part in film.parts) + (part in opposite) + (part == "lower back")
+            assert row["people"] == expected, (numeral, part)
+            assert row["share"] == pytest.approx(expected / 3, abs=1e-5)
+    summary = made["XVI"]
+    assert [row["film"] for row in summary] == [*map(str, range(1, 14)), "all", "all", "all", "all"]
+    assert [row["kind"] for row in summary[13:]] == [ONE, SEVERAL, GAIT, "all"]
+    everything = summary[-1]
+    # Film 8 hurts two right parts, films 6 and 9 parts of both sides: none is named in a mirror.
+    assert everything["answers"] == 39
+    assert everything["seen"] == pytest.approx(1 / 3, abs=1e-5)
+    assert everything["seen_without_side"] == pytest.approx(2 / 3, abs=1e-5)
+    assert everything["exact"] == pytest.approx(1 / 3, abs=1e-5)
+    assert everything["exact_without_side"] == pytest.approx(2 / 3, abs=1e-5)
+    parts = sum(len(film.parts) for film in FILMS)
+    assert everything["wrong"] == pytest.approx((0 + parts + 13) / 39, abs=1e-5)
+    assert everything["fluid"] == 3.0
+    assert everything["fluid_sd"] == pytest.approx((4 * 26 / 38) ** 0.5, abs=1e-5)
+
+
+def test_a_part_of_the_parts_is_seen_in_part(study: Study) -> None:
+    """Of film 9's three parts one is ticked, by one of two people; of film 1 both tick one more."""
+    first = [Answer(f.number, f.parts[:1] if f.number == 9 else f.parts, 4) for f in FILMS]
+    second = [Answer(f.number, () if f.number == 9 else f.parts, 2) for f in FILMS]
+    rows = {row["film"]: row for row in tables(study, [first, second])["XVI"][:13]}
+    assert rows["9"]["seen"] == pytest.approx(1 / 6, abs=1e-5)
+    assert rows["9"]["exact"] == 0
+    assert rows["9"]["wrong"] == 0
+    assert rows["1"]["seen"] == rows["1"]["exact"] == 1
+    assert rows["1"]["fluid"] == 3
+    assert rows["1"]["fluid_sd"] == pytest.approx(2**0.5, abs=1e-5)
+
+
+def test_the_command_writes_fourteen_tables(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = [str(write(folder, says.__name__, says)) for says in (right, mirrored)]
+    assert main(["study", str(folder / "films.json"), *files, "--out", str(folder / "out")]) == 0
+    assert "2 people, 26 answers" in (said := capsys.readouterr().out)
+    assert "ticked: 50 %, without side 100 % (Ferre 2019: 82 %). Fluid: 4.00 of 5." in said
+    names = {f"table-{numeral}.csv" for numeral in NUMERALS} | {"tables.md"}
+    assert {path.name for path in (folder / "out").iterdir()} == names
+    with open(folder / "out" / "table-IX.csv") as file:
+        ticked = {row["part"]: row["people"] for row in csv.DictReader(file)}
+    assert ticked["left shank"] == ticked["left forearm"] == ticked["right shank"] == "1"
+    assert sum(map(int, ticked.values())) == 4
+    text = (folder / "out" / "tables.md").read_text()
+    assert "## Table IX: film 7, several parts: left shank, left forearm" in text
+    assert "## Table XVI: all films" in text
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda d: d | {"study": "old"}, "answers another questionnaire"),
+        (lambda d: d | {"answers": d["answers"][1:]}, "film 13 is not answered"),
+        (lambda d: d | {"answers": [d["answers"][0], *d["answers"]]}, "film 13 is answered twice"),
+        (lambda d: d | {"answers": [d["answers"][0] | {"parts": ["tail"]}]}, "answer 1: no such part: tail"),
+        (lambda d: d | {"answers": [d["answers"][0] | {"fluid": 6}]}, "answer 1: `fluid` is 6"),
+        (lambda d: d | {"answers": [d["answers"][0] | {"fluid": True}]}, "answer 1: `fluid` is True"),
+        (lambda d: d | {"answers": [d["answers"][0] | {"film": 14}]}, "there is no film 14"),
+        (lambda d: d | {"answers": ["\x1b[31m"]}, r"answer 1 is no answer: \?\[31m"),
+        (lambda d: d | {"answers": 3}, "has no list `answers`"),
+        (lambda d: [d], "holds no keys and values"),
+    ],
+)
+def test_a_file_that_cannot_be_counted_says_where_it_is_wrong(
+    folder: Path, study: Study, change: Callable[[Any], Any], message: str
+) -> None:
+    path = write(folder, "someone", right)
+    path.write_text(json.dumps(change(json.loads(path.read_text()))))
+    with pytest.raises(InputError, match=message) as error:
+        read_answers(path, study)
+    assert "someone.json" in str(error.value)

@@ -1,0 +1,49 @@
+from pathlib import Path
+
+import pytest
+
+from hobble.core.processors import cores, multiplies_bfloat16
+
+
+def topology(folder: Path, shared: dict[int, str]) -> Path:
+    for processor, siblings in shared.items():
+        file = folder / f"cpu{processor}" / "topology" / "core_cpus_list"
+        file.parent.mkdir(parents=True)
+        file.write_text(f"{siblings}\n")
+    return folder
+
+
+def test_two_threads_of_one_core_count_once(tmp_path: Path) -> None:
+    folder = topology(tmp_path, {0: "0,4", 4: "0,4", 1: "1,5", 5: "1,5"})
+    assert cores([0, 4], folder) == 1
+    assert cores([0, 1], folder) == 2
+    assert cores([0, 1, 4, 5], folder) == 2
+
+
+def test_where_nothing_is_known_each_processor_counts(tmp_path: Path) -> None:
+    assert cores([0, 1, 2], tmp_path) == 3
+    assert cores([], tmp_path) == 1
+
+
+@pytest.mark.parametrize(
+    ("flags", "limit", "fast"),
+    [
+        ("avx2 avx512f avx512_bf16", None, True),
+        ("avx2 amx_bf16", None, True),
+        ("avx2 avx512f", None, False),
+        ("avx2 avx512f avx512_bf16", "AVX2", False),
+        ("avx2 avx512f avx512_bf16", "avx512_core", False),
+        ("avx2 avx512f avx512_bf16", "AVX512_CORE_BF16", True),
+    ],
+)
+def test_bfloat16_by_the_cpu_and_by_what_onednn_may_use(
+    tmp_path: Path, flags: str, limit: str | None, fast: bool
+) -> None:
+    file = tmp_path / "cpuinfo"
+    file.write_text(f"flags\t\t: fpu {flags}\n")
+    environment = {} if limit is None else {"ONEDNN_MAX_CPU_ISA": limit}
+    assert multiplies_bfloat16(file, environment) is fast
+
+
+def test_a_system_without_the_file_has_no_bfloat16(tmp_path: Path) -> None:
+    assert not multiplies_bfloat16(tmp_path / "missing", {})

@@ -1,0 +1,90 @@
+"""Left from right: names tell, and where they do not, it is asked for."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.motion.names import side_of_pair
+
+FLIP = np.array([-1.0, 1.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def original(shared):
+    return shared / "mocap/cmu/02_01.bvh"
+
+
+def renamed(path, folder, names):
+    """A file with other names of its joints, cut to a second and a half."""
+    text, rows = path.read_text().split("Frame Time:")
+    words = text.split()
+    for joint in (b for a, b in pairwise(words) if a in ("ROOT", "JOINT")):
+        text = re.sub(rf"(ROOT|JOINT) {joint}\b", rf"\1 {names(joint)}", text)
+    text = re.sub(r"Frames: +\d+", "Frames: 180", text)
+    out = folder / "renamed.bvh"
+    out.write_text("Frame Time:".join([text, "\n".join(rows.split("\n")[:181]) + "\n"]))
+    return out
+
+
+def word(joint: str) -> str:
+    """A name that says neither what a joint is nor on which side."""
+    seed = sum(ord(letter) * (i + 1) for i, letter in enumerate(joint))
+    return "".join("kmnptvz"[seed // 7**k % 7] + "aeiou"[seed // 5**k % 5] for k in range(4))
+
+
+def asf(joint: str) -> str:
+    """`lUpLeg` in small letters, as in the names of the Acclaim format."""
+    return joint.replace("Left", "L").replace("Right", "R").lower()
+
+
+def wrists(clip, side):
+    return clip.positions[:, clip.skeleton.role(f"{side}_wrist")]
+
+
+@pytest.mark.shared
+def test_a_rig_without_sides_is_refused_with_one_question(original, tmp_path, make):
+    with pytest.raises(InputError, match=r"no name tells its left side.*Set motion.handedness"):
+        make(renamed(original, tmp_path, word))
+
+
+@pytest.mark.shared
+def test_handedness_answers_it(original, tmp_path, make):
+    known, _ = make(original)
+    path = renamed(original, tmp_path, word)
+    right, report = make(path, handedness="right")
+    left, _ = make(path, handedness="left")
+    assert any("motion.handedness: right did" in note for note in report["notes"])
+    for side, other in (("left", "right"), ("right", "left")):
+        here = wrists(right, side)
+        assert np.linalg.norm(here - wrists(known, side)[: len(here)], axis=-1).mean() < 2
+        assert np.linalg.norm(wrists(left, other) * FLIP - here, axis=-1).mean() < 2
+
+
+@pytest.mark.shared
+def test_small_letters_tell_sides(original, tmp_path, make):
+    known, _ = make(original)
+    clip, report = make(renamed(original, tmp_path, asf))
+    assert not any("left side from its right" in note for note in report["notes"])
+    here = wrists(clip, "left")
+    assert np.linalg.norm(here - wrists(known, "left")[: len(here)], axis=-1).mean() < 2
+
+
+@pytest.mark.parametrize(
+    ("name", "other", "side"),
+    [
+        ("lfemur", "rfemur", "left"),
+        ("rtibia", "ltibia", "right"),
+        ("左足", "右足", "left"),
+        ("LeftLeg", "RightLeg", "left"),
+        ("arm1", "arm2", None),
+        ("lfemur", "rtibia", None),
+        ("leg", "leg", None),
+    ],
+)
+def test_names_that_differ_in_one_letter_tell(name, other, side):
+    assert side_of_pair(name, other) == side

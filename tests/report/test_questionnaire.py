@@ -1,0 +1,156 @@
+"""The questionnaire in a browser: every film once, in an order of its own, and a file that can be counted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.channels.injury.study import films
+from hobble.channels.injury.study.answers import read_answers, read_study
+from hobble.channels.injury.study.films import FILMS, PARTS, part_links
+from hobble.channels.injury.study.questionnaire import doubts, write_questionnaire
+from hobble.core.errors import HobbleError
+from hobble.core.skeleton import Skeleton
+from hobble.models.load import load_network
+from hobble.models.network import Network
+
+SHORT = FILMS[3:7]
+
+
+@pytest.fixture(scope="module")
+def made(
+    network: Network, examples: ModuleType, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, dict[str, Any]]:
+    """Four of the films, small and short."""
+    folder = tmp_path_factory.mktemp("questionnaire")
+    with pytest.MonkeyPatch.context() as patch:
+        for name, seconds in (("WALKED_IN", 0.1), ("HEALTHY", 0.1), ("HURT", 0.3)):
+            patch.setattr(films, name, seconds)
+        return folder, write_questionnaire(network, folder, examples.RUNTIME, "example", SHORT, size=48)
+
+
+@pytest.fixture
+def tab(
+    made: tuple[Path, dict[str, Any]], tools: ModuleType, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Any]:
+    yield from tools.opened((made[0] / "questionnaire.html").read_text(), tmp_path_factory.mktemp("asked"))
+
+
+def again(tab: Any, forget: bool = False) -> None:
+    """Open the page once more, with or without what the browser kept of the last time."""
+    if forget:
+        tab.run("localStorage.clear()")
+    tab.open(tab.run("location.href"))
+    assert tab.until("!!globalThis.Study")
+
+
+def test_what_hurts_is_listed_beside_the_page_and_not_in_it(made: tuple[Path, dict[str, Any]]) -> None:
+    folder, told = made
+    assert json.loads((folder / "films.json").read_text()) == json.loads(json.dumps(told))
+    assert [row["parts"] for row in told["films"]] == [list(film.parts) for film in SHORT]
+    assert told["films"][0]["links"] == ["LeftForeArm-LeftHand"]
+    assert all(row["from_healthy_cm"] > 0 for row in told["films"])
+    page = (folder / "questionnaire.html").read_text()
+    assert not any(kind in page for kind in ("several parts", "LeftForeArm", "change of gait"))
+    assert page.count('"webp"') == 4
+
+
+def test_each_film_is_asked_about_once_and_the_answers_can_be_counted(
+    tab: Any, made: tuple[Path, dict[str, Any]], tmp_path: Path
+) -> None:
+    again(tab, forget=True)
+    tab.run("document.getElementById('person').value = 'Ann 1'")
+    tab.run("document.getElementById('begin').click()")
+    film = "document.getElementById('film')"
+    assert tab.until(f"{film}.complete && {film}.naturalWidth === 48")
+    disabled = "document.getElementById('next').disabled"
+    box = "document.querySelector(`#parts input[value='{}']`)"
+    ticked = []
+    for i in range(4):
+        assert tab.run("document.getElementById('which').textContent") == f"Film {i + 1} of 4"
+        assert tab.run(disabled)
+        part = PARTS[i]
+        if i == 2:  # "nothing hurts" takes the ticks back
+            tab.run(f"{box.format(part)}.click(); {box.format('nothing')}.click()")
+            part = None
+        else:
+            tab.run(f"{box.format(part)}.click()")
+        assert tab.run(disabled), "it is not said yet how fluid it is"
+        tab.run(f"document.querySelectorAll('#marks input')[{i}].click()")
+        assert not tab.run(disabled)
+        tab.run("document.getElementById('again').click()")
+        tab.run("document.getElementById('next').click()")
+        ticked.append(() if part is None else (part,))
+    text = tab.run("document.getElementById('text').value")
+    assert not tab.run("document.getElementById('done').hidden")
+    data = json.loads(text)
+    assert data["person"] == "Ann 1"
+    assert [row["plays"] for row in data["answers"]] == [2] * 4
+    (tmp_path / "answers.json").write_text(text)
+    answers = read_answers(tmp_path / "answers.json", read_study(made[0] / "films.json"))
+    assert [a.film for a in answers] == data["order"]
+    assert sorted(data["order"]) == [film.number for film in SHORT]
+    assert [a.parts for a in answers] == ticked
+    assert [a.fluid for a in answers] == [1, 2, 3, 4]
+    assert tab.console == []
+    assert all(url.startswith(("file:", "data:", "blob:", "about:")) for url in tab.requests)
+
+
+def test_orders_differ_and_a_closed_page_goes_on(tab: Any) -> None:
+    orders = set()
+    for _ in range(12):
+        again(tab, forget=True)
+        tab.run("document.getElementById('begin').click()")
+        orders.add(tuple(tab.run("Study.state.order")))
+    assert len(orders) > 3
+    tab.run("document.querySelector('#parts input').click(); document.querySelector('#marks input').click()")
+    tab.run("document.getElementById('next').click()")
+    order = tab.run("Study.state.order")
+    again(tab)
+    assert "answered 1 of 4" in tab.run("document.getElementById('resumed').textContent")
+    tab.run("document.getElementById('begin').click()")
+    assert tab.run("document.getElementById('which').textContent") == "Film 2 of 4"
+    assert tab.run("Study.state.order") == order
+
+
+def test_films_in_which_nothing_can_be_seen_are_told() -> None:
+    rows = [
+        {"film": 1, "from_healthy_cm": 3.0, "never_told": []},
+        {"film": 2, "from_healthy_cm": 0.01, "never_told": ["A-B"]},
+    ]
+    assert doubts({"films": rows[:1]}) == []
+    same, never = doubts({"films": rows})
+    assert same.startswith("film 2: nothing hurts that can be seen")
+    assert never == "Never hurt in training: A-B."
+
+
+def test_the_link_that_was_hurt_in_training_is_hurt(network: Network) -> None:
+    links = network.channels["injury"]
+    x_mean = network.x_mean.copy()
+    x_mean[network.layout.x_channel("injury")] = np.array(
+        [link == "LeftHand-LeftFingerBase" for link in links]
+    )
+    assert part_links(network, ["left forearm", "right thigh"]) == [
+        "LeftForeArm-LeftHand",
+        "RightUpLeg-RightLeg",
+    ]
+    taught = replace(network, x_mean=x_mean)
+    assert part_links(taught, ["left forearm"]) == ["LeftForeArm-LeftHand"], "a finger is no forearm"
+
+
+def test_a_network_that_is_not_told_what_hurts_says_which_is(
+    examples: ModuleType, holden31: Skeleton, tmp_path: Path
+) -> None:
+    examples.weights(tmp_path / "weights.npz", holden31, links=False)
+    with pytest.raises(HobbleError, match="not told what hurts"):
+        write_questionnaire(
+            load_network(tmp_path / "weights.npz"), tmp_path / "out", examples.RUNTIME, "plain"
+        )
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,137 @@
+"""The recogniser in the page: the same cycles, numbers and answers as in Python."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.gait.cycles import measure
+from hobble.gait.graded import grade, grader
+from hobble.gait.people import people
+from hobble.gait.profile import profile
+from hobble.models.network import Network
+from hobble.report.recogniser import healthy_walk, learnt, playable_and_judged, words
+
+
+@pytest.fixture(scope="module")
+def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    yield from tools.opened(page, tmp_path_factory.mktemp("recogniser"))
+
+
+@pytest.fixture(scope="module")
+def walks(examples: ModuleType, holden31: Skeleton) -> dict[str, Array]:
+    """Walks (F, J, 3), cm: even, uneven in every joint, bending its way, and one that goes nowhere."""
+    even = examples.walker(holden31, 240, 2.2)["positions"].astype(float)
+    frames, rng = np.arange(240), np.random.default_rng(4)
+    uneven = even + 1.5 * np.sin(frames[:, None, None] / 19 + rng.uniform(0, 6, even.shape[1:]))
+    knee = holden31.role("right_knee")
+    uneven[:, knee, 2] += 4 * np.sin(frames / 9) ** 2
+    angle = np.radians(0.15) * frames
+    turned = uneven.copy()
+    turned[..., 0] = np.cos(angle)[:, None] * uneven[..., 0] + np.sin(angle)[:, None] * uneven[..., 2]
+    turned[..., 2] = np.cos(angle)[:, None] * uneven[..., 2] - np.sin(angle)[:, None] * uneven[..., 0]
+    still = even - even[:, :1] * [1, 0, 1]
+    found = {"even": even, "uneven": uneven, "bending": turned, "on the spot": still}
+    return {name: np.round(places, 6) for name, places in found.items()}
+
+
+def in_page(tab: Any, skeleton: Skeleton, places: Array) -> Any:
+    """Cycles and profile as the page finds them."""
+    spec = {"names": list(skeleton.joints), "roles": dict(skeleton.roles)}
+    frames = places.reshape(len(places), -1).tolist()
+    return tab.run(f"""(() => {{
+      const walk = Hobble.measureWalk({json.dumps(spec)}, {json.dumps(frames)});
+      const spans = ["right", "left"].map((side) => walk[side].map((c) => [c.start, c.end]));
+      return {{ spans, profile: Hobble.profile(walk) }};
+    }})()""")
+
+
+def test_cycles_and_their_numbers_are_those_of_python(
+    tab: Any, walks: dict[str, Array], holden31: Skeleton
+) -> None:
+    measured = 0
+    for name, places in walks.items():
+        walk, found = measure(holden31, places, 60), in_page(tab, holden31, places)
+        assert found["spans"] == [[[c.start, c.end] for c in side] for side in (walk.right, walk.left)], name
+        if not len(walk):
+            assert found["profile"] is None
+            continue
+        measured += 1
+        expected = profile(walk)
+        for key, value in found["profile"].items():
+            assert value == pytest.approx(expected[key], abs=1e-6), (name, key)
+    assert measured >= 3, "three of the walks have cycles"
+
+
+def test_answers_are_those_of_python(tab: Any) -> None:
+    """Of people's own walks at several strengths, beside their healthy ones."""
+    known = people()
+    healthy, cases = known.normal(), []
+    for gait in range(len(known.profiles)):
+        for person in (0, 3, 7):
+            walk = dict(zip(healthy, map(float, known.profiles[gait, person]), strict=True))
+            cases += [{k: (1 - s) * healthy[k] + s * walk[k] for k in healthy} for s in (0.2, 0.6, 1.0)]
+    found = tab.run(f"""(() => {{
+      const grade = Hobble.grader({json.dumps(learnt())}), healthy = {json.dumps(healthy)};
+      return {json.dumps(cases)}.map((walk) => grade(walk, healthy));
+    }})()""")
+    labels = set()
+    for case, answer in zip(cases, found, strict=True):
+        expected = grade(case, healthy)
+        labels.add(expected.label)
+        assert answer["label"] == expected.label
+        assert answer["strength"] == pytest.approx(expected.strength, abs=1e-6)
+        assert answer["distance"] == pytest.approx(expected.distance, abs=1e-6)
+        assert answer["probabilities"] == pytest.approx(dict(expected.probabilities), abs=1e-6)
+        assert answer["sides"] == pytest.approx(list(expected.sides.values()), abs=1e-6)
+    assert len(labels) >= 4, "the cases are called different things"
+
+
+def test_every_kind_has_words_of_its_own() -> None:
+    said = [words(*kind) for kind in grader().kinds]
+    assert len(set(said)) == len(said)
+    assert words("antalgic", "left") == "left thigh, shank or foot"
+    assert words("leaning_trunk", "forward") == "back, leaning forward"
+
+
+def test_a_walk_is_judged_beside_the_healthy_walk_of_the_same_figure(
+    network: Network, examples: ModuleType, holden31: Skeleton, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a figure that goes nowhere, or has no knees, nothing is said."""
+    spec = playable_and_judged(network, examples.RUNTIME)
+    assert spec["recogniser"]["healthy"] == healthy_walk(network, holden31, examples.RUNTIME)
+    assert spec["recogniser"]["healthy"]["speed_per_leg"] > 0.5
+    without = {role: joint for role, joint in holden31.roles.items() if role != "left_knee"}
+    assert healthy_walk(network, replace(holden31, roles=without), examples.RUNTIME) is None
+    monkeypatch.setattr("hobble.report.recogniser.SPEED", 0.0)
+    assert healthy_walk(network, holden31, examples.RUNTIME) is None
+    assert "recogniser" not in playable_and_judged(network, examples.RUNTIME)
+
+
+def test_the_panel_says_what_the_walk_looks_like(
+    tab: Any, walks: dict[str, Array], holden31: Skeleton
+) -> None:
+    """The watch sees three seconds, and asks for a walk where there is none."""
+    healthy = profile(measure(holden31, walks["even"], 60))
+    spec = {"names": list(holden31.joints), "roles": dict(holden31.roles)}
+    spec["recogniser"] = {"learnt": learnt(), "healthy": healthy}
+    said = {}
+    for name in ("even", "on the spot"):
+        frames = walks[name].reshape(240, -1).tolist()
+        said[name] = tab.run(f"""(() => {{
+          const watch = Hobble.watch({json.dumps(spec)});
+          {json.dumps(frames)}.forEach((places) => watch.add(places));
+          return watch.say();
+        }})()""")
+    last = grade(profile(measure(holden31, walks["even"][-180:], 60)), healthy)
+    assert said["even"]["text"] == "nothing hurts"
+    assert said["even"]["share"] == pytest.approx(last.probabilities["normal"], abs=1e-4)
+    assert said["on the spot"] == {"text": "walk straight on to be judged"}

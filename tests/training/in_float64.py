@@ -1,0 +1,90 @@
+"""Trainings in float64, alone or as one of those that torchrun started: in_float64.py JOBS.json
+
+So sums in another order differ by 1e-16 of themselves, and other batches by much more. Writes the weights,
+the moments and the losses of the sections for each.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from hobble.database.reader import Database
+from hobble.models import network_options
+from hobble.models.trainable import Trainable
+from hobble.training import train as module
+from hobble.training.batches import Batch, HostRows
+from hobble.training.device_rows import DeviceRows
+from hobble.training.options import Training
+from hobble.training.processes import ALONE, Processes, joined
+from hobble.training.rollout import RollOut
+
+WINDOW = Database.window
+
+
+def widen(kind: Any) -> None:
+    plain = kind.batches
+
+    def batches(self: Any, *place: int) -> Any:
+        for x, y, p, *rest in plain(self, *place):
+            yield Batch(x.double(), y.double(), p.double(), *rest)
+
+    kind.batches = batches
+
+
+def in_double() -> None:
+    """Make networks, batches and the errors that are carried on float64."""
+    widen(HostRows)
+    widen(DeviceRows)
+    to, begin = Trainable.to, RollOut.__init__
+    Trainable.to = lambda self, device, dtype=None: to(self, device, torch.float64)  # type: ignore[method-assign]
+
+    def double(self: Any, *arguments: Any) -> None:
+        begin(self, *arguments)
+        for name, value in vars(self).items():
+            if isinstance(value, torch.Tensor):
+                setattr(self, name, value.double())
+
+    RollOut.__init__ = double  # type: ignore[method-assign]
+
+
+def main(jobs: list[dict[str, Any]]) -> None:
+    in_double()
+    if "RANK" not in os.environ:
+        for job in jobs:
+            one(job, ALONE)
+        return
+    with joined(False) as processes:
+        for job in jobs:
+            one(job, processes)
+
+
+def one(job: dict[str, Any], processes: Processes) -> None:
+    """on_device: rows shuffled as on an accelerator. window: chunks held at a time, 0 for all."""
+    module.rows_for = DeviceRows if job["on_device"] else HostRows  # type: ignore[assignment]
+    window = job["window"]
+    Database.window = (lambda *_: window) if window else WINDOW  # type: ignore[method-assign]
+    training = Training.model_validate(job["training"])
+    state = module.train(
+        Database.open(job["database"], training.memory_mb),
+        network=network_options(job["network"]),
+        training=training,
+        checkpoints=Path(job["checkpoints"]),
+        processes=processes,
+    )
+    if processes.first:
+        arrays = {"flat": state.network.flat, "first": state.adam.first, "second": state.adam.second}
+        losses = np.array([row[4] for row in state.history])
+        np.savez(
+            job["out"], losses=losses, steps=state.adam.steps, **{k: v.numpy() for k, v in arrays.items()}
+        )
+
+
+if __name__ == "__main__":
+    main(json.loads(Path(sys.argv[1]).read_text()))

@@ -1,0 +1,227 @@
+"""Several processes take the steps of one, on loopback; where one dies, the next run goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+import zlib
+from collections.abc import Callable
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import HobbleError
+from hobble.core.files import load_npz
+from hobble.database.merge import write_database
+from hobble.training.options import Machines
+from hobble.workflow import lifetime
+from hobble.workflow.together import command, on_machines, train_together
+
+from .conftest import SPLITS, Recipe, clip_rows
+
+IN_FLOAT64 = Path(__file__).with_name("in_float64.py")
+# Short batches, roll-outs, dropout, a rate that changes: all that goes by the place of a row in a batch.
+HARD = {
+    "batch": 90,
+    "rollout": 4,
+    "dropout": 0.2,
+    "l1": 0.1,
+    "learning_rate": 1e-3,
+    "warm_up": 0.5,
+    "passes": 1,
+    "sections": 2,
+    "memory_mb": 64,
+    "device": "cpu",
+}
+Ends = dict[tuple[int, int, tuple[bool, int]], dict[str, np.ndarray]]
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """2,300 samples a pass in many small chunks, far more than fit into the memory that a test states."""
+    path = tmp_path_factory.mktemp("database") / "all"
+    clips = {"walk": clip_rows("walk", 150, 1, 1), "hop": clip_rows("hop", 80, 10, 2)}
+    write_database(path, clips, SPLITS, channels=["injury"], joint_weight=0.1, chunk_bytes=12_000)
+    return path
+
+
+# How the rows are read: (shuffled as on an accelerator, chunks held at a time or 0 for all).
+WAYS = [(False, 0), (False, 3), (True, 0)]
+
+
+@pytest.fixture(scope="module")
+def ends(database: Path, tmp_path_factory: pytest.TempPathFactory) -> Ends:
+    """(processes, stretches, way) -> where a training ends that has them."""
+    folder = tmp_path_factory.mktemp("ends")
+    found = {}
+    for processes, stretches in ((1, [1, 2, 3]), (2, [1, 2]), (3, [1, 3])):
+        jobs = []
+        for number, (cut, way) in enumerate(product(stretches, WAYS)):
+            name = f"{processes}-{number}"
+            jobs.append(
+                {
+                    "database": str(database),
+                    "network": {"kind": "pfnn", "hidden_layers": 2, "units": 24, "control_points": 4},
+                    "training": HARD | {"stretches": cut if cut != processes else None},
+                    "checkpoints": str(folder / name),
+                    "out": str(folder / f"{name}.npz"),
+                    "on_device": way[0],
+                    "window": way[1],
+                }
+            )
+        told = folder / f"{processes}.json"
+        told.write_text(json.dumps(jobs))
+        start = ["-m", "torch.distributed.run", "--standalone", f"--nproc-per-node={processes}"]
+        arguments = [*(start if processes > 1 else []), str(IN_FLOAT64), str(told)]
+        environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+        subprocess.run([sys.executable, *arguments], check=True, env=environment)
+        for (cut, way), job in zip(product(stretches, WAYS), jobs, strict=True):
+            found[processes, cut, way] = dict(np.load(job["out"]))
+    return found
+
+
+def furthest(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> float:
+    assert one["steps"] == other["steps"]
+    return max(float(np.abs(one[name] - other[name]).max()) for name in ("flat", "first", "second", "losses"))
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("processes", [2, 3])
+def test_they_take_the_steps_of_one(ends: Ends, processes: int, way: tuple[bool, int]) -> None:
+    """Of consecutive samples, and of those that come from a stretch for each process."""
+    assert furthest(ends[1, 1, way], ends[processes, 1, way]) < 1e-10
+    assert furthest(ends[1, processes, way], ends[processes, processes, way]) < 1e-10
+    assert furthest(ends[1, 1, way], ends[processes, processes, way]) > 1e-6
+
+
+@pytest.fixture
+def together(database: Path, network: Any, training: Recipe, tmp_path: Path) -> Callable[..., dict[str, Any]]:
+    """Train as the workflow does, in so many processes; what the checkpoint then holds."""
+
+    def go(
+        processes: int, folder: str = "checkpoints", data: Path = database, **changes: Any
+    ) -> dict[str, Any]:
+        machines = Machines(processes=processes)
+        typed = on_machines(training | HARD | {"sections": 3} | changes, machines, gpus=False)
+        train_together(
+            machines,
+            processes,
+            tmp_path / "log",
+            database=data,
+            network=network,
+            training=typed,
+            checkpoints=tmp_path / folder,
+            start=None,
+            code=None,
+        )
+        return load_npz(next((tmp_path / folder).glob("*/checkpoint.npz")))
+
+    return go
+
+
+def test_the_same_again_gives_the_same_bits(together: Callable[..., dict[str, Any]]) -> None:
+    one, again = together(2, "one"), together(2, "two")
+    for name in ("weights", "first", "second", "best"):
+        np.testing.assert_array_equal(one[name], again[name])
+
+
+def test_where_one_dies_the_others_end_and_another_number_goes_on(
+    together: Callable[..., dict[str, Any]], tmp_path: Path
+) -> None:
+    import psutil
+
+    def kill_one() -> None:
+        while not list((tmp_path / "checkpoints").glob("*/checkpoint.npz")):
+            time.sleep(0.01)
+        for process in psutil.Process().children(recursive=True):
+            if process.environ().get("RANK") == "1":
+                process.send_signal(signal.SIGKILL)
+
+    killer = threading.Thread(target=kill_one)
+    killer.start()
+    with pytest.raises(HobbleError, match=r"one of the 2 processes .* died"):
+        together(2, passes=40)
+    killer.join()
+    assert not [p for p in psutil.Process().children(recursive=True) if p.status() != psutil.STATUS_ZOMBIE]
+    reached = int(load_npz(next((tmp_path / "checkpoints").glob("*/checkpoint.npz")))["sections"])
+    assert 0 < reached < 120
+    assert not list((tmp_path / "checkpoints").glob("processes-*"))
+    final = together(3, passes=reached // 3 + 1)
+    assert int(final["sections"]) == (reached // 3 + 1) * 3
+    assert int(final["samples"]) == (reached // 3 + 1) * 2300
+    assert f"after section {reached} of" in (tmp_path / "log").read_text()
+
+
+def test_the_process_that_knows_the_fault_tells_it(
+    together: Callable[..., dict[str, Any]], database: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(database, tmp_path / "db")
+    spoil(tmp_path / "db")
+    with pytest.raises(HobbleError, match=r"rows of the database are not: .*(hop|walk) frame \d+"):
+        together(3, data=tmp_path / "db")
+
+
+def spoil(database: Path) -> None:
+    """Make one Y of one row no number, as if the database had been built so."""
+    manifest = json.loads((database / "manifest.json").read_text())
+    chunk = manifest["chunks"]["train"][-1]
+    file = database / manifest["folder"] / chunk["file"]
+    data = bytearray(file.read_bytes())
+    length = int.from_bytes(data[:8], "little")
+    start = 8 + length + json.loads(data[8 : 8 + length])["y"]["data_offsets"][0]
+    data[start : start + 4] = np.float32(np.nan).tobytes()
+    file.write_bytes(data)
+    chunk["crc32"] = zlib.crc32(data)
+    (database / "manifest.json").write_text(json.dumps(manifest))
+
+
+def test_a_damaged_chunk_is_named(
+    together: Callable[..., dict[str, Any]], database: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(database, tmp_path / "db")
+    last = sorted((tmp_path / "db").rglob("train/*.safetensors"))[-1]
+    last.write_bytes(last.read_bytes()[:-1])
+    with pytest.raises(HobbleError, match=rf"{last.name}: truncated"):
+        together(2, data=tmp_path / "db")
+
+
+def test_machines_need_slurm(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    machines = Machines(nodes=4, gpus=8)
+    monkeypatch.delenv("SLURM_JOB_ID", raising=False)
+    with pytest.raises(HobbleError, match=r"training\.nodes is 4, but this is not a job of SLURM"):
+        command(machines, tmp_path)
+    monkeypatch.setenv("SLURM_JOB_ID", "7")
+    words = command(machines, tmp_path)
+    assert words[0] == "srun"
+    assert {"--ntasks=4", "--nnodes=4", "--nproc-per-node=8"} <= set(words)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"gpus": 2, "processes": 2}, "not both"),
+        ({"gpus": 2, "device": "cpu"}, "needs `device"),
+        ({"nodes": 5, "processes": 8}, "40 processes share a batch of 32"),
+        ({"stretches": 33}, "above `batch`"),
+    ],
+)
+def test_machines_that_make_no_sense_are_refused(
+    training: Recipe, changes: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        training | changes
+
+
+def test_a_lifetime_names_this_process() -> None:
+    pid, _, began = lifetime.this_process().partition(" ")
+    assert int(pid) == os.getpid()
+    assert lifetime._is_alive(int(pid), began)

@@ -1,0 +1,17 @@
+"""Creates results/<configuration>/questionnaire/: the page that asks what hurts, and what does."""
+
+from hobble.channels.injury.study.questionnaire import doubts, write_questionnaire
+from hobble.models.load import load_network
+from hobble.runtime.options import Runtime
+from hobble.workflow.job import job
+
+with job(snakemake) as log:
+    told = write_questionnaire(
+        load_network(snakemake.input.weights),
+        snakemake.output.folder,
+        Runtime.model_validate(snakemake.params.runtime),
+        snakemake.params.configuration,
+    )
+    for doubt in doubts(told):
+        log.warning("%s", doubt)
+    log.info("wrote %d films to %s", len(told["films"]), snakemake.output.folder)
