@@ -16,7 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
-from . import runs, texts, throws
+from . import attacks, runs, texts, throws
 from .grammar import Case
 from .lab import ROOT, Lab
 from .throws import FAULT, REFUSED, REMADE, SKIPPED, UNHARMED, Throw
@@ -32,6 +32,8 @@ KINDS: dict[Callable[[Lab, Random], Throw], int] = {
     throws.spoilt_checkpoint: 4,
     runs.kill_run: 5,
     runs.two_runs: 2,
+    runs.stale_lock: 2,
+    runs.touched: 1,
 }
 TEXTS_PER_ROUND = 5
 COLUMNS = (REFUSED, REMADE, UNHARMED, SKIPPED, FAULT)
@@ -50,12 +52,13 @@ def main() -> int:
     print(f"seed {asked.seed}", flush=True)
     with tempfile.TemporaryDirectory(prefix="faults-") as scratch:
         Path(scratch).chmod(0o755)
-        lab = Lab(Path(scratch) / "lab")
+        lab = Lab(Path(scratch) / "lab", fresh=True)
         lab.undisturbed(TARGET)
         print(f"{len(lab.jobs)} jobs of an undisturbed run are ready", flush=True)
         thrown = _rounds(lab, asked.seed, range(asked.rounds) if asked.only is None else [asked.only])
         if asked.only is None:
             thrown += _texts(lab, Path(scratch), asked.seed, asked.rounds * TEXTS_PER_ROUND)
+            thrown += attacks.thrown(Path(scratch))
     table = _table(thrown)
     print(table)
     if asked.table:

@@ -60,19 +60,33 @@ class End:
     seconds: float
 
 
-def clone(folder: Path) -> None:
-    """The workflow without results in a new folder; the package is linked, so that compiled code is found."""
+def tracked() -> list[Path]:
+    """The files of the checkout that git knows, relative to it: what a fresh clone consists of."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
+    return [Path(name) for name in listed.stdout.split("\0") if name and (ROOT / name).is_file()]
+
+
+def clone(folder: Path, package: Path | None = ROOT / "src") -> None:
+    """A fresh clone of the checkout, as it is now, in a new folder.
+
+    package: the folder of the package, which is linked, so that its compiled code is found; None copies it.
+    """
     folder.mkdir(parents=True)
-    shutil.copy2(ROOT / "Snakefile", folder)
-    for part in ("config", "profiles", "workflow"):
-        shutil.copytree(ROOT / part, folder / part)
-    (folder / "src").symlink_to(ROOT / "src")
+    for name in tracked():
+        if package is None or name.parts[0] != "src":
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, folder / name)
+    if package is not None:
+        (folder / "src").symlink_to(package)
 
 
 class Lab:
-    """folder/run: a clone of the checkout, where the undisturbed run takes place."""
+    """folder/run: a clone of the checkout, where the undisturbed run takes place.
 
-    def __init__(self, folder: Path) -> None:
+    fresh: the clone has its own copy of the package, with nothing compiled yet.
+    """
+
+    def __init__(self, folder: Path, *, fresh: bool = False) -> None:
         self.folder = folder
         self.run = folder / "run"
         self.kept = folder / "kept"
@@ -81,16 +95,18 @@ class Lab:
         self.seconds: dict[str, float] = {}
         for part in (self.kept, folder / "site"):
             part.mkdir(parents=True)
-        clone(self.run)
+        clone(self.run, None if fresh else ROOT / "src")
         (folder / "site/sitecustomize.py").write_text(KEEP)
 
     def command(self, *arguments: str) -> list[str]:
-        """Snakemake as the README calls it, in a clone of the checkout."""
-        return [str(Path(sys.executable).with_name("snakemake")), *arguments]
+        """The README's own, with the environment's programs on the path: `snakemake -c2 results/...`."""
+        return ["snakemake", *arguments]
 
     def environment(self, keep: bool = False) -> dict[str, str]:
-        path = [str(ROOT / "src"), *([str(self.folder / "site")] if keep else [])]
-        own = {"PYTHONPATH": os.pathsep.join(path), "PYTHONDONTWRITEBYTECODE": "1"}
+        """A user's: the environment's programs on the path, whose package is that of the clone."""
+        path = [str(self.run / "src"), *([str(self.folder / "site")] if keep else [])]
+        programs = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+        own = {"PYTHONPATH": os.pathsep.join(path), "PYTHONDONTWRITEBYTECODE": "1", "PATH": programs}
         return {**os.environ, **own, "KEPT_SCRIPTS": str(self.kept)}
 
     def snakemake(self, folder: Path, *arguments: str, keep: bool = False) -> End:
@@ -131,7 +147,7 @@ class Lab:
         """A folder of its own with the job's inputs, its checksums included; gone afterwards."""
         folder = Path(tempfile.mkdtemp(prefix="bench-", dir=self.folder))
         try:
-            clone(folder / "run")
+            clone(folder / "run", self.run / "src")
             bench = Bench(self, job, folder / "run")
             bench.fill()
             yield bench

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -14,9 +15,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from random import Random
 
-from .lab import End, Job, Lab
+from .lab import End, Job, Lab, tracked
 from .same import same
-from .throws import FAULT, REFUSED, REMADE, TRACEBACK, UNHARMED, Throw
+from .throws import FAULT, REFUSED, REMADE, SKIPPED, TRACEBACK, UNHARMED, Throw
 
 FAILED = re.compile(r"^\d+ of \d+ jobs done in .*, \d+ failed:$", re.M)
 LOCKED = "cannot be locked"  # Snakemake's own words
@@ -130,6 +131,62 @@ def _compared(lab: Lab, folder: Path, what: str, at: str, happened: str, end: En
     if unlike or left:
         return Throw(what, at, FAULT, f"other than undisturbed: {unlike}; left: {left}; {end.said[-800:]}")
     return Throw(what, at, happened)
+
+
+def touched(lab: Lab, rng: Random) -> Throw:
+    """Every tracked file gets a new time, as after a fresh checkout: nothing may run again."""
+    what, at = "every tracked file touched", "a whole run"
+    folder = Path(tempfile.mkdtemp(prefix="run-", dir=lab.folder))
+    try:
+        shutil.copytree(lab.run, folder, symlinks=True, dirs_exist_ok=True)
+        for name in tracked():
+            if name.parts[0] != "src" or not (folder / "src").is_symlink():
+                (folder / name).touch()
+        before = _times(lab, folder)
+        end = lab.snakemake(folder, "-c2", *lab.targets)
+        if end.status:
+            return Throw(what, at, FAULT, f"status {end.status}: {end.said[-1500:]}")
+        again = sorted(path for path, time in _times(lab, folder).items() if time != before[path])
+        if again:
+            return Throw(what, at, FAULT, f"made again: {again}")
+        return Throw(what, at, UNHARMED)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _times(lab: Lab, folder: Path) -> dict[str, int]:
+    return {path: (folder / path).stat().st_mtime_ns for job in lab.jobs for path in job.outputs}
+
+
+def stale_lock(lab: Lab, rng: Random) -> Throw:
+    """A run that was killed leaves its lock, of this machine or of another one.
+
+    Of this machine, the same command goes on. Of another, it says how the lock is cleared, and that helps.
+    """
+    elsewhere = rng.random() < 0.5
+    what, at = f"a stale lock of {'another' if elsewhere else 'this'} machine", "a whole run"
+    with _started(lab, rng) as (folder, _):
+        locks = folder / ".snakemake/locks"
+        process = _start(lab, folder, folder / "said")
+        while not (locks / "owner.json").exists() and process.poll() is None:
+            time.sleep(0.01)
+        for pid in (process.pid, *_tree(process.pid)):
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        process.wait()
+        owner = locks / "owner.json"
+        if not owner.exists():
+            return Throw(what, at, SKIPPED, "the run had ended before it could be killed")
+        if not elsewhere:
+            return _rerun(lab, folder, what, at, REMADE)
+        owner.write_text(json.dumps({**json.loads(owner.read_text()), "host": "another"}))
+        end = lab.snakemake(folder, "-c2", *lab.targets)
+        if end.status == 0 or LOCKED not in end.said or "--unlock" not in end.said:
+            return Throw(what, at, FAULT, f"status {end.status}: {end.said[-1500:]}")
+        end = lab.snakemake(folder, "--unlock", *lab.targets)
+        if end.status:
+            return Throw(what, at, FAULT, f"--unlock ended in {end.said[-1500:]}")
+        return _rerun(lab, folder, what, at, REFUSED)
 
 
 def two_runs(lab: Lab, rng: Random) -> Throw:

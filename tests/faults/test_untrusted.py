@@ -28,12 +28,14 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import load_npz, read_json
 from hobble.core.untrusted import read_bytes, read_yaml
 from hobble.labels.files import SourceTime, read_gait_keys
+from hobble.models import checks
 from hobble.models.load import load_network
 from hobble.motion import read as bvh
 from hobble.motion.draft import MOST_SHOWN
 from hobble.motion.make import make_clip
 from hobble.motion.rig import load_skeleton
-from hobble.terrain.heightmaps import read_heights
+from hobble.terrain.heightmaps import heightmaps, read_heights
+from hobble.terrain.options import Heightmap
 from hobble.workflow.project import Project
 from hobble.workflow.targets import check
 
@@ -86,11 +88,11 @@ def test_two_billion_frames_are_refused_from_the_header(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("deep", [True, False])
-def test_a_million_joints_are_refused_from_the_header(tmp_path: Path, deep: bool) -> None:
+def test_too_many_joints_are_refused_from_the_header(tmp_path: Path, deep: bool) -> None:
     closing = "" if deep else "}\n"
     joint = f"JOINT j%d\n{{\nOFFSET 0 1 0\n{closing}"
-    joints = "".join(joint % i for i in range(5_000)) + joint * 995_000
-    text = HEADER + joints + "}\n" * (1_000_001 if deep else 1) + "MOTION\nFrames: 1\nFrame Time: 0.0083\n1\n"
+    joints = "".join(joint % i for i in range(5_000)) + joint * 295_000
+    text = HEADER + joints + "}\n" * (300_001 if deep else 1) + "MOTION\nFrames: 1\nFrame Time: 0.0083\n1\n"
     path = write(tmp_path / "a.bvh", text)
     refused(lambda: bvh.read_bvh(path), "a.bvh, line ", f"more than {bvh.MOST_JOINTS} joints", mb=1000)
 
@@ -120,6 +122,36 @@ def test_a_slow_frame_rate_is_no_way_to_a_long_clip(tmp_path: Path, tiny_bvh: st
     path = write(tmp_path / "a.bvh", text)
     make = lambda: make_clip(path, SKELETON, SKELETON.parent, "a", "holden31", OPTIONS)  # noqa: E731
     refused(make, "a.bvh: 3600 frames at 0.1 a second", "source_fps")
+
+
+BODY = HEADER + "}\nMOTION\nFrames: 9\nFrame Time: 0.0083\n"
+ENDLESS = {
+    "a header of line ends": (HEADER + "\n" * bvh.MOST_HEADER, "MOTION comes after more than 16 MB"),
+    "a header of one line": (HEADER + "x " * bvh.MOST_HEADER, "MOTION comes after more than 16 MB"),
+    "MOTION again and again": ("HIERARCHY\n" + "MOTIONx " * 4 * MB + "\n", "there is no MOTION section"),
+    "a frame of one line": (BODY + "1 " * 8 * MB, "line 10: a line of more than 4 MB"),
+    "a number of one line": (BODY + "1" * 9 * MB + "\n1\n", "line 10: a line of more than 4 MB"),
+    "a body of line ends": (BODY + "1\n" + "\n" * (bvh.MOST_LINES + 1), "more than 50000000 lines"),
+}
+
+
+@pytest.mark.parametrize("what", ENDLESS)
+def test_lines_without_end_take_neither_memory_nor_time(tmp_path: Path, what: str) -> None:
+    text, says = ENDLESS[what]
+    path = write(tmp_path / "a.bvh", text + "}\nMOTION\n" if "header" in what else text)
+
+    def read() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (30, 30))
+        bvh.read_bvh(path)
+
+    refused(read, "a.bvh", says)
+
+
+def test_a_frame_may_still_run_over_many_lines(tmp_path: Path) -> None:
+    head = HEADER.replace("1 Xposition", "3 Xposition Yposition Zposition")
+    values = "".join(f"{k}\n\n" for k in range(30))
+    path = write(tmp_path / "a.bvh", f"{head}}}\nMOTION\nFrames: 10\nFrame Time: 0.0083\n{values}")
+    np.testing.assert_array_equal(bvh.read_bvh(path).values, np.arange(30.0).reshape(10, 3))
 
 
 def test_files_without_end_are_not_read(tmp_path: Path) -> None:
@@ -170,6 +202,70 @@ def test_an_array_cannot_ask_for_more_than_the_file_holds(tmp_path: Path) -> Non
         refused(lambda r=read: r(path), "a.npz: damaged", mb=64)
     path = write(tmp_path / "a.npy", npy((10**6, 10**6), bytes(800)))
     refused(lambda: read_heights(path), "a.npy: not an array file", mb=64)
+
+
+HEADERS = {
+    "a dictionary that does not end": "{",
+    "brackets that do not end": "(" * 9000,
+    "signs without a number": "-" * 9000 + "1",
+    "a text that does not end": "'''",
+    "lines that go on": "\\\n" * 4000,
+    "lines that stand nowhere": "  x\n y\n  z\n",
+    "a type in brackets": "{'descr': ('<f8',), 'fortran_order': False, 'shape': (8,)}",
+    "a length of 100 digits": "{'descr': '<f8', 'fortran_order': False, 'shape': (1%s,)}" % ("0" * 99),
+    "a length below 0": "{'descr': '<f8', 'fortran_order': False, 'shape': (-8, -1)}",
+    "a type of a terabyte": "{'descr': 'V1000000000000', 'fortran_order': False, 'shape': (8,)}",
+    "objects": "{'descr': '|O', 'fortran_order': False, 'shape': (8,)}",
+}
+
+
+@pytest.mark.parametrize("what", HEADERS)
+def test_a_header_that_python_trips_over_is_refused(tmp_path: Path, what: str) -> None:
+    text = HEADERS[what].encode() + b"\n"
+    array = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + bytes(64)
+    path = zipped(tmp_path / "a.npz", {"heights.npy": array})
+    for read in (load_npz, load_network, read_heights):
+        refused(lambda r=read: r(path), "a.npz: damaged", mb=100, letters=400)
+    path = write(tmp_path / "a.npy", array)
+    refused(lambda: read_heights(path), "a.npy: not an array file", mb=100, letters=400)
+
+
+def test_bytes_do_not_become_eight_times_as_much_as_numbers(tmp_path: Path) -> None:
+    """A megabyte of compressed bytes, which is a gigabyte of heights or weights of one byte."""
+    path = tmp_path / "a.npz"
+    side = 9000
+    np.savez_compressed(path, heights=np.zeros((side, side), np.int8), W0=np.zeros((1, side, side), np.int8))
+    assert path.stat().st_size < MB
+    refused(lambda: read_heights(path), "a.npz: 81000000 heights, more than 67108864")
+    arrays = {"Xmean": np.zeros(9), "W0": np.zeros((1, side, side), np.int8)}
+    refused(lambda: checks.numbers("a.npz", arrays, "W0", 3), "W0 holds 81000000 numbers")
+
+
+def test_a_layer_of_the_release_is_no_larger_than_it_may_be(tmp_path: Path) -> None:
+    """Files of many gigabytes that take no room on the disk."""
+    for name in ("Xmean", "Xstd", "Ymean", "Ystd", "b0_000"):
+        write(tmp_path / f"{name}.bin", bytes(4 << 16))
+    with open(tmp_path / "W0_000.bin", "wb") as file:
+        file.truncate(4 << 32)
+    refused(lambda: load_network(tmp_path), "b0_000.bin: 65536 x 65536 weights", mb=64)
+
+
+@pytest.mark.parametrize("text", ["1e308 2\n3 4\n", "nan 2\n3 -1e9\n"])
+def test_ground_is_no_higher_than_the_world(tmp_path: Path, text: str) -> None:
+    path = write(tmp_path / "a.txt", text)
+    entry = Heightmap.model_validate({"kind": "file", "path": "a.txt"})
+    refused(lambda: heightmaps([entry], [path], cell=4.0, height_scale=10.0), "a.txt: a height of")
+
+
+@pytest.mark.parametrize(("kind", "value"), [(3, (7, 8)), (2, "none"), (7, b"\xff")])
+def test_what_stands_for_no_data_may_be_anything(tmp_path: Path, kind: int, value: Any) -> None:
+    from PIL import Image, TiffImagePlugin
+
+    tags = TiffImagePlugin.ImageFileDirectory_v2()
+    tags.tagtype[42113] = kind
+    tags[42113] = value
+    Image.fromarray(np.eye(4, dtype=np.uint8)).save(tmp_path / "a.tif", tiffinfo=tags)
+    refused(lambda: read_heights(tmp_path / "a.tif"), "a.tif: not an image that can be read")
 
 
 def test_a_zip_bomb_is_not_unpacked(tmp_path: Path) -> None:

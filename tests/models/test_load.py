@@ -154,6 +154,10 @@ MALFORMED: dict[str, tuple[Change, str]] = {
         layout(phase=1),
         "layout cannot be understood: there is no such key: phase",
     ),
+    "a channel of infinitely many columns": (
+        lambda c: [c["meta"]["layout"].pop("links"), layout(channels={"injury": float("inf")})(c)],
+        "layout cannot be understood",
+    ),
     "a layout that is a list": (meta(layout=[31, 60, 10, 30]), "layout is"),
     "3,000 gaits": (meta(gaits=[f"gait {i}" for i in range(3000)]), "gaits"),
     "seven gaits": (meta(gaits=[*GAITS, "fly"]), "gaits"),
@@ -166,6 +170,10 @@ MALFORMED: dict[str, tuple[Change, str]] = {
         "channel injury",
     ),
     "links that are a number": (meta(links=30), "channel injury"),
+    "limits of 400 digits": (
+        meta(limits={"injury": {"levels": [0, 10**400], "speeds": [1, 10**400]}}),
+        "limits of injury",
+    ),
     "a side that is text": (meta(terrain_side="wide"), "terrain_side"),
     "a side that is NaN": (meta(terrain_side=float("nan")), "terrain_side"),
     "a side of 1e30": (meta(terrain_side=1e30), "terrain_side"),

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 
 from hobble.database.reader import Database
-from hobble.models import options
+from hobble.models import network_options
 from hobble.models.trainable import Trainable
 from hobble.training import train as module
 from hobble.training.batches import Batch, HostRows
@@ -73,7 +73,7 @@ def one(job: dict[str, Any], processes: Processes) -> None:
     training = Training.model_validate(job["training"])
     state = module.train(
         Database.open(job["database"], training.memory_mb),
-        network=options(job["network"]),
+        network=network_options(job["network"]),
         training=training,
         checkpoints=Path(job["checkpoints"]),
         processes=processes,

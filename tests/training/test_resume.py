@@ -32,11 +32,11 @@ PROCESS = """
 import json, sys
 from pathlib import Path
 from hobble.database.reader import Database
-from hobble.models import options
+from hobble.models import network_options
 from hobble.training.options import Training
 from hobble.training.train import train
 sections = json.loads(sys.argv[3])
-typed = {"network": options(sections["network"]), "training": Training(**sections["training"])}
+typed = {"network": network_options(sections["network"]), "training": Training(**sections["training"])}
 train(Database.open(sys.argv[1], 64), checkpoints=Path(sys.argv[2]), threads=2, **typed)
 """
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from hobble.models import options
+from hobble.models import network_options
 from hobble.training.options import Machines, Training
 from hobble.training.run import run
 from hobble.workflow.job import job
@@ -16,7 +16,7 @@ with job(snakemake):
     start = Path(snakemake.input.checkpoint[0]) if snakemake.input.checkpoint else None
     arguments = {
         "database": Path(snakemake.input.database),
-        "network": options(snakemake.params.network),
+        "network": network_options(snakemake.params.network),
         "training": training,
         "checkpoints": Path(snakemake.params.checkpoints),
         "start": start,

@@ -55,7 +55,7 @@ class Limits:
         """The inverse of `to_dict`. Raises ValueError for what is no table of so many gaits and labels."""
         try:
             levels, speeds = (np.array(data[key], float) for key in ("levels", "speeds"))
-        except (KeyError, TypeError, ValueError):
+        except (KeyError, TypeError, ValueError, OverflowError):
             raise ValueError("no table of numbers: it has `levels` and `speeds`") from None
         if levels.ndim != 1 or len(levels) < 2 or speeds.shape != (gaits, labels, len(levels)):
             raise ValueError(

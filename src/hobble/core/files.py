@@ -12,12 +12,12 @@ import zipfile
 import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.core.untrusted import check_regular, read_text
+from hobble.core.untrusted import check_regular, printable, read_text
 
 MAX_INFLATED_BYTES = 1 << 30  # for all compressed arrays of a file, unpacked; Hobble writes uncompressed ones
 MAX_JSON_BYTES = 1 << 30
@@ -131,7 +131,7 @@ class Arrays(dict[str, np.ndarray]):
         self.path = path
 
     def __missing__(self, name: str) -> np.ndarray:
-        raise InputError(self.path, f"holds no array {name!r}", fix=DELETE_IT)
+        raise InputError(self.path, f"holds no array {printable(name)!r}", fix=DELETE_IT)
 
 
 def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
@@ -154,7 +154,7 @@ def load_npz(path: str | Path, names: Iterable[str] | None = None) -> Arrays:
     except OSError as error:
         raise InputError(path, f"cannot be read: {error.strerror or error}") from error
     except DAMAGE_ERRORS as error:
-        raise InputError(path, f"damaged or not an npz file ({error})", fix=DELETE_IT) from error
+        raise InputError(path, f"damaged or not an npz file ({printable(error)})", fix=DELETE_IT) from error
 
 
 def _entry_count(path: str | Path, archive: zipfile.ZipFile) -> int:
@@ -188,11 +188,43 @@ def _array(archive: zipfile.ZipFile, member: str) -> np.ndarray:
     if not info.compress_type and info.header_offset + info.file_size > archive.start_dir:
         raise EOFError(f"{member} does not fit into the file")
     with archive.open(info) as file:
-        shape, _, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)
-        count = 1
-        for length in shape:
-            count *= length
-        if dtype.hasobject or count * dtype.itemsize != info.file_size - file.tell():
-            raise ValueError(f"{member} does not hold what its header says")
+        _check_header(file, info.file_size)
     with archive.open(info) as file:
         return np.lib.format.read_array(file, allow_pickle=False)
+
+
+def load_npy(path: str | Path) -> np.ndarray:
+    """Read the array of an npy file, never a pickle or an archive.
+
+    Raises InputError where the file is missing, damaged or does not hold what its header says.
+    """
+    try:
+        size = check_regular(path).st_size
+        with open(path, "rb") as file:
+            _check_header(file, size)
+            file.seek(0)
+            return np.lib.format.read_array(file, allow_pickle=False)
+    except FileNotFoundError as error:
+        raise InputError(path, "no such file") from error
+    except OSError as error:
+        raise InputError(path, f"cannot be read: {error.strerror or error}") from error
+    except DAMAGE_ERRORS as error:
+        raise InputError(path, f"not an array file ({printable(error)})") from error
+
+
+def _check_header(file: IO[bytes], size: int) -> None:
+    """Raise ValueError where the header of an array is none, or asks for other than the `size` bytes hold.
+
+    NumPy reads a header as Python, whose parser ends in errors of many kinds.
+    """
+    try:
+        shape, _, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)
+    except OSError:
+        raise
+    except (Exception, MemoryError):  # of a header of 10,000 letters at most: too deeply nested
+        raise ValueError("an array whose header cannot be understood") from None
+    count = 1
+    for length in shape:
+        count *= length
+    if dtype.hasobject or min(shape, default=0) < 0 or count * dtype.itemsize != size - file.tell():
+        raise ValueError("an array does not hold what its header says")

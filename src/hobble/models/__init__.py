@@ -26,6 +26,9 @@ def model(kind: str) -> Model:
     return importlib.import_module(f"hobble.models.{kind}").MODEL
 
 
-def options(section: Mapping[str, Any]) -> Options:
-    """A configuration's section `network`, of its kind's type."""
+def network_options(section: Mapping[str, Any]) -> Options:
+    """A configuration's section `network`, of its kind's type.
+
+    Not called `options`: that is a module of this package, which would take its place once it is imported.
+    """
     return model(section.get("kind", DEFAULT)).options().model_validate(section)

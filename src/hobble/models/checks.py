@@ -18,6 +18,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 
 MOST_LAYERS = 16
+MOST_NUMBERS = 1 << 26  # of an array, 256 MB as float32; the largest of a known network has 3 million
 LARGEST_WEIGHT = 1e6  # trained ones are below 10
 LARGEST_MEAN = 1e9
 LARGEST_STD = 1e20  # a joint that is left out of the input has its own, times 1e11
@@ -40,7 +41,10 @@ def numbers(
         raise InputError(
             path, f"{name} has shape {array.shape} and type {array.dtype}, not numbers along {axes} axes"
         )
-    beyond = np.abs(array.astype(np.float64)).max()
+    if array.size > MOST_NUMBERS:
+        raise InputError(path, f"{name} holds {array.size} numbers; {MOST_NUMBERS} at most are read")
+    # Without a copy, which for compressed bytes would be eight times as large as what was unpacked.
+    beyond = max(float(array.max()), -float(array.min()))
     if not np.isfinite(beyond):
         raise InputError(path, f"{name} holds weights that are not finite numbers", fix=DIVERGED)
     if beyond > largest:

@@ -121,7 +121,7 @@ def _layout(
             raise InputError(path, f"layout: a window of {given['window']} is no multiple of {given['step']}")
         try:
             layout = RowLayout.from_dict(given)
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise InputError(path, f"its layout cannot be understood: {error}") from None
         for name, columns in layout.channels:
             if name not in NAMES:

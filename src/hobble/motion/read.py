@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import itertools
 import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,6 +25,9 @@ from hobble.core.untrusted import read_bytes
 MOST_JOINTS = 4096
 LONGEST_NAME = 200
 MOST_BYTES = 1 << 30
+MOST_HEADER = 1 << 24  # bytes before MOTION
+MOST_LINES = 50_000_000  # after it
+LONGEST_LINE = 1 << 22  # a frame of 4096 joints with six channels of 25 letters has 614,400
 MOST_POSES = 50_000_000
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 _EXPORT = "Export the clip again."
@@ -101,18 +105,18 @@ def _text(path: Path, data: bytes) -> bytes:
     return data
 
 
+_MOTION = re.compile(rb"^[ \t\r}]*MOTION(?![^\s])", re.MULTILINE)
+
+
 def _motion_at(path: Path, data: bytes) -> int:
     """Where the MOTION section begins: at the first line that says just that."""
-    at = -1
-    while True:
-        at = data.find(b"MOTION", at + 1)
-        if at < 0:
-            lines = data.count(b"\n") + 1
-            raise InputError(path, "truncated: there is no MOTION section", line=lines, fix=_EXPORT)
-        before = data[data.rfind(b"\n", 0, at) + 1 : at]
-        after = data[at + 6 : at + 8]
-        if not before.strip(b" \t\r}") and not after[:1].strip():
-            return at
+    found = _MOTION.search(data)
+    if not found:
+        lines = data.count(b"\n") + 1
+        raise InputError(path, "truncated: there is no MOTION section", line=lines, fix=_EXPORT)
+    if found.end() > MOST_HEADER:
+        raise InputError(path, f"MOTION comes after more than {MOST_HEADER >> 20} MB", fix=_EXPORT)
+    return found.end() - len(b"MOTION")
 
 
 class _Hierarchy:
@@ -308,6 +312,7 @@ def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_l
     text.seek(at)
     if not re.compile(rb"\S").search(data, at):
         raise InputError(path, f"truncated: declares {declared} frames and holds none", line=first_line)
+    _check_lines(path, data, at, first_line)
     try:
         table = np.loadtxt(text, dtype=float, comments=None, ndmin=2)
     except ValueError:
@@ -325,27 +330,37 @@ def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_l
     return table
 
 
+def _check_lines(path: Path, data: bytes, at: int, first_line: int) -> None:
+    """Raise InputError for lines too long or too many from `at` on: each becomes an object as it is read."""
+    for start in range(at, len(data) - LONGEST_LINE, LONGEST_LINE):
+        if data.find(b"\n", start, start + LONGEST_LINE) < 0:
+            line = first_line + data.count(b"\n", at, start)
+            problem = f"a line of more than {LONGEST_LINE >> 20} MB"
+            raise InputError(path, problem, line=line, fix=_EXPORT)
+    if data.count(b"\n", at) > MOST_LINES:
+        raise InputError(path, f"more than {MOST_LINES} lines after MOTION", fix="Cut it into shorter clips.")
+
+
 def _explained(path: Path, body: bytes, width: int, first_line: int) -> Array:
     """Frames that run over several lines are read; anything else is refused with its line."""
-    lines = body.split(b"\n")
-    counts = np.array([len(raw.split()) for raw in lines])
-    used = np.flatnonzero(counts)
-    whole = counts.sum() % width == 0 and counts.sum() > 0
-    if not (whole and (counts[used] < width).all()):
-        for n, i in enumerate(used):
-            if counts[i] == width:
-                continue
+    counts = np.fromiter((len(raw.split()) for raw in io.BytesIO(body)), np.int32)
+    used, total = np.flatnonzero(counts), int(counts.sum(dtype=np.int64))
+    if total % width or not total or not (counts[used] < width).all():
+        wrong = np.flatnonzero(counts[used] != width)
+        if len(wrong):
+            n, i = int(wrong[0]), int(used[wrong[0]])
             last = " (truncated?)" if i == used[-1] else ""
             problem = f"{counts[i]} values where the joints have {width} channels{last}"
-            raise InputError(path, problem, line=first_line + int(i), frame=n + 1, fix=_EXPORT)
-    for i in used:
-        for word in lines[i].split():
+            raise InputError(path, problem, line=first_line + i, frame=n + 1, fix=_EXPORT)
+    for i, raw in enumerate(io.BytesIO(body)):
+        for word in raw.split():
             if not _number(word):
                 shown = word[:40].decode("latin-1")
                 comma = " (a decimal comma?)" if b"," in word else ""
                 problem = f"{shown!r} is not a number{comma}"
-                raise InputError(path, problem, line=first_line + int(i), fix=_EXPORT)
-    return np.array([float(word) for word in body.split()]).reshape(-1, width)
+                raise InputError(path, problem, line=first_line + i, fix=_EXPORT)
+    words = (float(word) for raw in io.BytesIO(body) for word in raw.split())
+    return np.fromiter(words, float, total).reshape(-1, width)
 
 
 def _number(word: bytes) -> bool:
@@ -357,8 +372,9 @@ def _number(word: bytes) -> bool:
 
 
 def _line_of(body: bytes, frame: int, first_line: int) -> int | None:
-    used = [i for i, raw in enumerate(body.split(b"\n")) if raw.strip()]
-    return first_line + used[frame] if frame < len(used) else None
+    used = (i for i, raw in enumerate(io.BytesIO(body)) if raw.strip())
+    at = next(itertools.islice(used, frame, None), None)
+    return None if at is None else first_line + at
 
 
 def cut(bvh: Bvh, frames: slice | Array) -> Bvh:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,15 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from hobble.core.errors import InputError
-from hobble.core.files import load_npz
+from hobble.core.files import load_npy, load_npz
 from hobble.core.quat import Array
-from hobble.core.untrusted import read_text
+from hobble.core.untrusted import printable, read_text
 from hobble.terrain import options
 from hobble.terrain.generate import generate
 
 MAX_CELLS = 1 << 26  # of a map: 8192 x 8192, 512 MB, 322 x 322 m with cells of 3.9 cm
-MAX_TEXT_BYTES = 1 << 28  # of a map as text; reading it takes about eight times as much memory
-
+MAX_TEXT_BYTES = 1 << 28  # of a map as text
+MAX_LINE_LETTERS = 1 << 20  # of a line of it
+MAX_HEIGHT = 1e7  # cm, 100 km, as for the ground of a character
 
 ESRI_HEADER = {
     "ncols",
@@ -63,6 +65,12 @@ def heightmaps(
         if entry.kind == "file":
             path = next(given)
             heights = read_heights(path) * (scale or height_scale)
+            if (highest := float(np.nanmax(np.abs(heights)))) > MAX_HEIGHT:
+                raise InputError(
+                    path,
+                    f"a height of {highest:.4g} cm; {MAX_HEIGHT:g} at most",
+                    fix="Set height_scale of this map, or say in the file what stands for no data.",
+                )
             out.append(Heightmap(str(path), heights, width))
         elif entry.kind == "elevation":
             out.append(Heightmap("elevation", elevation(width) * (scale or 1.0), width))
@@ -104,12 +112,14 @@ def read_heights(path: str | Path) -> Array:
     path = Path(path)
     if not path.is_file():
         raise InputError(path, "no such heightmap", fix="See terrain.heightmaps of the data set.")
-    readers = {".npz": _npz, ".npy": _npy, **dict.fromkeys(IMAGE_FORMATS, _image)}
+    readers = {".npz": _npz, ".npy": load_npy, **dict.fromkeys(IMAGE_FORMATS, _image)}
     heights = np.asarray(readers.get(path.suffix.lower(), _text)(path))
     if heights.ndim != 2 or min(heights.shape) < 2:
         raise InputError(path, f"a heightmap needs rows and columns, but this has shape {heights.shape}")
     if heights.dtype.kind not in "fiub":
         raise InputError(path, f"heights must be numbers, not {heights.dtype}")
+    if heights.size > MAX_CELLS:
+        raise InputError(path, f"{heights.size} heights, more than {MAX_CELLS}")
     heights = heights.astype(float)
     if not np.isfinite(heights).any():
         raise InputError(path, "holds no finite height")
@@ -117,9 +127,12 @@ def read_heights(path: str | Path) -> Array:
 
 
 def _text(path: Path) -> Array:
-    rows: list[list[float]] = []
+    rows: list[Array] = []
     header: dict[str, float] = {}
-    for number, line in enumerate(read_text(path, MAX_TEXT_BYTES).splitlines(), 1):
+    cells = 0
+    for number, line in enumerate(io.StringIO(read_text(path, MAX_TEXT_BYTES), newline=None), 1):
+        if len(line) > MAX_LINE_LETTERS:
+            raise InputError(path, f"a line of more than {MAX_LINE_LETTERS} letters", line=number)
         words = line.split("#")[0].replace(",", " ").replace(";", " ").split()
         if not words:
             continue
@@ -127,7 +140,7 @@ def _text(path: Path) -> Array:
             if not rows and words[0].lower() in ESRI_HEADER:
                 header[words[0].lower()] = float(" ".join(words[1:]))
                 continue
-            rows.append([float(word) for word in words])
+            rows.append(np.array([float(word) for word in words]))
         except ValueError as error:
             raise InputError(
                 path, f"not a number: {str(error).split(':')[-1].strip()}", line=number
@@ -135,21 +148,13 @@ def _text(path: Path) -> Array:
         if len(rows[-1]) != len(rows[0]):
             problem = f"{len(rows[-1])} heights, but the rows above have {len(rows[0])}"
             raise InputError(path, problem, line=number)
+        cells += len(rows[-1])
+        if cells > MAX_CELLS:
+            raise InputError(path, f"more than {MAX_CELLS} heights", line=number)
     if not rows:
         raise InputError(path, "holds no heights")
     heights, nothing = np.array(rows), header.get("nodata_value")
     return heights if nothing is None else np.where(heights == nothing, np.nan, heights)
-
-
-def _npy(path: Path) -> Array:
-    try:
-        # A memory map, so that a header that claims too much data allocates nothing. It reads no pickles.
-        heights = np.lib.format.open_memmap(path, mode="r")
-        if heights.size > MAX_CELLS:
-            raise InputError(path, f"{heights.size} heights, more than {MAX_CELLS}")
-        return np.array(heights)
-    except (ValueError, OSError, EOFError, AttributeError, TypeError) as error:
-        raise InputError(path, f"not an array file ({error})") from error
 
 
 def _npz(path: Path) -> Array:
@@ -159,13 +164,13 @@ def _npz(path: Path) -> Array:
             return arrays[name]
     raise InputError(
         path,
-        f"which array holds the heights? There are: {', '.join(arrays) or 'none of two dimensions'}",
+        f"which array holds the heights? There are: {printable(', '.join(arrays)) or 'none with two axes'}",
         fix="Name it `heights`.",
     )
 
 
 def _image(path: Path) -> Array:
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
     try:
         # Only these formats: for others Pillow may start programs, such as Ghostscript for PostScript.
@@ -176,7 +181,9 @@ def _image(path: Path) -> Array:
             heights = np.asarray(grey, float)
             nothing = getattr(image, "tag_v2", {}).get(GDAL_NODATA)
             return heights if nothing is None else np.where(heights == float(nothing), np.nan, heights)
-    except (UnidentifiedImageError, Image.DecompressionBombError, OSError, SyntaxError, ValueError) as error:
+    except InputError:
+        raise
+    except Exception as error:  # Pillow's decoders raise many kinds of error for a damaged file
         wide = "64-bit numbers in a TIFF cannot be read. Save them as 32 bits or as .npy."
         fix = wide if path.suffix.lower() in (".tif", ".tiff") else None
-        raise InputError(path, f"not an image that can be read ({error})", fix=fix) from error
+        raise InputError(path, f"not an image that can be read ({printable(error)})", fix=fix) from error

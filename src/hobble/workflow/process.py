@@ -39,7 +39,7 @@ def main(told: Path) -> int:
 
 def _train(job: dict[str, Any]) -> None:
     from hobble.database.reader import Database
-    from hobble.models import options
+    from hobble.models import network_options
     from hobble.training.options import Training
     from hobble.training.processes import joined
     from hobble.training.train import train
@@ -48,7 +48,7 @@ def _train(job: dict[str, Any]) -> None:
     with joined(training.device == "cuda") as processes:
         train(
             Database.open(job["database"], training.memory_mb),
-            network=options(job["network"]),
+            network=network_options(job["network"]),
             training=training,
             checkpoints=Path(job["checkpoints"]),
             threads=job["threads"],

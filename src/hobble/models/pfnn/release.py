@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 PHASES = 50
 CONTROL_POINTS = 4
 MOST_COLUMNS = 1 << 16  # of a row, or units of a layer
+MOST_WEIGHTS = 1 << 21  # of a layer, which is read fifty times; the original's have 262,144
 # Of single precision weights near 1; a folder of another spline than ours is off by far more.
 LARGEST_RESIDUAL = 1e-4
 
@@ -57,6 +58,9 @@ def read_release(folder: str | Path) -> Mapping[str, Array]:
     size = len(arrays["Xmean"])
     for i in range(layers):
         rows = len(_read(folder / f"b{i}_000.bin"))
+        if rows * size > MOST_WEIGHTS:
+            problem = f"{rows} x {size} weights in a layer; {MOST_WEIGHTS} at most are read"
+            raise InputError(folder / f"b{i}_000.bin", problem)
         biases = np.stack([_read(folder / f"b{i}_{k:03d}.bin", rows) for k in range(PHASES)])
         weights = np.stack([_read(folder / f"W{i}_{k:03d}.bin", rows * size) for k in range(PHASES)])
         arrays[f"b{i}"] = _control_points(folder, f"b{i}", biases)

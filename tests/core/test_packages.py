@@ -1,0 +1,20 @@
+"""A module of a package takes the place of a function of the same name once it is imported."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+
+def test_no_function_of_a_package_is_hidden_by_a_module(root: Path) -> None:
+    """Unless the package imports that module itself, before it defines the function."""
+    found = []
+    for init in (root / "src").rglob("__init__.py"):
+        body = ast.parse(init.read_text(encoding="utf-8")).body
+        own = {node.name for node in body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+        imported = {
+            (node.module or "").rpartition(".")[2] for node in body if isinstance(node, ast.ImportFrom)
+        }
+        beside = {path.stem for path in init.parent.iterdir() if path.suffix == ".py" or path.is_dir()}
+        found += [f"{init.parent.name}.{name}" for name in (own & beside) - imported]
+    assert found == []
