@@ -151,6 +151,17 @@ def test_a_brisk_walk_is_a_walk_and_a_run_a_jog_though_nobody_says_so(shared, re
 
 
 @pytest.mark.shared
+@pytest.mark.parametrize(
+    ("name", "gait"),
+    [("walk_happy_001", WALK), ("walk_happy_002", WALK), ("run_sad_001", JOG), ("run_tired_001", JOG)],
+)
+def test_a_happy_walk_skips_and_a_sad_run_hardly_springs(shared, read, options, name, gait):
+    clip, motion = read(shared / f"mocap/styles/dataset-1_{name}.bvh")
+    labels, _ = label_clip(clip, [], motion, None, "rocky", options)
+    assert (labels.gait.argmax(axis=1) == gait).mean() > 0.8
+
+
+@pytest.mark.shared
 def test_the_original_s_rows_come_out(shared: Path, read, options):
     """Cycles, phase, phase change, contacts and gaits of the original generator, exactly."""
     rows = np.load(shared / "reference/original_rows_LocomotionFlat09_000.npz")
