@@ -7,11 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from hobble.core.quat import Array
 from hobble.report import measured
+from hobble.report.coverage import TURNS
 from hobble.report.formats import duration, number, size
 from hobble.report.gather import Material
 from hobble.report.summary import Figure, Hint, placed
 
+SHARP = 40.0  # degrees a second: a turn, not the sway of a straight walk
+FEW_TURNS = 0.01  # share of the time
 ORDER = ("warn", "note", "good", "fact")
 
 
@@ -59,11 +63,15 @@ def key_figures(material: Material) -> list[Figure]:
     return sorted(figures, key=lambda figure: figure.at)
 
 
-def hints(material: Material) -> list[Hint]:
-    """What to do next in the order in which to do it, then what is well, then what asks for nothing."""
+def hints(material: Material, turns: Mapping[str, Array] | None = None) -> list[Hint]:
+    """What to do next in the order in which to do it, then what is well, then what asks for nothing.
+
+    turns: split -> seconds at each turn (`coverage.counted`), where they were counted.
+    """
     found = [
         *measured.hints(material),
         *placed(10, _coverage(material)),  # what the data lack no training makes good
+        *placed(10, _turning(turns or {})),
         *placed(11, _repairs(material)),
         *placed(20, _curve(material)),
         *placed(90, _costs(material)),
@@ -122,6 +130,21 @@ def _coverage(material: Material) -> Iterator[Hint]:
             "note",
             f"There is little data of {' and '.join(sorted(thin))}:",
             "under three per cent of the seconds, and those gaits will be the least steady. Add clips.",
+        )
+
+
+def _turning(turns: Mapping[str, Array]) -> Iterator[Hint]:
+    seconds = np.sum(list(turns.values()), axis=0)
+    if not np.any(seconds):
+        return
+    share = float(np.sum(seconds[np.abs(TURNS[:-1] + TURNS[1:]) / 2 > SHARP]) / np.sum(seconds))
+    if share < FEW_TURNS:
+        yield Hint(
+            "warn",
+            f"Hardly anybody turns in these clips: {100 * share:.1f} % of the time by {SHARP:.0f} degrees a "
+            "second or more.",
+            "More training will not teach it: a character that is steered sideways will slide its feet. Add "
+            "clips in which somebody turns, to both sides.",
         )
 
 
