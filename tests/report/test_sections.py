@@ -263,10 +263,27 @@ def test_the_runs_lie_over_the_track_and_are_red_where_they_left_it() -> None:
     by_name = {trace["name"]: trace for trace in chart.traces}
     assert by_name["track"]["x"] == [0.0, 10.0, 10.0, 0.0], "it is closed"
     assert by_name["waypoints"]["text"] == ["0, walk", "1, jog", "2, crouch"]
-    left = by_name["more than 50 cm off"]
+    left = by_name["more than 100 cm off"]
     assert (left["x"], left["y"], left["customdata"]) == ([5.0], [-2.0], [[200.0, 2]])
     assert "the furthest was 200 cm" in chart.caption
     kept = responsivity_page.track_chart({"track": track, "runs": [near]})
     assert kept is not None
-    assert "none was further from it than 50 cm; the furthest was 10 cm" in kept.caption
+    assert "none was further from it than 100 cm; the furthest was 10 cm" in kept.caption
     assert responsivity_page.track_chart({"track": {"waypoints": 6}}) is None
+
+
+def test_each_clip_on_other_bones_has_one_bar_and_mirrors_none(material):
+    def figures(knee: float, thigh: float) -> dict:
+        return {"angles": {"left knee": {"apart": knee}}, "directions": {"right thigh": thigh}}
+
+    clips = {
+        "near": figures(2.0, 1.0),
+        "far": figures(3.0, 9.5),
+        "far_mirror": figures(3.0, 9.5),
+        "own": None,
+    }
+    reports = [{"clip": name, "retarget": value} for name, value in clips.items()]
+    chart = data_section.retarget_chart(replace(material, motion=reports))
+    (bars,) = chart.traces
+    assert (bars["x"], bars["y"], bars["text"]) == (["far", "near"], [9.5, 2.0], ["right thigh", "left knee"])
+    assert data_section.retarget_chart(replace(material, motion=reports[-1:])) is None

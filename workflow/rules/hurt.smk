@@ -27,7 +27,7 @@ rule hurt_clip:
         clip=lambda w: f"{w.clip}_hurt{w.version}",
         turn=lambda w: clips.hurt_versions(w.dataset)[f"{w.clip}_hurt{w.version}"],
         ground=lambda w: clips.entry(w.dataset, w.clip).ground,
-        options=lambda w: datasets.options(w.dataset, "hurt"),
+        options=lambda w: clips.hurt(w.dataset, w.clip).model_dump(mode="json"),
         code=package.code("hurt_clip"),
     script:
         "../scripts/hurt_clip.py"

@@ -6,6 +6,7 @@ rule training:
     input:
         database=lambda w: configurations.database(w.configuration),
         checkpoint=lambda w: configurations.start(w.configuration),
+        clips=lambda w: configurations.rows_in_order(w.configuration),
     output:
         weights="results/{configuration}/network/weights.npz",
         history="results/{configuration}/network/history.csv",

@@ -33,4 +33,5 @@ with job(snakemake):
         history=Path(snakemake.output.history),
         checkpoint=Path(snakemake.output.checkpoint),
         terrain_side=snakemake.params.terrain_side,
+        clips={Path(file).stem: file for file in snakemake.input.clips},
     )

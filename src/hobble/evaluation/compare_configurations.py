@@ -15,6 +15,7 @@ from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.evaluation.side_by_side import SideBySide, published_row
 from hobble.measures.given import Json
 from hobble.measures.registry import MEASURES
+from hobble.models import network_options
 
 
 def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> dict[str, Any]:
@@ -60,14 +61,15 @@ def each(function: str) -> Iterator[tuple[str, Callable[..., Any]]]:
 def describe(measured: ConfigurationResults, found: Iterable[SideBySide]) -> dict[str, Any]:
     """A description of a configuration: data set, network, training, and entries of the measurements."""
     model = measured.resolved["configuration"]
+    hidden = network_options(model["network"]).hidden
     about = {key: value for one in found for key, value in one.about.get(measured.name, {}).items()}
     return {
         "configuration": measured.name,
         "dataset": measured.dataset,
         "network_of": model.get("network_of"),
         "channels": list(model.get("channels") or ()),
-        "hidden_layers": model["network"].get("hidden_layers"),
-        "units": model["network"].get("units"),
+        "hidden_layers": len(hidden) or None,
+        "units": max(hidden, default=None),
         "passes": model["training"]["passes"],
         **about,
     }
