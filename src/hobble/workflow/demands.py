@@ -102,13 +102,13 @@ class Demands:
         return _minutes(seconds / self.machines(configuration).count, attempt, least=60)
 
     def machines(self, configuration: str) -> Machines:
-        """On what a configuration trains; one process where there is nothing to train."""
+        """The machines on which a configuration trains; one process if it has nothing to train."""
         if self.project.configurations.is_built(configuration):
             return Machines()
         return self.project.catalogue.configuration(configuration).training
 
     def training_threads(self, configuration: str) -> int:
-        """Two for one process, one for each of several on a CPU, two for each GPU that SLURM gives."""
+        """Threads of a training job: 2, or one for each of several CPU processes. Per GPU with `gpus`."""
         machines = self.machines(configuration)
         return 2 if machines.gpus else max(2, machines.processes)
 
@@ -123,7 +123,7 @@ class Demands:
         return int(self.project.configurations.section(configuration, "training")["device"] == "cuda")
 
     def gres(self, configuration: str) -> str:
-        """GPUs on each of several machines, as SLURM says it; else nothing."""
+        """SLURM's `gres` for GPUs on each of several machines, else ""."""
         machines = self.machines(configuration)
         return f"gpu:{machines.gpus}" if machines.gpus and machines.nodes > 1 else ""
 
