@@ -239,6 +239,7 @@ def test_a_skeleton_without_a_mirror_image_is_told_before_anything_runs(complete
             "training: {passes: 19}",
             r"which has 20 passes\. Its training\.passes must not be fewer, but it is 19",
         ),
+        ("network: {kind: matching}", "but matching is built and not trained"),
         ("training: {learning_rate: 1.0e-3, batch: 64}", None),
         ("", None),
     ],
