@@ -7,6 +7,7 @@ from hobble.channels import NAMES, modules_of, shown_modules
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import modules
 from hobble.workflow import lifetime
+from hobble.workflow.account import ensure_user_name
 from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
@@ -25,6 +26,7 @@ try:
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 
+ensure_user_name()
 lifetime.set_run_variable()
 lifetime.clear_stale_lock()
 
