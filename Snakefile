@@ -7,7 +7,7 @@ from hobble.channels import NAMES, modules_of, shown_modules
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import modules
 from hobble.workflow import lifetime
-from hobble.workflow.account import ensure_user_name
+from hobble.workflow.account import check_may_write, ensure_user_name
 from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
@@ -15,7 +15,10 @@ from hobble.workflow.project import Project
 from hobble.workflow.targets import check, notes
 from hobble.workflow.channel_sources import channels_of_folder
 
+ensure_user_name()
 try:
+    if workflow.is_main_process:
+        check_may_write(sys.argv[1:])
     # Relative, so that a checkout can be moved without making anything again.
     project = Project(Path(os.path.relpath(workflow.basedir)), config)
     targets = [argument for argument in sys.argv[1:] if argument.startswith("results/")]
@@ -26,7 +29,6 @@ try:
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 
-ensure_user_name()
 lifetime.set_run_variable()
 lifetime.clear_stale_lock()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,28 @@ def test_a_user_without_a_name_is_called_by_the_number() -> None:
         env=names, capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert said.stdout == "54321\n"
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can become another user")
+@pytest.mark.parametrize("closed", [".", ".snakemake", ".snakemake/locks"])
+def test_in_another_users_checkout_only_a_dry_run_starts(closed: str) -> None:
+    """Snakemake itself would end in a traceback when it takes its lock."""
+    with tempfile.TemporaryDirectory() as checkout:
+        folder = Path(checkout, closed)
+        folder.mkdir(parents=True, exist_ok=True)
+        Path(checkout).chmod(0o755)
+        folder.chmod(0o755)
+
+        def said(*arguments: str) -> str:
+            check = f"account.check_may_write({arguments!r}, Path({checkout!r}, '.snakemake'))"
+            code = f"from pathlib import Path\nfrom hobble.workflow import account\n{ASK}\n{check}"
+            return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stderr
+
+        assert f"{folder}: cannot be written by the user 54321" in said("-c2", "results/x")
+        for dry in ("-n", "-np", "--dry-run"):
+            assert said(dry, "results/x") == ""
+        folder.chmod(0o777)
+        assert said("-c2", "results/x") == ""
 
 
 @pytest.mark.parametrize("home", [None, "/nonexistent", ""])
