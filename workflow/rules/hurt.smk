@@ -1,5 +1,5 @@
 rule hurt_clip:
-    """A healthy clip as the body would have walked it hurt, with its labels and severities."""
+    """A hurt version of a healthy clip, with its labels and severities."""
     input:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
         report="results/datasets/{dataset}/motion/{clip}.json",

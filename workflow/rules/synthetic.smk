@@ -1,5 +1,5 @@
 rule synthetic_clip:
-    """One clip of the embedded walker, as a user's folder would hold it."""
+    """One clip of the embedded walker, in the same form as a user's clip."""
     input:
         skeleton=lambda w: keep_local(clips.skeleton_file(w.dataset)),
     output:

@@ -57,15 +57,19 @@ def _check_configuration(project: Project, name: str) -> None:
             raise HobbleError(f"configuration {name} cannot continue from itself")
         project.catalogue.configuration(other)
     if model.training.continues:
-        _check_continues(name, model, project.catalogue.configuration(model.training.continues))
+        _check_continues(project, name, model)
     _check_dataset(project, model.dataset)
     project.datasets.selected(model.dataset, model.channels)
     refuse_copies(project.clips, project.datasets, model.dataset, tuple(model.channels))
 
 
-def _check_continues(name: str, model: Configuration, start: Configuration) -> None:
+def _check_continues(project: Project, name: str, model: Configuration) -> None:
     """Check that a training can continue from another: same network, same sections, more passes."""
     begun = model.training.continues
+    if project.configurations.is_built(name):
+        raise HobbleError(f"configuration {name} is not trained, so it cannot continue from {begun}")
+    assert begun is not None
+    start = project.catalogue.configuration(begun)
     for key, mine, of_start in (
         ("channels", list(model.channels), list(start.channels)),
         ("network", model.network.model_dump(), start.network.model_dump()),
