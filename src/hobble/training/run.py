@@ -41,9 +41,10 @@ def run(
 ) -> None:
     """Train on the database folder and write the three files; see `hobble.training.train.train`.
 
-    The weights written are those at the end, as in the original; the checkpoint holds the best held-out ones
-    too. terrain_side: centimetres from the path to the side heights in the database's rows. clips: name ->
-    file of its rows in order; read where the network is of a kind that is built and not trained.
+    The weights written are those at the end, as in the original, or with `training.keep: best` those of the
+    lowest held-out error; the checkpoint holds both. terrain_side: centimetres from the path to the side
+    heights in the database's rows. clips: name -> file of its rows in order; read where the network is of a
+    kind that is built and not trained.
     """
     data = Database.open(database, training.memory_mb)
     if isinstance(model(network.kind), Built):
@@ -67,7 +68,12 @@ def run(
         start=start,
         code=code,
     )
-    blocks = data.layout.blocks("y")
+    blocks, kept = data.layout.blocks("y"), pack(state)
+    best_section = None
+    if training.keep == "best" and state.best is not None:
+        state.network.flat.copy_(state.best)
+        best_section = state.sections - state.since_best
+        log.info("weights of section %d of %d, of the lowest held-out error", best_section, state.sections)
     whole = HeldOut(data, state.network.flat.device, 0).whole(state.network)
     each = zip(["held out, every row", *blocks], whole, strict=True)
     log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in each))
@@ -77,8 +83,10 @@ def run(
         "steps": state.adam.steps,
         "terrain_side": terrain_side,
     }
+    if best_section is not None:
+        facts["best_section"] = best_section
     if data.rows("held_out"):
         facts["held_out_mse"] = whole[0]
     write_weights(weights, state.network, data, configuration, facts)
     write_history(history, blocks, state.history)
-    save_npz(checkpoint, **pack(state))
+    save_npz(checkpoint, **kept)

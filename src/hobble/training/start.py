@@ -28,7 +28,7 @@ from hobble.training.schedule import depends_on_passes
 
 log = logging.getLogger("hobble.training")
 
-NOT_IN_THE_NAME = ("continues", "device", *Machines.model_fields)
+NOT_IN_THE_NAME = ("continues", "device", "keep", "patience", *Machines.model_fields)
 OF_ADAM = ("learning_rate", "beta1", "beta2", "l1")
 OF_A_START = ("weights", "first", "second", "steps", "sections")  # what it gives to the run that goes on
 HALF_FROM = 256  # batch from which the products take most of the time
