@@ -195,30 +195,18 @@ def test_the_mirror_has_the_phase_of_the_release(shared: Path, read, options):
     assert mirrored.phase[frames] == pytest.approx(theirs[frames], abs=1e-5)
 
 
-CLIPS = [
-    ("walk", None),
-    ("jog", None),
-    ("walk-jog-walk", None),
-    ("sidesteps", None),
-    (None, "LeftUpLeg-LeftLeg"),
-    (None, "RightFoot-RightToeBase"),
-]
-
-
-@pytest.mark.parametrize(("recipe", "injured"), CLIPS)
-def test_automatic_labels_of_made_walks_are_exact(root: Path, read, options, tmp_path, recipe, injured):
-    """The generator knows when it put each foot down; limps from severity 3 to 10 are among them."""
+@pytest.mark.parametrize("recipe", ["walk", "jog", "walk-jog-walk", "sidesteps"])
+def test_automatic_labels_of_made_walks_are_exact(root: Path, read, options, tmp_path, recipe):
+    """The generator knows when it put each foot down."""
     skeleton = yaml.safe_load((root / "config/skeletons/holden31.yaml").read_text())
-    paths = {"bvh": "c.bvh", "footsteps": "c_footsteps.txt", "gait": "c_gait.txt", "status": "c_injuries.txt"}
+    paths = {"bvh": "c.bvh", "footsteps": "c_footsteps.txt", "gait": "c_gait.txt"}
     paths = {key: tmp_path / name for key, name in paths.items()}
     settings = Synthetic()
-    write_clip("c", {"name": "holden31", **skeleton}, 600, recipe, injured, settings, **paths)
+    write_clip("c", {"name": "holden31", **skeleton}, 600, recipe, settings, **paths)
     by_hand, automatic, _ = both_ways(read, paths["bvh"], options)
     assert phase_difference(by_hand, automatic) < 0.04
     plain = by_hand.gait.max(axis=1) > 0.9
-    # A badly hurt walker's jog is slower than a walk and keeps a foot on the ground: a walk, to the eye.
-    enough = 0.8 if injured else 0.9
-    assert (by_hand.gait.argmax(axis=1) == automatic.gait.argmax(axis=1))[plain].mean() >= enough
+    assert (by_hand.gait.argmax(axis=1) == automatic.gait.argmax(axis=1))[plain].mean() >= 0.9
     if recipe == "sidesteps":
         return  # where it turns back, one foot is put down again within 2 cm: no step that motion shows
     ours, theirs = matched(by_hand, automatic, 20, 580)

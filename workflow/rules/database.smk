@@ -33,27 +33,27 @@ rule database_clip:
 
 
 rule database_merge:
-    """The rows of all clips, shuffled, in chunks, with their statistics."""
+    """The rows of all clips, shuffled and in chunks, with their statistics."""
     input:
         clips=lambda w: expand(
             f"results/datasets/{w.dataset}/database/clips/{{clip}}.npz",
-            clip=datasets.selected(w.dataset, channels_of_folder(w.told)),
+            clip=datasets.selected(w.dataset, channels_of_folder(w.channels)),
         ),
-        # No motion may lie on both sides of the split.
+        # To check that no motion is on both sides of the split.
         compared=lambda w: expand(
             f"results/datasets/{w.dataset}/motion/{{clip}}.npz",
-            clip=datasets.compared(w.dataset, channels_of_folder(w.told)),
+            clip=datasets.compared(w.dataset, channels_of_folder(w.channels)),
         ),
         reports=lambda w: expand(
             f"results/datasets/{w.dataset}/motion/{{clip}}.json",
-            clip=datasets.compared(w.dataset, channels_of_folder(w.told)),
+            clip=datasets.compared(w.dataset, channels_of_folder(w.channels)),
         ),
     output:
-        database=directory("results/datasets/{dataset}/database/{told}"),
+        database=directory("results/datasets/{dataset}/database/{channels}"),
     log:
-        "results/datasets/{dataset}/logs/database/database_merge/{told}.log",
+        "results/datasets/{dataset}/logs/database/database_merge/{channels}.log",
     benchmark:
-        "results/datasets/{dataset}/benchmarks/database/database_merge/{told}.tsv"
+        "results/datasets/{dataset}/benchmarks/database/database_merge/{channels}.tsv"
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.memory_of_longest(w.dataset, 10, 24, attempt),
@@ -62,12 +62,12 @@ rule database_merge:
         ),
     params:
         dataset=lambda w: w.dataset,
-        splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.told)),
-        channels=lambda w: channels_of_folder(w.told),
-        sources=lambda w: datasets.sources(w.dataset, channels_of_folder(w.told)),
+        splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.channels)),
+        channels=lambda w: channels_of_folder(w.channels),
+        sources=lambda w: datasets.sources(w.dataset, channels_of_folder(w.channels)),
         options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=lambda w: package.code(
-            "database_merge", *modules_of(channels_of_folder(w.told))
+            "database_merge", *modules_of(channels_of_folder(w.channels))
         ),
     script:
         "../scripts/database_merge.py"

@@ -1,4 +1,4 @@
-"""Creates the shuffled, chunked database and its statistics from the rows of all clips."""
+"""Creates the shuffled database in chunks, and its statistics, from the rows of all clips."""
 
 from pathlib import Path
 

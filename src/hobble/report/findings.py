@@ -32,10 +32,11 @@ def lead(material: Material) -> str:
     passes = _recipe(material).get("passes")
     network = material.network
     text = (
-        f"A {network['described']}, with {network['sizes'][0]} inputs and {network['sizes'][-1]} outputs, "
-        "trained"
+        f"A {network['described']}, with {network['inputs']} inputs and {network['outputs']} outputs, trained"
+        if network["sizes"]
+        else f"A character by {network['described']}, built"
     )
-    text += f" for {passes} passes" if passes else ""
+    text += f" for {passes} passes" if passes and network["sizes"] else ""
     text += f" on {len(clips) - kept} clips of {material.dataset}"
     text += f" and tried on {kept} that it never saw" if kept else ""
     return f"{text}: {frames:,} frames at 60\u00a0Hz in all."
@@ -51,15 +52,9 @@ def key_figures(material: Material) -> list[Figure]:
         value, _, unit = duration(seconds).partition(" ")
         figures.append(Figure("Motion in all", value, unit, beside, 30))
     network = material.network
-    figures.append(
-        Figure(
-            "Network",
-            number(network["parameters"] / 1e6, 3),
-            "M",
-            f"parameters a phase: {'–'.join(map(str, network['sizes']))}; {size(network['bytes'])} on disk",
-            40,
-        )
-    )
+    beside = f"parameters a phase: {'–'.join(map(str, network['sizes']))}"
+    beside = f"{beside if network['sizes'] else 'numbers in its tables'}; {size(network['bytes'])} on disk"
+    figures.append(Figure("Network", number(network["parameters"] / 1e6, 3), "M", beside, 40))
     total = material.pipeline.get("total_seconds")
     if total:
         value, _, unit = duration(total).partition(" ")
