@@ -13,6 +13,7 @@ rule database_clip:
         terrain="results/datasets/{dataset}/terrain/clips/{rows}.npz",
     output:
         rows="results/datasets/{dataset}/database/clips/{rows}.npz",
+        facts="results/datasets/{dataset}/database/clips/{rows}.json",
     log:
         "results/datasets/{dataset}/logs/database/database_clip/{rows}.log",
     benchmark:

@@ -64,7 +64,17 @@ class Demands:
     def measure_minutes(self, configuration: str, name: str, attempt: int = 1) -> int:
         """Minutes for the measurement `name`."""
         cost = measure(name).cost
-        return self.evaluation_minutes(configuration, cost.seconds_each, attempt, cost.minutes)
+        each = cost.seconds_each * self._measured_share(configuration, name)
+        return self.evaluation_minutes(configuration, each, attempt, cost.minutes)
+
+    def _measured_share(self, configuration: str, name: str) -> float:
+        """The share of a data set's frames that a measurement reads: all, or those of a sample."""
+        if "sample_frames" not in measure(name).options.model_fields:
+            return 1.0
+        section = self.project.configurations.section(configuration, "evaluation", "sample_frames")
+        dataset = self.project.configurations.dataset(configuration)
+        frames = 1e3 * self.all_thousands(dataset) * MEASURED_JOINTS / self._joints(dataset)
+        return min(1.0, section["sample_frames"] / max(frames, 1.0))
 
     def evaluation_memory(self, configuration: str, each: float, attempt: int = 1) -> int:
         """Megabytes for a measurement of a network on one clip of its data set after another."""

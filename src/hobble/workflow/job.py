@@ -7,7 +7,7 @@ import logging
 import os
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from hobble.core.errors import HobbleError
@@ -19,10 +19,11 @@ BUG = "This is a fault of Hobble, not of your data; please report it with the lo
 
 
 @contextlib.contextmanager
-def job(snakemake: Any) -> Iterator[logging.Logger]:
+def job(snakemake: Any, checked_later: Iterable[str] = ()) -> Iterator[logging.Logger]:
     """Log to the rule's log file and, from warnings on, to the terminal; end a HobbleError in one message.
 
     Inputs that are not what their jobs wrote, or that change while the job runs, are such an error.
+    checked_later: names of inputs of which the script itself verifies those that it reads.
     A HobbleError ends the process with status 1 and its text. Anything unforeseen ends it with its last line
     on the terminal and the whole traceback in the log.
     """
@@ -46,7 +47,8 @@ def job(snakemake: Any) -> Iterator[logging.Logger]:
         checksums.forget(outputs)
         with ends_with_run():
             before = checksums.stamps(inputs)
-            checksums.verify(inputs)
+            later = {str(file) for name in checked_later for file in snakemake.input.get(name, ())}
+            checksums.verify(file for file in inputs if str(file) not in later)
             yield logger
             checksums.check_unchanged(before)
             checksums.record(outputs)
