@@ -1,4 +1,4 @@
-"""Snakemake's logger plugin `hobble`, which the default profile names; see `hobble.workflow.terminal`."""
+"""The Snakemake logger plugin `hobble`, set in the default profile; see `hobble.workflow.terminal`."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from hobble.workflow.terminal import Terminal
 
 
 class LogHandler(LogHandlerBase):
-    """Few words on standard error; with -p (or --verbose, --debug-dag) all of Snakemake's own."""
+    """Prints short messages to standard error; with -p, --verbose or --debug-dag, all of Snakemake's."""
 
     def __post_init__(self) -> None:
         asked = self.common_settings
         stream = sys.stdout if asked.stdout else sys.stderr
         self.full = asked.printshellcmds or asked.verbose or asked.debug_dag
         quiet, debug = asked.quiet, (asked.debug_dag, asked.verbose, asked.dryrun, asked.printshellcmds)
-        self.snakemakes = DefaultFilter(quiet, *debug)
-        self.snakemakes_words = DefaultFormatter(quiet, asked.show_failed_logs)
+        self.snakemake_filter = DefaultFilter(quiet, *debug)
+        self.snakemake_formatter = DefaultFormatter(quiet, asked.show_failed_logs)
         self.terminal = Terminal(stream, stream.isatty(), asked.dryrun)
 
     def emit(self, record: LogRecord) -> None:
-        """Say what there is to say of a record."""
+        """Print a record, in short or in full."""
         try:
-            if not self.snakemakes.filter(record):
+            if not self.snakemake_filter.filter(record):
                 return
             if self.full:
-                text = self.snakemakes_words.format(record)
+                text = self.snakemake_formatter.format(record)
                 self.terminal.stream.write(f"{text}\n")
             else:
                 self.terminal.take(record)
@@ -39,32 +39,32 @@ class LogHandler(LogHandlerBase):
             self.handleError(record)
 
     def close(self) -> None:
-        """The summary."""
+        """Print the summary."""
         if not self.full:
             self.terminal.close()
         super().close()
 
     @property
     def writes_to_stream(self) -> bool:
-        """It does: Snakemake then leaves the terminal to it."""
+        """True, so that Snakemake itself prints nothing."""
         return True
 
     @property
     def writes_to_file(self) -> bool:
-        """It does not."""
+        """False: it writes no file."""
         return False
 
     @property
     def has_filter(self) -> bool:
-        """It sees everything."""
+        """True: it filters records itself."""
         return True
 
     @property
     def has_formatter(self) -> bool:
-        """It words everything."""
+        """True: it formats records itself."""
         return True
 
     @property
     def needs_rulegraph(self) -> bool:
-        """It does not."""
+        """False: it does not use the rule graph."""
         return False

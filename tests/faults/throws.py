@@ -20,7 +20,7 @@ from .lab import NOBODY, Bench, End, Job, Lab
 
 OLD = b"what an earlier run made"
 TRACEBACK = "Traceback (most recent call last)"
-BUG = "This is a fault of Hobble"
+BUG = "This is a bug in Hobble"
 ANY = "any job"
 REFUSED, UNHARMED, REMADE, SKIPPED, FAULT = "refused", "unharmed", "made again", "skipped", "FAULT"
 

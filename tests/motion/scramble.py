@@ -26,7 +26,6 @@ from hobble.motion.options import ClipMotion
 
 Array = np.ndarray
 SIDES = (("Left", "L"), ("Right", "R"))
-UNSURE = ("Neither a joint nor", "Its feet stand at unlike")  # how notes begin that say what may be off
 NEAR = 3.5  # cm: a floor 3.1 cm off is put at 0, and one 2.9 off is not, which says nothing of a rig
 TRUNK = ("Hips", "LowerBack", "Spine", "Spine1", "Neck", "Neck1", "Head")
 LIMB = ("Shoulder", "Arm", "ForeArm", "Hand", "FingerBase", "HandIndex1", "Thumb")
@@ -490,8 +489,7 @@ def outcome(file: Path, seed: int, folder: Path, frames: int | None = None) -> O
     lowered = floor_of(two) - floor_of(one)
     if abs(lowered) <= NEAR:
         second = replace(second, root=second.root + np.array([0.0, lowered, 0.0]))
-    unsure = next((note for note in two["notes"] if note.startswith(UNSURE)), "")
-    return Outcome(how, names, compare(first, second, names), said=unsure)
+    return Outcome(how, names, compare(first, second, names), said=" ".join(two["unsure"]))
 
 
 def floor_of(report: Mapping[str, Any]) -> float:

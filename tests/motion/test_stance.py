@@ -9,6 +9,7 @@ from hobble.core.clip import Clip
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.motion.decode import decode
 from hobble.motion.read import read_bvh
+from tests.motion.scramble import outcome
 
 STYLES = ("walk_normal_001", "walk_old_001", "dash_angry_001", "walk-back_tired_001", "walk-left_happy_001")
 PATIENTS = ("A1_Cycle1", "A11_Cycle2", "B1_Cycle1", "D4_Cycle2")
@@ -82,3 +83,12 @@ def test_hips_and_shoulders_are_as_level_as_in_the_file(shared, make, name):
         before = tilt(*(places[report["roles"][f"{side}_{part}"]][at] for side in ("left", "right")))
         after = tilt(*(clip.positions[:, clip.skeleton.role(f"{side}_{part}")] for side in ("left", "right")))
         assert abs((after - before).mean()) < 1
+
+
+@pytest.mark.shared
+def test_feet_that_only_stand_unlike_are_told_of(shared, tmp_path):
+    """Uneven ground, and a zero pose in which nobody could stand: how feet are turned is a guess."""
+    path = shared / "mocap/cmu/03_02.bvh"
+    one = outcome(path, 99, tmp_path, 420)
+    assert one.how.rest == "twisted"
+    assert "feet stand at unlike angles" in one.said

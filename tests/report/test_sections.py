@@ -270,3 +270,20 @@ def test_the_runs_lie_over_the_track_and_are_red_where_they_left_it() -> None:
     assert kept is not None
     assert "none was further from it than 50 cm; the furthest was 10 cm" in kept.caption
     assert responsivity_page.track_chart({"track": {"waypoints": 6}}) is None
+
+
+def test_each_clip_on_other_bones_has_one_bar_and_mirrors_none(material):
+    def figures(knee: float, thigh: float) -> dict:
+        return {"angles": {"left knee": {"apart": knee}}, "directions": {"right thigh": thigh}}
+
+    clips = {
+        "near": figures(2.0, 1.0),
+        "far": figures(3.0, 9.5),
+        "far_mirror": figures(3.0, 9.5),
+        "own": None,
+    }
+    reports = [{"clip": name, "retarget": value} for name, value in clips.items()]
+    chart = data_section.retarget_chart(replace(material, motion=reports))
+    (bars,) = chart.traces
+    assert (bars["x"], bars["y"], bars["text"]) == (["far", "near"], [9.5, 2.0], ["right thigh", "left knee"])
+    assert data_section.retarget_chart(replace(material, motion=reports[-1:])) is None

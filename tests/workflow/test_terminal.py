@@ -90,11 +90,11 @@ def test_a_failure_is_told_once_and_named_in_the_end(tmp_path: Path) -> None:
     run.say(None, "Exiting because a job execution failed. Look below for error messages", logging.ERROR)
     run.terminal.close()
     assert run.lines[1:] == [
-        f"motion_clip b: ended without a message, killed perhaps. Its log: {silent}",
+        f"motion_clip b: ended without a message; it may have been killed. Its log: {silent}",
         "0 of 2 jobs done in 0 s, 2 failed:",
         f"  motion_clip a: {said}",
         f"  motion_clip b: {silent}",
-        "The same command goes on from here once this is put right.",
+        "When this is fixed, the same command continues from here.",
     ]
 
 
@@ -115,8 +115,8 @@ def test_jobs_that_end_because_the_run_is_stopped_have_not_failed() -> None:
     run.say("job_error", "", logging.ERROR, jobid=1, rule_name="training", log=[])
     run.terminal.close()
     assert run.lines[1:] == [
-        "Stopping the jobs that run.",
-        "0 of 1 jobs done in 0 s, then stopped. The same command goes on from here.",
+        "Stopping the running jobs.",
+        "0 of 1 jobs done in 0 s, then stopped. The same command continues from here.",
     ]
 
 

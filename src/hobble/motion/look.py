@@ -103,7 +103,11 @@ def seen(clip: Clip, report: Mapping[str, Any]) -> Look:
         cadence=cadence,
         stands=stands,
         off=worst(report["retarget"]) if report.get("retarget") else None,
-        warnings=(*rate_warnings(steps, moving, float(path.sum()), clip, report), *_first(report)),
+        warnings=(
+            *rate_warnings(steps, moving, float(path.sum()), clip, report),
+            *report.get("unsure", []),
+            *_first(report),
+        ),
         like=likeness(clip, report["sha256"]),
     )
 

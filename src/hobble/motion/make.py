@@ -190,5 +190,6 @@ def _report(file: Bvh, source: Source, made: Clip) -> dict[str, Any]:
         "rest_facing": source.axes.facing,
         "rig": source.match.rig,
         "stance": source.stance,
+        "unsure": source.unsure,
         "roles": dict(source.match.roles),
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TypeVar
@@ -47,7 +47,7 @@ class Source:
     """A file's motion at its own frame rate, on its own rig, or on the parts of its body.
 
     stance: where its rest pose is from, in words. moving: whether joints below the hips move in their
-    parents.
+    parents. unsure: sentences on what of the rest pose is uncertain.
     """
 
     clip: Clip
@@ -61,6 +61,7 @@ class Source:
     stance: str
     moving: bool
     told: bool
+    unsure: list[str] = field(default_factory=list)
 
 
 def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion) -> Source:
@@ -130,9 +131,9 @@ def _unknown(
         False,
         pairs(told.clip.skeleton, told.body, target.skeleton, theirs),
     )
-    notes = decoded.notes + unsure + told.notes + ([] if known else _said(found, options.handedness))
+    notes = decoded.notes + unsure + ([] if known else _said(found, options.handedness))
     moving = _moving(decoded, body, unit)
-    return _mended(
+    source = _mended(
         file,
         told.clip,
         match,
@@ -145,6 +146,7 @@ def _unknown(
         True,
         options,
     )
+    return replace(source, unsure=told.notes)
 
 
 def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: ClipMotion) -> Found:

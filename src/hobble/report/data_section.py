@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from hobble.channels.shown import speaker
+from hobble.motion.check import MOST, worst
 from hobble.report.charts import Chart, Trace, axis
 from hobble.report.formats import size
 from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
 
 GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
+FEW = 30  # bars that can have their names under them
 SPLIT_NAMES = {"train": "training", "held_out": "held out"}
 
 
@@ -81,6 +83,38 @@ def speed_chart(material: Material) -> Chart | None:
         "Seconds at each speed. Between two humps the network makes up its own way from one to the other."
     )
     return Chart("speeds", "How fast", caption, traces, layout, 300)
+
+
+def retarget_chart(material: Material) -> Chart | None:
+    """A bar for each clip: the joint or limb that is furthest off its file, in degrees."""
+    known = {report["clip"] for report in material.motion}
+    found = []
+    for report in material.motion:
+        clip, figures = report["clip"], report.get("retarget")
+        if figures and not (clip.endswith("_mirror") and clip.removesuffix("_mirror") in known):
+            found.append((*worst(figures), clip))
+    if not found:
+        return None
+    found.sort(key=lambda bar: -bar[1])
+    trace: Trace = {
+        "type": "bar",
+        "x": [clip for _, _, clip in found],
+        "y": [degrees for _, degrees, _ in found],
+        "text": [joint for joint, _, _ in found],
+        "textposition": "none",
+        "marker": {"color": "@muted"},
+        "hovertemplate": "%{x}: %{text} %{y:.1f} degrees off<extra></extra>",
+    }
+    layout = {
+        "showlegend": False,
+        "xaxis": {"type": "category", "showticklabels": len(found) <= FEW},
+        "yaxis": axis("degrees off", rangemode="tozero"),
+    }
+    caption = (
+        "Of each clip that was put on other bones, the joint or limb that differs most from its file, mean "
+        f"over the clip. From {MOST:.0f} degrees on a clip is refused."
+    )
+    return Chart("retarget", "How near clips are to their files", caption, [trace], layout, 220)
 
 
 def clip_table(material: Material) -> Table:

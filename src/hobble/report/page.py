@@ -108,6 +108,7 @@ def _sections(material: Material) -> dict[str, dict[str, Any]]:
             "turns": coverage.turn_chart(found),
             "both": coverage.both_chart(found),
             "told": coverage.told_charts(found, speaker(material.network["skeleton"])),
+            "retarget": data.retarget_chart(material),
             "clips": data.clip_table(material),
             "remarks": data.remarks_table(material),
         },

@@ -1,4 +1,4 @@
-"""What the clips of a data set are told: its channels, and where each one's values come from."""
+"""The channels of a data set, and where their values for each clip come from."""
 
 from __future__ import annotations
 
@@ -13,29 +13,32 @@ from hobble.core.errors import HobbleError, InputError
 if TYPE_CHECKING:
     from hobble.workflow.clips import Clips
 
-NO_CHANNEL = "plain"  # the folder of the database whose network is told nothing
+NO_CHANNEL = "plain"  # folder of the database of networks without channels
 
 
 class ChannelSources:
-    """The channels of the data sets of a project."""
+    """The channels of a project's data sets, and the sources of their values."""
 
     def __init__(self, catalogue: Catalogue, clips: Clips) -> None:
         self.catalogue, self.clips = catalogue, clips
 
     def channels(self, dataset: str) -> tuple[str, ...]:
-        """The channels that clips are told: those that the data set has a section for, and those without."""
+        """The channels of a data set: those with a section in it, and those that need no section."""
         given = self.catalogue.dataset(dataset).channels
         return tuple(name for name in NAMES if name in given or channel(name).Options is None)
 
     def files(self, dataset: str, clip: str, name: str) -> list[str]:
-        """What channel `name` reads of a clip: the file beside it, if its entry says nothing, and tables."""
+        """The files that channel `name` reads for a clip: tables, and the file beside the clip.
+
+        The file beside the clip is not read if the clip's entry has a value.
+        """
         one, made = channel(name), self.catalogue.dataset(dataset).synthetic is not None
         said = self._value(dataset, clip, name) is not None and not made
         beside = self.clips.side_files(dataset, clip, (one.suffix,)) if one.suffix and not said else []
         return [*beside, *self._tables(dataset, name)]
 
     def source(self, dataset: str, clip: str, name: str) -> dict[str, Any]:
-        """What the data set says of a clip to channel `name`: plain data, all of a `Source` but files."""
+        """The fields of a `Source` for channel `name` and a clip as plain data, without `files`."""
         return {
             "clip": self.clips.original(clip),
             "entry": self.clips.entry(dataset, clip).model_dump(mode="json", exclude={"channels"}),
@@ -45,7 +48,7 @@ class ChannelSources:
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def neutral(self, dataset: str, clip: str, name: str) -> bool:
-        """Whether a clip is told nothing by channel `name`."""
+        """Whether all values of channel `name` are 0 in a clip."""
         if self.clips.is_hurt_version(clip) and name == self.clips.hurt_channel:
             return False
         made = self.catalogue.dataset(dataset).synthetic is not None
@@ -53,13 +56,13 @@ class ChannelSources:
         return channel(name).is_neutral(Source(**self.source(dataset, clip, name), files=files))
 
     def check(self, dataset: str) -> None:
-        """Raise HobbleError for what the entries or options say that a channel cannot understand."""
+        """Check what clip entries and options say about channels. Raises HobbleError if it is wrong."""
         model = self.catalogue.dataset(dataset)
         rig = self.catalogue.skeleton(model.skeleton)
         for clip, entry in self.clips.listed(dataset).items():
             if extra := set(entry.channels) - set(self.channels(dataset)):
                 raise HobbleError(
-                    f"data set {dataset}: clips.{clip}.channels: the data set has no "
+                    f"data set {dataset}: clips.{clip}.channels: the data set has no channel "
                     f"{', '.join(sorted(extra))}; it has {', '.join(self.channels(dataset)) or 'none'}"
                 )
             for name in self.channels(dataset):
@@ -80,12 +83,12 @@ class ChannelSources:
 
 
 def database_folder(told: Sequence[str]) -> str:
-    """The name of the database whose network is told these channels."""
+    """The folder name of the database with these channels."""
     return "+".join(told) or NO_CHANNEL
 
 
 def channels_of_folder(folder_name: str) -> tuple[str, ...]:
-    """The inverse of `folder`. Raises HobbleError for no such name."""
+    """The inverse of `database_folder`. Raises HobbleError for any other name."""
     names = () if folder_name == NO_CHANNEL else tuple(folder_name.split("+"))
     if any(name not in NAMES for name in names) or list(names) != sorted(set(names), key=NAMES.index):
         raise HobbleError(

@@ -1,9 +1,8 @@
-"""What a job left behind, so that the next one notices when a file is no longer that.
+"""Checksums of the files that jobs write, so that the next job notices a damaged or changed file.
 
-An npz and a database's chunks carry checksums of their own. A digit flipped in a JSON, CSV, YAML or text file
-is another digit, which nobody could tell; so every job leaves the checksums of such files in
-results/<configuration>/checksums/ or results/datasets/<dataset>/checksums/, and every job that reads one
-looks there.
+An npz and the chunks of a database have checksums of their own. For all other files every job writes
+checksums to results/<configuration>/checksums/ or results/datasets/<dataset>/checksums/, and every job that
+reads such a file verifies them.
 """
 
 from __future__ import annotations
@@ -19,13 +18,13 @@ from hobble.core.files import write_text
 
 OWN_CHECKSUM = {".npz"}
 BLOCK_BYTES = 1 << 20
-CLOCK_TICK = 0.02  # seconds: coarser than the clock that stamps files
+CLOCK_TICK = 0.02  # seconds; the resolution of file times is finer than this
 
 Stamp = tuple[int, int, int]
 
 
 def record_of(path: Path) -> Path | None:
-    """Where the checksums of an artefact are kept; None for what is none, such as a user's clip."""
+    """The checksum file of an artefact. None for files that get none, such as npz or a user's clip."""
     parts = path.parts
     if "results" not in parts:
         return None
@@ -37,13 +36,13 @@ def record_of(path: Path) -> Path | None:
 
 
 def forget(paths: Iterable[str]) -> None:
-    """Take away the checksums of files that are about to be made again."""
+    """Delete the checksums of files that are about to be made again."""
     for record in filter(None, map(record_of, map(Path, paths))):
         record.unlink(missing_ok=True)
 
 
 def record(paths: Iterable[str]) -> None:
-    """Note the checksums of finished files; of a folder, those of the files right in it."""
+    """Write the checksums of finished files. For a folder, those of the files directly in it."""
     for path in map(Path, paths):
         if (where := record_of(path)) is not None and path.exists():
             lines = [f"{_checksum(file):08x} {file.name}" for file in _files(path)]
@@ -51,7 +50,7 @@ def record(paths: Iterable[str]) -> None:
 
 
 def verify(paths: Iterable[str]) -> None:
-    """Raise InputError for a file that is not what its job wrote; a file without checksums is let pass."""
+    """Raise InputError for a file that differs from what its job wrote. Files without checksums pass."""
     for path in map(Path, paths):
         where = record_of(path)
         if where is None or not where.is_file() or not path.exists():
@@ -62,25 +61,25 @@ def verify(paths: Iterable[str]) -> None:
             if known.get(file.name) != f"{_checksum(file):08x}":
                 raise InputError(
                     file,
-                    "damaged or changed: it is not what its job wrote",
-                    fix=f"Delete it; the next run makes it again. If the change is meant, delete {where}.",
+                    "damaged or changed: it differs from what its job wrote",
+                    fix=f"Delete it; the next run makes it again. To keep your change, delete {where}.",
                 )
 
 
 def stamps(paths: Iterable[str]) -> Mapping[str, Stamp]:
-    """When each file was last written, its length and its place on disk."""
+    """Modification time, size and inode of each file."""
     out = {}
     for path in map(str, paths):
         if os.path.isfile(path):
             if 0 <= time.time() - os.stat(path).st_mtime < CLOCK_TICK:
-                time.sleep(CLOCK_TICK)  # else a write that follows at once could bear the same time
+                time.sleep(CLOCK_TICK)  # otherwise a write right after this could get the same time
             found = os.stat(path)
             out[path] = (found.st_mtime_ns, found.st_size, found.st_ino)
     return out
 
 
 def check_unchanged(before: Mapping[str, Stamp]) -> None:
-    """Raise InputError for a file that was written, replaced or taken away since `before`."""
+    """Raise InputError for a file that was written, replaced or deleted since `before`."""
     now = stamps(before)
     for path, stamp in before.items():
         if now.get(path) != stamp:
@@ -88,7 +87,7 @@ def check_unchanged(before: Mapping[str, Stamp]) -> None:
 
 
 def _files(path: Path) -> list[Path]:
-    """The file itself, or those in the folder that are not hidden (Snakemake leaves its own there)."""
+    """The file itself, or the files in the folder without hidden ones, which are Snakemake's."""
     if not path.is_dir():
         return [path]
     return sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))

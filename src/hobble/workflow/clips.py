@@ -1,4 +1,4 @@
-"""The clips of each data set by name, and where the files lie that they come from."""
+"""The clips of each data set by name, and the files that they come from."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 
 DATASETS = "results/datasets"
 MIRROR_SUFFIX = "_mirror"
-HURT_SUFFIX = re.compile(r"_hurt([1-9])$")  # at the end of a hurt version's name
+HURT_SUFFIX = re.compile(r"_hurt([1-9])$")  # at the end of the name of a hurt version
 MAX_NOTES = 10
 LABEL_FILES = (".phase", ".gait", "_footsteps.txt", "_gait.txt")
 
 
 def original(clip: str) -> str:
-    """The clip that a mirror, a hurt version, or the mirror of one is made from; else itself."""
+    """The clip from which a mirror or a hurt version is made; for other clips the clip itself."""
     return HURT_SUFFIX.sub("", clip.removesuffix(MIRROR_SUFFIX))
 
 
 class Clips:
-    """Clips and their files. base: the checkout; mocap: the folder with the user's clips."""
+    """Clips and their files. base: the checkout. mocap: the folder with the user's clips."""
 
     def __init__(self, base: Path, mocap: Path, catalogue: Catalogue) -> None:
         self.base, self.mocap, self.catalogue = base, mocap, catalogue
@@ -46,31 +46,30 @@ class Clips:
 
     @functools.cache  # noqa: B019 - one project lives as long as the process
     def of(self, dataset: str) -> dict[str, ClipEntry]:
-        """The clips of a data set by name, hurt versions among them, without mirrors.
+        """The entries of a data set's clips by name, with hurt versions, without mirrors.
 
-        Raises HobbleError if there are none.
+        Raises HobbleError if there are no clips.
         """
         own = self.listed(dataset)
         return {**own, **{version: own[original(version)] for version in self.hurt_versions(dataset)}}
 
     @functools.cache  # noqa: B019
     def listed(self, dataset: str) -> dict[str, ClipEntry]:
-        """The clips that the data set lists or its folder holds."""
+        """The entries of the clips that the data set lists or that are in its folder."""
         listed = self.catalogue.dataset(dataset).clips or dict.fromkeys(self._scanned(dataset))
         if odd := [name for name in listed if name.endswith(MIRROR_SUFFIX)]:
             raise HobbleError(
-                f"data set {dataset}: {', '.join(odd)}: only a mirror is called so, which `mirror: true` "
-                "makes from its original. Put the original beside it and leave the mirror off the list, or "
-                "rename its file."
+                f"data set {dataset}: {', '.join(odd)}: names that end in _mirror are reserved for mirrors, "
+                "which `mirror: true` makes. List the original clip instead, or rename the file."
             )
         if odd := [name for name in listed if HURT_SUFFIX.search(name)]:
             raise HobbleError(
-                f"data set {dataset}: {', '.join(odd)}: only a hurt version is called so, which `hurt` makes "
-                "from its original. Take it out, or rename its file."
+                f"data set {dataset}: {', '.join(odd)}: names that end in _hurt1 to _hurt9 are reserved for "
+                "the hurt versions that `hurt` makes. Take the clip out, or rename its file."
             )
         return {name: entry or ClipEntry() for name, entry in listed.items()}
 
-    hurt_channel = TELLS  # the channel that hurt versions are told
+    hurt_channel = TELLS  # the channel with the severities of hurt versions
 
     @staticmethod
     def original(clip: str) -> str:
@@ -79,12 +78,12 @@ class Clips:
 
     @staticmethod
     def is_hurt_version(clip: str) -> bool:
-        """Whether it is a hurt version of a clip, or the mirror of one."""
+        """Whether a clip is a hurt version, or the mirror of one."""
         return HURT_SUFFIX.search(clip.removesuffix(MIRROR_SUFFIX)) is not None
 
     @functools.cache  # noqa: B019
     def hurt_versions(self, dataset: str) -> dict[str, int]:
-        """The hurt versions of the healthy clips by name, and which turn each has among them, from 0."""
+        """Name of each hurt version of the healthy clips -> its number among them, from 0."""
         options = self.catalogue.dataset(dataset).hurt
         healthy = (
             [clip for clip in self.listed(dataset) if self.channel_sources.neutral(dataset, clip, TELLS)]
@@ -96,7 +95,7 @@ class Clips:
         return {name: turn for turn, name in enumerate(names)}
 
     def entry(self, dataset: str, clip: str) -> ClipEntry:
-        """What the data set says of a clip, or of the original of a mirror or of a hurt version."""
+        """The entry of a clip; for a mirror or a hurt version, that of its original."""
         clips = self.listed(dataset)
         name = original(clip)
         if name not in clips:
@@ -104,9 +103,9 @@ class Clips:
         return clips[name]
 
     def folder(self, dataset: str) -> Path:
-        """Where the data set's own source files lie.
+        """The folder of the data set's source files.
 
-        Raises InputError if a user's folder is missing, unless its clips can be downloaded.
+        Raises InputError if a user's folder is missing, unless the clips can be downloaded.
         """
         model = self.catalogue.dataset(dataset)
         if model.synthetic is not None:
@@ -117,8 +116,8 @@ class Clips:
         if not path.is_dir():
             raise InputError(
                 path,
-                f"no such folder, but data set {dataset} reads its clips there",
-                fix="Put the clips there, or name the folder that holds it with --config mocap=FOLDER.",
+                f"no such folder, but data set {dataset} reads its clips from it",
+                fix="Put the clips there, or give the folder that contains it with --config mocap=FOLDER.",
             )
         if not os.access(path, os.R_OK | os.X_OK):
             raise InputError(path, "no permission to read this folder", fix="Check who owns it.")
@@ -135,15 +134,15 @@ class Clips:
         if clip in (known := self._checksums(dataset)):
             return self.downloaded(model.source or dataset, clip)
         path = self.folder(dataset) / f"{clip}.bvh"
-        nor = f", and {self._manifest(dataset)} has none to download" if known else ""
+        nor = f", and it is not in the download list {self._manifest(dataset)}" if known else ""
         raise InputError(path, f"no such file, but data set {dataset} lists this clip{nor}")
 
     def downloaded(self, dataset: str, clip: str) -> str:
-        """Where a clip of a data set is kept that is downloaded."""
+        """Path of a downloaded clip."""
         return str(self.base / "data" / "downloaded" / dataset / f"{clip}.bvh")
 
     def download(self, dataset: str, clip: str) -> dict[str, str]:
-        """What fetches a clip: its `url`, the `sha256` that it must have, the `folder` that lacks it."""
+        """How to download a clip: its `url`, its `sha256`, and the `folder` in which it is missing."""
         model = self.catalogue.dataset(dataset)
         if model.download is None or clip not in self._checksums(dataset):
             raise HobbleError(f"data set {dataset}: clip {clip} cannot be downloaded")
@@ -160,9 +159,9 @@ class Clips:
         return self.side_files(dataset, clip, LABEL_FILES) if self._reads_labels(dataset) else []
 
     def side_files(self, dataset: str, clip: str, suffixes: Iterable[str]) -> list[str]:
-        """The files called as the clip is, with one of `suffixes` after its name.
+        """The files beside a clip that have its name and one of `suffixes`.
 
-        Those of the embedded walker are named whether they exist or not, since it makes them all.
+        Files of the embedded walker need not exist yet, because a rule makes them.
         """
         made = self.catalogue.dataset(dataset).synthetic is not None
         if made:
@@ -173,7 +172,7 @@ class Clips:
         return [file for file in (f"{stem}{suffix}" for suffix in suffixes) if made or Path(file).is_file()]
 
     def heightmap_files(self, dataset: str) -> list[str]:
-        """Heightmaps that are files, in the order of the configuration."""
+        """Paths of the heightmaps of kind `file`, in the order of the data set."""
         maps = self.catalogue.dataset(dataset).terrain.heightmaps
         files = [self.mocap / m.path for m in maps if m.path]
         for file in filter(Path.exists, files):
@@ -185,7 +184,7 @@ class Clips:
         return self._skeleton(self.catalogue.dataset(dataset).skeleton)
 
     def rig_files(self, dataset: str, clip: str) -> list[str]:
-        """The skeleton file of the rig that the clip is on, where that is another than the data set's."""
+        """The skeleton file of the clip's rig, if this is not the skeleton of the data set."""
         model = self.catalogue.dataset(dataset)
         if model.synthetic is not None:
             name: str | None = self.catalogue.dataset(model.source or dataset).skeleton
@@ -207,25 +206,24 @@ class Clips:
         return self.catalogue.dataset(dataset).labels.files
 
     def _scanned(self, dataset: str) -> list[str]:
-        """The clips in the user's folder, but for mirrors of others that lie beside their originals."""
+        """The clips in the user's folder, without mirrors of clips that are there too."""
         folder, files = self.folder(dataset), self._files(dataset)
         for name in sorted(files):
             if not is_valid_clip_name(name):
-                raise InputError(
-                    folder, f"a clip is called {name!a:.80}", fix=f"Rename it: {CLIP_NAME_RULE}."
-                )
+                fix = f"Rename it. Allowed: {CLIP_NAME_RULE}."
+                raise InputError(folder, f"a clip is called {name!a:.80}", fix=fix)
             only_file(name, files[name])
         if not files:
             raise InputError(folder, "no .bvh files here", fix="Put clips there.")
         return sorted(set(files) - set(self._mirrors(dataset)))
 
     def _mirrors(self, dataset: str) -> list[str]:
-        """The files that are mirrors of others beside them: they are made anew, or left out."""
+        """Names of files NAME_mirror.bvh for which there is a NAME.bvh."""
         files = self._files(dataset)
         return sorted(name + MIRROR_SUFFIX for name in files if name + MIRROR_SUFFIX in files)
 
     def notes(self, dataset: str) -> list[str]:
-        """Sentences on files of the user's folder that no clip reads, and why."""
+        """Sentences about files in the user's folder that are not used, and why."""
         model = self.catalogue.dataset(dataset)
         if model.synthetic is not None or not (folder := self.folder(dataset)).is_dir():
             return []
@@ -234,9 +232,8 @@ class Clips:
         if mirrors:
             said.insert(
                 0,
-                f"{len(mirrors)} files in {folder} are mirrors of clips beside them ({mirrors[0]}.bvh, ...) "
-                "and were left out: `mirror: true` makes them anew, labels too, on the side of the split "
-                "that their originals are on.",
+                f"{len(mirrors)} files in {folder} are mirrors of other clips ({mirrors[0]}.bvh, ...) and "
+                "are left out. With `mirror: true` Hobble makes mirrors of all clips, with labels.",
             )
         more = len(said) - MAX_NOTES
         return [*said[:MAX_NOTES], *([f"{more} more files belong to no clip."] if more > 0 else [])]

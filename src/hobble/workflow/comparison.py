@@ -1,4 +1,4 @@
-"""Which configurations are set side by side, and what each of them has measured."""
+"""The configurations that are compared, and the files that the comparison reads."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ COMPARE = "compare"  # the folder under results/, and the key of --config
 class Comparison:
     """The configurations that `--config compare='[holden,injured]'` names.
 
-    asked: as it came from the command line, where anything may stand.
+    asked: the value from the command line, not yet checked.
     """
 
     def __init__(self, configurations: Configurations, asked: Any) -> None:
         self.configurations, self._asked = configurations, asked
 
     def names(self) -> list[str]:
-        """Their names. Raises HobbleError for anything but names, each once."""
+        """Their names. Raises HobbleError unless it is a list of different names."""
         names = self._asked.split(",") if isinstance(self._asked, str) else self._asked
         if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
-            raise HobbleError(f"compare: a list of configurations, as in '[holden,injured]', not {names!r}")
+            raise HobbleError(f"compare: must be a list of names, as in '[holden,injured]', not {names!r}")
         if not names or len(set(names)) < len(names):
             raise HobbleError(
-                f"compare: each configuration once, one or more, not {', '.join(names) or 'none'}"
+                f"compare: needs at least one configuration, each once, not {', '.join(names) or 'none'}"
             )
         return list(names)
 
     def input_files(self) -> dict[str, list[str]]:
-        """Kind of file, or measurement -> that of each configuration compared."""
+        """Kind of file, or measurement -> its file for each compared configuration."""
         names = self.names()
         return {
             "configuration": [f"results/{name}/configuration.yaml" for name in names],

@@ -1,4 +1,4 @@
-"""What rules ask of a configuration: its sections, its clips, and where what it is made from lies."""
+"""Answers the rules' questions about a configuration: its sections, its clips, the paths of its inputs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Configurations:
         self.catalogue, self.datasets = catalogue, datasets
 
     def section(self, configuration: str, name: str, *keys: str) -> dict[str, Any]:
-        """Plain values of one section of a configuration: of those `keys`, or of all where none is named."""
+        """Plain values of one section of a configuration: of `keys`, or of all keys."""
         values = getattr(self.catalogue.configuration(configuration), name).model_dump(mode="json")
         return {key: values[key] for key in keys} if keys else values
 
@@ -34,7 +34,7 @@ class Configurations:
         }
 
     def digest(self, configuration: str) -> str:
-        """A short name for all that `resolved` says, so that a dry run does not print it."""
+        """A hash of `resolved`. As a parameter of a rule it is short enough for a dry run to print."""
         text = json.dumps(self.resolved(configuration), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
@@ -43,38 +43,38 @@ class Configurations:
         return self.catalogue.configuration(configuration).dataset
 
     def channels(self, configuration: str) -> tuple[str, ...]:
-        """The channels that its network is told."""
+        """The channels that are inputs of its network."""
         return self.catalogue.configuration(configuration).channels
 
     def splits(self, configuration: str) -> dict[str, str]:
-        """Clip -> split."""
+        """Clip -> "train" or "held_out"."""
         return self.datasets.selected(self.dataset(configuration), self.channels(configuration))
 
     def of_dataset(self, configuration: str, pattern: str) -> list[str]:
-        """`pattern` (with {clip} in it, or not) under the configuration's data set, for each of its clips."""
+        """Paths under the configuration's data set: `pattern` for each clip, or once if it has no {clip}."""
         root = f"{DATASETS}/{self.dataset(configuration)}"
         if "{clip}" not in pattern:
             return [f"{root}/{pattern}"]
         return [f"{root}/{pattern.format(clip=clip)}" for clip in self.splits(configuration)]
 
     def owner(self, configuration: str) -> str:
-        """The configuration whose network it reads: itself, or another."""
+        """The configuration that trains its network: itself, or that of `network_of`."""
         return self.catalogue.configuration(configuration).network_of or configuration
 
     def kind(self, configuration: str) -> str:
-        """The package of the kind of network that it trains or reads: hobble.models.pfnn."""
+        """The package of its kind of network, such as hobble.models.pfnn."""
         return f"hobble.models.{self.catalogue.configuration(self.owner(configuration)).network.kind}"
 
     def network(self, configuration: str, file: str) -> str:
-        """A file of the configuration's network, or of the network it reads."""
+        """Path of a file of its network."""
         return f"results/{self.owner(configuration)}/network/{file}"
 
     def database(self, configuration: str) -> str:
-        """The database that the configuration learns from."""
+        """Path of its database."""
         folder = database_folder(self.channels(configuration))
         return f"{DATASETS}/{self.dataset(configuration)}/database/{folder}"
 
     def start(self, configuration: str) -> list[str]:
-        """The checkpoint that training goes on from, if it continues another configuration's."""
+        """The checkpoint from which its training continues, if there is one."""
         other = self.catalogue.configuration(configuration).training.continues
         return [f"results/{other}/network/checkpoint.npz"] if other else []

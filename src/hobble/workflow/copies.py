@@ -1,4 +1,4 @@
-"""Clips of a data set whose files have the same bytes, found before anything is made of them."""
+"""Finds clips of a data set with identical files before any job runs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hobble.workflow.datasets import Datasets
 
 
 def same_files(clips: Clips, dataset: str) -> list[tuple[str, str, str]]:
-    """Pairs of clips with equal files: name, name, "the same file". Only files of one size are read."""
+    """Pairs of clips with identical files: (name, name, "the same file"). Reads only files of equal size."""
     sizes: dict[int, list[tuple[str, Path]]] = defaultdict(list)
     for clip in clips.listed(dataset):
         path = Path(clips.source(dataset, clip))
@@ -28,7 +28,7 @@ def same_files(clips: Clips, dataset: str) -> list[tuple[str, str, str]]:
 
 
 def refuse_copies(clips: Clips, datasets: Datasets, dataset: str, channels: tuple[str, ...]) -> None:
-    """Raise HobbleError if one file is trained on under one name and held out under another."""
+    """Raise HobbleError if identical files are in the training data and held out."""
     model = datasets.catalogue.dataset(dataset)
     if model.synthetic is None and model.held_out:
         splits = {original(name): side for name, side in datasets.selected(dataset, channels).items()}

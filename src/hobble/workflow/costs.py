@@ -1,4 +1,4 @@
-"""Where each stage's benchmark files and artefacts lie, for the account of what a configuration cost."""
+"""Folders of each stage's benchmark files and artefacts, for the summary of time, memory and disk."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Places = dict[str, list[str]]
 
 
 def stages(configurations: Configurations, name: str) -> dict[str, Places]:
-    """Stage -> its "benchmarks" and its "files" (folders), of configuration `name`."""
+    """Stage -> folders of its "benchmarks" and its "files", for configuration `name`."""
     dataset = configurations.dataset(name)
     root, own = Path(DATASETS, dataset), Path("results", name)
     source = Path(DATASETS, configurations.catalogue.dataset(dataset).source or dataset)

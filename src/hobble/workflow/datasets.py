@@ -1,4 +1,4 @@
-"""What rules ask of a data set: its options, what it says of a clip, and which clips are trained on."""
+"""Answers the rules' questions about a data set: its options, its clip entries, the clips for training."""
 
 from __future__ import annotations
 
@@ -12,50 +12,51 @@ from hobble.workflow.clips import MIRROR_SUFFIX, Clips, original
 
 
 class Datasets:
-    """The data sets of a project, with the clips that lie in its folders."""
+    """The data sets of a project."""
 
     def __init__(self, catalogue: Catalogue, clips: Clips) -> None:
         self.catalogue, self.clips, self.channel_sources = catalogue, clips, clips.channel_sources
 
     def options(self, dataset: str, section: str, *keys: str) -> dict[str, Any]:
-        """Plain values of one section of a data set: of those `keys`, or of all where none is named."""
+        """Plain values of one section of a data set: of `keys`, or of all keys."""
         values = getattr(self.catalogue.dataset(dataset), section).model_dump(mode="json")
         return {key: values[key] for key in keys} if keys else values
 
     def part(self, dataset: str, section: str, model: type[Section]) -> dict[str, Any]:
-        """Plain values of the keys of a section that `model` has: what one rule reads of it."""
+        """Plain values of a section, only the keys that `model` has. A rule depends on no others."""
         return self.options(dataset, section, *model.model_fields)
 
     def motion_options(self, dataset: str, clip: str) -> dict[str, Any]:
-        """The motion section, with what the clip's entry overrules, and the ground that the clip is on."""
+        """The motion section with the values of the clip's entry, and the clip's ground."""
         keys = {"source_fps", "loops", "heading", "ground"}
         entry = self.clips.entry(dataset, clip).model_dump(include=keys, exclude_none=True)
         return {**self.options(dataset, "motion"), **entry}
 
     def frames(self, dataset: str, clip: str) -> int:
-        """Synthetic clips: the frames at 60 Hz that fall to this one."""
+        """Number of frames at 60 Hz of a synthetic clip."""
         synthetic = self.catalogue.dataset(dataset).synthetic
         assert synthetic is not None
         total = sum(entry.share for entry in self.clips.listed(dataset).values())
         return round(synthetic.frames * self.clips.entry(dataset, clip).share / total)
 
     def selected(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
-        """Clip -> "train" or "held_out", of the clips that no other channel tells anything.
+        """Clip -> "train" or "held_out", for the clips whose other channels are all 0.
 
-        channels: those that the network is told. Mirrors go with originals. Raises HobbleError if the data
-        set lacks one of `channels`, or no clip is left to train on.
+        channels: the channels of the network. A mirror is on the same side as its original. Raises
+        HobbleError if the data set lacks one of `channels`, or if no clip is left for training.
         """
         there = self.channel_sources.channels(dataset)
         if lacking := [name for name in channels if name not in there]:
             raise HobbleError(
-                f"data set {dataset} says nothing of {', '.join(lacking)}: give it a section "
-                f"`channels: {{{lacking[0]}: ...}}`, or take another data set"
+                f"data set {dataset} has no channel {', '.join(lacking)}. Give it a section "
+                f"`channels: {{{lacking[0]}: ...}}`, or use another data set"
             )
         others = [name for name in there if name not in channels]
         model, clips = self.catalogue.dataset(dataset), self.clips.of(dataset)
         held_out = set(model.held_out)
         if missing := held_out - set(self.clips.listed(dataset)):
-            raise HobbleError(f"data set {dataset}: held_out names no clip: {', '.join(sorted(missing))}")
+            missing_names = ", ".join(sorted(missing))
+            raise HobbleError(f"data set {dataset}: held_out names clips that do not exist: {missing_names}")
         splits = {}
         for clip in clips:
             if not all(self.channel_sources.neutral(dataset, clip, name) for name in others):
@@ -63,12 +64,15 @@ class Datasets:
             for name in (clip, clip + MIRROR_SUFFIX) if model.mirror else (clip,):
                 splits[name] = "held_out" if original(clip) in held_out else "train"
         if "train" not in splits.values():
-            only = f" that is told nothing of {' or '.join(others)}" if others else ""
+            only = f" without {' or '.join(others)}" if others else ""
             raise HobbleError(f"data set {dataset}: no clip{only} is left to train on")
         return splits
 
     def compared(self, dataset: str, channels: Sequence[str]) -> list[str]:
-        """The clips of which no two may be one motion: those that are files, where some are held out."""
+        """The clips that the merge compares, so that no motion is in both parts of the split.
+
+        These are the original clips from files. None if nothing is held out or the clips are synthetic.
+        """
         if self.catalogue.dataset(dataset).synthetic is not None:
             return []
         splits = self.selected(dataset, channels)
@@ -76,7 +80,7 @@ class Datasets:
         return [clip for clip in splits if both and clip == original(clip)]
 
     def sources(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
-        """Hurt version -> the healthy clip that it is made from, of the clips that are selected."""
+        """Hurt version -> the healthy clip it is made from, for the selected clips."""
         chosen = self.selected(dataset, channels)
         mirrors = {clip: MIRROR_SUFFIX if clip.endswith(MIRROR_SUFFIX) else "" for clip in chosen}
         return {clip: original(clip) + mirrors[clip] for clip in chosen if self.clips.is_hurt_version(clip)}

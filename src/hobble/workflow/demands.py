@@ -1,8 +1,8 @@
-"""What a job asks of a cluster: memory and time, by how long its clip is and how many joints the figure has.
+"""Memory and time that a job requests from a cluster, from the length of its clip and the number of joints.
 
-All is known from the configuration and the size of the user's files, never from a file that a job has yet to
-make: the jobs of a clip travel as one, and are weighed before the first has run. The figures were measured on
-clips of 10,000 and 40,000 frames; `benchmarks/demands.py` holds them against the logs of a finished run.
+Everything comes from the configuration and the sizes of the user's files, because requests are made before
+any job has run. The factors were measured on clips of 10,000 and 40,000 frames. `benchmarks/demands.py`
+compares them with the logs of a finished run.
 """
 
 from __future__ import annotations
@@ -21,42 +21,42 @@ from hobble.training.options import Machines
 from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 
-ENGINE_MB = 400  # Snakemake, twice in a cluster's job: as the step that SLURM starts, and beside the script
+ENGINE_MB = 400  # Snakemake runs twice in a cluster job: once for SLURM's step, once for the script
 PYTHON_MB = 400  # Python with numpy, scipy and the package
-MEMORY_MARGIN = 1.5  # asked for each megabyte measured
-TIME_MARGIN = 10  # the share of a second's work that a second on a busy, old machine may do
-MEASURED_JOINTS = 31  # of the figure that was measured
-ASSUMED_FRAMES = 20_000  # frames, of a clip that has yet to be downloaded
-VISITS_PER_PASS = 10  # of a row in a pass of training, as of the original recipe
-HEADER_BYTES = 1 << 20  # bytes, of a BVH file, within which its motion begins
-WEEK_MINUTES = 7 * 24 * 60  # minutes, the longest that a job asks for
+MEMORY_MARGIN = 1.5  # requested memory / measured memory
+TIME_MARGIN = 10  # requested time / measured time, for an old and busy machine
+MEASURED_JOINTS = 31  # of the figure in the measurements
+ASSUMED_FRAMES = 20_000  # of a clip that is not downloaded yet
+VISITS_PER_PASS = 10  # how often a pass of training uses a row
+HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
+WEEK_MINUTES = 7 * 24 * 60  # longest time that a job requests
 
 
 class Demands:
-    """What one project's jobs ask for. It grows with the attempt, so that a killed job gets more."""
+    """The requests of a project's jobs. They grow with the attempt, so that a killed job gets more."""
 
     def __init__(self, project: Project) -> None:
         self.project = project
 
     def memory(self, dataset: str, clip: str, each: float, attempt: int = 1) -> int:
-        """Megabytes for a job of one clip that takes `each` for a thousand frames of 31 joints."""
+        """MB for a job of one clip that takes `each` MB for a thousand frames of 31 joints."""
         return _megabytes(each * self.thousands(dataset, clip), attempt)
 
     def minutes(self, dataset: str, clip: str, each: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes for a job of one clip that takes `each` seconds for a thousand frames, `least` at least."""
+        """Minutes (at least `least`) for a job of one clip that takes `each` seconds for 1,000 frames."""
         return _minutes(each * self.thousands(dataset, clip), attempt, least)
 
     def memory_of_longest(self, dataset: str, each: float, rows: float = 0.0, attempt: int = 1) -> int:
-        """Megabytes for a job that takes one clip after another, and `rows` bytes for each frame of all."""
+        """MB for a job that reads clip after clip and keeps `rows` bytes for each frame of all clips."""
         longest = max(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
         return _megabytes(each * longest + rows * self.all_thousands(dataset) / 1e3, attempt)
 
     def minutes_of_all(self, dataset: str, each: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes for a job that takes `each` seconds for a thousand frames of all clips and mirrors."""
+        """Minutes for a job that takes `each` seconds for a thousand frames, over all clips and mirrors."""
         return _minutes(each * self.all_thousands(dataset), attempt, least)
 
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
-        """Megabytes for the measurement `name`."""
+        """MB for the measurement `name`."""
         cost = measure(name).cost
         more = math.ceil(MEMORY_MARGIN * cost.memory_mb * attempt)
         return more + self.evaluation_memory(configuration, cost.memory_each, attempt)
@@ -77,7 +77,7 @@ class Demands:
         return min(1.0, section["sample_frames"] / max(frames, 1.0))
 
     def evaluation_memory(self, configuration: str, each: float, attempt: int = 1) -> int:
-        """Megabytes for a measurement of a network on one clip of its data set after another."""
+        """MB for a measurement that reads one clip of the data set after another."""
         return self.memory_of_longest(self.project.configurations.dataset(configuration), each, 0.0, attempt)
 
     def evaluation_minutes(self, configuration: str, each: float, attempt: int = 1, least: int = 1) -> int:
@@ -86,18 +86,18 @@ class Demands:
         return self.minutes_of_all(dataset, each, attempt, least)
 
     def training_memory(self, configuration: str, attempt: int = 1) -> int:
-        """Megabytes for a training on each machine.
+        """MB on each machine for a training.
 
-        Each process has PyTorch, the part of the database it holds, weights and their moments.
+        Each process holds PyTorch, its part of the database, the weights and the optimiser state.
         """
         training = self.project.configurations.section(configuration, "training")
         each = 500 + training["memory_mb"] + 32e-6 * self.weights(configuration)
         return _megabytes(self.machines(configuration).each * each, attempt)
 
     def training_minutes(self, configuration: str, attempt: int = 1) -> int:
-        """Minutes for a training, as long as a week; killed by its limit it goes on from its last checkpoint.
+        """Minutes for a training, at most a week. After a kill it continues from its last checkpoint.
 
-        It does some 6.4e9 products of weights in a second (10,700 samples of 342-512-512-311, two cores).
+        Based on 6.4e9 products of weights a second (10,700 samples of 342-512-512-311 on two cores).
         """
         training = self.project.configurations.section(configuration, "training")
         dataset = self.project.configurations.dataset(configuration)
@@ -116,9 +116,9 @@ class Demands:
         return 2 if machines.gpus else max(2, machines.processes)
 
     def gpus(self, configuration: str) -> int:
-        """GPUs of a training on one machine: those it is told to use, 1 for `device: cuda`.
+        """GPUs on one machine for a training: `gpus`, or 1 for `device: cuda`.
 
-        `auto` takes what it finds, but asks for none.
+        `auto` may use a GPU but does not request one.
         """
         machines = self.machines(configuration)
         if machines.gpus:
@@ -133,11 +133,11 @@ class Demands:
     # Sizes
 
     def thousands(self, dataset: str, clip: str) -> float:
-        """Thousands of frames at the data set's rate, as if of 31 joints."""
+        """Thousands of frames of a clip, scaled by the number of joints / 31."""
         return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / MEASURED_JOINTS
 
     def weights(self, configuration: str) -> float:
-        """Numbers that are trained, by the columns of the configuration's rows."""
+        """Number of trained parameters."""
         chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
         return model(chosen.network.kind).parameters(chosen.network, layout.x_size, layout.y_size)
 
@@ -151,7 +151,7 @@ class Demands:
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
     def all_thousands(self, dataset: str) -> float:
-        """Thousands of frames of all clips, mirrors included."""
+        """Thousands of frames of all clips and mirrors, scaled like `thousands`."""
         once = sum(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
         return once * (1 + self.project.catalogue.dataset(dataset).mirror)
 
@@ -169,9 +169,9 @@ class Demands:
 
 
 def bvh_seconds(path: Path) -> float | None:
-    """Length of a BVH file in seconds, by its frame time and the length of its first row, or None.
+    """Estimated length of a BVH file in seconds, from its size, frame time and first row, or None.
 
-    The count in the header is not believed: it may promise what the file does not hold.
+    The frame count in the header is not used, because it may be wrong.
     """
     try:
         size = os.path.getsize(path)

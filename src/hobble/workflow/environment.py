@@ -1,6 +1,6 @@
-"""Makes the environment: python environment.py .venv, with any Python from 3.11 on and nothing beside it.
+"""Makes the virtual environment: python environment.py .venv. Needs only Python 3.11 or later.
 
-pip says either nothing or a hundred lines. Here one line says what is fetched and how far it is.
+Shows pip's work as one line: what is downloaded and how far it is.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import TextIO
 
 OLDEST_PYTHON = (3, 11)
-DISK_SPACE = "2.0 GB"  # on disk, on Linux with the constraints as they are
-PROGRESS_SECONDS = 10.0  # seconds between lines where they go to a file
-# torch first and alone: that it can be had decides whether the rest is worth fetching.
+DISK_SPACE = "2.0 GB"  # on Linux with the present constraints.txt
+PROGRESS_SECONDS = 10.0  # between lines of progress in a file
+# torch first, because it is the largest and the most likely to be unavailable.
 STEPS = (["torch==2.13.0"], ["--editable", ".[dev]"])
 DOWNLOAD_LINE = re.compile(r"\s*(?:Downloading|Using cached) (\S+?)(?:-\d\S*)? \(([\d.]+) (kB|MB|GB)\)")
 PROGRESS_LINE = re.compile(r"Progress (\d+) of (\d+)")
@@ -25,7 +25,7 @@ BYTES = {"kB": 1e3, "MB": 1e6, "GB": 1e9}
 
 
 class Line:
-    """The line of progress, written over on a terminal."""
+    """The line of progress. On a terminal it is overwritten, in a file there is a new line now and then."""
 
     def __init__(self, stream: TextIO) -> None:
         self.stream, self.live = stream, stream.isatty()
@@ -33,7 +33,7 @@ class Line:
         self.last = float("-inf")
 
     def take(self, said: str) -> None:
-        """Follow a line of pip's."""
+        """Update the progress with a line of pip's output."""
         if found := DOWNLOAD_LINE.match(said):
             self.fetched += self.size
             self.name, self.size, self.now = found[1], float(found[2]) * BYTES[found[3]], 0.0
@@ -42,7 +42,7 @@ class Line:
         elif said.startswith("Installing collected packages"):
             self.fetched, self.size = self.fetched + self.size, 0.0
             self.name = f"unpacking {said.count(',') + 1} packages, which takes a while"
-            self.last = float("-inf")  # to be said at once: pip is silent from here on
+            self.last = float("-inf")  # show it at once, because pip prints nothing after this
         else:
             return
         self._show()
@@ -58,13 +58,13 @@ class Line:
         self.stream.flush()
 
     def end(self) -> None:
-        """Leave the terminal a clean line."""
+        """Clear the line on a terminal."""
         if self.live:
             self.stream.write("\r\x1b[K")
 
 
 def follow(said: Iterable[str], line: Line) -> list[str]:
-    """Show what pip says as progress; returns its last words, for a message."""
+    """Show pip's output as progress. Returns its last lines, for an error message."""
     words: list[str] = []
     for text in said:
         line.take(text)
@@ -75,7 +75,7 @@ def follow(said: Iterable[str], line: Line) -> list[str]:
 
 
 def install(python: Path, arguments: list[str], line: Line) -> None:
-    """One call of pip; ends the program with its last words where it fails."""
+    """Run pip install. If it fails, exit with its last lines."""
     command = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as pip:
         assert pip.stdout is not None
@@ -85,18 +85,18 @@ def install(python: Path, arguments: list[str], line: Line) -> None:
 
 
 def main(folder: Path) -> None:
-    """Make the environment in `folder`, or complete it."""
+    """Make the environment in `folder`, or complete an existing one."""
     if sys.version_info < OLDEST_PYTHON:
         sys.exit("Hobble needs Python 3.11 or later: make env PYTHON=/path/to/python3.11")
-    print(f"Making the environment in {folder}: PyTorch, Snakemake, SciPy and what they need.")
+    print(f"Making the environment in {folder}: PyTorch, Snakemake, SciPy and their dependencies.")
     print(f"This downloads packages and takes {DISK_SPACE} of disk, and a few minutes with a fast network.")
     began = time.monotonic()
     venv.create(folder, with_pip=True)
     python, line = folder / "bin" / "python", Line(sys.stdout)
-    install(python, ["--quiet", "--upgrade", "pip>=25"], line)  # an older one does not say how far it is
+    install(python, ["--quiet", "--upgrade", "pip>=25"], line)  # older versions do not print progress
     for packages in STEPS:
         install(python, ["--progress-bar", "raw", "--constraint", "constraints.txt", *packages], line)
-    print(f"The environment is there, after {time.monotonic() - began:.0f} s.")
+    print(f"The environment is ready after {time.monotonic() - began:.0f} s.")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""A hash of what a rule computes: of its script and of every project module that this one imports.
+"""A hash of a rule's code: its script and every project module that the script imports.
 
-What cannot change a result does not count: comments, docstrings, annotations of functions, the words of
-errors and log messages, descriptions of options. Nor do the fields of a configuration's section, whose values
-reach the rule as params, nor the modules of `INFRASTRUCTURE`.
+It ignores what cannot change a result: comments, docstrings, annotations of functions, the text of errors and
+log messages, descriptions of options, and the modules of `INFRASTRUCTURE`. It also ignores the fields of
+configuration sections, because their values are params of the rules.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-# Modules (or packages) without a part in any result, and why. A change there re-runs nothing.
+# Modules or packages that cannot change a result, and why. A change in them re-runs nothing.
 INFRASTRUCTURE = {
     "hobble.config": "its values are params of the rules",
-    "hobble.workflow": "the frame around a job, and what the Snakefile asks",
-    "hobble.core.errors": "how a refusal is worded",
-    "hobble.core.files": "what is written comes back the same, or is refused",
-    "hobble.core.section": "how the configuration is checked, before there is a job",
-    "hobble.core.untrusted": "limits of what is read; within them a file is what it is",
+    "hobble.workflow": "runs jobs and answers the Snakefile",
+    "hobble.core.errors": "only words errors",
+    "hobble.core.files": "a file is read back as it was written, or refused",
+    "hobble.core.section": "checks the configuration before any job",
+    "hobble.core.untrusted": "only limits what is read",
 }
 LOGGERS = {"log", "logger", "logging", "warnings"}
 LEVELS = {"debug", "info", "warning", "error", "exception", "critical", "warn"}
@@ -29,9 +29,9 @@ WORDLESS = {"__future__", "collections.abc", "logging", "typing", "warnings"}
 
 
 def fingerprint(script: Path, source: Path, modules: Iterable[str] = ()) -> str:
-    """Hash `script` and its import closure among the packages under `source`.
+    """Hash `script` and all modules under `source` that it imports, directly or through others.
 
-    modules: full names of modules that the script imports by a name it is told.
+    modules: full names of modules that the script imports dynamically.
     """
     files = [_module(path, source) for path in (script, *sorted(closure(script, source, modules)))]
     used = frozenset().union(*(file.names for file in files))
@@ -39,15 +39,15 @@ def fingerprint(script: Path, source: Path, modules: Iterable[str] = ()) -> str:
     for module in files:
         digest.update(module.digest)
         for name, text in module.texts:
-            if name in used:  # else it stands in messages only
+            if name in used:  # otherwise only messages use it
                 digest.update(f"{name}={text}".encode())
     return digest.hexdigest()[:16]
 
 
 def closure(script: Path, source: Path, modules: Iterable[str] = ()) -> set[Path]:
-    """The project files that `script` imports, directly or through others, and `modules` with theirs.
+    """The project files that `script` and `modules` import, directly or through others.
 
-    Without the infrastructure.
+    The modules of INFRASTRUCTURE are left out.
     """
     found = {path for module in modules for path in _files_of(module, source)}
     waiting = [script, *found]
@@ -60,10 +60,10 @@ def closure(script: Path, source: Path, modules: Iterable[str] = ()) -> set[Path
 
 @dataclass(frozen=True)
 class _Module:
-    """What counts of a module.
+    """The parts of a module that count.
 
-    digest: of its code. texts: its constants that are texts, which count where something but a message uses
-    them. names: what its code uses. imports: project files.
+    digest: hash of its code. texts: its string constants (name, value), which count if code other than
+    messages uses them. names: the names that its code uses. imports: project files.
     """
 
     digest: bytes
@@ -92,7 +92,7 @@ def _module(path: Path, source: Path) -> _Module:
 
 
 class _Bare(ast.NodeTransformer):
-    """Takes away what cannot change a result; notes of the rest which names it uses and what it imports."""
+    """Removes what cannot change a result. Collects the names that the rest uses, and its imports."""
 
     def __init__(self) -> None:
         self.names: set[str] = set()
@@ -162,14 +162,14 @@ class _Bare(ast.NodeTransformer):
 
 
 def _name(node: ast.AST) -> str:
-    """The last part of a dotted name, "" of anything else."""
+    """The last part of a dotted name, or "" for anything else."""
     if isinstance(node, ast.Attribute):
         return node.attr
     return node.id if isinstance(node, ast.Name) else ""
 
 
 def _text(node: ast.stmt) -> tuple[str, str] | None:
-    """Name and content of a module's constant that is a text."""
+    """Name and value of a module's string constant, or None for other statements."""
     if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
         if isinstance(node.value, ast.JoinedStr):
             return node.targets[0].id, ast.dump(node.value)

@@ -1,4 +1,4 @@
-"""The frame around every job's script: a log, progress, and errors as messages."""
+"""The context in which every job's script runs: its log, checks of its files, and errors as messages."""
 
 from __future__ import annotations
 
@@ -15,17 +15,18 @@ from hobble.workflow import checksums
 from hobble.workflow.lifetime import ends_with_run
 from hobble.workflow.usage import peak_memory_mb
 
-BUG = "This is a fault of Hobble, not of your data; please report it with the log."
+BUG = "This is a bug in Hobble, not a fault in your data. Please report it with the log."
 
 
 @contextlib.contextmanager
 def job(snakemake: Any, checked_later: Iterable[str] = ()) -> Iterator[logging.Logger]:
-    """Log to the rule's log file and, from warnings on, to the terminal; end a HobbleError in one message.
+    """Run a script with logging, checks of its files, and clear errors.
 
-    Inputs that are not what their jobs wrote, or that change while the job runs, are such an error.
-    checked_later: names of inputs of which the script itself verifies those that it reads.
-    A HobbleError ends the process with status 1 and its text. Anything unforeseen ends it with its last line
-    on the terminal and the whole traceback in the log.
+    Everything is logged to the rule's log file; warnings and errors also go to the terminal. Inputs that
+    differ from what their jobs wrote, or that change while the job runs, raise HobbleError.
+    Every exception ends the process with status 1. A HobbleError prints its message. Other exceptions print
+    one line and write the traceback to the log.
+    checked_later: names of inputs of which the script itself verifies the files that it reads.
     """
     path = snakemake.log[0]
     with contextlib.suppress(OSError):
@@ -37,7 +38,7 @@ def job(snakemake: Any, checked_later: Iterable[str] = ()) -> Iterator[logging.L
     to_file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     to_terminal = logging.StreamHandler(sys.stderr)
     to_terminal.setLevel(logging.WARNING)
-    # On a terminal the line of progress gives way.
+    # On a terminal, first clear the line of progress.
     wiped = "\r\x1b[K" if sys.stderr.isatty() else ""
     to_terminal.setFormatter(logging.Formatter(f"{wiped}{snakemake.rule}: %(message)s"))
     logger.handlers = [to_file, to_terminal]
@@ -57,10 +58,10 @@ def job(snakemake: Any, checked_later: Iterable[str] = ()) -> Iterator[logging.L
         logger.error("%s", error)
         sys.exit(1)
     except MemoryError:
-        logger.error("ran out of memory. Give the job more, or make the data set or the batch smaller.")
+        logger.error("out of memory. Give the job more memory, or use a smaller data set or batch.")
         sys.exit(1)
     except OSError as error:
-        # Of the disk or of permissions, where nobody below knew better.
+        # An error of the disk or of permissions that no other code has explained.
         place, reason = error.filename or "a file", error.strerror or error
         logger.error("%s: %s. See %s", place, reason, path)
         _to_log_only(logger, to_terminal)
@@ -74,13 +75,13 @@ def job(snakemake: Any, checked_later: Iterable[str] = ()) -> Iterator[logging.L
 
 
 def _to_log_only(logger: logging.Logger, terminal: logging.Handler) -> None:
-    """Leave the traceback in the log."""
+    """Write the traceback to the log, not to the terminal."""
     logger.removeHandler(terminal)
     logger.error("%s", traceback.format_exc())
 
 
 class _LogFile(logging.FileHandler):
-    """A log that goes without what it cannot write: on a full disk the message still reaches the terminal."""
+    """A log file that ignores failed writes, so that on a full disk messages still reach the terminal."""
 
     def emit(self, record: logging.LogRecord) -> None:
         with contextlib.suppress(OSError):

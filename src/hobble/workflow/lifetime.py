@@ -1,8 +1,8 @@
-"""Who a run's lock belongs to, and that no job outlives the Snakemake that started it.
+"""Clears locks of killed runs, and ends all jobs together with their run.
 
-Snakemake's lock says nothing of its owner, so that after a kill it stays until a person clears it; and on
-SIGINT or SIGTERM Snakemake waits for the jobs that run. So a run notes beside its lock which process it is,
-ends its jobs when it is told to end, and each job looks now and then whether its run is still there.
+Snakemake's lock does not say which process it belongs to, so after a kill it stays until a person removes it.
+And on SIGINT or SIGTERM Snakemake waits for running jobs. So a run writes its process id next to its lock and
+ends its jobs on these signals. Each job checks regularly whether its run still exists.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from typing import Any
 
 LOCKS = Path(".snakemake/locks")  # Snakemake removes the folder when it unlocks
 OWNER = "owner.json"
-RUN_VARIABLE = "HOBBLE_RUN"  # in a job's environment: the process of its run, and when that began
-CHECK_SECONDS = 0.5  # seconds between a job's looks at its run
-GRACE_SECONDS = 2.0  # seconds that a job has for tidying up after SIGTERM
+RUN_VARIABLE = "HOBBLE_RUN"  # environment variable of a job: process id and start time of its run
+CHECK_SECONDS = 0.5  # how often a job checks that its run exists
+GRACE_SECONDS = 2.0  # time for a job to clean up after SIGTERM
 
 
 def set_run_variable() -> None:
-    """Say in the environment, which jobs inherit, which process the run is."""
+    """Put this process id and its start time into the environment, which jobs inherit."""
     os.environ[RUN_VARIABLE] = this_process()
 
 
 def this_process() -> str:
-    """This process as `RUN_VARIABLE` names one: its number, and when it began."""
+    """Id and start time of this process, in the form of RUN_VARIABLE."""
     return f"{os.getpid()} {_start_time(os.getpid())}"
 
 
 def record_lock_owner(locks: Path = LOCKS) -> None:
-    """Note beside the lock that Snakemake has just taken whose it is."""
+    """Write the owner of the lock that Snakemake has just taken next to the lock."""
     if locks.is_dir():
         owner = {"host": platform.node(), "pid": os.getpid(), "began": _start_time(os.getpid())}
         with contextlib.suppress(OSError):
@@ -46,7 +46,7 @@ def record_lock_owner(locks: Path = LOCKS) -> None:
 
 
 def clear_stale_lock(locks: Path = LOCKS) -> bool:
-    """Take away a lock whose owner was a process of this machine and is no more; True where there was one."""
+    """Remove a lock if its owner was a process of this machine and has ended. Returns whether it did."""
     try:
         text = (locks / OWNER).read_text(encoding="utf-8")
         owner = json.loads(text)
@@ -55,7 +55,7 @@ def clear_stale_lock(locks: Path = LOCKS) -> bool:
         return False
     if host != platform.node() or _is_alive(pid, began):
         return False
-    # Renamed first, so that of two runs that begin at once only one takes it away.
+    # Rename it first, so that only one of two runs that start together removes it.
     stale = locks.with_name(f"{locks.name}.stale.{os.getpid()}")
     try:
         os.rename(locks, stale)
@@ -71,21 +71,21 @@ def clear_stale_lock(locks: Path = LOCKS) -> bool:
 
 
 def end_jobs_on_signal() -> None:
-    """On SIGINT or SIGTERM end the jobs that run, and then Snakemake as by Ctrl-C: with no lock left."""
+    """On SIGINT or SIGTERM end the running jobs, then Snakemake as if by Ctrl-C, which removes its lock."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _stop)
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
     for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, signal.SIG_IGN)  # once is enough: what follows takes seconds at most
+        signal.signal(each, signal.SIG_IGN)  # ignore further signals; stopping takes only seconds
     threading.Thread(target=end_children, args=(os.getpid(),), daemon=True).start()
     raise KeyboardInterrupt
 
 
 def end_children(pid: int, grace: float = GRACE_SECONDS) -> None:
-    """End every process below one: SIGTERM, and SIGKILL for those still there after `grace` seconds."""
-    import psutil  # which Snakemake needs too; it takes longer to import than all of a job's frame
+    """End all descendants of a process with SIGTERM, and after `grace` seconds with SIGKILL."""
+    import psutil  # a dependency of Snakemake; imported here because it is slow to import
 
     with contextlib.suppress(psutil.NoSuchProcess):
         below = psutil.Process(pid).children(recursive=True)
@@ -110,7 +110,7 @@ def _runs(process: Any) -> bool:
 
 @contextlib.contextmanager
 def ends_with_run() -> Iterator[None]:
-    """While it lasts, this job ends tidily on SIGINT and SIGTERM, and soon after its run."""
+    """Within this context the job ends cleanly on SIGINT and SIGTERM, and soon after its run ends."""
     before = {}
     with contextlib.suppress(ValueError):  # not in the main thread, as in a test
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -127,11 +127,11 @@ def ends_with_run() -> Iterator[None]:
 
 
 def _exit(number: int, frame: FrameType | None) -> None:
-    raise SystemExit(128 + number)  # past every `except Exception`, through every `finally`
+    raise SystemExit(128 + number)  # not caught by `except Exception`, and runs every `finally`
 
 
 def _exit_with_run(run: str, done: threading.Event) -> None:
-    """End this process when its run is no more; by SIGKILL where compiled code lets no signal through."""
+    """End this process when its run has ended. If compiled code blocks SIGTERM, use SIGKILL."""
     pid, _, began = run.partition(" ")
     while not done.wait(CHECK_SECONDS):
         if not _is_alive(int(pid), began):
@@ -141,7 +141,7 @@ def _exit_with_run(run: str, done: threading.Event) -> None:
 
 
 def _is_alive(pid: int, began: str) -> bool:
-    """Whether process `pid` runs and is the one that began then, as another may bear its number by now."""
+    """Whether process `pid` runs and started at `began`. Another process may have got its number since."""
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -152,7 +152,7 @@ def _is_alive(pid: int, began: str) -> bool:
 
 
 def _start_time(pid: int) -> str:
-    """When a process began, in ticks since the machine did; "" for a zombie, "?" where no /proc tells."""
+    """Start time of a process in clock ticks since boot; "" for a zombie, "?" if /proc does not have it."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:

@@ -1,4 +1,4 @@
-"""What each measurement of a configuration reads, and on which keys of the configuration it depends."""
+"""The inputs of each measurement, and the keys of the configuration that it depends on."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NAMES = tuple(one.name for one in MEASURES)
 
 
 def result_file(configuration: str, name: str) -> str:
-    """The JSON of a measurement."""
+    """Path of a measurement's JSON."""
     return f"results/{configuration}/evaluation/{name}.json"
 
 
@@ -24,7 +24,7 @@ class Measurements:
         self.configurations, self.clips, self.package = configurations, clips, package
 
     def inputs(self, configuration: str, name: str) -> dict[str, str | list[str]]:
-        """Input -> its file or files, for those that the measurement asks for."""
+        """Name of each input of the measurement -> its file or files."""
         return {asked: self._input(configuration, asked) for asked in measure(name).inputs}
 
     def _input(self, configuration: str, asked: str) -> str | list[str]:
@@ -42,23 +42,23 @@ class Measurements:
         return result_file(configuration, measure(asked).name)
 
     def splits(self, configuration: str, name: str) -> dict[str, str]:
-        """Clip -> split, where the measurement reads clips."""
+        """Clip -> "train" or "held_out", if the measurement reads clips, else {}."""
         return self.configurations.splits(configuration) if "clips" in measure(name).inputs else {}
 
     def options(self, configuration: str, name: str) -> dict[str, Any]:
-        """Its own keys of the section `evaluation`."""
+        """The measurement's keys of the section `evaluation`."""
         keys = measure(name).options.model_fields
         return self.configurations.section(configuration, "evaluation", *keys) if keys else {}
 
     def runtime(self, configuration: str, name: str) -> dict[str, Any]:
-        """The keys of the section `runtime` that it depends on."""
+        """The keys of the section `runtime` that the measurement depends on."""
         keys = measure(name).runtime
         return self.configurations.section(configuration, "runtime", *keys) if keys else {}
 
     def package_of(self, name: str) -> str:
-        """Full name of its package."""
+        """Full name of the measurement's package."""
         return measure(name).package
 
     def code(self, name: str, *modules: str) -> str:
-        """Fingerprint of what it runs, and of other modules that it finds by name: of the network."""
+        """Fingerprint of the measurement's code and of `modules`, which it imports dynamically."""
         return self.package.code("measure", measure(name).module("run"), *modules)

@@ -1,4 +1,4 @@
-"""The package's own files that rules depend on: templates, scripts of the page, published figures, code."""
+"""Files of the package that rules depend on: templates, scripts of the page, published figures, code."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class Package:
         self.folder = base / "src" / "hobble"
 
     def code(self, script: str, *modules: str) -> str:
-        """Fingerprint of a rule's script and of all it imports from the package.
+        """Fingerprint of a rule's script and of everything that it imports from the package.
 
-        modules: full names of those that it finds by a name it is told.
+        modules: full names of modules that it imports dynamically.
         """
         path = self.base / "workflow" / "scripts" / f"{script}.py"
         return fingerprint(path, self.base / "src", modules)
@@ -29,10 +29,10 @@ class Package:
         return sorted([*files, self.published()])
 
     def web(self, suffix: str) -> list[str]:
-        """The page's scripts (".js"), or what says which packages they need (".json")."""
+        """The page's files with this suffix: ".js" for its scripts, ".json" for the list of packages."""
         files = [*(self.folder / "report" / "web").iterdir(), *self.folder.glob("models/**/*.js")]
         return sorted(str(path) for path in files if path.suffix == suffix)
 
     def published(self) -> str:
-        """The file of published figures that stand beside ours."""
+        """The file of published figures that the report shows beside ours."""
         return str(self.folder / "evaluation" / "published.yaml")

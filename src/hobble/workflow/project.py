@@ -1,4 +1,4 @@
-"""One checkout and one command line: the parts that the rules ask, put together."""
+"""Creates the objects that the rules use, for one checkout and one command line."""
 
 from __future__ import annotations
 
@@ -17,16 +17,15 @@ from hobble.workflow.measurements import Measurements
 from hobble.workflow.package import Package
 
 MOCAP = "mocap"
-RESERVED = (COMPARE, "datasets")  # folders of results/ that belong to no configuration
+RESERVED = (COMPARE, "datasets")  # folders of results/ that are not configurations
 
 
 class Project:
-    """The configuration folder of one checkout, with the overrides of one command line.
+    """The configurations and data sets of one checkout, with the overrides of one command line.
 
-    base: the folder of the Snakefile. config: Snakemake's config; `mocap` is the folder with the
-    user's clips, `compare` the configurations to set side by side, every other key goes on top of each
-    configuration. Raises HobbleError if a configuration has the name of a folder of results/, and for a
-    `mocap` that is no folder's name.
+    base: the folder of the Snakefile. config: Snakemake's config. Its `mocap` is the folder with the user's
+    clips, `compare` lists the configurations to compare, and all other keys override every configuration.
+    Raises HobbleError if a configuration has a reserved name, or if `mocap` is not a name.
     """
 
     def __init__(self, base: Path, config: Mapping[str, Any]) -> None:
@@ -34,7 +33,9 @@ class Project:
         self.base = base
         self.catalogue = Catalogue(base / "config", overrides)
         for name in set(RESERVED) & set(self.catalogue.names()):
-            raise HobbleError(f"no configuration can be called {name}: results/{name} is another folder")
+            raise HobbleError(
+                f"no configuration can be called {name}: Hobble uses results/{name} for something else"
+            )
         self.clips = Clips(base, _folder(config.get(MOCAP, base / "data")), self.catalogue)
         self.datasets = Datasets(self.catalogue, self.clips)
         self.configurations = Configurations(self.catalogue, self.datasets)
@@ -44,10 +45,10 @@ class Project:
 
 
 def _folder(asked: Any) -> Path:
-    """The folder that `--config mocap=...` names; YAML may have made a number or a list of it."""
+    """The folder given with `--config mocap=...`. YAML may have turned it into a number or a list."""
     if isinstance(asked, str | Path) and str(asked).strip():
         return Path(asked)
     raise HobbleError(
         f"--config mocap: must be the name of one folder, as in mocap=/data/mocap, not {asked!r:.80}. "
-        "A name that YAML takes for something else needs quotes and a folder before it: mocap=./5"
+        "Write a folder whose name is a number as mocap=./5"
     )

@@ -1,4 +1,4 @@
-"""What is known of a data set before anything is made of it: its rigs, and what can be downloaded."""
+"""Reads the joints of BVH files and download lists while Snakemake plans, before any job runs."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pathlib import Path
 from hobble.core.errors import InputError
 from hobble.core.untrusted import read_text
 
-HEADER_BYTES = 1 << 18  # bytes; that of 191 joints takes 40 kB
+HEADER_BYTES = 1 << 18  # enough for the joints of a BVH file; 191 joints take 40 kB
 JOINT = re.compile(r"^\s*(?:ROOT|JOINT)\s+(.*?)\s*\{?\s*$", re.MULTILINE | re.IGNORECASE)
 CHECKSUM_LINE = re.compile(r"([0-9a-fA-F]{64}) [ *](\S+)\.bvh")
 
 
 def joint_names(path: Path) -> set[str]:
-    """The joints of a BVH file without prefixes, as far as its beginning says; none of a missing one."""
+    """Joints in the first HEADER_BYTES of a BVH file, without prefixes. Empty if the file is missing."""
     try:
         with open(path, "rb") as file:
             header = file.read(HEADER_BYTES).partition(b"MOTION")[0].decode("latin-1")
@@ -25,7 +25,7 @@ def joint_names(path: Path) -> set[str]:
 
 
 def nearest_rig(joints: set[str], known: Mapping[str, Collection[str]], target: str) -> str | None:
-    """The known skeleton with most of the joints' names, where it has more of them than the target."""
+    """The known skeleton that has the most of these joints, or None if `target` has as many."""
     best, nearest = len(joints & set(known[target])), None
     for name in sorted(known):
         if len(joints & set(known[name])) > best:
@@ -34,9 +34,9 @@ def nearest_rig(joints: set[str], known: Mapping[str, Collection[str]], target: 
 
 
 def read_checksums(path: Path) -> dict[str, str]:
-    """Clip -> SHA-256, of a manifest with lines `<hash>  <clip>.bvh`, as `sha256sum *.bvh` writes them.
+    """Clip -> SHA-256, from a file with lines `<hash>  <clip>.bvh`, as `sha256sum *.bvh` writes them.
 
-    Raises InputError with the line where it reads otherwise.
+    Raises InputError with the number of a wrong line.
     """
     out: dict[str, str] = {}
     for number, line in enumerate(read_text(path).splitlines(), 1):
@@ -44,6 +44,6 @@ def read_checksums(path: Path) -> dict[str, str]:
             continue
         match = CHECKSUM_LINE.fullmatch(line.strip())
         if match is None:
-            raise InputError(path, "a line holds a SHA-256, two spaces and a clip's file", line=number)
+            raise InputError(path, "expected a SHA-256, two spaces and the file of a clip", line=number)
         out[match[2]] = match[1].lower()
     return out

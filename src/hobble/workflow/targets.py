@@ -1,4 +1,4 @@
-"""What can be told of the targets on a command line before Snakemake plans: mistakes end the run here."""
+"""Checks the targets of a command line before Snakemake plans, and ends the run if there are mistakes."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 
 INJURY = "injury"  # the channel that the questionnaire asks about
-PAGE = "page"  # under results/: what all reports share
+PAGE = "page"  # the folder in results/ with the files that all reports share
 
 
 def check(project: Project, targets: Iterable[str]) -> None:
-    """Validate every configuration, data set and skeleton that the targets need, and what they ask of them.
+    """Validate the targets, and every configuration, data set and skeleton that they need.
 
-    Raises HobbleError.
+    Raises HobbleError for the first mistake.
     """
     for target in list(targets) or ["results/holden/report.html"]:
         _, name, folder, file, *_ = (*Path(target).parts, "", "", "")
@@ -38,7 +38,7 @@ def check(project: Project, targets: Iterable[str]) -> None:
 
 
 def notes(project: Project, targets: Iterable[str]) -> list[str]:
-    """What a person should know of the folders of the data sets that the targets need, each once."""
+    """Notes on unused files in the folders of the data sets that the targets need."""
     names = []
     for target in list(targets) or ["results/holden/report.html"]:
         _, name, folder, *_ = (*Path(target).parts, "", "")
@@ -55,7 +55,7 @@ def _check_configuration(project: Project, name: str) -> None:
     model = project.catalogue.configuration(name)
     for other in filter(None, (model.network_of, model.training.continues)):
         if other == name:
-            raise HobbleError(f"configuration {name} cannot go on from itself")
+            raise HobbleError(f"configuration {name} cannot continue from itself")
         project.catalogue.configuration(other)
     if model.training.continues:
         _check_continues(name, model, project.catalogue.configuration(model.training.continues))
@@ -65,7 +65,7 @@ def _check_configuration(project: Project, name: str) -> None:
 
 
 def _check_continues(name: str, model: Configuration, start: Configuration) -> None:
-    """A training goes on with a network of the same shape, and counts its passes in sections."""
+    """Check that a training can continue from another: same network, same sections, more passes."""
     begun = model.training.continues
     for key, mine, of_start in (
         ("channels", list(model.channels), list(start.channels)),
@@ -74,12 +74,12 @@ def _check_continues(name: str, model: Configuration, start: Configuration) -> N
     ):
         if mine != of_start:
             raise HobbleError(
-                f"configuration {name} goes on from {begun}, so its {key} has to be {of_start}, not {mine}"
+                f"configuration {name} continues from {begun}, so its {key} must be {of_start}, not {mine}"
             )
     if model.training.passes < start.training.passes:
         raise HobbleError(
-            f"configuration {name} goes on from {begun}, which ends after {start.training.passes} passes, to "
-            f"training.passes: {model.training.passes}; give more"
+            f"configuration {name} continues from {begun}, which has {start.training.passes} passes. Its "
+            f"training.passes must not be fewer, but it is {model.training.passes}"
         )
 
 
@@ -97,12 +97,11 @@ def _check_dataset(project: Project, name: str) -> None:
 
 
 def _check_entry(where: str, entry: ClipEntry) -> None:
-    """What a clip's entry asks of the walker: what it can do."""
-    # Imported where there is something to check: it brings numpy, which takes longer than all else here.
+    """Check what a clip's entry says for the synthetic walker."""
     if entry.injured is not None:
         check_link(entry.injured, where)
     if entry.recipe is not None:
-        from hobble.synthetic.recipes import RECIPES
+        from hobble.synthetic.recipes import RECIPES  # imports numpy, which takes longer than all the rest
 
         if entry.recipe not in RECIPES:
             raise InputError(
@@ -113,12 +112,12 @@ def _check_entry(where: str, entry: ClipEntry) -> None:
 
 
 def _check_hurt(name: str, model: Dataset, links: Sequence[str]) -> None:
-    """What a data set says of hurt versions: links that there are."""
+    """Check that the links of a data set's section `hurt` exist."""
     if model.hurt is None or not model.hurt.versions:
         return
     if not links:
         raise HobbleError(
-            f"data set {name}: hurt: skeleton {model.skeleton} has no links. List `links` there."
+            f"data set {name}: hurt: skeleton {model.skeleton} has no `links`. Add them to its file."
         )
     if odd := [link for link in model.hurt.links if link not in links]:
         raise HobbleError(
@@ -127,7 +126,7 @@ def _check_hurt(name: str, model: Dataset, links: Sequence[str]) -> None:
 
 
 def _check_mirror(name: str, skeleton: SkeletonFile) -> None:
-    """Raise HobbleError for a skeleton that has no mirror image."""
+    """Raise HobbleError for a skeleton that cannot be mirrored."""
     from hobble.core.skeleton import Skeleton
     from hobble.motion.mirror import mirror_skeleton
 
@@ -137,12 +136,12 @@ def _check_mirror(name: str, skeleton: SkeletonFile) -> None:
 
 
 def _check_possible(project: Project, name: str, folder: str, file: str) -> None:
-    """What no network of this configuration could give, though it were trained."""
+    """Raise HobbleError for a target that this configuration cannot have, before anything is trained."""
     owner = project.catalogue.configuration(name).network_of or name
     if folder == "stimuli" and not project.catalogue.configuration(owner).channels:
         raise HobbleError(
-            f"results/{name}/stimuli: the network of configuration {owner} is told nothing, so that there is "
-            "one walk to show. Ask for those of a configuration that has `channels`."
+            f"results/{name}/stimuli: configuration {owner} has no `channels`, so it has only one walk to "
+            "show. Use a configuration with channels."
         )
     if folder == "questionnaire" and INJURY not in project.catalogue.configuration(owner).channels:
         raise HobbleError(
@@ -152,6 +151,6 @@ def _check_possible(project: Project, name: str, folder: str, file: str) -> None
     stem, _, suffix = file.rpartition(".")
     if folder == "export" and suffix == "onnx" and stem not in get_args(PhaseMode):
         raise HobbleError(
-            f"results/{name}/export/{file}: there are {', '.join(get_args(PhaseMode))}, as in "
+            f"results/{name}/export/{file}: the phase modes are {', '.join(get_args(PhaseMode))}, as in "
             f"results/{name}/export/cubic.onnx"
         )

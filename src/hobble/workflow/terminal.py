@@ -1,6 +1,6 @@
-"""What a run says on the terminal: one line of progress, each failure once, and a summary at the end.
+"""The terminal output of a run: one line of progress, each failure once, and a summary at the end.
 
-Snakemake hands over what it would say (`snakemake_logger_plugin_hobble`); `snakemake -p` says all of it.
+`snakemake_logger_plugin_hobble` passes Snakemake's log records to it. `snakemake -p` prints them all instead.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-PROGRESS_SECONDS = 10.0  # seconds between lines of progress where they go to a file
-WIDTH = 100  # columns of the line that is written over
-MAX_FAILURES_LISTED = 20  # failures that the summary names
-TAIL_BYTES = 1 << 16  # bytes at the end of a job's log in which its message stands
+PROGRESS_SECONDS = 10.0  # between lines of progress in a file
+WIDTH = 100  # columns of the line of progress on a terminal
+MAX_FAILURES_LISTED = 20  # in the summary
+TAIL_BYTES = 1 << 16  # the end of a job's log, in which its error message is searched
 MESSAGE = re.compile(r"^\S+ \S+ ERROR (.*)$", re.M)
-# What Snakemake says and a person need not read: it is said in fewer words here.
+# Messages of Snakemake that are not shown, because this module reports the same in fewer words.
 JOB_ENDED = re.compile(r"CalledProcessError|Command 'set -euo pipefail|returned non-zero exit status")
 SUPERFLUOUS = re.compile(
     r"Exiting because a job execution failed|Look below for error messages|^Shutting down|"
@@ -32,7 +32,7 @@ JOB_HINT = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
 
 @dataclass(frozen=True)
 class Job:
-    """A job as it is named to a person."""
+    """The names of a job that are printed. about: its wildcards."""
 
     rule: str
     about: str
@@ -45,7 +45,10 @@ class Job:
 
 
 class Terminal:
-    """One run's talk. live: the last line is written over, as on a terminal; else lines come now and then."""
+    """The output of one run.
+
+    live: overwrite the line of progress, as on a terminal. Otherwise print a line every PROGRESS_SECONDS.
+    """
 
     def __init__(
         self, stream: TextIO, live: bool, dryrun: bool = False, now: Callable[[], float] = time.monotonic
@@ -59,7 +62,7 @@ class Terminal:
         self.stopped = self.announced = self.shown = self.closed = False
 
     def take(self, record: logging.LogRecord) -> None:
-        """Say what there is to say of a record of Snakemake's logger."""
+        """Print what a record of Snakemake's logger needs."""
         event = str(getattr(record, "event", None) or "")
         handle = getattr(self, f"_{event}", None)
         if handle is not None:
@@ -68,7 +71,7 @@ class Terminal:
             self._words(record)
 
     def close(self) -> None:
-        """The summary, where jobs have run; once, though logging closes handlers again at exit."""
+        """Print the summary if jobs have run. Only once: logging calls this again at exit."""
         self._wipe()
         if self.closed or self.dryrun or not (self.jobs or self.failed):
             return
@@ -81,13 +84,13 @@ class Terminal:
                 self._line(f"  {job.name}: {job.log}")
             if len(self.failed) > MAX_FAILURES_LISTED:
                 self._line(f"  and {len(self.failed) - MAX_FAILURES_LISTED} more")
-            self._line("The same command goes on from here once this is put right.")
+            self._line("When this is fixed, the same command continues from here.")
         elif self.stopped:
-            self._line(f"{count}, then stopped. The same command goes on from here.")
+            self._line(f"{count}, then stopped. The same command continues from here.")
         else:
             self._line(f"{count}.")
 
-    # Snakemake's events, by their names
+    # One method for each of Snakemake's events, named after it
 
     def _run_info(self, data: Mapping[str, Any]) -> None:
         stats = data.get("stats") or {}
@@ -133,14 +136,14 @@ class Terminal:
         if self.stopped:
             return
         self.failed.append(job)
-        if not _message(job.log):  # else the job has said it itself
-            self._line(f"{job.name}: ended without a message, killed perhaps. Its log: {job.log}")
+        if not _message(job.log):  # otherwise the job has printed its message
+            self._line(f"{job.name}: ended without a message; it may have been killed. Its log: {job.log}")
 
     def _words(self, record: logging.LogRecord) -> None:
         text = str(record.msg or "").strip()
         if STOP_MESSAGE in text:
             self.stopped = True
-            self._line("Stopping the jobs that run.")
+            self._line("Stopping the running jobs.")
         elif record.levelno >= logging.ERROR:
             if not (JOB_ENDED.search(text) or SUPERFLUOUS.search(text)) and text:
                 self._line(text)
@@ -159,7 +162,7 @@ class Terminal:
 
 
 def _message(log: str) -> str:
-    """The last error in a job's log, "" where there is none."""
+    """The last error in a job's log, or "" if there is none."""
     try:
         with open(Path(log), "rb") as file:
             file.seek(0, 2)

@@ -1,4 +1,4 @@
-"""What a job has used, so that what its rule asks of a cluster can be held against it."""
+"""The memory that a job has used, to compare it with what its rule requests."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from pathlib import Path
 
 
 def peak_memory_mb() -> float:
-    """The largest resident memory of this process so far, in MB (10^6 bytes).
+    """Peak resident memory of this process, in MB (10^6 bytes).
 
-    Snakemake's own figure comes from samples, which miss a job of a second altogether; `ru_maxrss` begins at
-    the size of the process that started this one, so on Linux the kernel's mark of this program is read.
+    Snakemake measures by sampling, which misses short jobs. `ru_maxrss` starts at the size of the parent
+    process. So on Linux this reads the kernel's VmHWM.
     """
     try:
         mark = re.search(r"^VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text(), re.M)

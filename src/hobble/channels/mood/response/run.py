@@ -36,6 +36,9 @@ PACES = (0.85, 1.0, 1.15)  # of the middle speed of captured walks in no mood, a
 ASKED = 120.0  # cm a second, where nobody was captured walking in no mood
 VALUES = (0.5, 1.0)
 MIRROR = "_mirror"
+# Towards the diagonal of the covariance. With .6, 69 % of the captured windows that were left out are named
+# right, with the .02 of the injury recogniser 54 %: there are only one or two clips for each mood.
+SHRINKAGE = 0.6
 REASON = "this network is told no moods"
 TOO_FEW = "the clips walk in fewer than two moods"
 EFFECTS = ("speed", "stride", "trunk", "arms", "head")
@@ -70,7 +73,7 @@ def response(
     if len(known) < 2:
         return {"applies": False, "reason": TOO_FEW}
     windows = [w for w in windows if w.mood in (*known, NONE) and w.walks]
-    judge = learn(_table(windows), [w.mood for w in windows])
+    judge = learn(_table(windows), [w.mood for w in windows], SHRINKAGE)
     speed = float(np.median([w.values["speed"] for w in windows if w.mood == NONE] or [ASKED])) / FPS
     figures = [
         {},
@@ -156,7 +159,7 @@ def left_out(windows: Sequence[Window]) -> dict[str, Any]:
         rest = [w for w in windows if _original(w.clip) != clip]
         mine = [w for w in windows if _original(w.clip) == clip]
         if len({w.mood for w in rest}) > 1:
-            names = learn(_table(rest), [w.mood for w in rest]).names(_table(mine))
+            names = learn(_table(rest), [w.mood for w in rest], SHRINKAGE).names(_table(mine))
             for w, name in zip(mine, names, strict=True):
                 right.setdefault(w.mood, []).append(w.mood == name)
     return {
