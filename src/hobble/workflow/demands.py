@@ -29,6 +29,7 @@ MEASURED_JOINTS = 31  # of the figure in the measurements
 ASSUMED_FRAMES = 20_000  # of a clip that is not downloaded yet
 VISITS_PER_PASS = 10  # how often a pass of training uses a row
 HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
+ROW_KB = 5  # of a row of 31 joints before it is standardised, with its fits
 WEEK_MINUTES = 7 * 24 * 60  # longest time that a job requests
 
 
@@ -54,6 +55,16 @@ class Demands:
     def minutes_of_all(self, dataset: str, each: float, attempt: int = 1, least: int = 1) -> int:
         """Minutes for a job that takes `each` seconds for a thousand frames, over all clips and mirrors."""
         return _minutes(each * self.all_thousands(dataset), attempt, least)
+
+    def minutes_of_part(self, dataset: str, each: float, attempt: int = 1) -> int:
+        """Minutes for a job that takes `each` seconds for a thousand frames of its part of a database."""
+        thousands = self.all_thousands(dataset) / self.project.datasets.parts(dataset)
+        return _minutes(each * thousands, attempt, least=5)
+
+    def part_memory(self, dataset: str, attempt: int = 1) -> int:
+        """Megabytes for a job that orders its part of a database: what one shard has for it, and buckets."""
+        parts = self.project.datasets.parts(dataset)
+        return _megabytes(400 + ROW_KB * self.all_thousands(dataset) / parts**2, attempt)
 
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
         """MB for the measurement `name`."""
