@@ -28,11 +28,9 @@ def clips(rows_of, tmp_path: Path) -> dict[str, Path]:
     files = {}
     for number, name in enumerate("abcdefg"):
         rows = rows_of(name, 0 if name == "d" else 40 + 30 * number, None, seed=number)
-        gait = rows.x[:, rows.layout.with_channels(()).x_gait].reshape(
-            len(rows), len(GAITS), rows.layout.samples
-        )
-        gait[:] = np.eye(len(GAITS))[GAITS.index("walk")][:, None]
-        rows.x[:, columns] = gait.reshape(len(rows), -1)
+        columns = rows.layout.with_channels(()).x_gait
+        walk = np.eye(len(GAITS))[GAITS.index("walk")]
+        rows.x[:, columns] = np.repeat(walk, rows.layout.samples)
         rows.y[:, rows.layout.y_root_velocity] = [0, 1 if number % 2 else 2 + number / 10]
         hurt = np.full((len(rows), 2), [7.0, 0.0] if number % 2 else 0.0, np.float32)
         files[name] = tmp_path / f"{name}.npz"
@@ -95,6 +93,21 @@ def test_what_one_job_refuses_the_first_of_many_refuses(clips, tmp_path, rows_of
     np.savez(clips["c"], **{**data, "layout": np.array("{}")})
     with pytest.raises(InputError, match=r"c\.npz: not a file of rows"):
         in_parts(tmp_path / "parts", clips, dict.fromkeys(clips, "train"), 2, 2)
+
+
+def test_a_shard_that_lacks_bytes_is_named(clips, tmp_path):
+    splits = dict.fromkeys(clips, "train")
+    shards = [tmp_path / "0", tmp_path / "1"]
+    for number, folder in enumerate(shards):
+        write_shard(folder, clips, shard_of(list(clips), number, 2), splits, parts=2, **OPTIONS)
+    for table in ("frames", "fits"):
+        file = tmp_path / "1" / "buckets-train" / f"00000.{table}"
+        whole = file.read_bytes()
+        file.write_bytes(whole[:-4])
+        with pytest.raises(InputError, match=rf"00000\.{table}: truncated"):
+            write_part(tmp_path / "part", shards, 0, parts=2, joint_weight=0.1)
+        file.write_bytes(whole)
+        shutil.rmtree(tmp_path / "part")
 
 
 def test_a_job_holds_no_more_where_there_are_more_clips(rows_of, tmp_path, monkeypatch):

@@ -7,25 +7,21 @@ from hobble.core.files import write_json
 from hobble.evaluation.tables import write_tables
 from hobble.measures.given import Given
 from hobble.runtime.options import Runtime
-from hobble.workflow.checksums import verify
 from hobble.workflow.job import job
 
-# A sample of the clips is known once their facts are read, so the rows of the others are not looked at.
-with job(snakemake, checked_later=["clips"]) as log:
+with job(snakemake) as log:
     # By name: which measurements there are beside this one is no reason to run it again.
     measure = importlib.import_module(snakemake.params.package).MEASURE
     files = {need: Path(file) for need, file in snakemake.input.items() if need not in ("clips", "facts")}
-    clips = {Path(file).stem: Path(file) for file in snakemake.input.get("clips", ())}
     given = Given(
         snakemake.params.configuration,
         files,
-        clips,
+        {Path(file).stem: Path(file) for file in snakemake.input.get("clips", ())},
         snakemake.params.splits,
         [Path(file) for file in snakemake.input.get("facts", ())],
         Runtime.model_validate(snakemake.params.runtime),
     )
     found = measure.part("run").run(given, measure.options.model_validate(snakemake.params.options))
-    verify(str(clips[name]) for name in (clips if found.read is None else found.read))
     write_json(snakemake.output.json, found.result)
     write_tables(snakemake.output.tables, found.tables)
     log.info("%s", found.says)

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from hobble.core.errors import InputError
 from hobble.core.quat import Array
 
+HINT = "Delete the folder; the next run makes it again."
 INDEX = np.dtype([("place", "<i8"), ("count", "<i4"), ("clip", "<i4"), ("frame", "<i4"), ("phase", "<f4")])
 
 
@@ -53,11 +55,21 @@ class Buckets:
         return self.folder / f"{bucket:05d}.{table}"
 
     def read(self, bucket: int) -> tuple[Array, Array, np.ndarray]:
-        """A bucket's frames, fits and index as they came; of a bucket that nothing was added to none."""
+        """A bucket's frames, fits and index as they came; of a bucket that nothing was added to none.
+
+        Raises InputError where a file is not as long as the others say.
+        """
         if not self._file(bucket, "index").exists():
             return self._tables(np.empty(0, "<f4"), np.empty(0, "<f4"), np.empty(0, INDEX))
         frames, fits = (np.fromfile(self._file(bucket, table), "<f4") for table in ("frames", "fits"))
-        return self._tables(frames, fits, np.fromfile(self._file(bucket, "index"), INDEX))
+        index = np.fromfile(self._file(bucket, "index"), INDEX)
+        for table, values, size in (
+            ("frames", frames, len(index) * self.columns),
+            ("fits", fits, int(index["count"].sum()) * self.fit_columns),
+        ):
+            if len(values) != size:
+                raise InputError(self._file(bucket, table), "truncated or overwritten", fix=HINT)
+        return self._tables(frames, fits, index)
 
     def _tables(self, frames: Array, fits: Array, index: np.ndarray) -> tuple[Array, Array, np.ndarray]:
         return frames.reshape(-1, self.columns), fits.reshape(-1, self.fit_columns), index

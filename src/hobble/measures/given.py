@@ -64,10 +64,9 @@ class Given:
 class Outcome:
     """What a measurement found: `result` becomes <measure>.json, each of `tables` <measure>/<table>.csv.
 
-    says: a line for the log. read: the clips that were measured, where not all of them.
+    says: a line for the log.
     """
 
     result: Json = field(repr=False)
     tables: Mapping[str, Sequence[Row]] = field(default_factory=dict, repr=False)
     says: str = ""
-    read: Sequence[str] | None = field(default=None, repr=False)

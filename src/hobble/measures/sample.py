@@ -15,25 +15,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
-from hobble.core.section import Section
 from hobble.rows.facts import Facts
 
 LEAST = 2  # clips of a stratum: of one alone nobody knows how much it differs from the others
 SPEEDS = 3  # strata of a gait by speed
 SURE = 1.96  # standard errors to each side that hold 95 %
-
-
-class Sampling(Section):
-    """A key that measurements of every clip share."""
-
-    sample_frames: int = Field(
-        5_000_000,
-        gt=0,
-        description="frames measured, where the data set has more: of clips drawn by gait, speed, channel "
-        "and split",
-    )
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import logging
 import os
 import sys
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from hobble.core.errors import HobbleError
@@ -19,14 +19,13 @@ BUG = "This is a bug in Hobble, not a fault in your data. Please report it with 
 
 
 @contextlib.contextmanager
-def job(snakemake: Any, checked_later: Iterable[str] = ()) -> Iterator[logging.Logger]:
+def job(snakemake: Any) -> Iterator[logging.Logger]:
     """Run a script with logging, checks of its files, and clear errors.
 
     Everything is logged to the rule's log file; warnings and errors also go to the terminal. Inputs that
     differ from what their jobs wrote, or that change while the job runs, raise HobbleError.
     Every exception ends the process with status 1. A HobbleError prints its message. Other exceptions print
     one line and write the traceback to the log.
-    checked_later: names of inputs of which the script itself verifies the files that it reads.
     """
     path = snakemake.log[0]
     with contextlib.suppress(OSError):
@@ -48,8 +47,7 @@ def job(snakemake: Any, checked_later: Iterable[str] = ()) -> Iterator[logging.L
         checksums.forget(outputs)
         with ends_with_run():
             before = checksums.stamps(inputs)
-            later = {str(file) for name in checked_later for file in snakemake.input.get(name, ())}
-            checksums.verify(file for file in inputs if str(file) not in later)
+            checksums.verify(inputs)
             yield logger
             checksums.check_unchanged(before)
             checksums.record(outputs)

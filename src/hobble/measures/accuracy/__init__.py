@@ -2,7 +2,7 @@
 
 from hobble.measures.joints import Joints
 from hobble.measures.measure import Cost, Measure
-from hobble.measures.sample import Sampling
+from hobble.measures.sampling import Sampling
 
 
 class Options(Joints, Sampling):

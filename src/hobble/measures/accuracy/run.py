@@ -196,5 +196,4 @@ def run(given: Given, options: Options) -> Outcome:
     result = measure(
         given.weights, given.clips, given.splits, given.configuration, chosen_joints(given, options), sample
     )
-    read = list(sample.weights) if sample else None
-    return Outcome(result, {"clips": clip_rows(result)}, read=read)
+    return Outcome(result, {"clips": clip_rows(result)})

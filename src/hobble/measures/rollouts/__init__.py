@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field
 from hobble.core.section import Positive
 from hobble.measures.joints import Joints
 from hobble.measures.measure import Cost, Measure
-from hobble.measures.sample import Sampling
+from hobble.measures.sampling import Sampling
 
 
 def _some(lengths: tuple[int, ...]) -> tuple[int, ...]:

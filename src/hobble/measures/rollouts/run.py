@@ -296,5 +296,4 @@ def run(given: Given, options: Options) -> Outcome:
         given.runtime.mode,
         sample,
     )
-    read = list(sample.weights) if sample else None
-    return Outcome(result, {"lengths": roll_out_rows(result)}, read=read)
+    return Outcome(result, {"lengths": roll_out_rows(result)})
