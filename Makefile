@@ -8,26 +8,26 @@ BIN := .venv/bin
 help:            ## list these targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
 
-env: .venv/.ready  ## the environment in .venv
+env: .venv/.ready  ## make the environment in .venv
 
 .venv/.ready: pyproject.toml constraints.txt
 	$(PYTHON) src/hobble/workflow/environment.py .venv
 	touch $@
 
-report: env      ## train a character that can be hurt, and make its report
+report: env      ## train a character that can be hurt and make its report
 	$(BIN)/snakemake -c$(CORES) results/limp/report.html
 
-test: env browser  ## the whole test suite
+test: env browser  ## run the whole test suite
 	$(BIN)/python -m pytest -n $(CORES) --dist loadfile
 
-faults: env      ## throw N faults at the workflow (make faults N=200 SEED=7), see docs/faults.md
+faults: env      ## test the workflow with N random faults (make faults N=200 SEED=7), see docs/faults.md
 	$(BIN)/python -m tests.faults --rounds $(or $(N),100) $(if $(SEED),--seed $(SEED))
 
-cluster-test: env ## the test configuration through a SLURM of one node (root, Debian)
+cluster-test: env ## run the test configuration on a SLURM cluster of one node (needs root on Debian)
 	tests/cluster/run.sh
 
-# The tests that open the report need a browser. As root on Debian it is installed; elsewhere they say that they did not run.
-browser:         ## find or install the browser of the tests
+# The tests that open the report need a browser. As root on Debian this installs one; elsewhere these tests are skipped.
+browser:         ## find or install the browser for the tests
 	@for name in chromium chromium-browser google-chrome; do command -v $$name >/dev/null && exit 0; done; \
 	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	  echo "installing chromium, for the tests that open the report"; \
@@ -35,17 +35,17 @@ browser:         ## find or install the browser of the tests
 	fi; \
 	echo "no chromium here, and none could be installed: the tests that open the report will be skipped"
 
-check: env       ## lint, format and types
+check: env       ## check lint, format and types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow/rules
 	$(BIN)/mypy
 
-docs: env       ## the documentation site in site/
+docs: env        ## build the documentation site in site/
 	$(BIN)/python -m pip install --quiet --editable ".[docs]"
 	$(BIN)/mkdocs build --strict --quiet
 
-format: env      ## rewrite in the house style
+format: env      ## format all files
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow/rules

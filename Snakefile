@@ -15,7 +15,7 @@ from hobble.workflow.targets import check, notes
 from hobble.workflow.channel_sources import channels_of_folder
 
 try:
-    # Relative, so that a checkout can be moved without making anything again.
+    # A relative path, so that moving the checkout re-runs nothing.
     project = Project(Path(os.path.relpath(workflow.basedir)), config)
     targets = [argument for argument in sys.argv[1:] if argument.startswith("results/")]
     check(project, targets)
@@ -28,7 +28,7 @@ except HobbleError as error:
 lifetime.set_run_variable()
 lifetime.clear_stale_lock()
 
-# What the rules ask; each part is a module of hobble.workflow.
+# The rules use these objects. Each has a module in hobble.workflow.
 catalogue = project.catalogue
 clips = project.clips
 datasets = project.datasets
@@ -39,7 +39,7 @@ measurements = project.measurements
 demands = Demands(project)
 
 
-# A clip that a data set lists or its folder holds: no mirror, no hurt version.
+# A clip that a data set lists or that is in its folder: no mirror, no hurt version.
 LISTED_CLIP = r"[^/]+(?<!_mirror)(?<!_hurt[1-9])"
 
 
@@ -55,12 +55,12 @@ wildcard_constraints:
     clip=r"[^/]+(?<!_mirror)",
     rows=r"[^/]+",
     channel="|".join(NAMES),
-    told=r"plain|[a-z_+]+(?<!clips)",
+    channels=r"plain|[a-z_+]+(?<!clips)",
     measure="|".join(MEASURES),
 
 
 def keep_local(files):
-    """Files of the checkout or the user: they stay where they are, though results may lie in an object store."""
+    """Mark files of the checkout or the user as local, because results may be in an object store."""
     if isinstance(files, dict):
         return {name: keep_local(some) for name, some in files.items()}
     many = [files] if isinstance(files, str) else files

@@ -77,12 +77,10 @@ def source(project: Project, job: Job, folder: Path) -> tuple[Path, list[Path]]:
     entry = project.clips.entry(job.dataset, job.clip)
     skeleton = yaml.safe_load(Path(project.clips.skeleton_file(job.dataset)).read_text())
     name = project.catalogue.dataset(job.dataset).skeleton
-    files = {part: folder / f"{job.clip}_{part}.txt" for part in ("footsteps", "gait", "status")}
+    files = {part: folder / f"{job.clip}_{part}.txt" for part in ("footsteps", "gait")}
     bvh, frames = folder / f"{job.clip}.bvh", project.datasets.frames(job.dataset, job.clip)
     options = project.catalogue.dataset(job.dataset).synthetic
-    write_clip(
-        job.clip, {"name": name, **skeleton}, frames, entry.recipe, entry.injured, options, bvh=bvh, **files
-    )
+    write_clip(job.clip, {"name": name, **skeleton}, frames, entry.recipe, options, bvh=bvh, **files)
     return bvh, [files["footsteps"], files["gait"]]
 
 

@@ -23,20 +23,15 @@ def main() -> None:
     skeleton = Skeleton.from_dict({"name": "holden31", **data})
     frames = 1000
     print(f"{'recipe':15s} {'walk s':>7s} {'write s':>8s} {'x real time':>12s}")
-    for recipe, injured in (
-        ("walk-straight", None),
-        ("jog", None),
-        ("steps", None),
-        (None, "LowerBack-Spine"),
-    ):
+    for recipe in ("walk-straight", "jog", "steps"):
         start = time.perf_counter()
-        walk = generate("benchmark", skeleton, frames, recipe, injured, 120, 1)
+        walk = generate("benchmark", skeleton, frames, recipe, 120, 1)
         walked = time.perf_counter()
         with tempfile.TemporaryDirectory() as folder:
             write_bvh(Path(folder) / "benchmark.bvh", walk.clip)
         written = time.perf_counter()
         ratio = frames / 60 / (written - start)
-        print(f"{recipe or injured:15s} {walked - start:7.2f} {written - walked:8.2f} {ratio:12.0f}")
+        print(f"{recipe:15s} {walked - start:7.2f} {written - walked:8.2f} {ratio:12.0f}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The loop of a game: a wish goes in, a pose comes out, 60 times a second.
+"""A game loop: 60 times a second it passes a wish to the character and gets a pose.
 
 python examples/game_loop.py results/injured/network
 """
@@ -10,9 +10,9 @@ import numpy as np
 from hobble.runtime import ProceduralAnimation
 from hobble.runtime.axes import Axes
 
-# Unity's convention; Axes("left", "Z") is Unreal's, Axes("right", "Z", "m") Blender's.
+# These are Unity's axes. For Unreal use Axes("left", "Z"), for Blender Axes("right", "Z", "m").
 character = ProceduralAnimation.load(sys.argv[1], axes=Axes("left", "Y", "m"), mode="cubic")
-hurts = "injury" in character.network.channels
+can_be_hurt = "injury" in character.network.channels
 
 
 def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -21,9 +21,10 @@ def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 for frame in range(600):
-    angle = 2 * np.pi * frame / 600  # the player's stick goes round once in ten seconds
+    angle = 2 * np.pi * frame / 600  # the player turns the stick once around in ten seconds
     stick = np.array([np.sin(angle), np.cos(angle)])
-    injury = {"LeftUpLeg-LeftLeg": 7} if hurts and frame >= 300 else None
+    injury = {"LeftUpLeg-LeftLeg": 7} if can_be_hurt and frame >= 300 else None
     pose = character.next_pose(0.025 * stick, gait="walk", injury=injury, terrain=hills)  # metres a frame
-    if frame % 60 == 0:  # here a game would set its bones from pose.positions and pose.rotations
+    # A game would now set its bones from pose.positions and pose.rotations.
+    if frame % 60 == 0:
         print(f"{frame / 60:2.0f} s at {pose.root.round(2)}, contacts {pose.contacts.round(1)}")

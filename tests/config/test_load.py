@@ -137,10 +137,9 @@ def test_a_data_set_that_cannot_be_is_refused(values: dict, message: str) -> Non
     ("entry", "message"),
     [
         (
-            {"injured": "A-B"},
-            r"^d\.yaml: clips\.a\.injured: only clips of a `synthetic` .* have this key; use `channels`\.$",
+            {"recipe": "walk"},
+            r"^d\.yaml: clips\.a\.recipe: only clips of a `synthetic` data set have this key\.$",
         ),
-        ({"recipe": "walk"}, r"clips\.a\.recipe: only clips of a `synthetic` data set"),
         ({"share": 4}, r"clips\.a\.share: only clips of a `synthetic` data set"),
     ],
 )

@@ -76,7 +76,17 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
             "held_out": {"frames": 0, "mean": None, "sd": None, "mean_of_clips": None},
             "clips": [{"clip": c, "split": "train", **spread(m, 0.01)} for c, m in clips.items()],
         },
-        "responsivity": {"parameters": counts, "modes": modes, **modes[-1]},
+        "responsivity": {
+            "parameters": counts,
+            "stored": {
+                "constant": 50 * counts["true"],
+                "linear": 10 * counts["true"],
+                "cubic": 4 * counts["true"],
+            },
+            "exact": MODES[-1],
+            "modes": modes,
+            **modes[-1],
+        },
         "rollouts": {"lengths": [{"length": n, **ROLLED, "clips": []} for n in (1, 60)]},
         "injury": {"applies": False, "reason": "none"},
         "recognition": RECOGNISED if name == "ava" else {"applies": False, "reason": "none"},

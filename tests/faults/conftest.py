@@ -17,7 +17,7 @@ from .texts import base_bvh
 def tiny_bvh(holden31: Skeleton, tmp_path_factory: pytest.TempPathFactory) -> str:
     """A BVH of a second and a half."""
     folder = tmp_path_factory.mktemp("walk")
-    names = {"bvh": "a.bvh", "footsteps": "f.txt", "gait": "g.txt", "status": "s.txt"}
+    names = {"bvh": "a.bvh", "footsteps": "f.txt", "gait": "g.txt"}
     paths = {key: folder / name for key, name in names.items()}
-    write_clip("walk", holden31.to_dict(), 600, None, None, Synthetic(fps=120, seed=1), **paths)
+    write_clip("walk", holden31.to_dict(), 600, None, Synthetic(fps=120, seed=1), **paths)
     return base_bvh(Path(paths["bvh"]))

@@ -18,7 +18,7 @@ from .throws import FAULT, REFUSED, UNHARMED
 
 pytestmark = pytest.mark.workflow
 SEED = 20
-CLIPS = ("walk-straight-1", "injured-left-shank")
+CLIPS = ("walk-straight-1_hurt1", "uneven-1")
 TARGETS = [f"results/datasets/tiny/database/clips/{clip}.npz" for clip in CLIPS]
 
 

@@ -57,7 +57,7 @@ def made(holden31: Skeleton) -> Callable[[str], Healthy]:
     def make(name: str) -> Healthy:
         segments, ground = SEGMENTS[name]
         frames = round(60 * sum(s.seconds for s in segments))
-        result = walk(name, holden31, segments, frames, None, ground, 60, 1)
+        result = walk(name, holden31, segments, frames, ground, 60, 1)
         return labelled(result.clip, "jog" if name == "jog" else "walk", ground == "flat")
 
     return make

@@ -12,33 +12,39 @@ from hobble.core.errors import HobbleError
 from hobble.hurt.options import Hurt
 from hobble.hurt.parts import part_of_link
 from hobble.hurt.schedule import severities
+from hobble.hurt.version import WHOLE
+from hobble.workflow.project import Project
 
 
-def of_the_walker(root):
-    """Name -> frames of the clips of config/datasets/synthetic.yaml."""
-    data = yaml.safe_load((root / "config/datasets/synthetic.yaml").read_text())
-    total = sum(entry.get("share", 1) for entry in data["clips"].values())
-    frames = data["synthetic"]["frames"]
-    return data, {name: round(frames * e.get("share", 1) / total) for name, e in data["clips"].items()}
-
-
-def seconds_hurt(skeleton, data, frames):
-    """(30,) seconds for which each link hurts in the training clips."""
-    options = Hurt.model_validate(data["hurt"])
+def seconds_hurt(skeleton, versions, frames, options):
+    """(30,) seconds for which each link hurts in versions (name -> turn) of clips of so many frames."""
     out = np.zeros(len(skeleton.links))
-    for turn, (name, count) in enumerate(frames.items()):
-        if name not in data["held_out"]:
-            out += (severities(skeleton, count, 60.0, options, f"{name}_hurt1", turn) > 0).sum(axis=0) / 60
+    for name, turn in versions.items():
+        clip = name.rpartition("_hurt")[0]
+        severity = severities(skeleton, frames[clip], 60.0, options(clip), name, turn)
+        if len(severity) >= WHOLE * 60:
+            severity = severity[: round(options(clip).longest * len(severity))]
+        out += (severity > 0).sum(axis=0) / 60
     return out
 
 
 def test_the_walker_s_clips_hurt_all_thirty_links(root, holden31) -> None:
-    seconds = seconds_hurt(holden31, *of_the_walker(root))
+    project = Project(root, {})
+    held_out = project.catalogue.dataset("synthetic").held_out
+    clips = project.clips
+    frames = {clip: project.datasets.frames("synthetic", clip) for clip in clips.listed("synthetic")}
+    versions = {
+        name: turn
+        for name, turn in clips.hurt_versions("synthetic").items()
+        if name.rpartition("_hurt")[0] not in held_out
+    }
+    seconds = seconds_hurt(holden31, versions, frames, lambda clip: clips.hurt("synthetic", clip))
+    seconds = seconds + seconds[list(holden31.mirror_links)]  # the data set has mirrors
     assert seconds.min() > 2
     legs = [
         i for i, link in enumerate(holden31.links) if part_of_link(holden31, link).name in ("thigh", "shank")
     ]
-    assert seconds[legs].min() > 8
+    assert seconds[legs].min() > 14
 
 
 @pytest.mark.shared
@@ -47,7 +53,20 @@ def test_captured_clips_hurt_all_thirty_links(root, shared, holden31) -> None:
     with open(shared / "mocap/clips.csv") as file:
         known = {row["file"]: int(row["frames"]) // 2 for row in csv.DictReader(file)}
     frames = {clip: known[f"cmu/{clip}.bvh"] for clip, e in data["clips"].items() if "channels" not in e}
-    assert seconds_hurt(holden31, data, frames).min() > 2
+    versions = {f"{clip}_hurt1": turn for turn, clip in enumerate(frames) if clip not in data["held_out"]}
+    options = Hurt.model_validate(data["hurt"])
+    assert seconds_hurt(holden31, versions, frames, lambda clip: options).min() > 2
+
+
+def test_an_injury_has_the_highest_severity_for_half_of_its_time(holden31) -> None:
+    options = Hurt(links=("LeftUpLeg-LeftLeg",), at_once=1)
+    out = severities(holden31, 180 * 40, 60.0, options, "a", 0)
+    column = out[:, holden31.link_names.index("LeftUpLeg-LeftLeg")].reshape(40, 2, 90)
+    assert np.ptp(column, axis=2).max() == 0  # two halves of a second and a half
+    halves = column[:, :, 0]
+    assert (halves.max(axis=1) == 10).all()
+    assert set(halves.min(axis=1)) == {3.0, 5.0, 7.0}
+    assert {tuple(pair) for pair in halves == 10} == {(True, False), (False, True)}
 
 
 def test_a_clip_s_severities_are_its_own_and_always_the_same(holden31) -> None:

@@ -12,6 +12,9 @@ import pytest
 
 from hobble.core.errors import InputError
 from hobble.evaluation.motion_measures import in_root_frame
+from hobble.measures.given import Given
+from hobble.measures.measure import Measure
+from hobble.measures.registry import MEASURES
 from hobble.measures.rollouts.run import (
     Inputs,
     clip_roll_outs,
@@ -87,6 +90,7 @@ def test_a_roll_out_is_what_the_runtime_does(hurtable: Network, ground: Any) -> 
     assert np.abs(moved[0] - local[1]).max() > 1
 
 
+ROOT = Path(__file__).parents[2]
 LAYOUT = RowLayout(31, channels=(("injury", 30),))
 
 
@@ -197,6 +201,19 @@ def test_rows_of_another_layout_are_refused(hurtable: Network, network: Network,
         measure_roll_outs(tmp_path / "weights.npz", {"a": tmp_path / "a.npz"}, {"a": "train"}, "x")
 
 
+@pytest.mark.parametrize("measure", [m for m in MEASURES if m.package.startswith("hobble.channels.")])
+def test_a_channel_s_measure_does_not_apply_to_a_network_without_it(
+    measure: Measure, make_network, tmp_path: Path
+) -> None:
+    """`holden` is measured on clips that carry severities; what these say is nothing to it, and not read."""
+    save(tmp_path / "weights.npz", make_network())
+    files = {"weights": tmp_path / "weights.npz", "published": ROOT / "src/hobble/evaluation/published.yaml"}
+    given = Given("plain", files, {"a": tmp_path / "unread.npz"}, {"a": "train"})
+    found = measure.part("run").run(given, measure.options())
+    assert found.result["applies"] is False
+    assert "network" in found.result["reason"]
+
+
 def save(path: Path, network: Network) -> None:
     """Write a network as training does."""
     arrays: dict[str, Any] = {}
@@ -212,7 +229,7 @@ def save(path: Path, network: Network) -> None:
     meta = {
         "layout": network.layout.to_dict(),
         "skeleton": network.skeleton.to_dict(),
-        "channels": {"injury": list(network.channels["injury"])},
+        "channels": {name: list(labels) for name, labels in network.channels.items()},
         "gaits": list(network.gaits),
     }
     np.savez(path, **arrays, meta=np.array(json.dumps(meta)))

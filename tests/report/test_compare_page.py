@@ -42,6 +42,8 @@ def compared(material: Material) -> dict[str, Any]:
         responsivity = {
             **material.measured["responsivity"],
             "parameters": {k: factor * v for k, v in counts.items()},
+            "stored": {"cubic": 4 * factor * counts["true"]},
+            "exact": "cubic",
         }
         splits = {
             s: {

@@ -4,9 +4,11 @@ import re
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from hobble.measures.responsivity.page import track_figures
+from hobble.report.coverage import TURNS
 from hobble.report.findings import hints, key_figures
 from hobble.report.gather import Material
 
@@ -172,3 +174,18 @@ def test_what_the_data_lack_comes_before_longer_training(material: Material) -> 
     assert missing < longer
     standing = [{"clip": "a", "seconds": {"walk": 30.0, "stand": 5.0}, "strip": {}}]
     assert not any("Nobody stands" in head for head in heads(material, labels=standing, history=falling))
+
+
+def test_clips_without_turns_are_told(material: Material) -> None:
+    """A hundred seconds straight on, and some that turn by 50 degrees a second."""
+    middles = (TURNS[:-1] + TURNS[1:]) / 2
+
+    def said(seconds: float) -> bool:
+        straight = np.where(np.abs(middles) < 20, 50.0, 0.0)
+        turns = {"train": straight, "held_out": np.where(middles == 50, seconds, 0.0)}
+        return any("Hardly anybody turns" in hint.head for hint in hints(material, turns))
+
+    assert said(0.0)
+    assert said(0.9)
+    assert not said(1.5)
+    assert not any("turns" in hint.head for hint in hints(material, {"train": 0.0 * middles}))

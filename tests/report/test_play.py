@@ -269,6 +269,39 @@ def test_what_is_saved_as_bvh_is_what_was_played(
     assert len(read_bvh(tmp_path / "own.bvh")) > 20
 
 
+def test_the_view_of_the_inputs_shows_what_the_network_is_told(
+    tab: Any, network: Network, examples: ModuleType
+) -> None:
+    """Heights where the samples are, 25 cm to either side of the path too; velocities as Python's."""
+    animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
+    for _ in range(40):
+        pose = animation.next_pose([0.5, 2.4], None, "walk", terrain=hills)
+    samples, needles = tab.run("""(() => {
+      const spec = Hobble.material.playable.example, c = Hobble.character(spec);
+      const hills = (x, z) => 14 * Math.sin(x / 170) * Math.cos(z / 140) + 8 * Math.sin((x + z) / 260);
+      for (let f = 0; f < 40; f++) c.frame([.5, 2.4], null, "walk", hills);
+      return [Hobble.groundSamples(c, spec), Hobble.jointVelocities(c)];
+    })()""")
+    places = np.reshape([sample["place"] for sample in samples], (12, 3, 3))
+    told = np.reshape([sample["told"] for sample in samples], (12, 3))
+    assert np.abs(told - (places[..., 1] - places[:, 1, 1].mean())).max() < 1e-9
+    aside = np.linalg.norm((places - places[:, 1:2])[..., [0, 2]], axis=-1)
+    np.testing.assert_allclose(aside, np.tile([25.0, 0, 25.0], (12, 1)), atol=1e-6)
+    assert np.ptp(told) > 1, "the ground is not flat there"
+    velocity = animation.state.joint_velocity[0]
+    moving = np.linalg.norm(velocity, axis=-1) >= 0.15
+    start, end = (np.array([needle[key] for needle in needles]) for key in ("from", "to"))
+    np.testing.assert_allclose(end - start, 8 * velocity[moving], atol=1e-2)
+    np.testing.assert_allclose(start, pose.positions[moving], atol=1e-2)
+    show(tab)
+    button = "document.getElementById('play-inputs')"
+    tab.run(f"{button}.click()")
+    assert tab.run(f"{button}.getAttribute('aria-pressed')") == "true"
+    assert "heights of the ground" in tab.run("document.getElementById('play-note').textContent")
+    tab.run(f"{button}.click()")
+    assert tab.console == []
+
+
 LEFT_LEG = """(() => {{
   const {{ view, actors: [actor] }} = Hobble.player, {{ places }} = actor.rig;
   const [hip, knee] = actor.spec.legs[0];

@@ -263,12 +263,12 @@ def test_the_runs_lie_over_the_track_and_are_red_where_they_left_it() -> None:
     by_name = {trace["name"]: trace for trace in chart.traces}
     assert by_name["track"]["x"] == [0.0, 10.0, 10.0, 0.0], "it is closed"
     assert by_name["waypoints"]["text"] == ["0, walk", "1, jog", "2, crouch"]
-    left = by_name["more than 50 cm off"]
+    left = by_name["more than 100 cm off"]
     assert (left["x"], left["y"], left["customdata"]) == ([5.0], [-2.0], [[200.0, 2]])
     assert "the furthest was 200 cm" in chart.caption
     kept = responsivity_page.track_chart({"track": track, "runs": [near]})
     assert kept is not None
-    assert "none was further from it than 50 cm; the furthest was 10 cm" in kept.caption
+    assert "none was further from it than 100 cm; the furthest was 10 cm" in kept.caption
     assert responsivity_page.track_chart({"track": {"waypoints": 6}}) is None
 
 

@@ -40,11 +40,11 @@ def prediction(
 
 
 def move(
-    y: np.ndarray, position, direction, gait, phase=None, wish=(0.0, 1.0), held: float = 0.0
+    y: np.ndarray, position, direction, gait, phase=None, wish=(0.0, 1.0), held: float = 0.0, whole=False
 ) -> np.ndarray:
     phase = np.zeros(1) if phase is None else phase
     columns = trajectory.advance_columns(LAYOUT)
-    trajectory.advance(y, columns, np.array([wish], float), held, position, direction, gait, phase)
+    trajectory.advance(y, columns, np.array([wish], float), held, whole, position, direction, gait, phase)
     return phase
 
 
@@ -84,6 +84,14 @@ def test_a_standing_figure_is_held() -> None:
     np.testing.assert_allclose(position[0, MIDDLE], 0, atol=1e-12)
     np.testing.assert_allclose(direction[0, MIDDLE], [0, 1], atol=1e-12)
     assert phase[0] == pytest.approx(0.1 * 0.02)
+
+
+def test_a_standing_figure_whose_movement_is_of_its_pose_is_not_held() -> None:
+    position, direction, gait = path(stand=1.0)
+    phase = move(prediction(speed=2.0, turn=-0.1), position, direction, gait, whole=True)
+    np.testing.assert_allclose(position[0, MIDDLE], [0, 2.0], atol=1e-6)
+    np.testing.assert_allclose(direction[0, MIDDLE], [np.sin(0.1), np.cos(0.1)], atol=1e-6)
+    assert phase[0] == pytest.approx(0.02)
 
 
 @pytest.mark.parametrize(

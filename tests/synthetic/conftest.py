@@ -25,7 +25,7 @@ CONTACT = 0.02  # cm2 per 60 Hz frame
 
 @dataclass(frozen=True)
 class Files:
-    """A clip's four files, read; frames count from 0 at 60 Hz, as every second one of the BVH's is kept."""
+    """A clip's three files, read; frames count from 0 at 60 Hz, as every second one of the BVH's is kept."""
 
     folder: Path
     name: str
@@ -133,23 +133,21 @@ def read_bvh(text: str) -> tuple[list[str], float, Array]:
 
 @pytest.fixture(scope="session")
 def written(tmp_path_factory: pytest.TempPathFactory, holden31: Skeleton) -> Callable[..., Files]:
-    """Writes a clip once a session: `written(name, recipe, injured, frames, fps, seed)`."""
+    """Writes a clip once a session: `written(name, recipe, frames, fps, seed)`."""
     folder = tmp_path_factory.mktemp("synthetic")
 
     @functools.cache
     def write(
         name: str,
         recipe: str | None = None,
-        injured: str | None = None,
         frames: int = 600,
         fps: int = 120,
         seed: int = 1,
     ) -> Files:
-        here = folder / f"{fps}-{seed}-{frames}-{recipe}-{injured}"
+        here = folder / f"{fps}-{seed}-{frames}-{recipe}"
         paths: dict[str, Any] = {"bvh": here / f"{name}.bvh"}
-        endings = {"footsteps": "footsteps", "gait": "gait", "status": "injuries"}
-        paths |= {key: here / f"{name}_{ending}.txt" for key, ending in endings.items()}
-        write_clip(name, holden31.to_dict(), frames, recipe, injured, Synthetic(fps=fps, seed=seed), **paths)
+        paths |= {ending: here / f"{name}_{ending}.txt" for ending in ("footsteps", "gait")}
+        write_clip(name, holden31.to_dict(), frames, recipe, Synthetic(fps=fps, seed=seed), **paths)
         return Files(here, name)
 
     return write

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import yaml
 
-from hobble.synthetic.links import LINKS
 from hobble.synthetic.path import GAITS
 from hobble.synthetic.recipes import GROUND, RECIPES, plan
 
@@ -16,30 +15,26 @@ def plans(data):
     total = sum(entry.get("share", 1) for entry in data["clips"].values())
     for name, entry in data["clips"].items():
         frames = data["synthetic"]["frames"] * entry.get("share", 1) / total
-        recipe = entry.get("recipe") or "injured"
-        yield name, entry, frames, plan(recipe, 2 * frames, 120, data["synthetic"]["seed"], name)
+        yield name, entry, frames, plan(entry["recipe"], 2 * frames, 120, data["synthetic"]["seed"], name)
 
 
 @pytest.mark.parametrize("name", ["synthetic", "tiny"])
-def test_clips_name_recipes_and_links_that_there_are(root, name):
+def test_clips_name_recipes_that_there_are(root, name):
     data = yaml.safe_load((root / f"config/datasets/{name}.yaml").read_text())
     for clip, entry in data["clips"].items():
-        assert ("recipe" in entry) != ("injured" in entry), clip
-        assert entry.get("recipe", "injured") in RECIPES
-        assert entry.get("injured", "LowerBack-Spine") in LINKS
+        assert entry["recipe"] in RECIPES
         assert (entry.get("ground", "flat") == "rocky") == (entry.get("recipe") in GROUND), clip
         assert entry["gait"] in GAITS
     training = [entry for clip, entry in data["clips"].items() if clip not in data["held_out"]]
     for clip in data["held_out"]:
         entry = data["clips"][clip]
         if name == "synthetic":
-            like = [e for e in training if all(e.get(k) == entry.get(k) for k in ("recipe", "injured"))]
-            assert like, f"nothing like {clip} is trained on"
+            assert any(e["recipe"] == entry["recipe"] for e in training), f"nothing like {clip} is trained on"
 
 
 def test_every_recipe_is_walked(dataset):
-    used = {e["recipe"] for e in dataset["clips"].values() if "recipe" in e}
-    assert used == set(RECIPES) - {"injured", "walk-straight"}  # the latter is a tiny data set's
+    used = {e["recipe"] for e in dataset["clips"].values()}
+    assert used == set(RECIPES) - {"walk-straight"}  # the latter is a tiny data set's
 
 
 def test_turns_go_left_as_much_as_right_and_every_gait_has_its_share(dataset):

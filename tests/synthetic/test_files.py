@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import itertools
-import re
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.channels.injury.status import read_status
 from hobble.core.errors import HobbleError
-from hobble.synthetic.clip import ENOUGH, SHORTEST, write_clip
-from hobble.synthetic.files import footsteps_text, gait_text, status_text
-from hobble.synthetic.links import LINKS
+from hobble.synthetic.clip import write_clip
+from hobble.synthetic.files import footsteps_text, gait_text
 from hobble.synthetic.options import Synthetic
 from hobble.synthetic.path import gait_keys
 from hobble.synthetic.recipes import Segment
@@ -56,10 +53,8 @@ def test_frames_rate_and_number_are_as_asked(written):
 
 def test_same_arguments_same_bytes_and_another_seed_or_name_another_walk(written, tmp_path, holden31):
     def write(name, seed):
-        paths = {key: tmp_path / f"{name}{seed}{key}" for key in ("bvh", "footsteps", "gait", "status")}
-        write_clip(
-            name, holden31.to_dict(), 240, "uneven", "LowerBack-Spine", Synthetic(fps=120, seed=seed), **paths
-        )
+        paths = {key: tmp_path / f"{name}{seed}{key}" for key in ("bvh", "footsteps", "gait")}
+        write_clip(name, holden31.to_dict(), 240, "uneven", Synthetic(fps=120, seed=seed), **paths)
         return [path.read_bytes() for path in paths.values()]
 
     once = write("a", 1)
@@ -68,11 +63,9 @@ def test_same_arguments_same_bytes_and_another_seed_or_name_another_walk(written
     assert write("b", 1)[0] != once[0]
 
 
-def test_unknown_recipe_or_link_is_refused_with_what_there_is(written):
+def test_an_unknown_recipe_is_refused_with_what_there_is(written):
     with pytest.raises(HobbleError, match=r"clip x: there is no recipe 'moonwalk'.*walk-straight"):
         written("x", recipe="moonwalk")
-    with pytest.raises(HobbleError, match=r"clip x: .*cannot hurt 'Neck-Head'.*LeftUpLeg-LeftLeg"):
-        written("x", injured="Neck-Head")
 
 
 def test_gait_keys_say_which_gait_and_fade_between(written):
@@ -126,42 +119,10 @@ def test_feet_that_land_once_or_never_make_no_line():
     assert footsteps_text([4], [9]) == "5 10\n"
 
 
-def test_status_lines_cover_what_hurts_and_nothing_else():
-    assert status_text(90, None, [(0, 0)]) == "frames:90\n"
-    text = status_text(90, "A-B", [(0, 0), (20, 3), (50, 10)])
-    assert text == "frames:90\n21-50 A-B[3];\n51-90 A-B[10];\n"
-
-
-def test_a_clip_hurts_at_every_severity_from_footstep_to_footstep(written):
-    clip = written("hurt", injured="LeftLeg-LeftFoot", frames=800)
-    first, *lines = clip.text("_injuries.txt").splitlines()
-    assert first == "frames:1600"
-    found = [re.fullmatch(r"(\d+)-(\d+) LeftLeg-LeftFoot\[(\d+)\];", line) for line in lines]
-    ranges = [tuple(int(x) for x in match.groups()) for match in found]
-    assert [severity for _, _, severity in ranges] == [3, 5, 7, 10]
-    assert ranges[-1][1] == 1600
-    assert all(b + 1 == c for (_, b, _), (c, _, _) in itertools.pairwise(ranges))
-    landings = clip.footsteps.ravel()
-    for start, _, _ in ranges:
-        assert np.abs(landings - start).min() <= 2
-    assert written("healthy", recipe="jog").text("_injuries.txt") == "frames:1200\n"
-
-
-@pytest.mark.parametrize("link", LINKS)
-@pytest.mark.parametrize("fps", [60, 120])
-def test_the_shortest_clip_that_hurts_has_a_status_file_that_can_be_read(written, holden31, link, fps):
-    clip = written("short", injured=link, frames=SHORTEST, fps=fps)
-    status = read_status(clip.folder / "short_injuries.txt", holden31.link_names)
-    assert status.frames == SHORTEST * fps // 60
-    assert status.spells[-1].links == ((link, 10.0),)
-    enough = written("enough", injured=link, frames=ENOUGH, fps=fps)
-    assert len(read_status(enough.folder / "enough_injuries.txt", holden31.link_names).spells) == 4
-
-
 def test_a_clip_too_short_for_a_step_says_how_many_frames_are_enough(holden31, tmp_path):
-    paths = {key: tmp_path / key for key in ("bvh", "footsteps", "gait", "status")}
+    paths = {key: tmp_path / key for key in ("bvh", "footsteps", "gait")}
     options = Synthetic(frames=600, fps=120, seed=1)
-    said = r"clip a: 16 frames at 60 Hz are too short for a step. Set synthetic.frames to 4875 or more"
+    said = r"clip a: 16 frames at 60 Hz are too short for a step. Set synthetic.frames to 2250 or more"
     with pytest.raises(HobbleError, match=said):
-        write_clip("a", holden31.to_dict(), 16, "walk", None, options, **paths)
+        write_clip("a", holden31.to_dict(), 16, "walk", options, **paths)
     assert not list(tmp_path.iterdir())

@@ -24,7 +24,7 @@ from hobble.core.files import load_npz
 from hobble.database.merge import write_database
 from hobble.training.options import Machines
 from hobble.workflow import lifetime
-from hobble.workflow.together import command, on_machines, train_together
+from hobble.workflow.training_processes import command, on_machines, train_together
 
 from .conftest import SPLITS, Recipe, clip_rows
 
@@ -148,7 +148,7 @@ def test_where_one_dies_the_others_end_and_another_number_goes_on(
 
     killer = threading.Thread(target=kill_one)
     killer.start()
-    with pytest.raises(HobbleError, match=r"one of the 2 processes .* died"):
+    with pytest.raises(HobbleError, match=r"one of the 2 training processes died"):
         together(2, passes=40)
     killer.join()
     assert not [p for p in psutil.Process().children(recursive=True) if p.status() != psutil.STATUS_ZOMBIE]
@@ -197,7 +197,7 @@ def test_a_damaged_chunk_is_named(
 def test_machines_need_slurm(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     machines = Machines(nodes=4, gpus=8)
     monkeypatch.delenv("SLURM_JOB_ID", raising=False)
-    with pytest.raises(HobbleError, match=r"training\.nodes is 4, but this is not a job of SLURM"):
+    with pytest.raises(HobbleError, match=r"training\.nodes is 4, but this is not a SLURM job"):
         command(machines, tmp_path)
     monkeypatch.setenv("SLURM_JOB_ID", "7")
     words = command(machines, tmp_path)

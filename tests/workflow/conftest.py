@@ -117,7 +117,9 @@ def copied(finished: Workflow, tmp_path: Path) -> Workflow:
 def clips(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Two good clips with their label and status files."""
     made = copy_of(root, tmp_path_factory.mktemp("clips"))
-    names = ("injured-left-shank", "walk-straight-1")
+    names = ("uneven-1", "walk-straight-1")
     paths = [f"results/datasets/tiny/synthetic/{name}.bvh" for name in names]
     made.run("-c2", *paths)
+    status = made.folder / "results/datasets/tiny/synthetic/uneven-1_injuries.txt"
+    status.write_text("frames:786\n100-400 LeftLeg-LeftFoot[3];\n401-786 LeftLeg-LeftFoot[10];\n")
     return [made.folder / path for path in paths]

@@ -192,10 +192,6 @@ WALKER = "skeleton: s\nsynthetic: {frames: 600}\nclips: {b: {%s}}\n"
         (LISTED % "channels: {injury: 'left knee 8'}", "'left knee 8' does not read as Joint-Joint"),
         (LISTED % "channels: {injury: ''}", "clips.b.channels.injury: names no link"),
         (WALKER % "recipe: wlak", "clips.b.recipe: no such recipe: wlak. There are walk-straight, walk, "),
-        (
-            WALKER % "injured: LeftUpLeg-LeftLg",
-            "clips.b: injured: the walker cannot hurt .* It can: LeftUpLeg-LeftLeg",
-        ),
     ],
 )
 def test_what_a_clip_names_wrongly_is_told_before_anything_runs(

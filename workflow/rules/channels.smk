@@ -1,5 +1,5 @@
 rule channel_clip:
-    """What one channel tells the body in each frame of a clip."""
+    """The values of one channel in each frame of a clip."""
     input:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
         report="results/datasets/{dataset}/motion/{clip}.json",
@@ -27,7 +27,7 @@ rule channel_clip:
 
 
 rule channel_mirror:
-    """What one channel tells the body in each frame of a mirrored clip."""
+    """The values of one channel in each frame of a mirrored clip."""
     input:
         values="results/datasets/{dataset}/channels/{channel}/{clip}.npz",
         report="results/datasets/{dataset}/channels/{channel}/{clip}.json",

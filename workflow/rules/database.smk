@@ -34,17 +34,17 @@ rule database_clip:
         "../scripts/database_clip.py"
 
 
-def clips_of(dataset, told, file):
+def clips_of(dataset, channels, file):
     """That file of each clip of a database."""
     return expand(
         f"results/datasets/{dataset}/{file}",
-        clip=datasets.selected(dataset, channels_of_folder(told)),
+        clip=datasets.selected(dataset, channels_of_folder(channels)),
     )
 
 
 def compared(w, file):
     """That file of the clips that must not be one motion on both sides of the split; of one shard, if asked."""
-    names = datasets.compared(w.dataset, channels_of_folder(w.told))
+    names = datasets.compared(w.dataset, channels_of_folder(w.channels))
     if hasattr(w, "number"):
         names = shard_of(names, int(w.number), datasets.parts(w.dataset))
     return expand(f"results/datasets/{w.dataset}/{file}", clip=names)
@@ -54,7 +54,7 @@ def pieces(w, kind):
     """The folders of a database's shards, or of its parts; none where one job merges it."""
     count = datasets.parts(w.dataset)
     return [
-        f"results/datasets/{w.dataset}/database/parts/{w.told}/{kind}-{number}"
+        f"results/datasets/{w.dataset}/database/parts/{w.channels}/{kind}-{number}"
         for number in range(count if count > 1 else 0)
     ]
 
@@ -62,19 +62,19 @@ def pieces(w, kind):
 rule database_shard:
     """The rows of some clips, scattered over the parts of the database."""
     input:
-        clips=lambda w: clips_of(w.dataset, w.told, "database/clips/{clip}.npz"),
+        clips=lambda w: clips_of(w.dataset, w.channels, "database/clips/{clip}.npz"),
         compared=lambda w: compared(w, "motion/{clip}.npz"),
         reports=lambda w: compared(w, "motion/{clip}.json"),
     output:
         shard=temp(
             directory(
-                "results/datasets/{dataset}/database/parts/{told}/shard-{number}"
+                "results/datasets/{dataset}/database/parts/{channels}/shard-{number}"
             )
         ),
     log:
-        "results/datasets/{dataset}/logs/database/database_shard/{told}-{number}.log",
+        "results/datasets/{dataset}/logs/database/database_shard/{channels}-{number}.log",
     benchmark:
-        "results/datasets/{dataset}/benchmarks/database/database_shard/{told}-{number}.tsv"
+        "results/datasets/{dataset}/benchmarks/database/database_shard/{channels}-{number}.tsv"
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.memory_of_longest(w.dataset, 10, 24, attempt),
@@ -82,12 +82,12 @@ rule database_shard:
     params:
         number=lambda w: int(w.number),
         parts=lambda w: datasets.parts(w.dataset),
-        splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.told)),
-        channels=lambda w: channels_of_folder(w.told),
-        sources=lambda w: datasets.sources(w.dataset, channels_of_folder(w.told)),
+        splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.channels)),
+        channels=lambda w: channels_of_folder(w.channels),
+        sources=lambda w: datasets.sources(w.dataset, channels_of_folder(w.channels)),
         options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=lambda w: package.code(
-            "database_shard", *modules_of(channels_of_folder(w.told))
+            "database_shard", *modules_of(channels_of_folder(w.channels))
         ),
     script:
         "../scripts/database_shard.py"
@@ -99,12 +99,14 @@ rule database_part:
         shards=lambda w: pieces(w, "shard"),
     output:
         part=temp(
-            directory("results/datasets/{dataset}/database/parts/{told}/part-{number}")
+            directory(
+                "results/datasets/{dataset}/database/parts/{channels}/part-{number}"
+            )
         ),
     log:
-        "results/datasets/{dataset}/logs/database/database_part/{told}-{number}.log",
+        "results/datasets/{dataset}/logs/database/database_part/{channels}-{number}.log",
     benchmark:
-        "results/datasets/{dataset}/benchmarks/database/database_part/{told}-{number}.tsv"
+        "results/datasets/{dataset}/benchmarks/database/database_part/{channels}-{number}.tsv"
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.part_memory(w.dataset, attempt),
@@ -114,32 +116,32 @@ rule database_part:
         parts=lambda w: datasets.parts(w.dataset),
         options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=lambda w: package.code(
-            "database_part", *modules_of(channels_of_folder(w.told))
+            "database_part", *modules_of(channels_of_folder(w.channels))
         ),
     script:
         "../scripts/database_part.py"
 
 
 rule database_merge:
-    """The rows of all clips, shuffled, in chunks, with their statistics."""
+    """The rows of all clips, shuffled and in chunks, with their statistics."""
     input:
         clips=lambda w: (
             []
             if pieces(w, "part")
-            else clips_of(w.dataset, w.told, "database/clips/{clip}.npz")
+            else clips_of(w.dataset, w.channels, "database/clips/{clip}.npz")
         ),
-        # No motion may lie on both sides of the split.
+        # To check that no motion is on both sides of the split.
         compared=lambda w: [] if pieces(w, "part") else compared(w, "motion/{clip}.npz"),
         reports=lambda w: [] if pieces(w, "part") else compared(w, "motion/{clip}.json"),
         # Of more than one job there is what these have made.
         shards=lambda w: pieces(w, "shard"),
         parts=lambda w: pieces(w, "part"),
     output:
-        database=directory("results/datasets/{dataset}/database/{told}"),
+        database=directory("results/datasets/{dataset}/database/{channels}"),
     log:
-        "results/datasets/{dataset}/logs/database/database_merge/{told}.log",
+        "results/datasets/{dataset}/logs/database/database_merge/{channels}.log",
     benchmark:
-        "results/datasets/{dataset}/benchmarks/database/database_merge/{told}.tsv"
+        "results/datasets/{dataset}/benchmarks/database/database_merge/{channels}.tsv"
     threads: 1
     resources:
         mem_mb=lambda w, attempt: demands.memory_of_longest(w.dataset, 10, 24, attempt),
@@ -148,12 +150,12 @@ rule database_merge:
         ),
     params:
         dataset=lambda w: w.dataset,
-        splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.told)),
-        channels=lambda w: channels_of_folder(w.told),
-        sources=lambda w: datasets.sources(w.dataset, channels_of_folder(w.told)),
+        splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.channels)),
+        channels=lambda w: channels_of_folder(w.channels),
+        sources=lambda w: datasets.sources(w.dataset, channels_of_folder(w.channels)),
         options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=lambda w: package.code(
-            "database_merge", *modules_of(channels_of_folder(w.told))
+            "database_merge", *modules_of(channels_of_folder(w.channels))
         ),
     script:
         "../scripts/database_merge.py"

@@ -1,5 +1,5 @@
 rule measure:
-    """One measurement of a network: its JSON, and its tables as CSV. What there is to measure: hobble.measures."""
+    """One measurement of a network: its JSON and its tables as CSV. hobble.measures lists the measurements."""
     input:
         unpack(lambda w: keep_local(measurements.inputs(w.configuration, w.measure))),
     output:
@@ -31,7 +31,7 @@ rule measure:
 
 
 rule compare:
-    """Configurations side by side, with the published figures: one JSON and its tables as CSV."""
+    """The comparison of configurations with each other and with published figures: a JSON and CSV tables."""
     input:
         unpack(lambda w: comparison.input_files()),
         published=keep_local(package.published()),

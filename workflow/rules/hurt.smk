@@ -1,5 +1,5 @@
 rule hurt_clip:
-    """A healthy clip as the body would have walked it hurt, with its labels and severities."""
+    """A hurt version of a healthy clip, with its labels and severities."""
     input:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
         report="results/datasets/{dataset}/motion/{clip}.json",
@@ -27,7 +27,7 @@ rule hurt_clip:
         clip=lambda w: f"{w.clip}_hurt{w.version}",
         turn=lambda w: clips.hurt_versions(w.dataset)[f"{w.clip}_hurt{w.version}"],
         ground=lambda w: clips.entry(w.dataset, w.clip).ground,
-        options=lambda w: datasets.options(w.dataset, "hurt"),
+        options=lambda w: clips.hurt(w.dataset, w.clip).model_dump(mode="json"),
         code=package.code("hurt_clip"),
     script:
         "../scripts/hurt_clip.py"

@@ -1,5 +1,5 @@
 def for_listed_clips(dataset, file):
-    """That file of each clip that the data set lists or its folder holds."""
+    """The path `file` for each clip that the data set lists or that is in its folder."""
     return [
         f"results/datasets/{dataset}/{file}".format(clip=clip)
         for clip in clips.listed(dataset)
@@ -7,7 +7,7 @@ def for_listed_clips(dataset, file):
 
 
 rule labels_clip:
-    """Contacts, phase and gait of a clip, from hand-made files where there are any."""
+    """Contacts, phase and gait of a clip, from label files beside it if there are any."""
     input:
         clip="results/datasets/{dataset}/motion/{clip}.npz",
         report="results/datasets/{dataset}/motion/{clip}.json",
@@ -36,7 +36,7 @@ rule labels_clip:
 
 
 rule labels_mirror:
-    """The labels of a mirrored clip: the other foot, half a cycle on."""
+    """The labels of a mirrored clip: feet swapped, phase shifted by half a cycle."""
     input:
         labels="results/datasets/{dataset}/labels/{clip}.npz",
         report="results/datasets/{dataset}/labels/{clip}.json",
@@ -61,7 +61,7 @@ rule labels_mirror:
 
 
 rule look_page:
-    """What the clips of a data set say about themselves, one line a clip."""
+    """A page with one line for each clip of a data set: rig, rate, cadence, gaits, warnings."""
     input:
         clips=lambda w: for_listed_clips(w.dataset, "motion/{clip}.npz"),
         reports=lambda w: for_listed_clips(w.dataset, "motion/{clip}.json"),

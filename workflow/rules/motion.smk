@@ -1,6 +1,6 @@
-# No `code` here: a file that has its checksum is the right one, whatever fetched it.
+# No `code` here: if the checksum is right, it does not matter which code downloaded the file.
 rule download_clip:
-    """A clip that the user's folder lacks, from the address that the data set names."""
+    """A clip that is not in the user's folder, downloaded from the data set's address."""
     output:
         bvh=local(clips.downloaded("{dataset}", "{clip}")),
     log:
@@ -18,7 +18,7 @@ rule download_clip:
 
 
 rule motion_clip:
-    """A BVH file, read, checked and put on the data set's skeleton at 60 Hz."""
+    """A clip from its BVH file: checked, on the data set's skeleton, at 60 Hz."""
     input:
         bvh=lambda w: keep_local(clips.source(w.dataset, w.clip)),
         skeleton=lambda w: keep_local(clips.skeleton_file(w.dataset)),

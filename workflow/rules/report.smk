@@ -1,5 +1,5 @@
 rule page_packages:
-    """What the page takes from the npm registry, as its lock file says; fetched once."""
+    """The page's npm packages, downloaded once, as in its lock file."""
     input:
         keep_local(package.web(".json")),
     output:
@@ -17,7 +17,7 @@ rule page_packages:
 
 
 rule page_bundle:
-    """The page's scripts in one, shared by every report."""
+    """The page's scripts in one file, shared by all reports."""
     input:
         packages=rules.page_packages.output,
         scripts=keep_local(package.web(".js")),
@@ -35,7 +35,7 @@ rule page_bundle:
 
 
 rule configuration:
-    """The resolved configuration and data set, as they determine the results."""
+    """The resolved configuration and data set, with all values that determine the results."""
     output:
         yaml="results/{configuration}/configuration.yaml",
     log:
@@ -53,9 +53,9 @@ rule configuration:
 
 
 rule pipeline_summary:
-    """What each stage cost: seconds and memory from its benchmark files, bytes from its artefacts."""
+    """The cost of each stage: seconds and memory from its benchmark files, bytes from its artefacts."""
     input:
-        # Everything that the account covers, so that it is drawn up last.
+        # All that it sums up, so that it runs last.
         expand(rules.measure.output.json, measure=MEASURES, allow_missing=True),
         rules.generate.output.scenarios,
     output:
@@ -74,7 +74,7 @@ rule pipeline_summary:
 
 
 rule report:
-    """One HTML file that a person opens, reads and plays with."""
+    """The report of a configuration as one HTML file."""
     input:
         measured=expand(rules.measure.output.json, measure=MEASURES, allow_missing=True),
         pipeline=rules.pipeline_summary.output.json,
@@ -134,7 +134,7 @@ rule report:
 
 
 rule report_compare:
-    """Configurations side by side, and two of them in the same world."""
+    """The page that compares configurations and shows two of them in the same world."""
     input:
         compared=rules.compare.output.json,
         configuration=lambda w: comparison.input_files()["configuration"],
@@ -158,7 +158,7 @@ rule report_compare:
 
 
 rule stimuli:
-    """Short loops of the character walking as each channel shows it, for a questionnaire or a README."""
+    """Short looping films of the character's walk for each channel."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
@@ -180,7 +180,7 @@ rule stimuli:
 
 
 rule questionnaire:
-    """A page that shows thirteen films of the character and asks what hurts, and the list of what does."""
+    """A page that shows thirteen films of the character and asks what hurts, and the right answers."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         template=keep_local(package.templates()),
@@ -204,7 +204,7 @@ rule questionnaire:
 
 
 rule export_web:
-    """The character for other web pages: an ES module, its network, TypeScript types and an example."""
+    """The character for other web pages: an ES module, its network, TypeScript types and an example page."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         packages=rules.page_packages.output,
@@ -227,7 +227,7 @@ rule export_web:
 
 
 rule limp_picture:
-    """The healthy and the hurt walk side by side, going round: the picture at the top of the README."""
+    """A looping picture of the healthy and the hurt walk side by side, for the README."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:

@@ -1,5 +1,5 @@
 rule generate:
-    """The character walking, jogging, crouching and limping by itself, as BVH files."""
+    """Motion of the character in scripted scenarios (walk, jog, crouch, limp), as BVH files."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
@@ -23,7 +23,7 @@ rule generate:
 
 
 rule export_onnx:
-    """The network as one ONNX file in a phase mode, checked with onnxruntime."""
+    """The network as an ONNX file for one phase mode, checked with onnxruntime."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
@@ -46,7 +46,7 @@ rule export_onnx:
 
 
 rule export_release:
-    """The network as the original release's folder of .bin files, for its demo and its ports."""
+    """The network as .bin files like those of the original release, for its demo and its ports."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
     output:
@@ -68,7 +68,7 @@ rule export_release:
 
 
 rule export_glb:
-    """The character for a game engine: body, skeleton and the scripted walks, limps included, as glTF 2.0."""
+    """The character for a game engine as glTF 2.0: body, skeleton and scripted walks with limps."""
     input:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         scenarios=rules.generate.output.scenarios,

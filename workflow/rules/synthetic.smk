@@ -1,12 +1,11 @@
 rule synthetic_clip:
-    """One clip of the embedded walker, as a user's folder would hold it."""
+    """One clip of the embedded walker, in the same form as a user's clip."""
     input:
         skeleton=lambda w: keep_local(clips.skeleton_file(w.dataset)),
     output:
         bvh="results/datasets/{dataset}/synthetic/{clip}.bvh",
         footsteps="results/datasets/{dataset}/synthetic/{clip}_footsteps.txt",
         gait="results/datasets/{dataset}/synthetic/{clip}_gait.txt",
-        status="results/datasets/{dataset}/synthetic/{clip}_injuries.txt",
     log:
         "results/datasets/{dataset}/logs/synthetic/synthetic_clip/{clip}.log",
     benchmark:
@@ -21,7 +20,6 @@ rule synthetic_clip:
         clip=lambda w: w.clip,
         frames=lambda w: datasets.frames(w.dataset, w.clip),
         recipe=lambda w: clips.entry(w.dataset, w.clip).recipe,
-        injured=lambda w: clips.entry(w.dataset, w.clip).injured,
         ground=lambda w: clips.entry(w.dataset, w.clip).ground,
         options=lambda w: datasets.options(w.dataset, "synthetic"),
         code=package.code("synthetic_clip"),

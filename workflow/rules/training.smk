@@ -2,10 +2,11 @@ from hobble.training.options import Recipe
 
 
 rule training:
-    """The network, learnt from the database; checkpoints survive a kill."""
+    """The network, trained on the database. After a kill, training continues from its last checkpoint."""
     input:
         database=lambda w: configurations.database(w.configuration),
         checkpoint=lambda w: configurations.start(w.configuration),
+        clips=lambda w: configurations.rows_in_order(w.configuration),
     output:
         weights="results/{configuration}/network/weights.npz",
         history="results/{configuration}/network/history.csv",
@@ -19,7 +20,7 @@ rule training:
         mem_mb=lambda w, attempt: demands.training_memory(w.configuration, attempt),
         runtime=lambda w, attempt: demands.training_minutes(w.configuration, attempt),
         gpu=lambda w: demands.gpus(w.configuration),
-        # Processes on each of so many machines; `tasks` and `gres` are SLURM's words, one task for each machine.
+        # `processes` on each of `nodes` machines. `tasks` (one for each machine) and `gres` are SLURM's names.
         nodes=lambda w: demands.machines(w.configuration).nodes,
         tasks=lambda w: demands.machines(w.configuration).nodes,
         gres=lambda w: demands.gres(w.configuration),
@@ -27,7 +28,7 @@ rule training:
     params:
         configuration=lambda w: w.configuration,
         network=lambda w: configurations.section(w.configuration, "network"),
-        # Not the machines: where it runs is no part of what is learnt.
+        # Without the machines, because they do not change the result.
         training=lambda w: configurations.section(
             w.configuration, "training", *Recipe.model_fields
         ),

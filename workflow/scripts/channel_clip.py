@@ -1,4 +1,4 @@
-"""Creates what one channel tells the body in each frame of a clip, from where its data set says."""
+"""Creates the values of one channel in each frame of a clip, from the sources that the data set names."""
 
 from hobble.channels import Source, channel
 from hobble.channels.files import clip_values, save_values, write_report

@@ -1,4 +1,4 @@
-"""Creates what one channel tells the body in each frame of a mirrored clip."""
+"""Creates the values of one channel in each frame of a mirrored clip from those of its original."""
 
 from hobble.channels import channel
 from hobble.channels.files import load_values, save_values, write_report

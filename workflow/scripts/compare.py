@@ -1,4 +1,4 @@
-"""Creates compare.json and its CSV tables from what each of the compared configurations measured."""
+"""Creates compare.json and its CSV tables from the results of the compared configurations."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Creates results/<configuration>/configuration.yaml: every key of it and of its data set, resolved."""
+"""Creates results/<configuration>/configuration.yaml with all resolved keys of it and of its data set."""
 
 from pathlib import Path
 

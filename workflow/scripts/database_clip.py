@@ -1,4 +1,4 @@
-"""Creates the rows of one clip from its motion, labels, what it is told, and terrain fits."""
+"""Creates the rows of one clip from its motion, labels, channel values and terrain fits."""
 
 from hobble.channels.files import load_values
 from hobble.core.clip import load_clip

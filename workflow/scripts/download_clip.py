@@ -1,4 +1,4 @@
-"""Fetches a clip that the user's folder lacks, and keeps it once its checksum is right."""
+"""Downloads a clip that is not in the user's folder, and keeps it if its checksum is right."""
 
 from hobble.motion.download import download_clip
 from hobble.workflow.job import job

@@ -1,4 +1,4 @@
-"""Creates results/<configuration>/limp.webp: the healthy and the hurt walk side by side, going round."""
+"""Creates results/<configuration>/limp.webp: a loop of the healthy and the hurt walk side by side."""
 
 from hobble.channels.injury.limp_picture import write_limp_picture
 from hobble.models.load import load_network

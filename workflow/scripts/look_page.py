@@ -1,4 +1,4 @@
-"""Creates results/datasets/<dataset>/look.html: what the clips of a data set say about themselves."""
+"""Creates results/datasets/<dataset>/look.html: a page with one line for each clip of a data set."""
 
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json, write_text

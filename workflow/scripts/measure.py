@@ -1,4 +1,4 @@
-"""Creates <measure>.json and its tables (CSV) from what the measurement asks for."""
+"""Creates <measure>.json and its CSV tables from the inputs of the measurement."""
 
 import importlib
 from pathlib import Path
@@ -10,7 +10,7 @@ from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
-    # By name: which measurements there are beside this one is no reason to run it again.
+    # Imported by name, so that adding another measurement does not re-run this one.
     measure = importlib.import_module(snakemake.params.package).MEASURE
     files = {need: Path(file) for need, file in snakemake.input.items() if need not in ("clips", "facts")}
     given = Given(

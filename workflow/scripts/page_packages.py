@@ -1,4 +1,4 @@
-"""Creates results/page/node_modules/ from the page's lock file and the npm registry."""
+"""Creates results/page/node_modules/: the npm packages in the page's lock file."""
 
 from pathlib import Path
 

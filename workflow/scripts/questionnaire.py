@@ -1,4 +1,4 @@
-"""Creates results/<configuration>/questionnaire/: the page that asks what hurts, and what does."""
+"""Creates results/<configuration>/questionnaire/: the page that asks what hurts, and the right answers."""
 
 from hobble.channels.injury.study.questionnaire import doubts, write_questionnaire
 from hobble.models.load import load_network

@@ -1,4 +1,4 @@
-"""Creates results/<configuration>/report.html from evaluation, clip reports and generated motion."""
+"""Creates results/<configuration>/report.html from the measurements, clip reports and generated motion."""
 
 from pathlib import Path
 

@@ -1,5 +1,4 @@
-"""Creates results/<configuration>/stimuli/: loops of the character, as it is told, as animated images
-and BVH files."""
+"""Creates results/<configuration>/stimuli/: loops of the character for each channel, as WebP and BVH."""
 
 from hobble.models.load import load_network
 from hobble.report.stimuli import doubts, write_stimuli

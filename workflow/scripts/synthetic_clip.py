@@ -1,4 +1,4 @@
-"""Creates one clip of the embedded data set (BVH, footsteps, gait, status) from its recipe and a skeleton."""
+"""Creates one clip of the embedded data set (BVH, footsteps, gait) from its recipe and a skeleton."""
 
 from pathlib import Path
 
@@ -14,10 +14,8 @@ with job(snakemake):
         {"name": source.stem, **read_yaml(source)},
         snakemake.params.frames,
         snakemake.params.recipe,
-        snakemake.params.injured,
         Synthetic.model_validate(snakemake.params.options),
         bvh=snakemake.output.bvh,
         footsteps=snakemake.output.footsteps,
         gait=snakemake.output.gait,
-        status=snakemake.output.status,
     )

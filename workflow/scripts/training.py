@@ -6,7 +6,7 @@ from hobble.models import network_options
 from hobble.training.options import Machines, Training
 from hobble.training.run import run
 from hobble.workflow.job import job
-from hobble.workflow.together import on_machines, train_together
+from hobble.workflow.training_processes import on_machines, train_together
 
 with job(snakemake):
     recipe = Training.model_validate(snakemake.params.training)
@@ -24,7 +24,7 @@ with job(snakemake):
     }
     if machines.count > 1:
         train_together(machines, snakemake.threads, Path(snakemake.log[0]), **arguments)
-    # Alone it trains; after the others it finds their last checkpoint, and writes what is asked for.
+    # With one process this trains. With several it finds their last checkpoint and writes the outputs.
     run(
         **arguments,
         configuration=snakemake.params.configuration,
@@ -33,4 +33,5 @@ with job(snakemake):
         history=Path(snakemake.output.history),
         checkpoint=Path(snakemake.output.checkpoint),
         terrain_side=snakemake.params.terrain_side,
+        clips={Path(file).stem: file for file in snakemake.input.clips},
     )

@@ -111,7 +111,7 @@ class Channel(ABC):
             label: {
                 "seconds": float(np.sum(column > 0) / fps),
                 "highest": float(column.max()),
-                "spells": spells(column, fps),
+                "spells": spells(column, fps, self.highest),
             }
             for label, column in zip(labels, values.T, strict=True)
             if column.any()
@@ -119,16 +119,22 @@ class Channel(ABC):
 
 
 SILENT = 1e10  # the deviation of an input that is to have no effect: it standardises to nothing
+JUMP = 0.05  # of a channel's highest value, from one frame to the next
 LEAST = 1e-6  # below this a column does not vary at all
 
 
-def spells(column: Array, fps: float) -> list[list[float]]:
-    """[from, to, value] in seconds of each stretch of one value above 0."""
+def spells(column: Array, fps: float, highest: float) -> list[list[float]]:
+    """[from, to, highest value] in seconds of each stretch above 0; a jump of the value begins another.
+
+    A value that rises or falls over many frames makes no jump.
+    """
     import numpy as np
 
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(column)) + 1, [len(column)]])
+    on = column > 0
+    jumps = (np.abs(np.diff(column)) > JUMP * highest) | (on[1:] != on[:-1])
+    edges = np.concatenate([[0], np.flatnonzero(jumps) + 1, [len(column)]])
     return [
-        [round(float(a / fps), 3), round(float(b / fps), 3), float(column[a])]
+        [round(float(a / fps), 3), round(float(b / fps), 3), float(column[a:b].max())]
         for a, b in itertools.pairwise(edges)
-        if column[a] > 0
+        if on[a]
     ]

@@ -17,9 +17,14 @@ from hobble.core.quat import Array
 
 UNLIMITED = 1e4  # cm a frame: of a gait in which no healthy clip goes ahead
 LEVELS = 5  # values for which a speed is kept, from 0 to the highest; between them it is interpolated
-TOP = 75  # percentile of the speeds of healthy cycles in a gait, of which a hurt body keeps its share
+TOP = 95  # percentile of the speeds of healthy cycles in a gait: that of a body that is told nothing
+USUAL = 50  # percentile of those, of which a hurt body keeps its share
+LAME = (
+    0.85  # who keeps this share of the usual speed, or less, cannot hurry; who keeps all is as fast as ever
+)
 AHEAD = 0.9  # share of its speed that a cycle makes forward, of those that say how fast a gait is
-STEADY = 0.1  # of the highest value: a cycle in which a value changes by more says nothing of either
+STEADY = 0.35  # of the highest value: a cycle in which a value changes by more says nothing of either
+FAINT = 0.05  # of the highest value: less, as a mean over a cycle, is nothing told
 RESOLUTE = 0.1  # cm a frame; a slower cycle of a healthy body is no measure of anything
 FIRM = 2.0  # cycles that the expectation counts as much as, where cycles are few
 SLOWEST = 0.1  # share of the healthy speed that everybody keeps
@@ -114,11 +119,12 @@ class Pace:
         highest = np.maximum.reduceat(values[order], starts) if len(order) else values
         lowest = np.minimum.reduceat(values[order], starts) if len(order) else values
         shares = np.stack([mean(column) for column in gait.T], axis=1)
+        means = np.stack([mean(column) for column in values.T], axis=1)
         cycles = _Cycles(
             shares.argmax(axis=1),
             mean(np.hypot(velocity[:, 0], velocity[:, 1])),
             mean(velocity[:, 1]),
-            highest.astype(float),
+            np.where(means < FAINT * self.highest, 0.0, means),
             numbers,
         )
         keep = (shares.max(axis=1) > 0.5) & ((highest - lowest).max(axis=1) <= STEADY * self.highest)
@@ -145,7 +151,7 @@ class Pace:
         usual = np.zeros(self.gaits)
         for g in range(self.gaits):
             if len(speeds := healthy[healthy[:, 0] == g, 1]):
-                top[g], usual[g] = np.percentile(speeds, TOP), np.median(speeds)
+                top[g], usual[g] = np.percentile(speeds, [TOP, USUAL])
         gait, share, values = self._shares(usual)
         if not len(share):
             return None
@@ -160,7 +166,8 @@ class Pace:
             expected = _fitted(levels, s, r, np.maximum(1 - fall * levels, SLOWEST))
             for k in np.flatnonzero(top < UNLIMITED):
                 own = _fitted(levels, s[gaits == k], r[gaits == k], expected)
-                speeds[k, label] = top[k] * own
+                hurries = np.maximum(own - LAME, 0.0) / (1 - LAME)
+                speeds[k, label] = usual[k] * own + (top[k] - usual[k]) * hurries
         return Limits(levels, speeds)
 
     def _healthy(self) -> Array:

@@ -37,10 +37,9 @@ def _channel(name: str) -> str:
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 ClipName = Annotated[str, AfterValidator(_clip_name)]
-Link = Annotated[str, Field(min_length=3)]
 ChannelName = Annotated[str, AfterValidator(_channel)]
 OLD_KEYS = {key: one.name for one in every() for key in one.former}
-WALKER_KEYS = ("injured", "recipe", "share")  # keys of a clip that only the walker reads
+WALKER_KEYS = ("recipe", "share")  # keys of a clip that only the walker reads
 
 
 class ClipEntry(s.Section):
@@ -49,12 +48,14 @@ class ClipEntry(s.Section):
     gait: s.Gait | None = Field(None, description="the main gait of the clip, for automatic labels")
     ground: s.Ground = "flat"
     channels: dict[ChannelName, Any] = Field({}, description="channel -> its value in all frames of the clip")
-    injured: Link | None = Field(
-        None, description="synthetic: the link that is hurt, at severities 3, 5, 7 and 10"
-    )
     recipe: str | None = Field(None, description="synthetic: which plan the walker follows")
     share: s.PositiveFloat = Field(1.0, description="synthetic: length relative to the other clips")
     source_fps: s.PositiveFloat | None = Field(None, description="overrides the file's Frame Time")
+    hurt: Annotated[float, Field(ge=0, le=9, allow_inf_nan=False)] | None = Field(
+        None,
+        description="how many times its length its hurt versions last together; overrides `hurt.versions` "
+        "and `hurt.longest` of the data set",
+    )
     loops: s.Positive | None = Field(None, description="overrides motion.loops")
     heading: s.Finite | None = Field(None, description="overrides motion.heading")
 
@@ -111,15 +112,18 @@ class Dataset(s.Section):
         unknown = [c for c in self.held_out if self.clips and c not in self.clips]
         if unknown:
             raise ValueError(f"held_out names clips that are not in `clips`: {', '.join(unknown)}")
+        if self.hurt is None and self.extends is None:
+            for clip, entry in self.clips.items():
+                if entry and entry.hurt is not None:
+                    raise ValueError(f"clips.{clip}.hurt: the data set has no section `hurt`")
         return self
 
     def _no_walker_keys(self) -> None:
         for clip, entry in self.clips.items():
             for key in WALKER_KEYS:
                 if entry and getattr(entry, key) != ClipEntry.model_fields[key].default:
-                    hint = "; use `channels`" if key == "injured" else ""
                     raise ValueError(
-                        f"clips.{clip}.{key}: only clips of a `synthetic` data set have this key{hint}"
+                        f"clips.{clip}.{key}: only clips of a `synthetic` data set have this key"
                     )
 
 

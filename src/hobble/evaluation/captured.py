@@ -1,4 +1,4 @@
-"""Captured motion as the measures take it, from the rows of a clip: unbroken stretches in the root frame."""
+"""Captured motion for the measurements: unbroken stretches of a clip's rows, in the root frame."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from hobble.rows.layout import GAITS
 class Captured:
     """F consecutive frames of a clip.
 
-    local: (F, J, 3) positions in the root frame, cm above the ground; contacts: (F, 4); phase: (F,);
-    told: channel -> (F, its columns); gait: (F, 6); velocity: (F, 2) of the root, seen from itself, cm a
-    frame; root: (F, 3) where it is, level, from the origin on; acceleration: (F,) the largest of any joint,
-    cm per frame squared, 0 in the first frame; rows: (F,) which row of the clip each frame is.
+    local: (F, J, 3) joint positions in the root frame, heights above the ground, cm. contacts: (F, 4).
+    phase: (F,). told: channel -> (F, columns). gait: (F, 6) shares. velocity: (F, 2) of the root in its own
+    frame, cm a frame. root: (F, 3) position on the ground, starting at the origin. acceleration: (F,) largest
+    of any joint, cm per frame squared, 0 in the first frame. rows: (F,) the clip's row of each frame.
     """
 
     clip: str
@@ -40,7 +40,7 @@ class Captured:
 
 
 def unbroken(frame: np.ndarray) -> list[np.ndarray]:
-    """Rows of each stretch without a gap; of the two rows of a frame that two cycles share, the first.
+    """Row indices of each stretch of consecutive frames. A frame that two cycles share counts once.
 
     >>> [run.tolist() for run in unbroken(np.array([3, 4, 7, 8, 8, 9]))]
     [[0, 1], [2, 3, 5]]
@@ -52,7 +52,7 @@ def unbroken(frame: np.ndarray) -> list[np.ndarray]:
 
 
 def captured(rows: ClipRows) -> Iterator[Captured]:
-    """The unbroken stretches of a clip's rows, on the first terrain fit of each."""
+    """The unbroken stretches of a clip's rows, with the first terrain fit of each row."""
     layout = rows.layout
     for chosen in unbroken(rows.frame):
         y = rows.y[chosen].astype(float)
@@ -75,18 +75,18 @@ def captured(rows: ClipRows) -> Iterator[Captured]:
 
 
 def captured_clips(paths: Iterable[str | Path]) -> Iterator[Captured]:
-    """The unbroken stretches of all clips, one clip in memory at a time, in the order of their names."""
+    """The unbroken stretches of all clips, in the order of clip names, with one clip in memory at a time."""
     for path in sorted(paths, key=lambda path: Path(path).stem):
         yield from captured(load_clip_rows(path))
 
 
 def headings(turn: Array) -> Array:
-    """(F,) yaw of a root, 0 at first; turn: (F,) of the world seen from it, so that the root turns back."""
+    """(F,) yaw of a root, starting at 0. turn: (F,) turn of the world seen from the root (opposite sign)."""
     return np.concatenate([[0.0], -np.cumsum(turn)[:-1]])
 
 
 def root_path(velocity: Array, turn: Array) -> Array:
-    """(F, 3) where a root is that moves by velocity (F, 2), seen from itself, then turns (see headings)."""
+    """(F, 3) path of a root from its velocity (F, 2) in its own frame and its turn (F,); see `headings`."""
     steps = rotate_by_yaw(velocity, headings(turn))
     out = np.zeros((len(turn), 3))
     out[1:, ::2] = np.cumsum(steps, axis=0)[:-1]
@@ -94,14 +94,14 @@ def root_path(velocity: Array, turn: Array) -> Array:
 
 
 def rotate_by_yaw(vectors: Array, yaw: Array) -> Array:
-    """Level vectors x, z (..., 2) seen from a root of yaw (...), as the world sees them."""
+    """Rotate ground vectors x, z (..., 2) from the frame of a root with this yaw (...) to the world."""
     sin, cos = np.sin(yaw), np.cos(yaw)
     x, z = vectors[..., 0], vectors[..., 1]
     return np.stack([x * cos + z * sin, z * cos - x * sin], axis=-1)
 
 
 def _accelerations(velocity: Array, turn: Array) -> Array:
-    """(F,) the largest change of velocity (F, J, 3), each seen from its own root."""
+    """(F,) largest change of any joint's velocity (F, J, 3), which is in the root frame of each frame."""
     carried = velocity[:-1].copy()
     carried[..., ::2] = rotate_by_yaw(velocity[:-1, :, ::2], turn[:-1, None])
     change = np.linalg.norm(velocity[1:] - carried, axis=-1)

@@ -1,10 +1,9 @@
-"""Any number of configurations side by side, and the published figures beside them.
+"""Compares any number of configurations with each other and with published figures.
 
-What each configuration measured of itself is gathered, and each measurement says what there is to compare.
-Its `comparison.py` may have
+Gathers the results of each configuration, and calls the `comparison.py` of each measurement, which may have
 
 - `compared(all_measured, published) -> SideBySide`: what it adds to compare.json (see `side_by_side`),
-- `tables(compared) -> Mapping[str, Sequence[Row]]`: CSV tables of that, by name.
+- `tables(compared) -> Mapping[str, Sequence[Row]]`: the same as CSV tables, by name.
 """
 
 from __future__ import annotations
@@ -16,15 +15,16 @@ from hobble.evaluation.configuration_results import ConfigurationResults
 from hobble.evaluation.side_by_side import SideBySide, published_row
 from hobble.measures.given import Json
 from hobble.measures.registry import MEASURES
+from hobble.models import network_options
 
 
 def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> dict[str, Any]:
-    """compare.json: lists with an entry for each configuration, in their order.
+    """The content of compare.json. Its lists have entries for each configuration, in their order.
 
-    `configurations`: what sets each apart; `training`, `stages`: how it came about; under the name of each
-    measurement: what it found; `difference`: eq. 3.2 of each pair; `beside`: the published figures with
-    ours; `published`: all of them. Whatever a clock decides stands under `milliseconds`: `difference` and
-    `beside` again, and what else the measurements have of it.
+    `configurations`: how they differ. `training`: their histories. `stages`: time, memory and size of their
+    stages. The name of each measurement: its results. `difference`: eq. 3.2 for each pair. `beside`:
+    published figures with ours. `published`: all published figures. `milliseconds`: everything that depends
+    on a clock, again with `difference` and `beside`.
     """
     found = {name: say(all_measured, published) for name, say in each("compared")}
     times = SideBySide(milliseconds={"beside": stage_times(all_measured, published)})
@@ -52,30 +52,31 @@ def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> di
 
 
 def each(function: str) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """The name of each measurement whose `comparison.py` has this function, and the function."""
+    """Yield the name and the function of each measurement whose `comparison.py` has this function."""
     for one in MEASURES:
         if (found := getattr(one.part("comparison"), function, None)) is not None:
             yield one.name, found
 
 
 def describe(measured: ConfigurationResults, found: Iterable[SideBySide]) -> dict[str, Any]:
-    """What sets a configuration apart: its data, network, training, and what the measurements say of it."""
+    """A description of a configuration: data set, network, training, and entries of the measurements."""
     model = measured.resolved["configuration"]
+    hidden = network_options(model["network"]).hidden
     about = {key: value for one in found for key, value in one.about.get(measured.name, {}).items()}
     return {
         "configuration": measured.name,
         "dataset": measured.dataset,
         "network_of": model.get("network_of"),
         "channels": list(model.get("channels") or ()),
-        "hidden_layers": model["network"].get("hidden_layers"),
-        "units": model["network"].get("units"),
+        "hidden_layers": len(hidden) or None,
+        "units": max(hidden, default=None),
         "passes": model["training"]["passes"],
         **about,
     }
 
 
 def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
-    """Published bytes of the database and of the patches, with ours."""
+    """Published sizes of the database and the patches, with ours."""
     found = {m.name: m for m in all_measured}
     out = []
     for row in published["stages"]:

@@ -1,4 +1,4 @@
-"""The comparison as flat rows, one table a CSV file."""
+"""The comparison as flat tables, one for each CSV file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hobble.measures.given import Json, Row
 
 
 def tables(compared: Json) -> dict[str, Sequence[Row]]:
-    """Table name -> rows of equal keys, of what `compare.compare` returned."""
+    """Table name -> rows with equal keys, from the result of `compare`."""
     of_measures = {name: rows for _, say in each("tables") for name, rows in say(compared).items()}
     return {
         "configurations": [flat(row) for row in compared["configurations"]],
@@ -30,7 +30,7 @@ def tables(compared: Json) -> dict[str, Sequence[Row]]:
 
 
 def flat(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A row with the mappings in it laid out as `key_inner`."""
+    """A row in which each inner mapping is replaced by keys `key_inner`."""
     out: dict[str, Any] = {}
     for key, value in row.items():
         if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""What one configuration measured of itself, as a comparison reads it."""
+"""The results of one configuration, for a comparison."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from hobble.measures.given import Json
 
 @dataclass(frozen=True)
 class ConfigurationResults:
-    """What one configuration left behind: its resolved configuration, its costs, its history.
+    """The results of one configuration.
 
-    measured: measurement -> its JSON.
+    resolved: configuration.yaml. measured: measurement -> its JSON. pipeline: pipeline.json. history: column
+    -> values of history.csv, None for empty fields.
     """
 
     name: str
@@ -28,16 +29,16 @@ class ConfigurationResults:
     history: Mapping[str, list[float | None]] = field(repr=False)
 
     def found(self, measure: str) -> Json:
-        """What a measurement found."""
+        """The JSON of a measurement."""
         return self.measured[measure]
 
     @property
     def dataset(self) -> str:
-        """The data set it learns from."""
+        """The name of its data set."""
         return self.resolved["configuration"]["dataset"]
 
     def of_stage(self, stage: str, key: str) -> float | None:
-        """What one stage took or left behind."""
+        """A value of one stage in pipeline.json, such as "seconds" or "bytes"; None without that stage."""
         return next((s[key] for s in self.pipeline["stages"] if s["stage"] == stage), None)
 
 

@@ -1,5 +1,4 @@
-"""Many figures at once, each walking by a script of its own: speed, gait and what it is told, step by
-step."""
+"""Many figures at once. Each walks by its own script of speeds, gaits and channel values."""
 
 from __future__ import annotations
 
@@ -15,15 +14,15 @@ from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
 FPS = 60
-SPEEDS = {"walk": 2.5, "jog": 7.0}  # cm a frame asked for
-SETTLING_SHARE = 0.25  # share of a stretch that is not measured: what is told and gait are still on their way
+SPEEDS = {"walk": 2.5, "jog": 7.0}  # wished speeds, cm a frame
+SETTLING_SHARE = 0.25  # share of a stretch, at its beginning, in which channels and gait still change
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """`frames` in which C figures are asked for the same: gait (C,) names, told: channel -> (C, columns).
+    """A number of frames with constant wishes for C figures.
 
-    speed: (C,) cm a frame; by default the gait's.
+    gait: (C,) names. told: channel -> (C, columns). speed: (C,) cm a frame, or None for SPEEDS of the gait.
     """
 
     frames: int
@@ -34,11 +33,11 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Walks:
-    """What C figures did over F frames, and `starts` (S + 1,) of each stretch.
+    """The motion of C figures over F frames and S stretches.
 
-    local: (F, C, J, 3) positions in the root frame, float32; contacts (F, C, 4); phase (F, C); root
-    (F, C, 3); acceleration (F, C): the largest of any joint around a frame, cm per frame squared, 0 at both
-    ends.
+    local: (F, C, J, 3) positions in the root frame, cm, float32. contacts: (F, C, 4). phase: (F, C).
+    root: (F, C, 3). acceleration: (F, C) largest of any joint, cm per frame squared, 0 in the first and last
+    frame. starts: (S + 1,) first frame of each stretch, then F.
     """
 
     local: Array = field(repr=False)
@@ -49,9 +48,9 @@ class Walks:
     starts: np.ndarray
 
     def measured(self, stretch: int, figure: int) -> slice:
-        """The frames of a stretch that are measured: the last ones that make up whole cycles of the figure.
+        """The frames of a stretch to measure: whole cycles of the figure at the end of the stretch.
 
-        All but the beginning where it does not get through a cycle.
+        If there is no whole cycle after the settling time, all frames after it.
         """
         start, stop = int(self.starts[stretch]), int(self.starts[stretch + 1])
         start += round(SETTLING_SHARE * (stop - start))
@@ -63,7 +62,7 @@ class Walks:
 
 
 def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
-    """Let figures that stand at first walk by `script`, straight ahead on flat ground."""
+    """Run figures through `script`, from a stand, straight ahead on flat ground."""
     assert network.skeleton is not None
     count, frames = len(script[0].gait), sum(s.frames for s in script)
     animation = ProceduralAnimation(network, characters=count, **dict(runtime))
@@ -78,7 +77,7 @@ def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
         shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
         for _ in range(stretch.frames):
             pose = animation.next_pose(velocity, gait=shares, **stretch.told)
-            # One figure alone has no axis of its own.
+            # A single figure has no leading axis.
             positions = pose.positions.reshape(count, -1, 3)
             root[f], phase[f], contacts[f] = pose.root, pose.phase, pose.contacts
             local[f] = in_root_frame(positions, root[f], np.atleast_1d(pose.yaw))
@@ -92,9 +91,10 @@ def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
 
 
 def channel_values(network: Network, name: str, each: Sequence[Mapping[str, float]]) -> dict[str, Array]:
-    """What a stretch tells its figures by channel `name`, given as column -> value; {} where the
-    network is not
-    told that channel."""
+    """The values of channel `name` for a stretch, or {} if the network does not have that channel.
+
+    each: column -> value, for each figure.
+    """
     columns = network.channels.get(name)
     if columns is None:
         return {}

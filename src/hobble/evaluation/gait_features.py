@@ -1,4 +1,4 @@
-"""What a stretch of walking looks like in some forty numbers, from which it can be told what hurts."""
+"""Describes a stretch of walking with about forty numbers, from which a classifier finds what hurts."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ SIDES = ("left", "right")
 
 
 def features(skeleton: Skeleton, local: Array, contacts: Array, root: Array) -> dict[str, float]:
-    """The gait's measures, and for each limb how far and about which middle it moves.
+    """The measures of the gait, and mean and standard deviation of the motion of each limb.
 
-    local: (F, J, 3) positions in the root frame; contacts: (F, 4); root: (F, 3). Degrees, cm and shares;
-    lengths of steps and asymmetries are 0 where there is no step.
+    local: (F, J, 3) positions in the root frame, cm. contacts: (F, 4). root: (F, 3), cm. Returns degrees, cm
+    and shares. Step lengths and asymmetries are 0 if there is no step.
     """
     measured = gait_measures(skeleton, local, contacts, root)
     out = {name: value if value is not None else 0.0 for name, value in measured.items()}
@@ -50,7 +50,7 @@ def features(skeleton: Skeleton, local: Array, contacts: Array, root: Array) -> 
 
 
 def _swing(down: Array) -> Array:
-    """Degrees that a limb (F, 3) that hangs down points forward."""
+    """Angle of a limb (F, 3) forward from straight down, degrees."""
     return np.degrees(np.arctan2(down[:, 2], -down[:, 1]))
 
 

@@ -1,6 +1,6 @@
-"""What can be measured of generated motion: slide, turns, gait events, angles. Centimetres, 60 Hz, degrees.
+"""Measures of generated motion: foot slide, turns, gait events, angles. Centimetres, 60 Hz, degrees.
 
-Functions take frames first; where they serve many characters at once, those come second: (F, C, ...).
+The first axis is frames.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 
 STANCE = 0.5  # predicted contact from which a foot counts as standing
-SHORTEST_STANCE = 4  # frames; shorter contacts are flickers, not steps
+SHORTEST_STANCE = 4  # frames; shorter contacts do not count as steps
 
 
 def runs(on: np.ndarray) -> np.ndarray:
-    """(N, 2) first frame and end (exclusive) of each stretch in which `on` (F,) is true.
+    """(N, 2) first frame and end (exclusive) of each run of true values in `on` (F,).
 
     >>> runs(np.array([False, True, True, False, True])).tolist()
     [[1, 3], [4, 5]]
@@ -27,12 +27,12 @@ def runs(on: np.ndarray) -> np.ndarray:
 
 
 def stance(contacts: Array) -> np.ndarray:
-    """(F, 2) whether the left and the right foot stand, by heel or toe, of contacts (F, 4)."""
+    """(F, 2) whether the heel or the toe of the left and the right foot is in contact; contacts: (F, 4)."""
     return np.maximum(contacts[:, ::2], contacts[:, 1::2]) >= STANCE
 
 
 def foot_slide(toes: Array, contacts: Array) -> Array:
-    """(N,) how far the toe slides on the ground in each stance, cm; toes (F, 2, 3), contacts (F, 4)."""
+    """(N,) distance that the toe slides in each stance, cm. toes: (F, 2, 3), contacts: (F, 4)."""
     out = []
     for side in range(2):
         step = np.linalg.norm(np.diff(toes[:, side, ::2], axis=0), axis=1)
@@ -43,7 +43,7 @@ def foot_slide(toes: Array, contacts: Array) -> Array:
 
 
 def largest_turn(rotations: Array) -> float:
-    """Degrees that any joint turns at most from one frame to the next; rotations (F, J, 4) world."""
+    """Largest turn of any joint from one frame to the next, degrees. rotations: (F, J, 4) world."""
     if len(rotations) < 2:
         return 0.0
     dot = np.abs(np.sum(rotations[1:] * rotations[:-1], axis=-1, dtype=float))
@@ -51,12 +51,12 @@ def largest_turn(rotations: Array) -> float:
 
 
 def acceleration(positions: Array) -> Array:
-    """(F - 2, ...) size of the second difference of positions (F, ..., 3), cm per frame squared."""
+    """(F - 2, ...) length of the second difference of positions (F, ..., 3), cm per frame squared."""
     return np.linalg.norm(np.diff(positions, n=2, axis=0), axis=-1)
 
 
 def bend(a: Array, b: Array, c: Array) -> Array:
-    """(...) degrees by which the joint at b (..., 3) is bent between a and c; 0 is straight."""
+    """(...) angle by which the joint at b (..., 3) is bent between a and c, degrees; 0 is straight."""
     u, v = b - a, c - b
     cosine = np.sum(u * v, axis=-1) / np.maximum(
         np.linalg.norm(u, axis=-1) * np.linalg.norm(v, axis=-1), 1e-9
@@ -65,7 +65,7 @@ def bend(a: Array, b: Array, c: Array) -> Array:
 
 
 def in_root_frame(positions: Array, root: Array, yaw: Array) -> Array:
-    """World positions (..., J, 3) relative to root (..., 3), turned so that the facing `yaw` (...) is +Z."""
+    """World positions (..., J, 3) relative to root (..., 3), rotated so that its facing `yaw` (...) is +Z."""
     p = positions - root[..., None, :]
     sin, cos = np.sin(yaw)[..., None], np.cos(yaw)[..., None]
     x, z = p[..., 0] * cos - p[..., 2] * sin, p[..., 0] * sin + p[..., 2] * cos
@@ -73,7 +73,7 @@ def in_root_frame(positions: Array, root: Array, yaw: Array) -> Array:
 
 
 def asymmetry(left: float | None, right: float | None) -> float | None:
-    """(left - right) / their mean: 0 is even, positive where the left is larger; None without both."""
+    """(left - right) / mean: 0 if equal, positive if the left is larger. None if one is missing."""
     if left is None or right is None or left + right == 0:
         return None
     return 2 * (left - right) / (left + right)
@@ -82,12 +82,12 @@ def asymmetry(left: float | None, right: float | None) -> float | None:
 def gait_measures(
     skeleton: Skeleton, local: Array, contacts: Array, travelled: Array
 ) -> dict[str, float | None]:
-    """One character's walk in numbers.
+    """Measures of one character's walk.
 
-    local: (F, J, 3) positions in the root frame; contacts: (F, 4); travelled: (F, 3) world root positions.
-    Returns speed (cm/s over the straight distance), stance shares, step lengths (cm the landing heel is ahead
-    of the other), knee and arm ranges (degrees, 5th to 95th percentile), trunk lean (degrees, forward and to
-    the left), hip height (cm) and asymmetries; None where nothing of the kind happened.
+    local: (F, J, 3) positions in the root frame. contacts: (F, 4). travelled: (F, 3) world root positions.
+    Returns speed (cm/s, straight-line distance), stance shares, step lengths (distance of the landing heel
+    ahead of the other, cm), knee and arm ranges (degrees, 5th to 95th percentile), trunk lean (degrees,
+    forward and to the left), hip height (cm) and asymmetries. Values without any step are None.
     """
     role = skeleton.role
     seconds = (len(local) - 1) / 60

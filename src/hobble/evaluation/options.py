@@ -1,4 +1,4 @@
-"""The keys of a configuration's `evaluation` section: those of every measurement, together."""
+"""The keys of a configuration's `evaluation` section, collected from all measurements."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from hobble.measures.registry import MEASURES
 
 
 def joined_sections(sections: list[type[Section]]) -> type[Section]:
-    """One section with the keys of all.
+    """One section with the keys of all sections.
 
-    Raises TypeError for a key that two of them define; a common base may define it for both.
+    Raises TypeError if two sections define the same key, unless they inherit it from the same base.
     """
     owner: dict[str, type] = {}
     for section in sections:

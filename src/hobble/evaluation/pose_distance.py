@@ -1,4 +1,4 @@
-"""How far apart two ways of walking are: the distance of poses at the same phase."""
+"""The distance between two walks: that of their poses at the same phase."""
 
 from __future__ import annotations
 
@@ -6,19 +6,22 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-PHASES = 24  # bins of the cycle in which poses are compared
+PHASES = 24  # phase bins of a cycle
 FPS = 60
-SETTLED_SHARE = 0.1  # share of the final change within which a response counts as settled
-SMALLEST_CHANGE_CM = 0.1  # cm; a smaller change is none that could settle
+SETTLED_SHARE = 0.1  # a response is settled within this share of its final change
+SMALLEST_CHANGE_CM = 0.1  # smaller changes get no settling time
 
 
 def phase_bins(phase: Array) -> np.ndarray:
-    """(...) which of PHASES bins each phase falls into."""
+    """(...) index of the bin of each phase, 0 to PHASES - 1."""
     return np.minimum((np.asarray(phase) * PHASES).astype(int), PHASES - 1)
 
 
 def mean_cycle(local: Array, phase: Array) -> Array:
-    """(PHASES, J, 3) mean pose in each phase bin of local (F, J, 3), phase (F,); a gap takes its nearest."""
+    """(PHASES, J, 3) mean pose in each phase bin of local (F, J, 3), phase (F,).
+
+    An empty bin gets the pose of the nearest bin.
+    """
     at = phase_bins(phase)
     mean = np.zeros((PHASES, *local.shape[1:]))
     seen = np.unique(at)
@@ -31,20 +34,21 @@ def mean_cycle(local: Array, phase: Array) -> Array:
 
 
 def distance_to_cycle(local: Array, phase: Array, cycle: Array) -> Array:
-    """(F,) mean distance in cm of the joints of local (F, J, 3) from a mean cycle at the same phase."""
+    """(F,) mean distance of the joints of local (F, J, 3) from a mean cycle at the same phase, cm."""
     return np.linalg.norm(local - cycle[phase_bins(phase)], axis=-1).mean(axis=-1)
 
 
 def period(phase: Array) -> int:
-    """Frames of a cycle of phase (F,), at most a second and a half."""
+    """Mean length of a cycle of phase (F,) in frames, limited to 10 to 90."""
     rate = np.mod(np.diff(phase), 1.0).mean()
     return int(np.clip(round(1 / max(rate, 1e-3)), 10, 3 * FPS // 2))
 
 
 def settling(distance: Array, normal: float, window: int) -> float | None:
-    """Seconds until distance (F,) from a motion, over a window of a cycle, stays near its last.
+    """Seconds until a distance (F,) from a motion stays close to its last value.
 
-    normal: the distance before the change. Near is within a tenth of the whole change; None without one.
+    window: frames to average over, usually a cycle. normal: the distance before the change. Close means
+    within SETTLED_SHARE of the whole change. None if the change is below SMALLEST_CHANGE_CM.
     """
     window = min(window, len(distance))
     smooth = np.convolve(distance, np.ones(window) / window, mode="valid")

@@ -1,4 +1,4 @@
-"""Two series set against each other, and a straight line through points."""
+"""The difference of two series, and a straight line through points."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 def difference(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float | None:
-    """2 |mean a - mean b| / (sd a + sd b), eq. 3.2 of Segerstedt 2021; None where neither series spreads.
+    """2 |mean a - mean b| / (sd a + sd b), eq. 3.2 of Segerstedt 2021; None if both deviations are 0.
 
     >>> difference(3.0, 0.5, 1.0, 1.5)
     2.0
@@ -20,7 +20,7 @@ def difference(mean_a: float, sd_a: float, mean_b: float, sd_b: float) -> float 
 def line(x: Sequence[float], y: Sequence[float]) -> dict[str, float | None] | None:
     """The least-squares line y = intercept + slope x and its r2; None for fewer than two different x.
 
-    r2 is None where y does not change.
+    r2 is None if all y are equal.
     """
     if len(set(x)) < 2:
         return None

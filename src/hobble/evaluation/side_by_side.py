@@ -1,4 +1,4 @@
-"""What a measurement says of several configurations, and the pieces that it is made of."""
+"""What a measurement adds to the comparison of configurations, and the rows it consists of."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from hobble.measures.given import Json, Row
 class SideBySide:
     """What one measurement adds to compare.json.
 
-    entries: the list under its own name. about: configuration -> what sets it apart. differences: rows of
-    `pair`. beside: rows of `beside`, published figures with ours. milliseconds: likewise `difference`,
-    `beside` and whatever else a clock decides.
+    entries: the list under its own name. about: configuration -> entries for its description. differences:
+    rows from `pair`. beside: rows from `published_row`. milliseconds: everything that depends on a clock,
+    with the keys `difference`, `beside` and others.
     """
 
     entries: Sequence[Json] = field(default=(), repr=False)
@@ -29,10 +29,10 @@ class SideBySide:
 
 
 def pair(a: Json, b: Json) -> dict[str, Any]:
-    """Mean and standard deviation of two series, and eq. 3.2 of Segerstedt 2021 of them.
+    """Means and standard deviations of two series, and their difference by eq. 3.2 of Segerstedt 2021.
 
-    `difference` divides by the deviations of single frames. `difference_of_means`, as published, by those of
-    the means of clips or laps, where a and b have them as `means`; None where they do not.
+    `difference` divides by the deviations over single frames. `difference_of_means` divides by those over the
+    means of clips or laps (`means` of a and b), as published. It is None if a or b has fewer than two means.
     """
     out = {
         "mean_a": a["mean"],
@@ -53,10 +53,10 @@ def pair(a: Json, b: Json) -> dict[str, Any]:
 def published_row(
     measure: str, row: Json, theirs: float, ours: float | None, unit: str = ""
 ) -> dict[str, Any]:
-    """A published figure, and ours where it was measured.
+    """A published figure (`theirs`) with ours, which is None if it was not measured.
 
-    row: its `configuration` and `source`; the `table` that it was printed in, and the other figure that the
-    same publication gives `elsewhere`, where there are any.
+    row: has `configuration` and `source`, and may have the `table` in which it was printed and another
+    figure that the same publication gives `elsewhere`.
     """
     return {
         "measure": measure,

@@ -1,4 +1,4 @@
-"""Does any of many characters fall apart? Random wishes, injuries and grounds for any number of frames."""
+"""A long test of many characters with random wishes, injuries and grounds, for implausible poses."""
 
 from __future__ import annotations
 
@@ -16,14 +16,17 @@ from hobble.runtime.animation import ProceduralAnimation
 
 FPS = 60
 GAITS = ("walk", "jog", "crouch")
-FASTEST_WISH = 8.0  # cm a frame of a wish
-START_SPACING_CM = 4e4  # centimetres between the places where characters start, each on ground of its own
+FASTEST_WISH = 8.0  # cm a frame
+START_SPACING_CM = 4e4  # between the starts of the characters, each on its own ground
 LIMITS = {"hips_lowest_cm": 60.0, "hips_highest_cm": 110.0, "added_turn_degrees": 30.0}
 
 
 @dataclass
 class Wishes:
-    """What C characters are asked for in a frame; each is asked for something new every 1 to 8 seconds."""
+    """The wishes for C characters in a frame. Each character gets new ones every 1 to 8 seconds.
+
+    velocity, facing: (C, 2). gait: C names. told: channel -> (C, columns). left: (C,) frames that remain.
+    """
 
     velocity: Array
     facing: Array
@@ -33,7 +36,7 @@ class Wishes:
 
     @classmethod
     def none(cls, characters: int, channels: Mapping[str, int]) -> Wishes:
-        """Nothing yet: everyone is asked at the first `renew`."""
+        """Empty wishes. The first `renew` draws them for all characters."""
         return cls(
             np.zeros((characters, 2)),
             np.zeros((characters, 2)),
@@ -43,7 +46,7 @@ class Wishes:
         )
 
     def renew(self, rng: np.random.Generator) -> None:
-        """Draw anew for those whose time is over: a third stand, half look elsewhere than they go."""
+        """Draw new wishes for characters whose time is over. A third stand, half face a random direction."""
         self.left -= 1
         for c in np.flatnonzero(self.left <= 0):
             going, looking = rng.uniform(-np.pi, np.pi, 2)
@@ -75,14 +78,17 @@ def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array
 
 @dataclass
 class Slides:
-    """How far toes slide in each stance of C characters, as `motion_measures.foot_slide`."""
+    """Distance that toes slide in each stance of C characters, as in `motion_measures.foot_slide`.
+
+    far: (C, 2) distance in this stance, cm. frames: (C, 2) its length. done: distances of past stances.
+    """
 
     far: Array
     frames: np.ndarray
     done: list[Array] = field(default_factory=list)
 
     def add(self, toes: Array, before: Array, standing: np.ndarray) -> None:
-        """One frame on: toes and before (C, 2, 3), standing (C, 2)."""
+        """Add a frame. toes, before: (C, 2, 3) positions now and in the frame before. standing: (C, 2)."""
         over = ~standing & (self.frames >= SHORTEST_STANCE)
         self.done.append(self.far[over])
         stays = standing & (self.frames > 0)
@@ -91,7 +97,7 @@ class Slides:
 
 
 def turns(now: Array, before: Array) -> Array:
-    """Degrees between rotations (..., 4)."""
+    """(...) angle between rotations (..., 4), degrees."""
     dot = np.abs(np.sum(now * before, axis=-1))
     return np.asarray(np.degrees(2 * np.arccos(np.minimum(1.0, dot))))
 
@@ -99,12 +105,13 @@ def turns(now: Array, before: Array) -> Array:
 def soak(
     network: Network, characters: int = 200, frames: int = 5000, seed: int = 1, **options: Any
 ) -> dict[str, Any]:
-    """The worst of characters x frames; options: of ProceduralAnimation.
+    """The worst values over all characters and frames. options: of ProceduralAnimation.
 
-    `finite`; `hips_lowest_cm` and `hips_highest_cm` above the ground under them; `network_turn_degrees`, the
-    most that the network turned a joint in a frame, `turn_degrees` that of the pose, `added_turn_degrees`
-    the most by which the pose turned further than the network in the same joint and frame; `slide_cm` a
-    stance, mean; `toes_cm` and `knees_cm`, the most that these moved in a frame.
+    `finite`: all numbers are. `hips_lowest_cm`, `hips_highest_cm`: above the ground under the hips.
+    `network_turn_degrees`: largest turn of a joint in a frame by the network, `turn_degrees`: by the pose,
+    `added_turn_degrees`: largest difference of the two in the same joint and frame; `frames_beyond`: frames
+    of a character in which it exceeds its limit. `fastest_joint_cm`: a frame. `slide_cm`: mean of a stance.
+    `holds`: whether all values are within LIMITS.
     """
     rng = np.random.default_rng(seed)
     skeleton = network.skeleton

@@ -1,4 +1,4 @@
-"""Does the figure fall apart? The worst of minutes of walks, jogs, crouches, strafes, stops and turns."""
+"""Does the motion stay plausible? The worst values in minutes of walks, jogs, crouches, strafes and turns."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 
 FPS = 60
-# speed in cm a frame, whether it looks elsewhere than it goes, gait
+# kind -> speed in cm a frame, whether to face a random direction, gait
 KINDS: dict[str, tuple[float, bool, str]] = {
     "walk": (2.5, False, "walk"),
     "jog": (7.0, False, "jog"),
@@ -33,7 +33,7 @@ LIMITS = {
 
 @dataclass(frozen=True)
 class Stretch:
-    """One thing asked for: velocity (2,) cm a frame, facing (2,) or None, gait, for `frames`."""
+    """A constant wish for `frames` frames: velocity (2,) cm a frame, facing (2,) or None, gait."""
 
     kind: str
     velocity: Array
@@ -43,7 +43,7 @@ class Stretch:
 
 
 def stretches(minutes: float, seed: int = 1) -> Iterator[Stretch]:
-    """Two to eight seconds of each kind in a random order, in random directions, `minutes` together."""
+    """Random stretches of 2 to 8 seconds in random directions, `minutes` in total."""
     rng = np.random.default_rng(seed)
     left = int(minutes * 60 * FPS)
     while left > 0:
@@ -57,10 +57,11 @@ def stretches(minutes: float, seed: int = 1) -> Iterator[Stretch]:
 
 
 def stability(network: Network, minutes: float = 10.0, seed: int = 1, **options: Any) -> dict[str, Any]:
-    """The worst of `minutes` on flat ground, over all and by kind; options: of ProceduralAnimation.
+    """The worst values of `minutes` on flat ground, in all and by kind. options: of ProceduralAnimation.
 
-    `finite`; `hips_lowest_cm`, `hips_highest_cm` above the ground; `largest_turn_degrees` of a joint in a
-    frame, in the world; `foot_slide_cm` a step, mean, and `steps`; `stable`: whether all keeps within LIMITS.
+    `finite`: all numbers are. `hips_lowest_cm`, `hips_highest_cm`: above the ground. `largest_turn_degrees`:
+    of a joint in a frame, in the world. `foot_slide_cm`: mean of a step. `steps`: their number. `stable`:
+    whether all values are within LIMITS.
     """
     animation = ProceduralAnimation(network, **options)
     assert network.skeleton is not None

@@ -1,4 +1,4 @@
-"""Rows as CSV."""
+"""Writes rows as CSV files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hobble.core.files import write_text
 
 
 def write_csv(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows of equal keys; None becomes an empty field, no rows an empty file."""
+    """Write rows with equal keys. None becomes an empty field; without rows the file is empty."""
     out = io.StringIO()
     if rows:
         writer = csv.DictWriter(out, fieldnames=list(rows[0]), lineterminator="\n")
@@ -22,7 +22,7 @@ def write_csv(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def write_tables(folder: str | Path, tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
-    """Write each table to <folder>/<name>.csv; the folder is made."""
+    """Write each table to <folder>/<name>.csv. Creates the folder."""
     Path(folder).mkdir(parents=True, exist_ok=True)
     for name, rows in tables.items():
         write_csv(Path(folder) / f"{name}.csv", rows)

@@ -26,7 +26,7 @@ MIXES: dict[str, dict[str, float]] = {
 }
 BOTH_SIDES = ("back",)  # parts whose profile is taken from both sides alike
 # Gains on people's curves of trunk, pelvis and shoulders.
-GAIN: dict[str, float] = {"pelvis": 1.6, "hip": 1.9, "thigh": 1.25, "shank": 1.0, "foot": 0.9}
+GAIN: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "shank": 1.0, "foot": 0.9}
 # speed, stride: ratios. lift, push, strike: ratios of the height of the swing, and of the foot's pitch with
 # its heel up (push-off) and its toe up (heel strike). out: leg lengths that the foot swings outward. toe_out:
 # degrees. crouch: degrees of knee flexion added in stance. arms: ratio of both arms' swing. back, head: ratio
@@ -50,7 +50,7 @@ OWN: dict[str, dict[str, float]] = {
         "push": 0.25,
         "lift": 0.08,
         "strike": 0.0,
-        "crouch": 10.0,
+        "crouch": 14.0,
         "toe_out": 4.0,
     },
     "foot": {"speed": 0.66, "stride": 1.03, "push": 0.3, "lift": 0.7, "strike": 0.9, "toe_out": 14.0},
@@ -86,7 +86,7 @@ RATIOS = (
 # The recordings take a slow ankle for a stance, which an early landing changes by half only; and
 # the network smooths what it learns from.
 TIMING = 1.85
-STEP = {"thigh": 0.44, "shank": 0.42, "foot": 0.42}  # of the hurt foot, where the mix would say less
+STEP = {"thigh": 0.44, "shank": 0.38, "foot": 0.44}  # of the hurt foot, where the mix would say less
 
 
 @functools.cache

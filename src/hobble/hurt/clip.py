@@ -28,7 +28,10 @@ from hobble.labels.model import Labels
 @dataclass(frozen=True)
 class HurtClip:
     """A clip of N frames with its severities (N, L) and its labels. when: (N,) the source frame, fractions
-    included, that the body shows in each."""
+    included, that the body shows in each.
+
+    The severities are those that the motion shows: a change of what was asked sets in over about a second.
+    """
 
     clip: Clip
     severity: Array = field(repr=False)
@@ -74,7 +77,7 @@ def hurt_clip(
     feet = [move_foot(source, changes, path, feet[side], side) for side in (LEFT, RIGHT)]
     out = _assembled(source, changes, timing, path, feet, name)
     which = np.clip(np.floor(timing.body + 1e-6).astype(int), 0, len(clip) - 1)
-    return HurtClip(out, severity[which], relabel(labels, timing, zero, margins), timing.body)
+    return HurtClip(out, changes.felt[which], relabel(labels, timing, zero, margins), timing.body)
 
 
 def _ground(source: Source, feet: list[Foot]) -> Array:

@@ -13,9 +13,10 @@ from hobble.hurt.amounts import amounts
 from hobble.hurt.parts import LEFT, RIGHT, part_of_link
 
 HIGHEST = 10.0
-POWER = 0.8  # of the strength over severity: 3 is .38, 5 is .57, 7 is .75
+POWER = 0.75  # of the strength over severity: 3 is .41, 5 is .59, 7 is .77
 LEAST = 0.02  # a ratio
 SETTLING = 0.3  # seconds, of the Gaussian over which a change of severity sets in
+UNFELT = 0.05  # a severity
 TOGETHER = 3.0  # how two injuries add: 1 would be their sum, infinity the worse one
 WHOLE = ("speed", "stride", "back", "head", "forward", "nod")  # of the body, not of a side
 SIDED = (
@@ -47,13 +48,15 @@ class Effects:
     """What changes in each of F frames of a clip, in the terms of `hobble.hurt.amounts`.
 
     whole: (F,) by name. sided: (F, 2), left and right, by name. curves: (F, 5, 5). strength: (F,) of the
-    worst link, 0 to 1.
+    worst link, 0 to 1. felt: (F, L) severities that the frames show: those given, but a change sets in over
+    about a second.
     """
 
     whole: dict[str, Array] = field(repr=False)
     sided: dict[str, Array] = field(repr=False)
     curves: Array = field(repr=False)
     strength: Array = field(repr=False)
+    felt: Array = field(repr=False)
 
     def ratio(self, name: str) -> Array:
         """(F,) or (F, 2) factor that a ratio is."""
@@ -94,7 +97,14 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
         {name: total.value() for name, total in sided.items()},
         curves.value(),
         strength.max(axis=1, initial=0.0),
+        _felt(strength),
     )
+
+
+def _felt(strength: Array) -> Array:
+    """The severities (F, L) that go with strengths, none where next to nothing shows."""
+    severity = np.round(HIGHEST * np.clip(strength, 0.0, 1.0) ** (1 / POWER), 3)
+    return np.where(severity < UNFELT, 0.0, severity)
 
 
 def _add_sided(sided: dict[str, _Sum], name: str, values: Array, side: int | None) -> None:

@@ -14,7 +14,7 @@ from hobble.hurt.options import Hurt
 from hobble.hurt.parts import part_of_link
 
 # Entries of a part's links in the deck; 1 for those that change little.
-OFTEN = {"hip": 4, "thigh": 4, "shank": 4, "foot": 4, "pelvis": 2, "back": 2, "upper arm": 2, "forearm": 2}
+OFTEN = {"hip": 3, "thigh": 3, "shank": 3, "foot": 3, "back": 2}
 GOLDEN = (math.sqrt(5) - 1) / 2
 TOGETHER = 0.25  # of the stretches hurt more than one link, where that is allowed
 SHORTEST = 0.4  # of `seconds`: what is left of a clip that is shorter belongs to the stretch before
@@ -23,7 +23,8 @@ SHORTEST = 0.4  # of `seconds`: what is left of a clip that is shorter belongs t
 def severities(skeleton: Skeleton, frames: int, fps: float, options: Hurt, clip: str, turn: int) -> Array:
     """(frames, L) severities of the hurt version that has the `turn` (from 0) among all of the data set.
 
-    The version goes on through one deck of links and severities from a place that its turn gives, so that
+    In a stretch of about `seconds` one link hurts, at one severity and half way on at another. The version
+    goes on through one deck of links and severities from a place that its turn gives, so that
     versions of any number and length share the deck evenly; `clip` and the seed choose what else hurts.
     Raises HobbleError for a link that the skeleton has not.
     """
@@ -36,34 +37,37 @@ def severities(skeleton: Skeleton, frames: int, fps: float, options: Hurt, clip:
         hurt = [deck[(first + i) % len(deck)]]
         if options.at_once > 1 and rng.random() < TOGETHER:
             hurt += [deck[j] for j in rng.permutation(len(deck))[: rng.integers(1, options.at_once)]]
-        for link, severity in hurt[::-1]:
-            out[begin : begin + length, link] = severity
+        for link, first_half, second_half in hurt[::-1]:
+            half = begin + length // 2
+            out[begin:half, link] = first_half
+            out[half : begin + length, link] = second_half
         begin += length
     return out
 
 
-def _deck(skeleton: Skeleton, options: Hurt) -> list[tuple[int, float]]:
-    """(column, severity) in an order that is the data set's: every link once, then those again that change
-    much.
+def _deck(skeleton: Skeleton, options: Hurt) -> list[tuple[int, float, float]]:
+    """(column, severity, next severity) in an order that is the data set's: every link, those more often that
+    change much.
 
-    A link's first severity is the highest, its further ones take turns through the others.
+    One of the two severities is the highest, from which a network learns most; the other takes turns through
+    the rest.
     """
     names = list(skeleton.link_names)
     if odd := [link for link in options.links if link not in names]:
         raise HobbleError(f"hurt.links: skeleton {skeleton.name} has no link {', '.join(odd)}")
     wanted = [names.index(link) for link in options.links] if options.links else list(range(len(names)))
     rng = np.random.default_rng(options.seed)
-    entries: list[tuple[float, int, float]] = []
+    entries: list[tuple[float, int, tuple[float, float]]] = []
     for i in wanted:
         often = OFTEN.get(part_of_link(skeleton, skeleton.links[i]).name, 1)
         values = sorted(options.severities, reverse=True)
-        others = [values[j] for j in 1 + rng.permutation(len(values) - 1)]
+        others = [values[j] for j in 1 + rng.permutation(len(values) - 1)] or values
         start = rng.random()
         for n in range(often):
-            severity = ([values[0], *others])[n % len(values)]
+            both = (values[0], others[n % len(others)])
             # Entries of one link lie far apart, so that no clip is only about it.
-            entries.append((math.modf(start + n / often)[0], i, severity))
-    return [(i, severity) for _, i, severity in sorted(entries)]
+            entries.append((math.modf(start + n / often)[0], i, both if n % 2 == 0 else both[::-1]))
+    return [(i, *both) for _, i, both in sorted(entries)]
 
 
 def _stretches(frames: int, length: float) -> list[int]:

@@ -14,10 +14,10 @@ from hobble.hurt.effects import Effects
 from hobble.hurt.parts import LEFT, RIGHT
 from hobble.hurt.source import Source
 
-SQUEEZE = 0.6  # of the time between two events of a leg that is left to it at least
+SQUEEZE = 0.57  # of the time between two events of a leg that is left to it at least
 JOG_STRIDE = 0.15  # share of a longer stride's time that a jog takes on: its flight cannot last longer
 JOG_SHIFT = 0.6  # share of what its landings and leavings shift, whose stances are short
-MOST_SHIFT = 0.22  # cycles
+MOST_SHIFT = 0.3  # cycles
 
 
 @dataclass(frozen=True)

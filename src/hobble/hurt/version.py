@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +12,11 @@ from hobble.core.clip import Clip
 from hobble.hurt.clip import HurtClip, hurt_clip
 from hobble.hurt.options import Hurt
 from hobble.hurt.schedule import severities
+from hobble.labels.files import whole_frame
 from hobble.labels.model import LabelReport, Labels
 from hobble.labels.phase import find_cycles
 
+NEAR = 0.5  # a severity within this of one that was asked for is that one
 WHOLE = 6.0  # seconds: a version of a shorter clip is not cut, which might leave no cycle of it
 
 
@@ -23,10 +27,27 @@ def hurt_version(
     severity = severities(clip.skeleton, len(clip), clip.fps, options, name, turn)
     flat = ground == "flat"
     hurt = hurt_clip(clip, labels, severity, name, flat=flat, zero=report.phase_zero, margins=report.margins)
+    if not options.in_between:
+        hurt = settled(hurt, options.severities, report)
     if len(clip) >= WHOLE * clip.fps:
         hurt = cut(hurt, round(options.longest * len(clip)), report)
     _, dropped = find_cycles(hurt.labels.footsteps, len(hurt.clip), report.phase_zero, report.margins)
     return hurt, replace(report, clip=name, cycles_dropped=dropped)
+
+
+def settled(hurt: HurtClip, severities: Sequence[float], report: LabelReport) -> HurtClip:
+    """The clip without cycles in which a link shows another severity than 0 or one of `severities`.
+
+    Their footsteps are marked as not to be used, so that the mirrored clip lacks them too.
+    """
+    known = np.array([0.0, *severities])
+    odd = (np.abs(hurt.severity[..., None] - known).min(axis=-1) > NEAR).any(axis=1)
+    footsteps = hurt.labels.footsteps.copy()
+    for line, following in itertools.pairwise(footsteps):
+        if np.isfinite(line[0]) and np.isfinite(following[0]):
+            line[2] = max(line[2], float(odd[whole_frame(line[0]) : whole_frame(following[0]) + 1].any()))
+    cycles, _ = find_cycles(footsteps, len(hurt.clip), report.phase_zero, report.margins)
+    return replace(hurt, labels=replace(hurt.labels, footsteps=footsteps, cycles=cycles))
 
 
 def cut(hurt: HurtClip, frames: int, report: LabelReport) -> HurtClip:

@@ -27,8 +27,10 @@ Export = Callable[[Path, str], str]
 class Predictor(Protocol):
     """A network prepared to run: what a character asks in every frame.
 
-    network: what it was made of. One predictor serves one crowd: it may keep buffers, or what it knows of
-    each character, between calls.
+    network: what it was made of. One predictor serves one crowd: it may keep buffers between calls. What it
+    has to know of each character is not kept here but in the character: where `Network.memory` is above 0,
+    `evaluate` and `predict` take a last argument, `memory`, (C, Network.memory) float64. It is changed in
+    place, and zeros before a character's first frame.
     """
 
     @property
@@ -58,6 +60,9 @@ class Network(ABC):
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
     phase: ClassVar[bool] = True  # whether a prediction depends on the phase that it is given
+    rooted: ClassVar[bool] = (
+        False  # whether its movement of the root belongs to its pose, and is never held back
+    )
     modes: ClassVar[tuple[str, ...]] = ("exact",)  # of the predictor; the last one is exact
 
     x_mean: Array = field(repr=False)
@@ -82,6 +87,11 @@ class Network(ABC):
         means = self.x_mean[self.layout.x_channel(channel)] if labels else ()
         return tuple(label for label, mean in zip(labels, means, strict=True) if mean > 0) or labels
 
+    @property
+    def memory(self) -> int:
+        """Numbers that a character keeps for it between frames; see `Predictor`."""
+        return 0
+
     @classmethod
     def mode(cls, wanted: str | None) -> str:
         """Which of `modes` runs where `wanted` is asked for: the exact one by default.
@@ -97,12 +107,16 @@ class Network(ABC):
     @property
     @abstractmethod
     def sizes(self) -> tuple[int, ...]:
-        """Units of each layer, the input first: (342, 512, 512, 311)."""
+        """Units of each layer, the input first: (342, 512, 512, 311); () where there are no layers."""
 
     @property
     @abstractmethod
     def parameters(self) -> int:
         """Numbers that one prediction goes through: the weights and biases of one phase."""
+
+    def stored(self, mode: str) -> int:
+        """Numbers that it keeps in memory to run in a mode, one of `modes`."""
+        return self.parameters
 
     @property
     @abstractmethod

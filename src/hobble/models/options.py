@@ -9,3 +9,8 @@ class Options(Section):
     """The keys of a configuration's `network` section; each kind adds its own."""
 
     kind: str = ""
+
+    @property
+    def hidden(self) -> tuple[int, ...]:
+        """Units of each hidden layer; () where there are no layers."""
+        return ()

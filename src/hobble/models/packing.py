@@ -28,3 +28,14 @@ def packed_rows(weights: Array, biases: Array) -> dict[str, Any]:
         "scale": packed(scale),
         "biases": packed(biases.astype(np.float32)),
     }
+
+
+def packed_columns(table: Array) -> dict[str, Any]:
+    """A table (R, columns) as integers of -32767..32767 with a factor for each column."""
+    scale = np.maximum(np.abs(table).max(axis=0) / 32767, 1e-30).astype(np.float32)
+    return {
+        "rows": table.shape[0],
+        "columns": table.shape[1],
+        "values": packed(np.round(table / scale).astype(np.int16)),
+        "scale": packed(scale),
+    }

@@ -29,7 +29,11 @@ def render_compared(
     which as many are kept as there is room for, in their order; bundle: the scripts, of `bundle.bundle`.
     """
     sections: dict[str, dict[str, Any]] = {
-        "overview": {"table": tables.configuration_table(compared), "beside": tables.beside_table(compared)},
+        "overview": {
+            "verdicts": measured.compared_verdicts(compared),
+            "table": tables.configuration_table(compared),
+            "beside": tables.beside_table(compared),
+        },
         "training": {"curves": parts.training_curves(compared)},
         "stages": {"charts": parts.stage_dots(compared)},
     }

@@ -7,11 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from hobble.core.quat import Array
 from hobble.report import measured
+from hobble.report.coverage import TURNS
 from hobble.report.formats import duration, number, size
 from hobble.report.gather import Material
 from hobble.report.summary import Figure, Hint, placed
 
+SHARP = 40.0  # degrees a second: a turn, not the sway of a straight walk
+FEW_TURNS = 0.01  # share of the time
 ORDER = ("warn", "note", "good", "fact")
 
 
@@ -28,10 +32,11 @@ def lead(material: Material) -> str:
     passes = _recipe(material).get("passes")
     network = material.network
     text = (
-        f"A {network['described']}, with {network['sizes'][0]} inputs and {network['sizes'][-1]} outputs, "
-        "trained"
+        f"A {network['described']}, with {network['inputs']} inputs and {network['outputs']} outputs, trained"
+        if network["sizes"]
+        else f"A character by {network['described']}, built"
     )
-    text += f" for {passes} passes" if passes else ""
+    text += f" for {passes} passes" if passes and network["sizes"] else ""
     text += f" on {len(clips) - kept} clips of {material.dataset}"
     text += f" and tried on {kept} that it never saw" if kept else ""
     return f"{text}: {frames:,} frames at 60\u00a0Hz in all."
@@ -47,15 +52,9 @@ def key_figures(material: Material) -> list[Figure]:
         value, _, unit = duration(seconds).partition(" ")
         figures.append(Figure("Motion in all", value, unit, beside, 30))
     network = material.network
-    figures.append(
-        Figure(
-            "Network",
-            number(network["parameters"] / 1e6, 3),
-            "M",
-            f"parameters a phase: {'–'.join(map(str, network['sizes']))}; {size(network['bytes'])} on disk",
-            40,
-        )
-    )
+    beside = f"parameters a phase: {'–'.join(map(str, network['sizes']))}"
+    beside = f"{beside if network['sizes'] else 'numbers in its tables'}; {size(network['bytes'])} on disk"
+    figures.append(Figure("Network", number(network["parameters"] / 1e6, 3), "M", beside, 40))
     total = material.pipeline.get("total_seconds")
     if total:
         value, _, unit = duration(total).partition(" ")
@@ -64,11 +63,15 @@ def key_figures(material: Material) -> list[Figure]:
     return sorted(figures, key=lambda figure: figure.at)
 
 
-def hints(material: Material) -> list[Hint]:
-    """What to do next in the order in which to do it, then what is well, then what asks for nothing."""
+def hints(material: Material, turns: Mapping[str, Array] | None = None) -> list[Hint]:
+    """What to do next in the order in which to do it, then what is well, then what asks for nothing.
+
+    turns: split -> seconds at each turn (`coverage.counted`), where they were counted.
+    """
     found = [
         *measured.hints(material),
         *placed(10, _coverage(material)),  # what the data lack no training makes good
+        *placed(10, _turning(turns or {})),
         *placed(11, _repairs(material)),
         *placed(20, _curve(material)),
         *placed(90, _costs(material)),
@@ -127,6 +130,21 @@ def _coverage(material: Material) -> Iterator[Hint]:
             "note",
             f"There is little data of {' and '.join(sorted(thin))}:",
             "under three per cent of the seconds, and those gaits will be the least steady. Add clips.",
+        )
+
+
+def _turning(turns: Mapping[str, Array]) -> Iterator[Hint]:
+    seconds = np.sum(list(turns.values()), axis=0)
+    if not np.any(seconds):
+        return
+    share = float(np.sum(seconds[np.abs(TURNS[:-1] + TURNS[1:]) / 2 > SHARP]) / np.sum(seconds))
+    if share < FEW_TURNS:
+        yield Hint(
+            "warn",
+            f"Hardly anybody turns in these clips: {100 * share:.1f} % of the time by {SHARP:.0f} degrees a "
+            "second or more.",
+            "More training will not teach it: a character that is steered sideways will slide its feet. Add "
+            "clips in which somebody turns, to both sides.",
         )
 
 

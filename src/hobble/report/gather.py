@@ -129,6 +129,8 @@ def describe_network(path: str | Path) -> dict[str, Any]:
     return {
         "described": network.described,
         "sizes": list(network.sizes),
+        "inputs": network.layout.x_size,
+        "outputs": network.layout.y_size,
         "parameters": network.parameters,
         "bytes": Path(path).stat().st_size,
         "skeleton": network.meta.get("skeleton") or {},

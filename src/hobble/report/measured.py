@@ -11,6 +11,7 @@ configuration. Its `comparison_page.py` may have
 
 - `section(compared) -> Section`: its part of the page of a comparison,
 - `columns(compared) -> Iterable[Overview]`: for the table of configurations on top of it,
+- `verdicts(compared) -> Iterable[Verdict]`: which configuration is best at something, for the first screen,
 
 where `compared` is compare.json.
 """
@@ -27,6 +28,7 @@ from hobble.report.gather import Material
 from hobble.report.parts import Section, joined
 from hobble.report.summary import Figure, Hint
 from hobble.report.tables import Column
+from hobble.report.verdicts import Verdict
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,12 @@ def hints(material: Material) -> list[Hint]:
 def compared_sections(compared: Json) -> list[Section]:
     """The sections of the page of a comparison that show measurements."""
     return joined(show(compared) for _, show in _each("comparison_page", "section"))
+
+
+def compared_verdicts(compared: Json) -> list[Verdict]:
+    """Which configuration is best at what, in the order in which it is said."""
+    found = [verdict for _, show in _each("comparison_page", "verdicts") for verdict in show(compared)]
+    return sorted(found, key=lambda verdict: verdict.at)
 
 
 def compared_columns(compared: Json) -> list[Overview]:

@@ -42,7 +42,8 @@ def render(
 
     Every value is escaped where it stands; data for the scripts is JSON in which no "<" is left.
     """
-    sections, shown = _sections(material), measured.sections(material)
+    found = coverage.counted(material.rows, material.splits)
+    sections, shown = _sections(material, found), measured.sections(material)
     strips = data_section.strips(material)
     scenes = dict(scenes or {})
     grounds = ground_pictures(material.terrain, material.network["skeleton"])
@@ -70,7 +71,7 @@ def render(
         eyebrow=f"Hobble report · configuration {material.name} · data set {material.dataset}",
         measured=shown,
         figures=findings.key_figures(material),
-        hints=findings.hints(material),
+        hints=findings.hints(material, found["turns"]),
         lead=findings.lead(material),
         embedded=embedded(data),
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
@@ -87,10 +88,9 @@ def render(
     )
 
 
-def _sections(material: Material) -> dict[str, dict[str, Any]]:
-    """Charts and tables by section; None where there is nothing to show."""
+def _sections(material: Material, found: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Charts and tables by section; None where there is nothing to show. found: of `coverage.counted`."""
     costs, data, training = cost_section, data_section, training_section
-    found = coverage.counted(material.rows, material.splits)
     return {
         "training": {
             "curve": training.learning_curve(material),

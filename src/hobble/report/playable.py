@@ -41,6 +41,7 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     sole = feet.sole_heights(network, legs).tolist()
     return {
         "network": {"kind": network.kind, **network.page(seen, rows)},
+        "rooted": network.rooted,
         "seen": seen.tolist(),
         "xMean": packed(network.x_mean[seen].astype(np.float32)),
         "xScale": packed(scale[seen].astype(np.float32)),

@@ -79,7 +79,8 @@ def keep_within(rows: Any, low: Any, high: Any, wild: Any) -> bool:
 @njit
 def unsound(
     position: Any, direction: Any, gait: Any, joints: Any, velocities: Any, rotations: Any, told: Any,
-    target: Any, facing: Any, owed: Any, hold: Any, lift: Any, body: Any, added: Any, phase: Any, wild: Any,
+    target: Any, facing: Any, owed: Any, hold: Any, lift: Any, body: Any, added: Any, memory: Any, phase: Any,
+    wild: Any,
 ) -> bool:  # fmt: skip
     """Whether a number of a character's state is not finite or too large; `wild` (C,) says of which."""
     any_wild = False
@@ -88,7 +89,7 @@ def unsound(
         sound &= _sound(position[c]) and _sound(direction[c]) and _sound(gait[c]) and _sound(joints[c])
         sound &= _sound(velocities[c]) and _sound(rotations[c]) and _sound(told[c]) and _sound(target[c])
         sound &= _sound(facing[c]) and _sound(owed[c]) and _sound(hold[c]) and _sound(lift[c])
-        sound &= _sound(added[c])
+        sound &= _sound(added[c]) and _sound(memory[c])
         wild[c] = not sound
         any_wild |= not sound
     return any_wild

@@ -22,6 +22,7 @@ class Character:
     target_velocity, target_direction: (C, 2); strafe: (C,); owed: (C, 2) of `trajectory.follow_wish`.
     foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2), foot_added (C, 2, 2, 4),
     body_lift (C,): of `feet`. placed: (C,) whether joints have been lifted to the ground of the start.
+    memory: (C, M) what the network keeps of it, of `Network.memory`.
     """
 
     position: Array
@@ -45,6 +46,7 @@ class Character:
     foot_added: Array
     body_lift: Array
     placed: np.ndarray
+    memory: Array
 
 
 class Kept:
@@ -100,6 +102,7 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         foot_added=np.tile([1.0, 0.0, 0.0, 0.0], (count, 2, 2, 1)),
         body_lift=np.zeros(count),
         placed=np.zeros(count, bool),
+        memory=np.zeros((count, network.memory)),
     )
 
 

@@ -73,6 +73,8 @@ class Controller:
         self.root = np.stack([here[:, 0], np.zeros(count), here[:, 1]], axis=1)
         self.yaw = np.arctan2(ahead[:, 0], ahead[:, 1])
         self.bounds = Bounds.of(network)
+        # What the network keeps of each character, for those that keep anything.
+        self._memory = (character.memory,) if network.memory else ()
         self._wild = np.zeros(count, bool)
         self.pose_position = character.joint_position.copy()
         self.pose_rotation = character.joint_rotation.copy()
@@ -109,7 +111,7 @@ class Controller:
         if unsound(
             c.position, c.direction, c.gait, c.joint_position, c.joint_velocity, c.joint_rotation, c.told,
             c.target_velocity, c.target_direction, c.owed, c.foot_hold, c.foot_lift, c.body_lift,
-            c.foot_added, c.phase, self._wild,
+            c.foot_added, c.memory, c.phase, self._wild,
         ):  # fmt: skip
             self._restore("the state")
         self._prepare(wish_velocity, wish_direction, wish_strafe, wish_gait, ground)
@@ -119,7 +121,7 @@ class Controller:
         t2 = clock()
         self.predictor.standardise(self.x, self.z)
         t3 = clock()
-        self.predictor.evaluate(self.z, c.phase, self.y)
+        self.predictor.evaluate(self.z, c.phase, self.y, *self._memory)
         if keep_within(self.y, self.bounds.y_low, self.bounds.y_high, self._wild):
             self._warn("the network's answer")
         t4 = clock()
@@ -201,8 +203,11 @@ class Controller:
 
     def _update(self, velocity: Array) -> None:
         c = self.character
-        held = trajectory.HELD if self.steering > 0 else 0.0
-        trajectory.advance(self.y, self._y_columns, velocity, held, c.position, c.direction, c.gait, c.phase)
+        whole = self.predictor.network.rooted
+        held = trajectory.HELD if self.steering > 0 and not whole else 0.0
+        trajectory.advance(
+            self.y, self._y_columns, velocity, held, whole, c.position, c.direction, c.gait, c.phase
+        )  # fmt: skip
 
 
 def _heights(ground: Ground, x: Array, z: Array) -> Array:

@@ -201,14 +201,15 @@ def prepare(
 
 @njit
 def advance(
-    y: Any, at: Any, wish: Any, held: float, position: Any, direction: Any, gait: Any, phase: Any
+    y: Any, at: Any, wish: Any, held: float, whole: bool, position: Any, direction: Any, gait: Any, phase: Any
 ) -> None:
     """One frame on: shift the past, move and turn the root, take the predicted future, advance the phase.
 
     y: (C, outputs) prediction; at: columns of y (root velocity, turn, phase change, position, direction) and
     the future samples and step. A standing figure is held: movement is scaled by (1 - stand)^.25. So is one
     that goes where it should not: `held` is the share that it loses of its movement against the velocity
-    `wish` (C, 2), and of all of it where it is to turn on the spot; 0 is the original runtime.
+    `wish` (C, 2), and of all of it where it is to turn on the spot; 0 is the original runtime. `whole`: who
+    stands is not held either, since the movement belongs to the pose (`Network.rooted`).
     The predicted yaw velocity is that of the world seen from the root, so the root turns by its negative.
     """
     length = position.shape[1]
@@ -221,7 +222,7 @@ def advance(
                 direction[c, i, k] = direction[c, i + 1, k]
             for k in range(gait.shape[2]):
                 gait[c, i, k] = gait[c, i + 1, k]
-        moving = moving_share(gait[c, middle, 0])
+        moving = 1.0 if whole else moving_share(gait[c, middle, 0])
         yaw = np.arctan2(direction[c, middle, 0], direction[c, middle, 1])
         sin, cos = np.sin(yaw), np.cos(yaw)
         vx, vz = y[c, at[0]], y[c, at[0] + 1]

@@ -1,4 +1,4 @@
-"""One clip of the embedded data set: from its plan to motion, footsteps, gait keys and status."""
+"""One clip of the embedded data set: from its plan to motion, footsteps and gait keys."""
 
 from __future__ import annotations
 
@@ -14,79 +14,52 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
 from hobble.core.skeleton import Skeleton
-from hobble.synthetic import files, injury
+from hobble.synthetic import files
 from hobble.synthetic.feet import move_foot
 from hobble.synthetic.footsteps import landings, phase_curve, stances
-from hobble.synthetic.gait import Style, healthy_style
+from hobble.synthetic.gait import LEFT, RIGHT, healthy_style
 from hobble.synthetic.ground import Ground, make_ground
-from hobble.synthetic.links import LEFT, RIGHT, check_link
 from hobble.synthetic.options import Synthetic
-from hobble.synthetic.path import Path, gait_keys, margin, walk_path
+from hobble.synthetic.path import gait_keys, walk_path
 from hobble.synthetic.pose import pose
-from hobble.synthetic.recipes import GROUND, INJURED, Segment, generator, plan
+from hobble.synthetic.recipes import GROUND, Segment, generator, plan
 
-SHORTEST = 60  # frames at 60 Hz in which some foot lands, so that pain can begin; no clip is shorter
-ENOUGH = 130  # frames at 60 Hz in which every severity has its own landing
+SHORTEST = 60  # frames at 60 Hz in which some foot lands; no clip is shorter
 
 
 @dataclass(frozen=True)
 class Walk:
     """A generated clip and its labels; frames count from 0 at the clip's rate.
 
-    right, left: frames in which a foot lands. gait: (frame, label) keys. status: (first frame, severity) of
-    each stretch of the hurt `link`, which is None in a healthy clip. ground: what it walks on.
+    right, left: frames in which a foot lands. gait: (frame, label) keys. ground: what it walks on.
     """
 
     clip: Clip
     right: list[int]
     left: list[int]
     gait: list[tuple[int, str]]
-    link: str | None
-    status: list[tuple[int, int]]
     ground: Ground
 
 
-def generate(
-    clip: str,
-    skeleton: Skeleton,
-    frames: int,
-    recipe: str | None,
-    injured: str | None,
-    fps: float,
-    seed: int,
-) -> Walk:
+def generate(clip: str, skeleton: Skeleton, frames: int, recipe: str | None, fps: float, seed: int) -> Walk:
     """Walk a recipe for `frames` frames at 60 Hz, written at `fps`; the same arguments give the same motion.
 
-    Raises HobbleError for an unknown recipe or a link that cannot be hurt.
+    Raises HobbleError for an unknown recipe.
     """
-    recipe = recipe or (INJURED if injured else "walk-straight")
+    recipe = recipe or "walk-straight"
     total = round(frames * fps / 60)
     segments = plan(recipe, total, fps, seed, clip)
-    return walk(clip, skeleton, segments, total, injured, GROUND.get(recipe, "flat"), fps, seed)
+    return walk(clip, skeleton, segments, total, GROUND.get(recipe, "flat"), fps, seed)
 
 
 def walk(
-    clip: str,
-    skeleton: Skeleton,
-    segments: list[Segment],
-    total: int,
-    injured: str | None,
-    ground: str,
-    fps: float,
-    seed: int,
+    clip: str, skeleton: Skeleton, segments: list[Segment], total: int, ground: str, fps: float, seed: int
 ) -> Walk:
     """Walk a plan for `total` frames at `fps`, on a kind of ground that `make_ground` knows."""
-    status = [(0, 0)]
-    if injured:
-        check_link(injured, f"clip {clip}")
-        status = injury.schedule(total)
-    for _ in range(3 if injured else 1):
-        # Severity changes as a foot lands, which depends on severity: the landings settle in a round or two.
-        path, style = _styled(segments, total, fps, injured, status)
-        phase = phase_curve(style, fps, generator(seed, clip, "phase").random())
-        right, left = (_frames(landings(phase, style, side), path.first, total) for side in (RIGHT, LEFT))
-        if injured:
-            status = injury.at_footsteps(status, sorted(right + left))
+    path = walk_path(segments, total, fps)
+    style = healthy_style(path)
+    phase = phase_curve(style, fps, generator(seed, clip, "phase").random())
+    right, left = (_frames(landings(phase, side), path.first, total) for side in (RIGHT, LEFT))
     rng = generator(seed, clip, "walk")
     terrain = make_ground(ground, rng)
     steps = stances(path, style, phase, terrain, rng)
@@ -94,18 +67,7 @@ def walk(
     rotations, root = pose(skeleton, path, style, phase, feet, terrain, rng)
     part = slice(path.first, path.first + total)
     motion = Clip(clip, skeleton, fps, rotations[part], root[part])
-    return Walk(motion, right, left, gait_keys(segments, total, fps), injured, status, terrain)
-
-
-def _styled(
-    segments: list[Segment], total: int, fps: float, injured: str | None, status: list[tuple[int, int]]
-) -> tuple[Path, Style]:
-    if injured is None:
-        path = walk_path(segments, total, fps)
-        return path, healthy_style(path)
-    severity = injury.smoothed(status, total, margin(fps), fps)
-    path = walk_path(segments, total, fps, injury.slowing(severity, injured))
-    return path, injury.hurt(healthy_style(path), severity, injured)
+    return Walk(motion, right, left, gait_keys(segments, total, fps), terrain)
 
 
 def _frames(at: np.ndarray, first: int, total: int) -> list[int]:
@@ -118,27 +80,24 @@ def write_clip(
     skeleton: dict[str, Any],
     frames: int,
     recipe: str | None,
-    injured: str | None,
     options: Synthetic,
     *,
     bvh: str | pathlib.Path,
     footsteps: str | pathlib.Path,
     gait: str | pathlib.Path,
-    status: str | pathlib.Path,
 ) -> None:
     """Generate a clip and write it as a user's folder would hold it. skeleton: as `Skeleton.to_dict`.
 
     options: the section `synthetic`. Raises HobbleError for what cannot be walked, and for too few frames.
     """
     if frames < SHORTEST:
-        enough = math.ceil(options.frames * ENOUGH / max(frames, 1))
+        enough = math.ceil(options.frames * SHORTEST / max(frames, 1))
         raise HobbleError(
             f"clip {clip}: {frames} frames at 60 Hz are too short for a step. "
             f"Set synthetic.frames to {enough} or more, or give the clip a larger share."
         )
     rig = Skeleton.from_dict(skeleton)
-    walk = generate(clip, rig, frames, recipe, injured, options.fps, options.seed)
+    walk = generate(clip, rig, frames, recipe, options.fps, options.seed)
     write_bvh(bvh, walk.clip)
     write_text(footsteps, files.footsteps_text(walk.right, walk.left))
     write_text(gait, files.gait_text(walk.gait))
-    write_text(status, files.status_text(len(walk.clip), walk.link, walk.status))

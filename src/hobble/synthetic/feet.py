@@ -11,7 +11,7 @@ from scipy.ndimage import maximum_filter1d
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.synthetic.footsteps import FOOT, Stance
-from hobble.synthetic.gait import SIGN, Style
+from hobble.synthetic.gait import Style
 from hobble.synthetic.ground import Ground
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
@@ -36,7 +36,7 @@ class Foot:
 
 def move_foot(steps: list[Stance], style: Style, side: int, ground: Ground) -> Foot:
     """The path of one foot through its stances. Frames before the first and after the last one stay zero."""
-    frames = len(style.lag)
+    frames = len(style.duty)
     turns = np.tile(quat.IDENTITY, (frames, 1))
     foot = Foot(np.zeros((frames, 3)), turns, turns.copy())
     rolls = [_Roll.of(step, style, side) for step in steps]
@@ -69,7 +69,7 @@ class _Roll:
 
     @classmethod
     def of(cls, step: Stance, style: Style, side: int) -> _Roll:
-        t = np.arange(len(style.lag), dtype=float)
+        t = np.arange(len(style.duty), dtype=float)
         land = np.interp(step.land, t, style.land_pitch[:, side])
         off = np.interp(step.leave, t, style.off_pitch[:, side])
         flat = np.interp(step.land, t, style.flat)
@@ -129,7 +129,6 @@ def _swing(foot: Foot, here: _Roll, there: _Roll, style: Style, side: int, groun
     share = np.stack([going, _ease(u), going], axis=1)
     toe = here.toe(p0) + (there.toe(p1) - here.toe(p0)) * share
     toe[:, 1] += style.lift[t, side] * bump
-    toe += quat.rotate(turn, np.array([SIGN[side], 0.0, 0.0])) * (style.swing_out[t, side] * bump)[:, None]
     toe[:, 1] += (
         _lack(toe, rotation, toes, style.clearance[t, side] * bump, ground)
         * _ease(u / RISE)

@@ -1,4 +1,4 @@
-"""The text files that lie beside a clip: footsteps, gait keys and status."""
+"""The text files that lie beside a clip: footsteps and gait keys."""
 
 from __future__ import annotations
 
@@ -22,13 +22,3 @@ def footsteps_text(right: Sequence[int], left: Sequence[int]) -> str:
 def gait_text(keys: Sequence[tuple[int, str]]) -> str:
     """Lines `frame label`; frames from 0 in, from 1 in the file."""
     return "".join(f"{frame + 1} {label}\n" for frame, label in keys)
-
-
-def status_text(frames: int, link: str | None, changes: Sequence[tuple[int, int]]) -> str:
-    """`frames:N`, then `A-B link[severity];` a stretch that hurts; frames from 0 in, from 1 in the file."""
-    lines = [f"frames:{frames}"]
-    ends = [*(start for start, _ in changes[1:]), frames]
-    for (start, severity), end in zip(changes, ends, strict=True):
-        if link and severity:
-            lines.append(f"{start + 1}-{end} {link}[{severity}];")
-    return "\n".join(lines) + "\n"

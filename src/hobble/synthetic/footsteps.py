@@ -8,9 +8,8 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.synthetic.gait import SIGN, Style
+from hobble.synthetic.gait import LEFT, RIGHT, SIGN, Style
 from hobble.synthetic.ground import Ground
-from hobble.synthetic.links import LEFT, RIGHT
 from hobble.synthetic.path import Path
 
 ANKLE_HEIGHT = 7.0  # of the ankle joint over the sole; the toe joint is 4.5 cm lower on the skeleton
@@ -43,9 +42,9 @@ def phase_curve(style: Style, fps: float, start: float) -> Array:
     return start + np.cumsum(style.frequency) / fps
 
 
-def landings(phase: Array, style: Style, side: int) -> Array:
+def landings(phase: Array, side: int) -> Array:
     """Frames (with fractions) at which a foot lands."""
-    own = phase - (style.lag if side == LEFT else 0.0)
+    own = phase - (0.5 if side == LEFT else 0.0)
     whole = np.arange(np.ceil(own[0]), np.floor(own[-1]) + 1)
     return np.interp(whole, own, np.arange(len(own), dtype=float))
 
@@ -55,7 +54,7 @@ def stances(
 ) -> tuple[list[Stance], list[Stance]]:
     """Every stance of the left and of the right foot along the path, placed in the order they land."""
     frames = np.arange(len(path), dtype=float)
-    events = [(land, side) for side in (LEFT, RIGHT) for land in landings(phase, style, side)[:-1]]
+    events = [(land, side) for side in (LEFT, RIGHT) for land in landings(phase, side)[:-1]]
     out: tuple[list[Stance], list[Stance]] = ([], [])
     for land, side in sorted(events):
         here = np.interp(land, frames, phase)
@@ -91,7 +90,7 @@ def _footprint(
     facing = value(path.facing)
     toe_out = np.radians(value(style.toe_out[:, side]))
     out = SIGN[side] * value(style.width) + moving * rng.normal(0, 0.6)
-    along = value(style.shift[:, side]) - value(style.behind) + moving * rng.normal(0, 0.8)
+    along = -value(style.behind) + moving * rng.normal(0, 0.8)
     yaw = facing + SIGN[side] * toe_out
     x = value(path.position[:, 0]) + out * np.cos(facing) + along * np.sin(facing)
     z = value(path.position[:, 1]) - out * np.sin(facing) + along * np.cos(facing)

@@ -13,6 +13,8 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.synthetic.path import GAITS, Path
 
+LEFT, RIGHT = 0, 1
+
 # name: for each gait (value at the gait's reference speed, change per m/s). Degrees, centimetres, shares.
 REFERENCE_SPEED = (0.0, 1.3, 2.8, 0.8)
 TABLE: dict[str, tuple[tuple[float, float], ...]] = {
@@ -61,10 +63,7 @@ SIGN = (1.0, -1.0)  # +X is the figure's left
 class Style:
     """How the figure moves in each of F frames: (F,), or (F, 2) left and right. See TABLE; and, beside it:
 
-    frequency: cycles a second. lag: phase from the right foot's landing to the left's. shift: (F, 2) cm that
-    a footprint lies ahead. swing_out: (F, 2) cm of a swinging foot sideways. hike: (F, 2) degrees the pelvis
-    is raised over a swinging leg. side_lean: (F, 2) degrees of the trunk over the stance leg. twist: (F, 2)
-    degrees of an upper arm inward.
+    frequency: cycles a second. The left foot lands half a cycle after the right one.
     """
 
     duty: Array
@@ -93,12 +92,6 @@ class Style:
     elbow_swing: Array
     abduction: Array
     frequency: Array
-    lag: Array
-    shift: Array
-    swing_out: Array
-    hike: Array
-    side_lean: Array
-    twist: Array
 
     def changed(self, **values: Array) -> Style:
         """A copy with some curves replaced."""
@@ -117,17 +110,7 @@ def healthy_style(path: Path) -> Style:
         values[name] = np.repeat(mixed[:, None], 2, axis=1) if name in SIDED else mixed
     values["duty"] = np.clip(values["duty"], 0.28, 0.82)
     values["heel_off"] = np.clip(values["heel_off"], 0.3, 0.75)
-    zero = np.zeros((len(path), 2))
-    style = Style(
-        **values,
-        frequency=np.sum(path.gait * _frequencies(speed), axis=1),
-        lag=np.full(len(path), 0.5),
-        shift=zero,
-        swing_out=zero,
-        hike=zero,
-        side_lean=zero,
-        twist=zero + 12.0,
-    )
+    style = Style(**values, frequency=np.sum(path.gait * _frequencies(speed), axis=1))
     return _directed(style, path)
 
 

@@ -8,6 +8,8 @@ from pydantic import Field
 
 from hobble.core.section import Section
 
+WRITES = ("_footsteps.txt", "_gait.txt")  # beside each clip
+
 
 class Synthetic(Section):
     """The embedded data set: how much of it, and from which seed."""

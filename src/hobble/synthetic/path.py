@@ -39,8 +39,8 @@ class Path:
         return np.linalg.norm(self.velocity, axis=1)
 
 
-def walk_path(segments: Sequence[Segment], frames: int, fps: float, slowing: Array | float = 1.0) -> Path:
-    """Integrate the plan. slowing: factor on the speed, one or (frames + 2 * margin,)."""
+def walk_path(segments: Sequence[Segment], frames: int, fps: float) -> Path:
+    """Integrate the plan."""
     first = margin(fps)
     total = frames + 2 * first
     which = _segment_of_frame(segments, frames, fps)
@@ -53,8 +53,6 @@ def walk_path(segments: Sequence[Segment], frames: int, fps: float, slowing: Arr
     sigma = BLEND * fps
     velocity = gaussian_filter1d(wanted, sigma, axis=0, mode="nearest")
     turning = gaussian_filter1d(turning, sigma * 0.8, mode="nearest")
-    velocity = (velocity.T * slowing).T
-    turning = turning * slowing
     facing = np.cumsum(turning) / fps
     facing -= facing[first]
     sin, cos = np.sin(facing), np.cos(facing)

@@ -10,12 +10,12 @@ from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.synthetic.feet import Foot, smooth_above
-from hobble.synthetic.gait import SIGN, Style
+from hobble.synthetic.gait import LEFT, RIGHT, SIGN, Style
 from hobble.synthetic.ground import Ground, flat
-from hobble.synthetic.links import LEFT, RIGHT
 from hobble.synthetic.path import Path
 
 X, Y, Z = np.eye(3)
+TWIST = 12.0  # degrees of an upper arm inward
 STRETCH = {True: 0.9975, False: 0.98}  # of the leg's length, at most, on flat and on other ground
 SMOOTH = {True: 0.03, False: 0.06}  # seconds over which the hips come down to where the legs reach
 
@@ -59,22 +59,12 @@ def _wave(phase: Array, peak: Array | float, times: int = 1) -> Array:
 
 def _centre(style: Style, side: int) -> Array:
     """Phase of the middle of a foot's stance."""
-    return style.duty[:, side] / 2 + (style.lag if side == LEFT else 0.0)
-
-
-def _over(style: Style, phase: Array, side: int) -> Array:
-    """(F,) 0 to 1: how much the weight is on a side, 1 in the middle of its stance."""
-    return 0.5 + 0.5 * _wave(phase, _centre(style, side))
+    return style.duty[:, side] / 2 + (0.5 if side == LEFT else 0.0)
 
 
 def _pelvis(style: Style, phase: Array, yaw: Array, noise: Array) -> Array:
     turn = style.pelvis_yaw * _wave(phase, 0.0) + 0.6 * noise[:, 0]
     lean = -style.pelvis_list * _wave(phase, 0.25)
-    lean = (
-        lean
-        + style.hike[:, LEFT] * _over(style, phase, RIGHT)
-        - style.hike[:, RIGHT] * _over(style, phase, LEFT)
-    )
     tilt = style.pelvis_tilt + 0.8 * _wave(phase, 0.0, 2)
     return quat.mul(yaw, quat.mul(_turn(Y, turn), quat.mul(_turn(Z, lean), _turn(X, tilt))))
 
@@ -82,10 +72,7 @@ def _pelvis(style: Style, phase: Array, yaw: Array, noise: Array) -> Array:
 def _chest(style: Style, phase: Array, yaw: Array, noise: Array) -> Array:
     turn = -style.chest_yaw * _wave(phase, 0.03) + 0.8 * noise[:, 1]
     lean = style.lean + 0.8 * _wave(phase, 0.05, 2) + 0.8 * noise[:, 2]
-    over = style.side_lean[:, RIGHT] * _over(style, phase, RIGHT) - style.side_lean[:, LEFT] * _over(
-        style, phase, LEFT
-    )
-    return quat.mul(yaw, quat.mul(_turn(Y, turn), quat.mul(_turn(Z, over), _turn(X, lean))))
+    return quat.mul(yaw, quat.mul(_turn(Y, turn), _turn(X, lean)))
 
 
 def _root(
@@ -179,7 +166,7 @@ def _arm(skeleton: Skeleton, world: Array, path: Path, style: Style, phase: Arra
     flexion = style.arm_mean[:, side] + style.arm_swing[:, side] * swing
     elbow = style.elbow[:, side] + style.elbow_swing[:, side] * _wave(phase, 0.05 if side == LEFT else 0.55)
     upper = quat.mul(quat.mul(upright, _turn(X, -flexion)), _turn(Z, sign * (style.abduction[:, side] - 90)))
-    upper = quat.mul(upper, _turn(X, style.twist[:, side]))
+    upper = quat.mul(upper, _turn(X, np.full(len(path), TWIST)))
     lower = quat.mul(upper, _turn(Y, -sign * np.maximum(elbow, 2)))
     world[:, skeleton.index(f"{name}Shoulder")] = chest
     world[:, skeleton.index(f"{name}Arm")] = upper

@@ -10,7 +10,6 @@ import numpy as np
 from hobble.core.errors import HobbleError
 
 STAND, WALK, JOG, CROUCH = "stand", "walk", "jog", "crouch"
-INJURED = "injured"
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,6 @@ RECIPES: dict[str, tuple[Segment, ...]] = {
     "slopes": (_walk(125, 0, 4), _walk(110, 60, 3), _jog(240, 0, 2.5), _walk(125, -60, 3), _walk(90, 0, 2)),
     "steps": (_walk(85, 0, 4), _walk(70, 12, 3), _walk(100, -12, 3), _stand(1.8)),
     "uneven": (_walk(115, 0, 3), _walk(95, 70, 3), _walk(125, -70, 3), _walk(70, 0, 2.5)),
-    INJURED: (_walk(125, 0, 3), _walk(130, 50, 2), _walk(115, -50, 2), _jog(240, 0, 2)),
 }
 GROUND = {"slopes": "slopes", "steps": "steps", "uneven": "uneven"}  # the others are planned on flat ground
 
@@ -88,7 +86,7 @@ def plan(recipe: str, frames: float, fps: float, seed: int, clip: str) -> list[S
     """The segments of a clip of `frames` frames, each a little different by the clip's own generator.
 
     The recipe is walked as often as fits best, at three quarters of its time or more, the turns of
-    every other round mirrored; an injured clip starts anywhere in it.
+    every other round mirrored.
     Raises HobbleError for a recipe that there is not.
     """
     if recipe not in RECIPES:
@@ -96,8 +94,6 @@ def plan(recipe: str, frames: float, fps: float, seed: int, clip: str) -> list[S
     rng = generator(seed, clip, "plan")
     segments = RECIPES[recipe]
     side = 1.0 if rng.random() < 0.5 else -1.0
-    start = int(rng.integers(len(segments))) if recipe == INJURED else 0
-    segments = segments[start:] + segments[:start]
     seconds = frames / fps
     once = sum(segment.seconds for segment in segments)
     rounds = max(1, round(seconds / once))

@@ -13,7 +13,10 @@ import torch
 from hobble.core.errors import InputError
 from hobble.core.files import save_npz
 from hobble.models.trainable import Trainable
+from hobble.training.history import COLUMNS
 from hobble.training.optimiser import Adam
+
+HELD_OUT = COLUMNS.index("held_out_mse")
 
 
 @dataclass
@@ -40,6 +43,12 @@ class State:
         """Remember the present weights if their held-out error is the lowest so far."""
         if held_out_mse < self.best_mse:
             self.best_mse, self.best = held_out_mse, self.network.flat.clone()
+
+    @property
+    def since_best(self) -> int:
+        """Sections since the one after which the held-out error was the lowest; 0 before there is one."""
+        errors = [row[HELD_OUT] for row in self.history]
+        return len(errors) - 1 - int(np.argmin(errors)) if errors else 0
 
 
 def pack(state: State) -> dict[str, np.ndarray]:

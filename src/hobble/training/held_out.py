@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import Protocol
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from hobble.database.reader import Database
-from hobble.models.trainable import Trainable
 
 SPLIT = "held_out"
 AT_ONCE = 2048  # rows in one product: large enough to be fast, small enough to stay in 50 MB
+
+
+class Asked(Protocol):
+    """What is asked for predictions: a network in training, or one that is read."""
+
+    @property
+    def outputs(self) -> int:
+        """Columns of Y."""
+
+    def __call__(self, x: Tensor, p: Tensor) -> Tensor:
+        """Standardised outputs (B, Y) of standardised inputs (B, X) at phases (B,)."""
 
 
 class HeldOut:
@@ -34,15 +45,15 @@ class HeldOut:
             if rows <= 0:
                 break
 
-    def errors(self, network: Trainable) -> list[float]:
+    def errors(self, network: Asked) -> list[float]:
         """Mean squared error of the standardised output on the sample, then that of each block of Y."""
         return self._errors(network, self.sample)
 
-    def whole(self, network: Trainable) -> list[float]:
+    def whole(self, network: Asked) -> list[float]:
         """The same over every held-out row."""
         return self._errors(network, self._stream())
 
-    def _errors(self, network: Trainable, batches: Iterable[tuple[Tensor, ...]]) -> list[float]:
+    def _errors(self, network: Asked, batches: Iterable[tuple[Tensor, ...]]) -> list[float]:
         total = np.zeros(network.outputs)
         rows = 0
         for x, y, p in batches:

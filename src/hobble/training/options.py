@@ -27,6 +27,16 @@ class Recipe(Section):
     rollout: Positive = Field(
         1, description="frames over which errors of the network stay in the pose that it is given; 1: none"
     )
+    keep: Literal["last", "best"] = Field(
+        "last",
+        description="which weights are written: those at the end, as in the original, or those with the "
+        "lowest held-out error after a section",
+    )
+    patience: Positive | None = Field(
+        None,
+        description="the training ends after so many sections without a lower held-out error; none: after "
+        "all passes",
+    )
     seed: int = 1
     memory_mb: Positive = Field(
         512, description="largest part of the database held in memory, by each process"

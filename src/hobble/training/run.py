@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from pathlib import Path
 
 from hobble.core.files import save_npz
 from hobble.database.reader import Database
+from hobble.models import model
+from hobble.models.model import Built
 from hobble.models.network import TERRAIN_SIDE
 from hobble.models.options import Options
+from hobble.training.built import run_built
 from hobble.training.checkpoint import pack
 from hobble.training.held_out import HeldOut
 from hobble.training.history import write_history
@@ -33,13 +37,28 @@ def run(
     history: Path,
     checkpoint: Path,
     terrain_side: float = TERRAIN_SIDE,
+    clips: Mapping[str, str | Path] | None = None,
 ) -> None:
     """Train on the database folder and write the three files; see `hobble.training.train.train`.
 
-    The weights written are those at the end, as in the original; the checkpoint holds the best held-out ones
-    too. terrain_side: centimetres from the path to the side heights in the database's rows.
+    The weights written are those at the end, as in the original, or with `training.keep: best` those of the
+    lowest held-out error; the checkpoint holds both. terrain_side: centimetres from the path to the side
+    heights in the database's rows. clips: name -> file of its rows in order; read where the network is of a
+    kind that is built and not trained.
     """
     data = Database.open(database, training.memory_mb)
+    if isinstance(model(network.kind), Built):
+        run_built(
+            data,
+            clips or {},
+            configuration=configuration,
+            network=network,
+            weights=weights,
+            history=history,
+            checkpoint=checkpoint,
+            terrain_side=terrain_side,
+        )
+        return
     state = train(
         data,
         network=network,
@@ -49,7 +68,12 @@ def run(
         start=start,
         code=code,
     )
-    blocks = data.layout.blocks("y")
+    blocks, kept = data.layout.blocks("y"), pack(state)
+    best_section = None
+    if training.keep == "best" and state.best is not None:
+        state.network.flat.copy_(state.best)
+        best_section = state.sections - state.since_best
+        log.info("weights of section %d of %d, of the lowest held-out error", best_section, state.sections)
     whole = HeldOut(data, state.network.flat.device, 0).whole(state.network)
     each = zip(["held out, every row", *blocks], whole, strict=True)
     log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in each))
@@ -59,8 +83,10 @@ def run(
         "steps": state.adam.steps,
         "terrain_side": terrain_side,
     }
+    if best_section is not None:
+        facts["best_section"] = best_section
     if data.rows("held_out"):
         facts["held_out_mse"] = whole[0]
     write_weights(weights, state.network, data, configuration, facts)
     write_history(history, blocks, state.history)
-    save_npz(checkpoint, **pack(state))
+    save_npz(checkpoint, **kept)

@@ -17,6 +17,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.database.manifest import FILE
 from hobble.database.reader import Database
 from hobble.models import model
+from hobble.models.model import Trained
 from hobble.models.options import Options
 from hobble.models.trainable import Step, Trainable
 from hobble.training.checkpoint import State, unpack
@@ -27,7 +28,7 @@ from hobble.training.schedule import depends_on_passes
 
 log = logging.getLogger("hobble.training")
 
-NOT_IN_THE_NAME = ("continues", "device", *Machines.model_fields)
+NOT_IN_THE_NAME = ("continues", "device", "keep", "patience", *Machines.model_fields)
 OF_ADAM = ("learning_rate", "beta1", "beta2", "l1")
 OF_A_START = ("weights", "first", "second", "steps", "sections")  # what it gives to the run that goes on
 HALF_FROM = 256  # batch from which the products take most of the time
@@ -155,7 +156,9 @@ def _check_start(state: State, training: Training, path: Path) -> None:
 def fresh(database: Database, network: Options, training: Training, processes: Processes = ALONE) -> State:
     """A new network, sized for the database's rows, and an optimiser that has not moved."""
     skeleton = Skeleton.from_dict(database.skeleton)
-    new = model(network.kind).trainable(network, database.layout, skeleton, training.seed)
+    kind = model(network.kind)
+    assert isinstance(kind, Trained), "what is built is not trained"
+    new = kind.trainable(network, database.layout, skeleton, training.seed)
     new = new.to(device(training.device, processes))
     return State(new, Adam(new, **training.model_dump(include=set(OF_ADAM))))
 

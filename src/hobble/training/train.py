@@ -15,7 +15,7 @@ from hobble.models.options import Options
 from hobble.training.batches import TRAIN, Watch
 from hobble.training.checkpoint import Saver, State, pack
 from hobble.training.device_rows import rows_for
-from hobble.training.held_out import HeldOut
+from hobble.training.held_out import SPLIT, HeldOut
 from hobble.training.history import duration
 from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes
@@ -45,10 +45,15 @@ def train(
     checkpoint to begin from where there is none yet; a run from another start is another run. processes: who
     trains together, each calling this; the first reads and writes checkpoints and keeps the history. The
     result depends on the arguments and the number of threads, never on interruptions. Raises HobbleError
-    where an error is no finite number, naming the batch (the last checkpoint stays), and where there are
-    fewer samples than sections.
+    where an error is no finite number, naming the batch (the last checkpoint stays), where there are fewer
+    samples than sections, and where `keep` or `patience` ask for a held-out error that there is not.
     """
     use_threads(threads)
+    if (training.patience or training.keep == "best") and not database.rows(SPLIT):
+        raise HobbleError(
+            "training.keep: best and training.patience go by the held-out error, but no clip is held out. "
+            "Name some under held_out in the data set."
+        )
     pairs, sections = database.pairs(TRAIN), training.sections
     if pairs < sections:
         raise HobbleError(f"{pairs} samples to train on are fewer than training.sections, {sections}")
@@ -74,6 +79,9 @@ def _run(
     roll_out = RollOut(database, training.rollout, len(places), device, places.start)
     pairs = database.pairs(TRAIN)
     for turn in range(state.sections, passes * sections):
+        if training.patience and processes.numbers_of_first(state.since_best)[0] >= training.patience:
+            log.info("no lower held-out error for %d sections: it ends here", training.patience)
+            break
         pass_index, section = divmod(turn, sections)
         where = f"pass {pass_index + 1} of {passes}, section {section + 1} of {sections}"
         watch = Watch(where, database.clips, processes)

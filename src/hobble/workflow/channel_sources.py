@@ -41,7 +41,7 @@ class ChannelSources:
         """The fields of a `Source` for channel `name` and a clip as plain data, without `files`."""
         return {
             "clip": self.clips.original(clip),
-            "entry": self.clips.entry(dataset, clip).model_dump(mode="json", exclude={"channels"}),
+            "entry": self.clips.entry(dataset, clip).model_dump(mode="json", exclude={"channels", "hurt"}),
             "value": self._value(dataset, clip, name),
             "options": self.catalogue.dataset(dataset).channels.get(name, {}),
         }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import os
 import re
 from collections.abc import Iterable
@@ -20,8 +21,8 @@ from hobble.core.clip_files import (
 )
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular
-from hobble.hurt.options import TELLS
-from hobble.synthetic.links import WRITES
+from hobble.hurt.options import TELLS, Hurt
+from hobble.synthetic.options import WRITES
 from hobble.workflow.channel_sources import ChannelSources
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
 
@@ -90,9 +91,23 @@ class Clips:
             if options
             else []
         )
-        many = options.versions if options else 0
-        names = [f"{clip}_hurt{version + 1}" for version in range(many) for clip in healthy]
+        many = {clip: self.hurt(dataset, clip).versions for clip in healthy}
+        names = [
+            f"{clip}_hurt{version + 1}"
+            for version in range(max(many.values(), default=0))
+            for clip in healthy
+            if version < many[clip]
+        ]
         return {name: turn for turn, name in enumerate(names)}
+
+    def hurt(self, dataset: str, clip: str) -> Hurt:
+        """The section `hurt` of a data set that has one, with what the clip's entry overrules."""
+        options, amount = self.catalogue.dataset(dataset).hurt, self.entry(dataset, clip).hurt
+        assert options is not None
+        if amount is None:
+            return options
+        versions = math.ceil(amount)
+        return options.model_copy(update={"versions": versions, "longest": amount / max(versions, 1)})
 
     def entry(self, dataset: str, clip: str) -> ClipEntry:
         """The entry of a clip; for a mirror or a hurt version, that of its original."""

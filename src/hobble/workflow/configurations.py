@@ -7,6 +7,8 @@ import json
 from typing import Any
 
 from hobble.config.load import Catalogue
+from hobble.models import model
+from hobble.models.model import Built
 from hobble.workflow.channel_sources import database_folder
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.datasets import Datasets
@@ -73,6 +75,19 @@ class Configurations:
         """Path of its database."""
         folder = database_folder(self.channels(configuration))
         return f"{DATASETS}/{self.dataset(configuration)}/database/{folder}"
+
+    def is_built(self, configuration: str) -> bool:
+        """Whether its network is built from rows in their order, and not trained."""
+        return isinstance(model(self.catalogue.configuration(configuration).network.kind), Built)
+
+    def rows_in_order(self, configuration: str) -> list[str]:
+        """The rows of each training clip, for a network that is built; [] for one that is trained."""
+        if not self.is_built(configuration):
+            return []
+        root = f"{DATASETS}/{self.dataset(configuration)}/database/clips"
+        return [
+            f"{root}/{clip}.npz" for clip, split in self.splits(configuration).items() if split == "train"
+        ]
 
     def start(self, configuration: str) -> list[str]:
         """The checkpoint from which its training continues, if there is one."""

@@ -16,6 +16,7 @@ from pathlib import Path
 from hobble.channels import channel
 from hobble.measures.registry import measure
 from hobble.models import model
+from hobble.models.model import Trained
 from hobble.rows.layout import RowLayout
 from hobble.training.options import Machines
 from hobble.workflow.clips import original
@@ -99,10 +100,14 @@ class Demands:
     def training_memory(self, configuration: str, attempt: int = 1) -> int:
         """MB on each machine for a training.
 
-        Each process holds PyTorch, its part of the database, the weights and the optimiser state.
+        Each process holds PyTorch, its part of the database, the weights and the optimiser state. A network
+        that is built holds every row of the clips instead, three times at most.
         """
         training = self.project.configurations.section(configuration, "training")
         each = 500 + training["memory_mb"] + 32e-6 * self.weights(configuration)
+        if self.project.configurations.is_built(configuration):
+            layout, dataset = self.layout(configuration), self.project.configurations.dataset(configuration)
+            each += 3 * 4e-3 * (layout.x_size + layout.y_size) * self.all_thousands(dataset)
         return _megabytes(self.machines(configuration).each * each, attempt)
 
     def training_minutes(self, configuration: str, attempt: int = 1) -> int:
@@ -118,11 +123,13 @@ class Demands:
         return _minutes(seconds / self.machines(configuration).count, attempt, least=60)
 
     def machines(self, configuration: str) -> Machines:
-        """On what a configuration trains."""
+        """The machines on which a configuration trains; one process if it has nothing to train."""
+        if self.project.configurations.is_built(configuration):
+            return Machines()
         return self.project.catalogue.configuration(configuration).training
 
     def training_threads(self, configuration: str) -> int:
-        """Two for one process, one for each of several on a CPU, two for each GPU that SLURM gives."""
+        """Threads of a training job: 2, or one for each of several CPU processes. Per GPU with `gpus`."""
         machines = self.machines(configuration)
         return 2 if machines.gpus else max(2, machines.processes)
 
@@ -137,7 +144,7 @@ class Demands:
         return int(self.project.configurations.section(configuration, "training")["device"] == "cuda")
 
     def gres(self, configuration: str) -> str:
-        """GPUs on each of several machines, as SLURM says it; else nothing."""
+        """SLURM's `gres` for GPUs on each of several machines, else ""."""
         machines = self.machines(configuration)
         return f"gpu:{machines.gpus}" if machines.gpus and machines.nodes > 1 else ""
 
@@ -150,7 +157,10 @@ class Demands:
     def weights(self, configuration: str) -> float:
         """Number of trained parameters."""
         chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
-        return model(chosen.network.kind).parameters(chosen.network, layout.x_size, layout.y_size)
+        kind = model(chosen.network.kind)
+        return (
+            kind.parameters(chosen.network, layout.x_size, layout.y_size) if isinstance(kind, Trained) else 0
+        )
 
     def layout(self, configuration: str) -> RowLayout:
         """The columns of a configuration's rows."""

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, get_args
 
 from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
-from hobble.synthetic.links import check_link
 from hobble.workflow.comparison import COMPARE
 from hobble.workflow.copies import refuse_copies
 from hobble.workflow.project import Project
@@ -58,15 +57,19 @@ def _check_configuration(project: Project, name: str) -> None:
             raise HobbleError(f"configuration {name} cannot continue from itself")
         project.catalogue.configuration(other)
     if model.training.continues:
-        _check_continues(name, model, project.catalogue.configuration(model.training.continues))
+        _check_continues(project, name, model)
     _check_dataset(project, model.dataset)
     project.datasets.selected(model.dataset, model.channels)
     refuse_copies(project.clips, project.datasets, model.dataset, tuple(model.channels))
 
 
-def _check_continues(name: str, model: Configuration, start: Configuration) -> None:
+def _check_continues(project: Project, name: str, model: Configuration) -> None:
     """Check that a training can continue from another: same network, same sections, more passes."""
     begun = model.training.continues
+    if project.configurations.is_built(name):
+        raise HobbleError(f"configuration {name} is not trained, so it cannot continue from {begun}")
+    assert begun is not None
+    start = project.catalogue.configuration(begun)
     for key, mine, of_start in (
         ("channels", list(model.channels), list(start.channels)),
         ("network", model.network.model_dump(), start.network.model_dump()),
@@ -89,7 +92,7 @@ def _check_dataset(project: Project, name: str) -> None:
     for clip, entry in project.clips.listed(name).items():
         project.clips.rig_files(name, clip)
         _check_entry(f"data set {name}: clips.{clip}", entry)
-    _check_hurt(name, model, [f"{a}-{b}" for a, b in skeleton.links])
+    _check_hurt(project, name, model, [f"{a}-{b}" for a, b in skeleton.links])
     project.datasets.channel_sources.check(name)
     project.datasets.selected(name, project.datasets.channel_sources.channels(name))
     if model.mirror:
@@ -98,8 +101,6 @@ def _check_dataset(project: Project, name: str) -> None:
 
 def _check_entry(where: str, entry: ClipEntry) -> None:
     """Check what a clip's entry says for the synthetic walker."""
-    if entry.injured is not None:
-        check_link(entry.injured, where)
     if entry.recipe is not None:
         from hobble.synthetic.recipes import RECIPES  # imports numpy, which takes longer than all the rest
 
@@ -111,9 +112,9 @@ def _check_entry(where: str, entry: ClipEntry) -> None:
             )
 
 
-def _check_hurt(name: str, model: Dataset, links: Sequence[str]) -> None:
+def _check_hurt(project: Project, name: str, model: Dataset, links: Sequence[str]) -> None:
     """Check that the links of a data set's section `hurt` exist."""
-    if model.hurt is None or not model.hurt.versions:
+    if model.hurt is None or not project.clips.hurt_versions(name):
         return
     if not links:
         raise HobbleError(

@@ -1,9 +1,9 @@
 """A linear network, as small as a kind of network can be: y = W x + b, whatever the phase."""
 
-from hobble.models.model import Model
+from hobble.models.model import Trained
 
 
-class _Toy(Model):
+class _Toy(Trained):
     def options(self):
         from hobble.models.toy.options import ToyOptions
 

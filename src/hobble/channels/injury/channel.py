@@ -41,8 +41,6 @@ class Injury(Channel):
         """Whether no status has a severity above 0."""
         if source.value is not None:
             return not hurts(str(source.value))
-        if source.entry.get("injured"):  # the embedded walker is asked to limp, and writes the file itself
-            return False
         return not any(hurts(read_bytes(file, MAX_TEXT_BYTES).decode("latin-1")) for file in source.files)
 
     def check(self, source: Source, rig: Rig) -> None:

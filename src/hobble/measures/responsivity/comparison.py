@@ -18,7 +18,6 @@ NAME = "responsivity"
 STEPS = ("prepare", "input", "insert", "predict", "output", "update", "total")
 COUNTS = ("true", "table_6_1", "table_6_1_as_printed")
 FLOAT = 4  # bytes of a stored weight
-PHASES = {"constant": 50, "linear": 10}  # whose weights the original stores
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
@@ -52,12 +51,16 @@ def by_mode(measured: ConfigurationResults) -> list[dict[str, Any]]:
 
 
 def _sizes(measured: ConfigurationResults) -> dict[str, Any]:
-    """Computations as Table 6.1 counts them, and bytes of the weights of so many phases."""
-    counts = measured.found(NAME)["parameters"]
-    phases = {**PHASES, "cubic": measured.resolved["configuration"]["network"].get("control_points", 1)}
+    """Computations as Table 6.1 counts them, None without layers, and bytes that each mode keeps in memory.
+
+    exact: the mode without loss.
+    """
+    found = measured.found(NAME)
+    counts = found["parameters"]
     return {
-        "computations": {key: counts[key] for key in COUNTS},
-        "weights_bytes": {mode: count * counts["true"] * FLOAT for mode, count in phases.items()},
+        "computations": {key: counts[key] for key in COUNTS} if counts else None,
+        "weights_bytes": {mode: count * FLOAT for mode, count in found["stored"].items()},
+        "exact": found["exact"],
     }
 
 
@@ -85,10 +88,11 @@ def fits(all_measured: Sequence[ConfigurationResults], published: Mapping[str, A
 
     `computations` says which of the counts, `step` what of a frame: the mean of `total`, as published, or of
     `predict`, or the `median` of the total, which a busy machine moves least. Slope in milliseconds per
-    computation. Configurations that read another's network, and those of one size, are points like any other.
+    computation. Configurations that read another's network, and those of one size, are points like any other;
+    what has no layers is none.
     """
     out = []
-    entries = [(m, entry) for m in all_measured for entry in by_mode(m)]
+    entries = [(m, entry) for m in all_measured if m.found(NAME)["parameters"] for entry in by_mode(m)]
     modes = list(dict.fromkeys(entry["mode"] for _, entry in entries))
     for counts in COUNTS:
         for mode in modes:
@@ -137,7 +141,7 @@ def lap_means(entry: Json) -> list[float]:
 def _published_sizes(about: Mapping[str, Json], published: Json) -> list[dict[str, Any]]:
     out = []
     for row in published["computations"]:
-        counts = about.get(row["configuration"], {}).get("computations", {})
+        counts = about.get(row["configuration"], {}).get("computations") or {}
         printed = {**row, "table": "6.1"}
         out.append(
             published_row("computations of Table 6.1", printed, row["table_6_1"], counts.get(COUNTS[2]))

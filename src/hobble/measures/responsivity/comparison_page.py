@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from hobble.report.charts import Chart, Trace, axis, line
-from hobble.report.formats import size
+from hobble.report.formats import number, size
 from hobble.report.measured import Overview
 from hobble.report.parts import Part, Section
 from hobble.report.side_by_side import Compared, colours, dots, names
 from hobble.report.tables import Column
+from hobble.report.verdicts import Verdict, best
 
 
 def section(compared: Compared) -> Section:
@@ -19,17 +21,59 @@ def section(compared: Compared) -> Section:
 
 
 def columns(compared: Compared) -> Iterator[Overview]:
-    """The median of a frame, in the cubic mode where it was run, and the size of the network."""
-    frames = {
-        entry["configuration"]: entry["milliseconds"]["spread"]["median"]
-        for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] == "cubic")
-    }
+    """The median of a frame, in the exact mode where it was run, and the size of the network."""
+    exact = in_exact_mode(compared)
+    frames = {name: entry["milliseconds"]["spread"]["median"] for name, entry in exact.items()}
     yield Overview(30, Column.number("ms a frame, median"), frames)
     about = {entry["configuration"]: entry for entry in compared["configurations"]}
-    counts = {name: entry["computations"]["true"] for name, entry in about.items()}
+    counts = {name: (entry["computations"] or {}).get("true") for name, entry in about.items()}
     yield Overview(40, Column.count("parameters"), counts)
-    weights = {name: entry["weights_bytes"]["cubic"] for name, entry in about.items()}
-    yield Overview(110, Column("weights", lambda v: size(float(v)), "n"), weights)
+    yield Overview(110, Column("in memory", lambda v: size(float(v)), "n"), _bytes(compared))
+
+
+def verdicts(compared: Compared) -> Iterator[Verdict]:
+    """Which keeps to the path, which moves smoothly, which is fast and which is small."""
+    exact = in_exact_mode(compared)
+    whole = {name: e for name, e in exact.items() if e["waypoints_reached"] == e["waypoints"]}
+    astray = [name for name in exact if name not in whole]
+    lost = f" Did not reach every waypoint: {', '.join(astray)}." if astray else ""
+    yield from best(
+        20,
+        "Best on the path",
+        {name: e["path_overshoot_cm"] for name, e in whole.items()},
+        lambda name, v: f"at worst {name} is {number(v, 3)} cm off it",
+        lost,
+    )
+    yield from best(
+        30,
+        "Smoothest",
+        {name: e["foot_slide_cm"] for name, e in whole.items()},
+        lambda name, v: (
+            f"the feet of {name} slide {number(v, 2)} cm a step, and no joint turns more than "
+            f"{number(exact[name]['largest_turn_degrees'], 2)} degrees in a frame"
+        ),
+    )
+    yield from best(
+        40,
+        "Fastest",
+        {name: e["milliseconds"]["spread"]["median"] for name, e in exact.items()},
+        lambda name, v: f"a frame of {name} takes {number(v, 3)} ms, the median of its laps",
+    )
+    yield from best(
+        50, "Smallest", _bytes(compared), lambda name, v: f"to run, {name} keeps {size(v)} in memory"
+    )
+
+
+def in_exact_mode(compared: Compared) -> dict[str, Any]:
+    """Configuration -> its laps in the mode without loss, or in the one that was run."""
+    exact = {entry["configuration"]: entry["exact"] for entry in compared["configurations"]}
+    ordered = sorted(compared["responsivity"], key=lambda e: e["mode"] == exact[e["configuration"]])
+    found = {entry["configuration"]: entry for entry in ordered}
+    return {name: found[name] for name in names(compared) if name in found}
+
+
+def _bytes(compared: Compared) -> dict[str, float]:
+    return {e["configuration"]: e["weights_bytes"][e["exact"]] for e in compared["configurations"]}
 
 
 def lap_lines(compared: Compared) -> Chart | None:

@@ -28,7 +28,7 @@ STEPS = {
 }
 
 FEWEST_STEPS = 10  # under so many, what the feet did says nothing
-OFF = 50.0  # cm from the line between two waypoints, beyond which a run has left it
+OFF = 100.0  # cm from the line between two waypoints, beyond which a run has left it
 FRAME_BUDGET_MS = 1000 / 60
 TRACK = "The character is led around a track of six waypoints, walking, side-stepping, jogging and crouching."
 

@@ -72,8 +72,11 @@ class Strayed:
             return self
         return Strayed(self.frames, self.starts, self.moments * weight, self.last * weight, self.ended)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data; None where there was no frame, or no roll-out that came to its end."""
+    def to_dict(self, phase: bool = True) -> dict[str, Any]:
+        """Plain data; None where there was no frame, or no roll-out that came to its end.
+
+        phase: whether the network goes by the phase; of one that does not, how far it is off says nothing.
+        """
         known, ended = self.frames > 0, self.ended > 0
         return {
             "frames": self.frames,
@@ -82,7 +85,7 @@ class Strayed:
             "position_error_cm": float(self.moments.mean[1]) if known else None,
             "ended": self.ended,
             "last_cm": float(self.last.mean[0]) if ended else None,
-            "last_phase": float(self.last.mean[1]) if ended else None,
+            "last_phase": float(self.last.mean[1]) if ended and phase else None,
         }
 
 
@@ -136,6 +139,7 @@ def roll_out(
     place = x[:, layout.x_joint_position].reshape(joints).astype(float)
     phase = asked.phase[starts].copy()
     speed = np.zeros(joints)
+    memory = np.zeros((len(starts), predictor.network.memory))
     made = []
     for age in range(length):
         alive = int(np.searchsorted(starts, len(asked.x) - age))
@@ -149,7 +153,8 @@ def roll_out(
             lower[..., 1] += (asked.mean[at - 1] - asked.mean[at])[:, None]
             row[:, layout.x_joint_position] = lower.reshape(alive, -1)
             row[:, layout.x_joint_velocity] = speed[:alive].reshape(alive, -1)
-        y = predictor.predict(row, phase[:alive])
+        kept = {"memory": memory[:alive]} if predictor.network.memory else {}
+        y = predictor.predict(row, phase[:alive], **kept)
         before = row[:, layout.x_joint_position].reshape(alive, -1, 3).astype(float)
         speed[:alive] = y[:, layout.y_joint_velocity].reshape(alive, -1, 3)
         guess = y[:, layout.y_joint_position].reshape(alive, -1, 3)
@@ -237,7 +242,7 @@ def measure_roll_outs(
         check_layout(clips[name], rows, network)
         for length, found in clip_roll_outs(predictor, rows, joints, lengths).items():
             total[length][splits[name]] += found.weighing(weight)
-            entries[length].append({"clip": name, "split": splits[name], **found.to_dict()})
+            entries[length].append({"clip": name, "split": splits[name], **found.to_dict(network.phase)})
         log.info("%s: %s", name, entries[lengths[-1]][-1])
     result: dict[str, Any] = {
         "configuration": configuration,
@@ -246,7 +251,7 @@ def measure_roll_outs(
         "lengths": [
             {
                 "length": length,
-                **{split: total[length][split].to_dict() for split in SPLITS},
+                **{split: total[length][split].to_dict(network.phase) for split in SPLITS},
                 "clips": entries[length],
             }
             for length in lengths

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hobble.core.skeleton import Skeleton
-from hobble.models.model import Model
+from hobble.models.model import Trained
 from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hobble.models.mann.trainable import TrainableMann
 
 
-class _Mann(Model):
+class _Mann(Trained):
     def options(self) -> type[MannOptions]:
         from hobble.models.mann.options import MannOptions
 

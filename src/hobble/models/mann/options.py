@@ -19,9 +19,14 @@ class MannOptions(Options):
     gate_layers: Annotated[int, Field(ge=1, le=4)] = 2
     gate_units: Annotated[int, Field(gt=0, le=1024)] = 32
 
+    @property
+    def hidden(self) -> tuple[int, ...]:
+        """As in `Options`."""
+        return (self.units,) * self.hidden_layers
+
     def sizes(self, inputs: int, outputs: int) -> tuple[int, ...]:
         """Units of each layer of an expert, the input first."""
-        return (inputs, *[self.units] * self.hidden_layers, outputs)
+        return (inputs, *self.hidden, outputs)
 
     def gate_sizes(self, inputs: int) -> tuple[int, ...]:
         """Units of each layer of the gating network, its input first."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hobble.core.skeleton import Skeleton
-from hobble.models.model import Model
+from hobble.models.model import Trained
 from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hobble.models.pfnn.trainable import TrainablePfnn
 
 
-class _Pfnn(Model):
+class _Pfnn(Trained):
     def options(self) -> type[PfnnOptions]:
         from hobble.models.pfnn.options import PfnnOptions
 

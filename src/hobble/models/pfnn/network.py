@@ -71,6 +71,10 @@ class Pfnn(Network):
         """Weights and biases of one phase: sum of n_l n_(l+1) + n_(l+1)."""
         return sum(a * b + b for a, b in pairwise(self.sizes))
 
+    def stored(self, mode: str) -> int:
+        """As in `Network`: the weights of so many phases, or the control points."""
+        return (MODES[mode] or self.control_points) * self.parameters
+
     @property
     def described(self) -> str:
         """As in `Network`."""

@@ -17,6 +17,11 @@ class PfnnOptions(Options):
     units: Annotated[int, Field(gt=0, le=8192)] = 512
     control_points: Annotated[int, Field(ge=4, le=16)] = 4
 
+    @property
+    def hidden(self) -> tuple[int, ...]:
+        """As in `Options`."""
+        return (self.units,) * self.hidden_layers
+
     def sizes(self, inputs: int, outputs: int) -> tuple[int, ...]:
         """Units of each layer, the input first."""
-        return (inputs, *[self.units] * self.hidden_layers, outputs)
+        return (inputs, *self.hidden, outputs)

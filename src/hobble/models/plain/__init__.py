@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hobble.core.skeleton import Skeleton
-from hobble.models.model import Model
+from hobble.models.model import Trained
 from hobble.rows.layout import RowLayout
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hobble.models.plain.trainable import TrainablePlain
 
 
-class _Plain(Model):
+class _Plain(Trained):
     def options(self) -> type[PlainOptions]:
         from hobble.models.plain.options import PlainOptions
 

@@ -16,6 +16,11 @@ class PlainOptions(Options):
     hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
     units: Annotated[int, Field(gt=0, le=8192)] = 512
 
+    @property
+    def hidden(self) -> tuple[int, ...]:
+        """As in `Options`."""
+        return (self.units,) * self.hidden_layers
+
     def sizes(self, inputs: int, outputs: int) -> tuple[int, ...]:
         """Units of each layer, the columns of X first; the first layer is given two more, of the phase."""
-        return (inputs, *[self.units] * self.hidden_layers, outputs)
+        return (inputs, *self.hidden, outputs)

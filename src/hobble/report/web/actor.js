@@ -1,6 +1,7 @@
 // One character that is played: the controller, its body and figure, what it leaves on the ground, and its last seconds.
 import { createCharacter } from "./character.js";
 import { createFigure } from "./figure.js";
+import { drawInputs } from "./inputs.js";
 import { createLab } from "./lab.js";
 import { toldColour } from "./paint.js";
 import { createRig } from "./rig.js";
@@ -57,6 +58,7 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
   actor.draw = (way = true) => {
     const c = actor.character, { paint } = view, plain = tint ? paint[tint] : paint.body, one = placed(spec);
     drawGround(way);
+    if (view.inputs) drawInputs(view, c, spec);
     figure.take(rig);
     figure.pose((columns) => {
       const most = one ? Math.max(0, ...columns.map((l) => c.told[one.first + l])) * one.scale / one.highest : 0;

@@ -20,6 +20,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), told: filled(L, 0), wished: filled(L, 0),
     velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, owed: [0, 0], lock: [0, 0],
     hold: [[0, 0], [0, 0]], lift: [0, 0], raised: 0, placed: false, added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
+    memory: filled(spec.network.memory ?? 0, 0),
   };
   // The rotation at `i` of the outputs, an axis times half the angle, turned about Y with the root; into q.
   const q = [1, 0, 0, 0];
@@ -248,11 +249,11 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       c.dz[i] = c.dz[i + 1];
       for (let g = 0; g < G; g++) c.gait[i * G + g] = c.gait[(i + 1) * G + g];
     }
-    const moving = max(0, 1 - c.gait[M * G]) ** .25, [vx, vz] = [y[Y.root_velocity], y[Y.root_velocity + 1]];
+    const moving = spec.rooted ? 1 : max(0, 1 - c.gait[M * G]) ** .25, [vx, vz] = [y[Y.root_velocity], y[Y.root_velocity + 1]];
     let yaw = atan2(c.dx[M], c.dz[M]);
     // Half of a movement that nobody asked for is held back: against the wish, or where the figure turns on the spot.
     let a = moving * (vx * cos(yaw) + vz * sin(yaw)), b = moving * (vz * cos(yaw) - vx * sin(yaw));
-    const held = spec.steering > 0 ? k.held : 0, squared = wish[0] ** 2 + wish[1] ** 2;
+    const held = spec.steering > 0 && !spec.rooted ? k.held : 0, squared = wish[0] ** 2 + wish[1] ** 2;
     if (squared < k.still ** 2) [a, b] = [(1 - held) * a, (1 - held) * b];
     else {
       const against = held * min(0, a * wish[0] + b * wish[1]) / squared;
@@ -382,7 +383,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     prepare(velocity, direction, strafe, share, ground);
     input();
     within(x, xLow, xHigh);
-    const y = predict(x, c.phase);
+    const y = predict(x, c.phase, c.memory);
     within(y, yLow, yHigh);
     output(y, ground);
     update(y, velocity);

@@ -5,6 +5,7 @@ import { createCharacter } from "./character.js";
 import { createChase } from "./chase.js";
 import { hero } from "./hero.js";
 import { createRig } from "./rig.js";
+import { groundSamples, jointVelocities } from "./inputs.js";
 import { drawAll } from "./charts.js";
 import { csv } from "./tables.js";
 import "./walking.js";
@@ -17,4 +18,4 @@ import "./fits.js";
 import "./strips.js";
 import "./page.js";
 
-globalThis.Hobble = { bvh, character: createCharacter, chase: createChase, colour, csv, drawAll, grader: createGrader, hero, lab: createLab, material, measureWalk, openClip, player, profile, rig: createRig, watch: createWatch };
+globalThis.Hobble = { bvh, character: createCharacter, chase: createChase, colour, csv, drawAll, grader: createGrader, groundSamples, hero, jointVelocities, lab: createLab, material, measureWalk, openClip, player, profile, rig: createRig, watch: createWatch };

@@ -1,23 +1,23 @@
 // Strips and dots that lie on the ground or in the air, given anew for every picture.
 import { BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Mesh, MeshBasicMaterial } from "three";
-import { minus } from "./numbers.js";
+import { cross, minus, unit } from "./numbers.js";
 import { linear } from "./paint.js";
 
-const MOST = 4000; // four-cornered pieces
-
-export const createMarks = (scene) => {
+// most: four-cornered pieces. over: whether they are seen through the figure.
+export const createMarks = (scene, { most = 4000, over = false } = {}) => {
   const geometry = new BufferGeometry(), colour = new Color(), index = [];
-  const place = new BufferAttribute(new Float32Array(12 * MOST), 3), shade = new BufferAttribute(new Float32Array(16 * MOST), 4);
+  const place = new BufferAttribute(new Float32Array(12 * most), 3), shade = new BufferAttribute(new Float32Array(16 * most), 4);
   for (const attribute of [place, shade]) attribute.setUsage(DynamicDrawUsage);
-  for (let q = 0; q < MOST; q++) index.push(4 * q, 4 * q + 1, 4 * q + 2, 4 * q, 4 * q + 2, 4 * q + 3);
+  for (let q = 0; q < most; q++) index.push(4 * q, 4 * q + 1, 4 * q + 2, 4 * q, 4 * q + 2, 4 * q + 3);
   geometry.setAttribute("position", place);
   geometry.setAttribute("color", shade);
   geometry.setIndex(index);
   const material = new MeshBasicMaterial({
-    vertexColors: true, transparent: true, depthWrite: false, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -2, polygonOffsetUnits: -4,
+    vertexColors: true, transparent: true, depthWrite: false, depthTest: !over, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -2, polygonOffsetUnits: -4,
   });
   const mesh = new Mesh(geometry, material);
   mesh.frustumCulled = false;
+  if (over) mesh.renderOrder = 3;
   scene.add(mesh);
   let used = 0;
 
@@ -25,7 +25,7 @@ export const createMarks = (scene) => {
     clear() { used = 0; },
     // Four corners of one colour [r, g, b] and opacity.
     piece(points, rgb, alpha) {
-      if (used === MOST || alpha < .02) return;
+      if (used === most || alpha < .02) return;
       linear(rgb, colour);
       points.forEach((p, i) => {
         place.array.set(p, 12 * used + 3 * i);
@@ -40,6 +40,14 @@ export const createMarks = (scene) => {
         [a[0] - sx, a[1] + up, a[2] - sz], [a[0] + sx, a[1] + up, a[2] + sz],
         [b[0] + sx, b[1] + up, b[2] + sz], [b[0] - sx, b[1] + up, b[2] - sz],
       ], rgb, alpha);
+    },
+    // A needle in the air from a to b, two crossed blades that taper from `width` cm to nothing.
+    needle(a, b, width, rgb, alpha) {
+      const way = unit(minus(b, a)), side = unit(Math.abs(way[1]) < .9 ? cross(way, [0, 1, 0]) : [1, 0, 0]);
+      for (const out of [side, cross(way, side)]) {
+        const [left, right] = [1, -1].map((s) => a.map((v, i) => v + s * width / 2 * out[i]));
+        marks.piece([left, right, b, b], rgb, alpha);
+      }
     },
     // The print of a foot whose heel and toe stood at two places on the ground.
     print(heel, toe, rgb, alpha) {

@@ -105,6 +105,11 @@ const createPlay = (stage, playables) => {
 
   // Buttons
 
+  find("play-inputs").addEventListener("click", (event) => {
+    view.inputs = !view.inputs;
+    event.currentTarget.setAttribute("aria-pressed", String(view.inputs));
+    told.say(view.inputs ? "Squares are the heights of the ground that the network is told: red above the path, blue below. Needles are the velocities of the joints." : "");
+  });
   find("play-reset").addEventListener("click", () => { start(); view.orbit.reset(); });
   ground.addEventListener("change", start);
   chosen.forEach((select) => select && select.addEventListener("change", cast));

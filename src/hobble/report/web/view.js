@@ -79,9 +79,10 @@ export const createView = (canvas, home, draw) => {
   const lights = lit(scene);
   let scale = 1, eye = [0, 0, 1], right, up, ahead, seen = false, waiting = false, drawnAt = 0, drawnFor = -1;
   // framing: how large what is looked at is drawn, and by how much of the width and height it is moved aside.
-  const view = { scene, W: 0, H: 0, zoom: 1, paint: {}, milliseconds: 0, framing: { size: 1.75, aside: 0, up: 0 }, balls: 12, onHidden: () => {} };
+  const view = { scene, W: 0, H: 0, zoom: 1, paint: {}, milliseconds: 0, framing: { size: 1.75, aside: 0, up: 0 }, balls: 12, inputs: false, onHidden: () => {} };
   view.land = createLand(scene);
   view.marks = createMarks(scene);
+  view.over = createMarks(scene, { most: 400, over: true });
 
   const paint = (now) => {
     if (drawnFor < 0) return; // not laid out yet
@@ -98,12 +99,14 @@ export const createView = (canvas, home, draw) => {
     drawnAt = now;
     if (slow > PATIENCE && level + 1 < LEVELS.length && !asked) { level++; slow = 0; }
     view.marks.clear();
+    view.over.clear();
     draw(now, view);
     const before = performance.now(), [w, h] = [canvas.width, canvas.height], room = gl.domElement;
     if (room.width < w || room.height < h) gl.setSize(Math.max(room.width, w), Math.max(room.height, h), false);
     gl.setViewport(0, 0, w, h);
     gl.setScissor(0, 0, w, h);
     view.marks.done();
+    view.over.done();
     gl.render(scene, camera);
     // The sky lies under the scene, so that saved pictures and films have one.
     const sky = context.createLinearGradient(0, 0, 0, h), [r, g, b] = view.paint.sky, [u, v, t] = view.paint.zenith;

@@ -96,7 +96,8 @@ def _walked(rows: ClipRows, links: Sequence[str], skeleton: Skeleton) -> list[Li
     walk = joined(walks) if walks else Walk(FPS, (), ())
     if not len(walk):
         return []
-    hurt = {link: float(value) for link, value in zip(links, severity[0], strict=True) if value > 0}
+    # A network that is told of no injury names no link; its clips are those in which nothing hurts.
+    hurt = {link: float(value) for link, value in zip(links, severity[0], strict=False) if value > 0}
     return [Limp(rows.clip, hurt, walk, float(np.mean(speeds)))]
 
 

@@ -257,7 +257,9 @@ def run(given: Given, options: Options) -> Outcome:
     network = load_network(given.weights)
     if network.skeleton is None:
         raise HobbleError(f"{given.weights} carries no skeleton")
-    every, told = limps(given.clips.values(), given.splits, links_of(network), network.skeleton)
+    # Without severities there is nothing to measure, whatever the clips say.
+    files = given.clips.values() if links_of(network) else ()
+    every, told = limps(files, given.splits, links_of(network), network.skeleton)
     result = limp(
         network,
         every,

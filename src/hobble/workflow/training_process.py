@@ -1,6 +1,6 @@
-"""One of the processes of a training, as torchrun starts it: python -m hobble.workflow.process JOB.json
+"""One process of a training. torchrun starts it as: python -m hobble.workflow.training_process JOB.json
 
-The file has the arguments of `hobble.training.train.train` as plain data, the number of threads and the log.
+The file has the arguments of `hobble.training.train.train`, the number of threads and the log, as plain data.
 """
 
 from __future__ import annotations
@@ -18,10 +18,13 @@ from hobble.workflow.lifetime import ends_with_run
 FORMAT = "%(asctime)s %(levelname)s %(message)s"
 
 
-def main(told: Path) -> int:
-    """Train with the others; the status of the process, 1 where a message lies beside the file."""
+def main(job_file: Path) -> int:
+    """Train together with the other processes. Returns the exit status.
+
+    After a HobbleError the status is 1, and the message is in a file error-<rank> beside `job_file`.
+    """
     rank = int(os.environ["RANK"])
-    job = json.loads(told.read_text(encoding="utf-8"))
+    job = json.loads(job_file.read_text(encoding="utf-8"))
     logger = logging.getLogger("hobble")
     logger.setLevel(logging.INFO if rank == 0 else logging.ERROR)
     to_file = logging.FileHandler(job["log"], encoding="utf-8")
@@ -31,8 +34,8 @@ def main(told: Path) -> int:
         with ends_with_run():
             _train(job)
     except HobbleError as error:
-        # The first process's first: what stopped it stopped the others.
-        (told.parent / f"error-{rank:05d}").write_text(str(error), encoding="utf-8")
+        # Named by rank: the message of the lowest rank is shown, because its error stops the others.
+        (job_file.parent / f"error-{rank:05d}").write_text(str(error), encoding="utf-8")
         return 1
     return 0
 

@@ -1,4 +1,4 @@
-"""A training in several processes: torchrun starts them, on other machines SLURM's srun starts torchrun."""
+"""Starts a training in several processes with torchrun; on several machines SLURM's srun starts torchrun."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from typing import IO
 from hobble.core.errors import HobbleError
 from hobble.models.options import Options
 from hobble.training.options import Machines, Training
-from hobble.workflow import lifetime, process
+from hobble.workflow import lifetime, training_process
 
-SLURM = "SLURM_JOB_ID"  # in the environment of a job
-GRACE = 10.0  # seconds for torchrun to end its processes
+SLURM_VARIABLE = "SLURM_JOB_ID"  # environment variable that SLURM sets in a job
+GRACE_SECONDS = 10.0  # time for torchrun to end its processes
 
 
 def on_machines(training: Training, machines: Machines, gpus: bool) -> Training:
-    """The recipe on these machines: several processes are on GPUs, one each, or all on CPUs."""
+    """The training options for these machines. With several processes, all use CPUs or each has a GPU."""
     device = training.device if machines.count == 1 else "cuda" if gpus else "cpu"
     own = {"nodes": machines.nodes, **({"gpus": machines.each} if gpus else {"processes": machines.each})}
     return Training.model_validate({**training.model_dump(), **own, "device": device})
@@ -45,9 +45,9 @@ def train_together(
 ) -> None:
     """Train in `machines.count` processes until the last checkpoint is on disk.
 
-    threads: of all processes of one machine. log: what the processes say goes to its end. The others are as
-    in `hobble.training.train.train`; all machines have to see these files. Raises HobbleError with the
-    message of the process that could not go on, or the status with which they ended.
+    threads: of all processes of one machine together. log: the output of the processes is appended to it. The
+    other arguments are those of `hobble.training.train.train`. All machines must see these files. Raises
+    HobbleError with the message of the process that failed, or with its exit status.
     """
     job = {
         "database": str(database),
@@ -59,65 +59,67 @@ def train_together(
     }
     checkpoints.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="processes-", dir=checkpoints) as folder:
-        told = Path(folder, "job.json")
+        job_file = Path(folder, "job.json")
         each = max(1, threads // machines.each)
-        told.write_text(json.dumps({**job, "threads": each, "log": str(log)}), encoding="utf-8")
-        with open(log, "ab") as said:
-            status = _ended(command(machines, told), _environment(machines, each), said)
+        job_file.write_text(json.dumps({**job, "threads": each, "log": str(log)}), encoding="utf-8")
+        with open(log, "ab") as output:
+            status = _run(command(machines, job_file), _environment(machines, each), output)
         errors = [file.read_text(encoding="utf-8") for file in sorted(Path(folder).glob("error-*"))]
     if errors:
         raise HobbleError(errors[0])
     if status:
         raise HobbleError(
-            f"one of the {machines.count} processes that train together died, and the others ended with it "
-            f"(status {status}). The last checkpoint is kept. The same command goes on from there, also with "
-            f"another number of processes. {log} has what they said."
+            f"one of the {machines.count} training processes died, and the others ended with it "
+            f"(status {status}). The same command continues from the last checkpoint, also with another "
+            f"number of processes. Their output is in {log}."
         )
 
 
-def command(machines: Machines, told: Path) -> list[str]:
-    """What starts the processes."""
+def command(machines: Machines, job_file: Path) -> list[str]:
+    """The command that starts the processes. Raises HobbleError for several machines without SLURM."""
     torchrun = [sys.executable, "-m", "torch.distributed.run", f"--nproc-per-node={machines.each}"]
-    start = ["-m", process.__name__, str(told)]
+    start = ["-m", training_process.__name__, str(job_file)]
     if machines.nodes == 1:
         return [*torchrun, "--standalone", *start]
-    if SLURM not in os.environ:
+    if SLURM_VARIABLE not in os.environ:
         raise HobbleError(
-            f"training.nodes is {machines.nodes}, but this is not a job of SLURM, which would start the "
-            "processes there. Use the profile slurm, or nodes: 1."
+            f"training.nodes is {machines.nodes}, but this is not a SLURM job, so the processes cannot be "
+            "started on other machines. Use the profile slurm, or nodes: 1."
         )
-    meeting = [
+    rendezvous = [
         f"--nnodes={machines.nodes}",
         "--rdzv-backend=c10d",
         f"--rdzv-endpoint={platform.node()}:{_free_port()}",
         f"--rdzv-id={uuid.uuid4().hex}",
     ]
     srun = ["srun", "--overlap", "--kill-on-bad-exit=1", f"--ntasks={machines.nodes}", "--cpu-bind=none"]
-    return [*srun, *torchrun, *meeting, *start]
+    return [*srun, *torchrun, *rendezvous, *start]
 
 
-def _ended(command: list[str], environment: Mapping[str, str], said: IO[bytes]) -> int:
-    """The status with which the command ended; it does not outlive this process's wish to stop."""
-    started = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=said, stderr=said, env=environment)
+def _run(command: list[str], environment: Mapping[str, str], output: IO[bytes]) -> int:
+    """Run a command and return its exit status. If this process is stopped, the command is ended too."""
+    started = subprocess.Popen(
+        command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, env=environment
+    )
     try:
         return started.wait()
     finally:
         if started.poll() is None:
             started.terminate()
             with contextlib.suppress(subprocess.TimeoutExpired):
-                started.wait(GRACE)
+                started.wait(GRACE_SECONDS)
             started.kill()
 
 
 def _environment(machines: Machines, threads: int) -> dict[str, str]:
-    """That of this process; on its own machine the others end when it is no more."""
-    found = {**os.environ, "OMP_NUM_THREADS": str(threads)}
-    found["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
+    """The environment of the processes. On a single machine they end when this process ends."""
+    variables = {**os.environ, "OMP_NUM_THREADS": str(threads)}
+    variables["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     if machines.nodes == 1:
-        found[lifetime.RUN_VARIABLE] = lifetime.this_process()
+        variables[lifetime.RUN_VARIABLE] = lifetime.this_process()
     else:
-        found.pop(lifetime.RUN_VARIABLE, None)
-    return found
+        variables.pop(lifetime.RUN_VARIABLE, None)
+    return variables
 
 
 def _free_port() -> int:

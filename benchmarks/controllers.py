@@ -1,0 +1,99 @@
+"""Controllers side by side: laps, ten minutes, roll-outs, frame times in turn, bytes.
+
+    python benchmarks/controllers.py DATABASE NAME=WEIGHTS ... [--laps 19] [--minutes 10] [--rollouts]
+
+DATABASE is results/datasets/<dataset>/database/plain, beside the `clips` it was made from. The first of the
+networks is what the frame times of the others are divided by. A frame is timed on one core: one character
+that walks, jogs, stops and turns. Each network makes a stretch of frames in turn, so that other work on the
+machine falls on all alike. What is printed is the median of the ratios of the stretches' means: these hold
+the frames in which motion matching searches and those in which it does not.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from hobble.database.manifest import Manifest
+from hobble.evaluation.stability import stability, stretches
+from hobble.measures.responsivity.run import responsivity
+from hobble.measures.rollouts.run import measure_roll_outs
+from hobble.models.load import load_network
+from hobble.models.network import Network
+from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.options import Runtime
+
+TURNS, FRAMES = 60, 60  # stretches of each network, frames of a stretch
+CROWD = 200
+LENGTHS = (1, 60, 300)
+
+
+def frame_ratios(networks: dict[str, Network], characters: int, turns: int) -> dict[str, tuple[float, float]]:
+    """Name -> microseconds a frame (median of the stretches), and how many times those of the first."""
+    made = {name: ProceduralAnimation(n, characters=characters) for name, n in networks.items()}
+    wishes = [s for s in stretches(10.0) for _ in range(s.frames)]
+    for animation in made.values():
+        for wish in wishes[:: len(wishes) // 20]:
+            animation.next_pose(wish.velocity, wish.facing, wish.gait)
+    took: dict[str, list[float]] = {name: [] for name in made}
+    for turn in range(turns):
+        part = wishes[turn * FRAMES : (turn + 1) * FRAMES]
+        for name, animation in made.items():
+            begin = perf_counter()
+            for wish in part:
+                animation.next_pose(wish.velocity, wish.facing, wish.gait)
+            took[name].append((perf_counter() - begin) / len(part))
+    first = np.array(next(iter(took.values())))
+    return {
+        name: (1e6 * float(np.median(t)), float(np.median(np.array(t) / first))) for name, t in took.items()
+    }
+
+
+def roll_outs(weights: Path, database: Path) -> str:
+    """Centimetres over roll-outs of LENGTHS held-out frames."""
+    clips = {
+        c["clip"]: c["split"] for c in Manifest.load(database).clips if c["split"] == "held_out" and c["rows"]
+    }
+    files = {name: database.parent / "clips" / f"{name}.npz" for name in clips}
+    found = measure_roll_outs(weights, files, clips, "benchmark", lengths=LENGTHS)
+    return " ".join(f"{entry['held_out']['position_error_cm']:.2f}" for entry in found["lengths"])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("database", type=Path)
+    parser.add_argument("networks", nargs="+", metavar="NAME=WEIGHTS")
+    parser.add_argument("--laps", type=int, default=19)
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--rollouts", action="store_true")
+    options = parser.parse_args()
+    paths = {name: Path(path) for name, _, path in (one.partition("=") for one in options.networks)}
+    networks = {name: load_network(path) for name, path in paths.items()}
+    for count, turns in ((1, TURNS), (CROWD, 4)):
+        for name, (us, ratio) in frame_ratios(networks, count, turns).items():
+            print(f"{name}: {count} characters, {us:,.0f} us a frame, {ratio:.2f} times", flush=True)
+    for name, network in networks.items():
+        size, kept = paths[name].stat().st_size / 1e6, 4e-6 * network.stored(network.mode(None))
+        print(f"{name}: {size:.1f} MB file, {kept:.1f} MB in memory", flush=True)
+        if options.laps:
+            lap = responsivity(
+                network, configuration="", runtime=Runtime(), laps=options.laps, lap_seconds=400, modes=()
+            )
+            print(
+                f"{name}: {lap['waypoints_reached']} of {lap['waypoints']} waypoints, at most "
+                f"{lap['path_overshoot_cm']:.0f} cm off the path, a lap {lap['mean_lap_seconds']} s, slide "
+                f"{lap['foot_slide_cm']:.2f} cm, turn {lap['largest_turn_degrees']:.0f} degrees",
+                flush=True,
+            )
+        if options.minutes:
+            print(f"{name}: {stability(network, options.minutes)}", flush=True)
+        if options.rollouts:
+            strayed = roll_outs(paths[name], options.database)
+            print(f"{name}: {', '.join(map(str, LENGTHS))} frames: {strayed} cm", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,38 @@
+"""Motion matching (Clavet 2016; features after Holden et al. 2020): no network, the clips themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hobble.core.skeleton import Skeleton
+from hobble.models.model import Built
+from hobble.rows.layout import RowLayout
+
+if TYPE_CHECKING:
+    from hobble.models.matching.build import Tables
+    from hobble.models.matching.network import Matching
+    from hobble.models.matching.options import MatchingOptions
+
+
+class _Matching(Built):
+    def options(self) -> type[MatchingOptions]:
+        from hobble.models.matching.options import MatchingOptions
+
+        return MatchingOptions
+
+    def build(
+        self, options: MatchingOptions, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton
+    ) -> Tables:
+        from hobble.models.matching.build import build
+
+        return build(options, clips, layout, skeleton)
+
+    def read(self, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Matching:
+        from hobble.models.matching.network import Matching
+
+        return Matching.read(path, arrays, common)
+
+
+MODEL = _Matching()

@@ -1,0 +1,129 @@
+"""The tables that motion matching goes through, from the rows of clips in their order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.models.matching.features import columns_and_weights
+from hobble.models.matching.options import MatchingOptions
+from hobble.rows.clip_rows import ClipRows, load_clip_rows
+from hobble.rows.compose import compose, frame_inputs
+from hobble.rows.layout import RowLayout
+
+
+@dataclass(frozen=True)
+class Tables:
+    """R frames of clips, one run of consecutive frames after another.
+
+    features: (R, n) float32, weighted; y: (R, Y) float32 raw; phase: (R,); left: (R,) int32, frames that
+    follow in the run; columns: (n,) of X, weights: (n,) of the features. every, halflife: of the options.
+    """
+
+    kind: ClassVar[str] = "matching"
+
+    features: Array = field(repr=False)
+    y: Array = field(repr=False)
+    phase: Array = field(repr=False)
+    left: NDArray[np.int32] = field(repr=False)
+    columns: NDArray[np.int64]
+    weights: Array
+    every: int
+    halflife: float
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What a file holds of them."""
+        return {
+            "features": self.features,
+            "frames": self.y,
+            "phase": self.phase,
+            "left": self.left,
+            "columns": self.columns,
+            "feature_weights": self.weights,
+        }
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What a file's meta says of them."""
+        return {
+            "network": "y is the frame of the clips whose weighted columns of x are nearest, and the frames "
+            "that follow it until the next search",
+            "every": self.every,
+            "halflife": self.halflife,
+        }
+
+    @property
+    def described(self) -> str:
+        """Their size in a few words."""
+        return f"{len(self.y):,} frames of clips, compared by {len(self.columns)} features"
+
+
+def build(
+    options: MatchingOptions, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton
+) -> Tables:
+    """The tables of clips' files of rows, laid out as `layout`.
+
+    Raises InputError where a file is none, is of another layout, or all of them together hold no frame.
+    """
+    xs, ys, phases, lefts = [], [], [], []
+    for path in clips:
+        rows = load_clip_rows(path)
+        if rows.layout.with_channels(()) != layout.with_channels(()) or not set(layout.channels) <= set(
+            rows.layout.channels
+        ):
+            raise InputError(path, f"its rows ({rows.layout}) are not those of the database ({layout})")
+        x, y = on_mean_ground(rows, layout)
+        one, left = in_runs(rows)
+        xs.append(x[one])
+        ys.append(y[one])
+        phases.append(rows.p[one])
+        lefts.append(left)
+    if not sum(map(len, ys)):
+        raise InputError("the clips", "hold no frame to match", fix="Train on a clip with a whole cycle.")
+    x = np.concatenate(xs)
+    columns, weights = columns_and_weights(layout, skeleton, options, x)
+    return Tables(
+        features=np.ascontiguousarray(x[:, columns] * weights, np.float32),
+        y=np.concatenate(ys),
+        phase=np.concatenate(phases).astype(np.float32) % 1.0,
+        left=np.concatenate(lefts),
+        columns=columns,
+        weights=weights,
+        every=options.every,
+        halflife=options.halflife,
+    )
+
+
+def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
+    """x (R, X) and y (R, Y) float32 raw, of each row once, with the mean of its terrain fits under it."""
+    x = np.empty((len(rows), layout.x_size), np.float32)
+    y = rows.y.astype(np.float32)
+    if not len(rows):
+        return x, y
+    count = rows.fits[:, None]
+    ground = np.add.reduceat(rows.heights, rows.first_fit, axis=0) / count
+    lift = np.add.reduceat(rows.mean, rows.first_fit)[:, None] / count
+    told = {name: rows.channels[name] for name, _ in layout.channels}
+    compose(layout, frame_inputs(layout, rows.x, told), ground, lift, x, y)
+    return x, y
+
+
+def in_runs(rows: ClipRows) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """The rows (R',) whose frames follow one another, and how many frames follow each in its run (R',).
+
+    Cycles that touch share a frame, which stands in the file twice: the later row, with which a cycle begins,
+    is kept.
+    """
+    frame = rows.frame
+    one = np.flatnonzero(np.diff(frame, append=-1) != 0)
+    frame = frame[one]
+    ends = np.flatnonzero(np.diff(frame, append=frame[-1] + 2 if len(frame) else 0) != 1)
+    return one, (ends[np.searchsorted(ends, np.arange(len(one)))] - np.arange(len(one))).astype(np.int32)

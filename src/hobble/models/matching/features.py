@@ -1,0 +1,71 @@
+"""What a frame of the clips and a frame of the character are compared by: weighted columns of X.
+
+After Holden, Kanoun, Perepichka, Popa, Learned Motion Matching (2020), section 3: the path and the facing a
+third, two thirds and a whole window ahead, position and velocity of both feet and velocity of the hips. Added
+are the gait, the heights ahead and what the channels tell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hobble.channels import channel
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.models.matching.options import MatchingOptions
+from hobble.rows.layout import GAITS, RowLayout
+
+FEET = ("left_heel", "right_heel")
+LEAST = 1e-6  # spread below which a group of columns tells nothing
+
+
+def groups(
+    layout: RowLayout, skeleton: Skeleton, options: MatchingOptions
+) -> list[tuple[str, list[int], float]]:
+    """(name, columns of X, weight) of each group of features whose columns share one scale."""
+    samples, now = layout.samples, layout.samples // 2
+    ahead = sorted({now + max(0, round(layout.future * part / 3) - 1) for part in (1, 2, 3)})
+    joint, speed = layout.x_joint_position.start, layout.x_joint_velocity.start
+
+    def pairs(block: slice) -> list[int]:
+        return [block.start + axis * samples + at for axis in range(2) for at in ahead]
+
+    def of(start: int, role: str) -> list[int]:
+        return [start + 3 * skeleton.role(role) + axis for axis in range(3)]
+
+    found = [
+        ("path", pairs(layout.x_position), options.path),
+        ("facing", pairs(layout.x_direction), options.facing),
+        *((f"{foot} position", of(joint, foot), options.foot_position) for foot in FEET),
+        *((f"{foot} velocity", of(speed, foot), options.foot_velocity) for foot in FEET),
+        ("hips velocity", of(speed, "hips"), options.hip_velocity),
+        ("gait", [layout.x_gait.start + g * samples + now for g in range(len(GAITS))], options.gait),
+        ("ground", [layout.x_terrain.start + samples + at for at in ahead], options.ground),
+    ]
+    return found + [(name, _columns(layout.x_channel(name)), options.channels) for name, _ in layout.channels]
+
+
+def columns_and_weights(
+    layout: RowLayout, skeleton: Skeleton, options: MatchingOptions, x: Array
+) -> tuple[NDArray[np.int64], Array]:
+    """Columns of X (n,), and what each is multiplied by (n,) float32, so that distances can be added up.
+
+    x: (R, X) the rows of the clips, raw. A group is divided by the mean spread of its columns, as in the
+    source: standardising each alone would blow up those that hardly vary. A channel is divided by its highest
+    value, so that it says nothing about how often a clip has it.
+    """
+    columns: list[int] = []
+    weights: list[Array] = []
+    for name, group, weight in groups(layout, skeleton, options):
+        if name in dict(layout.channels):
+            spread = channel(name).highest
+        else:
+            spread = float(x[:, group].std(axis=0, dtype=np.float64).mean())
+        columns += group
+        weights.append(np.full(len(group), weight / spread if spread > LEAST else 0.0, np.float32))
+    return np.array(columns, np.int64), np.concatenate(weights)
+
+
+def _columns(block: slice) -> list[int]:
+    return list(range(block.start, block.stop))

@@ -1,0 +1,164 @@
+"""What a character remembers between frames, and how a transition is hidden: by inertialisation.
+
+At a transition the pose changes at once to that of another frame of the clips. The difference, and that of
+the velocities, is remembered, added to the poses that follow, and decays like a critically damped spring that
+is let go (Bollo, Inertialization, GDC 2018; the spring in closed form after Holden, Spring-It-On, 2021). No
+joint jumps, and only one pose is read in a frame.
+
+Rotations are axes times half the angle, as in Y. All is in the root frame, centimetres, per frame.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hobble.core.compiled import njit
+
+ROW, SINCE, OFFSETS = 0, 1, 2  # places in the memory: 1 + the row shown last, frames since the search
+OF_JOINT = 12  # offsets of position, velocity, rotation and turn, three numbers each
+FASTEST_PULL = 0.002  # cycles a frame by which a phase may go beyond that of the clips to catch up
+
+
+def remembered(joints: int) -> int:
+    """Numbers that are remembered of one character."""
+    return OFFSETS + OF_JOINT * joints
+
+
+@njit
+def go_on(memory: Any, left: Any, every: int, before: Any, following: Any, due: Any) -> None:
+    """Where each character's run goes on, and who is due for a search.
+
+    memory: (C, M); left: (R,) frames that follow each row in its run. before: (C,) the row shown last, or -1;
+    following: (C,) the row after it, or -1 where its run ends there; due: (C,).
+    """
+    rows = len(left)
+    for c in range(len(memory)):
+        row = memory[c, ROW]
+        sound = 1 <= row <= rows
+        before[c] = np.int64(row) - 1 if sound else -1
+        following[c] = before[c] + 1 if sound and left[before[c]] > 0 else -1
+        due[c] = following[c] < 0 or not memory[c, SINCE] + 1 < every
+
+
+@njit(error_model="numpy")
+def show(
+    memory: Any, frames: Any, scale: Any, phases: Any, before: Any, following: Any, shown: Any, due: Any,
+    phase: Any, joints: int, at: Any, halflife: float, out: Any,
+) -> None:  # fmt: skip
+    """Write what each character shows of row `shown` (C,) into `out` (C, Y), and remember it.
+
+    frames: (R, Y), times scale (Y,); phases: (R,); at: first columns of joint positions, velocities,
+    rotations and of the change of phase. A character whose row follows on its last one goes on; any other
+    makes a transition. No row may be the first of its run, but the one that a character begins with.
+    """
+    damping = 2.0 * np.log(2.0) / halflife
+    for c in range(len(memory)):
+        row = shown[c]
+        out[c] = frames[row] * scale
+        if before[c] < 0:
+            memory[c] = 0.0
+        else:
+            if row != following[c]:
+                _begin(memory[c], frames, scale, before[c], following[c], row, joints, at)
+            _decay(memory[c, OFFSETS:], damping)
+            _add(memory[c, OFFSETS:], joints, at, out[c])
+            off = phases[row] - phase[c]
+            off -= np.floor(off + 0.5)
+            out[c, at[3]] += min(max(off, -FASTEST_PULL), FASTEST_PULL)
+        memory[c, ROW] = row + 1
+        memory[c, SINCE] = 0 if due[c] else memory[c, SINCE] + 1
+
+
+@njit(forceinline=True, cache=False)
+def _begin(
+    memory: Any, frames: Any, scale: Any, before: int, following: int, row: int, joints: int, at: Any
+) -> None:
+    """Add to the offsets what the pose that would have come next differs by from that of `row`."""
+    o = memory[OFFSETS:]
+    old, new = frames[following if following >= 0 else before] * scale, frames[row] * scale
+    # How fast a joint turns is the step between two rows of one run.
+    before_old, before_new = frames[before] * scale, frames[max(row - 1, 0)] * scale
+    q, p, r = np.empty(4), np.empty(4), np.empty(3)
+    for j in range(joints):
+        k = OF_JOINT * j
+        for i in range(3):
+            o[k + i] += old[at[0] + 3 * j + i] - new[at[0] + 3 * j + i]
+            o[k + 3 + i] += old[at[1] + 3 * j + i] - new[at[1] + 3 * j + i]
+        turn = at[2] + 3 * j
+        _exp(old, turn, q)
+        _exp(new, turn, p)
+        _between(q, p, r)
+        _exp(o, k + 6, p)
+        _exp(r, 0, q)
+        _log(p, q, o, k + 6)
+        if following >= 0:
+            _step(old, before_old, turn, r)
+            for i in range(3):
+                o[k + 9 + i] += r[i]
+            _step(new, before_new, turn, r)
+            for i in range(3):
+                o[k + 9 + i] -= r[i]
+
+
+@njit(forceinline=True, cache=False)
+def _decay(o: Any, damping: float) -> None:
+    """One frame of x'' = -2 d x' - d^2 x, for position with its velocity and rotation with its turn."""
+    fade = np.exp(-damping)
+    for k in range(0, len(o), 6):
+        for i in range(k, k + 3):
+            j = o[i + 3] + o[i] * damping
+            o[i], o[i + 3] = fade * (o[i] + j), fade * (o[i + 3] - j * damping)
+
+
+@njit(forceinline=True, cache=False)
+def _add(o: Any, joints: int, at: Any, y: Any) -> None:
+    """Add the offsets to a row Y."""
+    q, p = np.empty(4), np.empty(4)
+    for j in range(joints):
+        k, turn = OF_JOINT * j, at[2] + 3 * j
+        for i in range(3):
+            y[at[0] + 3 * j + i] += o[k + i]
+            y[at[1] + 3 * j + i] += o[k + 3 + i]
+        _exp(o, k + 6, q)
+        _exp(y, turn, p)
+        _log(q, p, y, turn)
+
+
+@njit(forceinline=True, cache=False)
+def _exp(v: Any, at: int, q: Any) -> None:
+    """The quaternion of an axis times half the angle."""
+    half = np.sqrt(v[at] * v[at] + v[at + 1] * v[at + 1] + v[at + 2] * v[at + 2])
+    scale = np.sin(half) / half if half > 1e-8 else 1.0
+    q[0], q[1], q[2], q[3] = np.cos(half), v[at] * scale, v[at + 1] * scale, v[at + 2] * scale
+
+
+@njit(forceinline=True, cache=False)
+def _log(a: Any, b: Any, v: Any, at: int) -> None:
+    """The axis times half the angle of the product a b, along the shorter way."""
+    w = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
+    x = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
+    y = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
+    z = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
+    if w < 0:
+        w, x, y, z = -w, -x, -y, -z
+    length = np.sqrt(x * x + y * y + z * z)
+    scale = np.arctan2(length, w) / length if length > 1e-8 else 1.0
+    v[at], v[at + 1], v[at + 2] = x * scale, y * scale, z * scale
+
+
+@njit(forceinline=True, cache=False)
+def _between(a: Any, b: Any, v: Any) -> None:
+    """What turns b into a: the axis times half the angle of a b^-1. b becomes its inverse."""
+    b[1], b[2], b[3] = -b[1], -b[2], -b[3]
+    _log(a, b, v, 0)
+
+
+@njit(forceinline=True, cache=False)
+def _step(now: Any, earlier: Any, turn: int, v: Any) -> None:
+    """How far a joint turned from one row to the next."""
+    q, p = np.empty(4), np.empty(4)
+    _exp(now, turn, q)
+    _exp(earlier, turn, p)
+    _between(q, p, v)

@@ -1,0 +1,204 @@
+"""Motion matching as the rest of Hobble sees a network: its tables, and what each part gets of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from hobble.core.errors import InputError
+from hobble.core.quat import Array
+from hobble.models import checks
+from hobble.models.matching.inertia import remembered
+from hobble.models.matching.predictor import MatchingPredictor
+from hobble.models.network import Network, standardised
+from hobble.models.packing import packed, packed_columns
+
+MOST_ROWS = 1 << 24  # more would not be told apart by the page's float32
+MOST_WEIGHT = 1e9
+LONGEST = 1_000_000  # frames
+FEWEST_LEFT = 20  # frames that have to follow a row for a run to begin there
+MOST_ON_PAGE = 8000  # rows, about 8 MB of text; a page of several characters is to stay below 20 MB
+
+
+@dataclass(frozen=True)
+class Matching(Network):
+    """features: (R, n) float32; frames: (R, Y) float32 raw; phases: (R,) float32; left: (R,) frames that
+    follow in the run; columns: (n,) of X and weights: (n,) of the features. every: frames between two
+    searches; halflife: frames of the inertialisation.
+    """
+
+    kind: ClassVar[str] = "matching"
+    phase: ClassVar[bool] = False
+    rooted: ClassVar[bool] = True
+
+    features: Array = field(repr=False)
+    frames: Array = field(repr=False)
+    phases: Array = field(repr=False)
+    left: NDArray[np.int64] = field(repr=False)
+    columns: NDArray[np.int64] = field(repr=False)
+    weights: Array = field(repr=False)
+    every: int
+    halflife: float
+
+    @classmethod
+    def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Matching:
+        """From the arrays that `Tables.arrays` wrote; see `hobble.models.load`."""
+        meta, inputs, outputs = common["meta"], len(common["x_mean"]), len(common["y_mean"])
+        frames = checks.numbers(path, arrays, "frames", 2, checks.LARGEST_MEAN)
+        features = checks.numbers(path, arrays, "features", 2, checks.LARGEST_MEAN)
+        phases = checks.numbers(path, arrays, "phase", 1, 1.0)
+        weights = checks.numbers(path, arrays, "feature_weights", 1, MOST_WEIGHT)
+        columns = _whole(path, arrays, "columns", inputs - 1)
+        left = _whole(path, arrays, "left", MOST_ROWS)
+        rows, n = len(frames), len(columns)
+        expected = {"frames": (rows, outputs), "features": (rows, n), "phase": (rows,), "left": (rows,)}
+        found = {"frames": frames, "features": features, "phase": phases, "left": left}
+        for name, shape in expected.items():
+            if found[name].shape != shape:
+                raise InputError(path, f"{name} is {found[name].shape} where {shape} belongs")
+        if weights.shape != (n,) or weights.min() < 0:
+            raise InputError(path, f"feature_weights are not {n} numbers of 0 or more")
+        if rows > MOST_ROWS:
+            raise InputError(path, f"{rows} frames; {MOST_ROWS} at most are read")
+        # Where frames follow, the next row is the next frame: playing it never leaves the table.
+        if left[-1] != 0 or (left[:-1][left[:-1] > 0] != left[1:][left[:-1] > 0] + 1).any():
+            raise InputError(path, "left does not count down to the end of each run")
+        if common["skeleton"] is None:
+            raise InputError(path, "motion matching without a skeleton: its meta has none")
+        return cls(
+            features=features,
+            frames=frames,
+            phases=phases,
+            left=left,
+            columns=columns,
+            weights=weights,
+            every=checks.whole(path, "every", meta.get("every"), 1, LONGEST),
+            halflife=checks.length(path, "halflife", meta.get("halflife"), LONGEST),
+            **common,
+        )
+
+    def shortened(self, most: int) -> Matching:
+        """The same with the first part of each run, as long as leaves `most` rows or a few more in all."""
+        rows = len(self.left)
+        if rows <= most:
+            return self
+        begins = np.flatnonzero(np.r_[True, self.left[:-1] == 0])
+        lengths = self.left[begins] + 1
+        kept = np.ceil(lengths * (most / rows)).astype(np.int64)
+        within = np.arange(rows) - np.repeat(begins, lengths)
+        left = np.repeat(kept, lengths) - 1 - within
+        some = left >= 0
+        return replace(
+            self,
+            features=self.features[some],
+            frames=self.frames[some],
+            phases=self.phases[some],
+            left=left[some],
+        )
+
+    @cached_property
+    def starts(self) -> NDArray[np.int64]:
+        """Rows that a search may find: not at the end of a run, nor the first of one, which has no turn.
+
+        All rows where no run is so long.
+        """
+        begins = np.r_[True, self.left[:-1] == 0]
+        found = np.flatnonzero((self.left >= FEWEST_LEFT) & ~begins)
+        return found if len(found) else np.flatnonzero(~begins) if (~begins).any() else np.arange(len(begins))
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Of the features of `starts`."""
+        return cKDTree(self.features[self.starts])
+
+    @property
+    def memory(self) -> int:
+        """As in `Network`: the row shown, the frames since the search, and what inertialisation adds."""
+        return remembered(self.layout.joints)
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """As in `Network`: there are no layers."""
+        return ()
+
+    @property
+    def parameters(self) -> int:
+        """Numbers in its tables."""
+        return self.frames.size + self.features.size
+
+    @property
+    def described(self) -> str:
+        """As in `Network`."""
+        return f"motion matching over {len(self.frames):,} frames of clips"
+
+    def queries(self, z: Array) -> Array:
+        """Features (n, F) float32 of standardised inputs z (n, X)."""
+        raw = z[:, self.columns] * self.x_std[self.columns] + self.x_mean[self.columns]
+        return np.ascontiguousarray(raw * self.weights, np.float32)
+
+    def nearest(self, queries: Array) -> NDArray[np.int64]:
+        """The rows (n,) whose features are nearest to queries (n, F)."""
+        return self.starts[self.tree.query(queries)[1]]
+
+    def predict(self, x: Array, phase: Array) -> Array:
+        """The frame that is nearest to each row of x (n, X); the phase is not looked at.
+
+        This is a search for each row, without the runs and transitions of a character.
+        """
+        return self.frames[self.nearest(self.queries(standardised(self, x)))]
+
+    def predictor(self, mode: str | None = None, storage: str = "float32") -> MatchingPredictor:
+        """As in `Network`; there is one mode. int16 halves the memory of the frames."""
+        self.mode(mode)
+        return MatchingPredictor(self, storage)
+
+    def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
+        """As in `Network`: frames as integers with a factor for each column; features are as they are, so
+        that the page finds the same rows. Of many rows only MOST_ON_PAGE are there, of each run the first."""
+        return self.shortened(MOST_ON_PAGE)._packed(inputs, outputs)
+
+    def _packed(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
+        place = {int(column): i for i, column in enumerate(inputs)}
+        there = [i for i, column in enumerate(self.columns) if int(column) in place]
+        used, layout = self.columns[there], self.layout
+        rank = {int(column): i for i, column in enumerate(outputs)}
+        turn = layout.y_joint_rotation
+        turning = [j for j in range(layout.joints) if turn.start + 3 * j in rank]
+        return {
+            "frames": packed_columns(self.frames[:, outputs]),
+            "features": packed(self.features[:, there].astype(np.float32)),
+            "columns": [place[int(c)] for c in used],
+            "weights": packed(self.weights[there]),
+            "phases": packed(self.phases),
+            "left": packed(np.minimum(self.left, 1 << 30).astype(np.int32)),
+            "start": packed(self.starts.astype(np.int32)),
+            "every": self.every,
+            "halflife": self.halflife,
+            "memory": self.memory,
+            "joints": layout.joints,
+            "at": [rank.get(block.start, -1) for block in _moving(layout)],
+            "turning": [[j, rank[turn.start + 3 * j]] for j in turning],
+        }
+
+
+def _moving(layout: Any) -> list[slice]:
+    return [layout.y_joint_position, layout.y_joint_velocity, layout.y_phase_change]
+
+
+def _whole(path: str | Path, arrays: Mapping[str, Any], name: str, most: int) -> NDArray[np.int64]:
+    """The array `name` of whole numbers (n,) from 0 to `most`."""
+    if name not in arrays:
+        raise InputError(path, f"not a network: no {name}")
+    array = np.asarray(arrays[name])
+    if array.dtype.kind not in "iu" or array.ndim != 1 or not array.size:
+        raise InputError(path, f"{name} has shape {array.shape} and type {array.dtype}, not whole numbers")
+    if array.min() < 0 or array.max() > most:
+        raise InputError(path, f"{name} holds numbers that are not from 0 to {most}")
+    return array.astype(np.int64)

@@ -1,0 +1,33 @@
+// What the network is told of the ground and of the body's motion, drawn where it is: Play's view of its inputs.
+const AHEAD = 8; // frames that a joint would go on for at its velocity
+const LEAST = .15; // cm a frame; slower joints have no line
+
+// The samples of the ground along the path that was and is to come, and to its sides; higher ones than the path are warm.
+export const groundSamples = (c, spec) => {
+  const { step, constants: { side } } = spec, out = [];
+  for (let s = 0; s < c.ground.length / 3; s++) {
+    const i = s * step, a = side * c.dz[i], b = side * c.dx[i];
+    [[a, -b], [0, 0], [-a, b]].forEach(([x, z], k) => {
+      out.push({ place: [c.px[i] + x, c.ground[3 * s + k], c.pz[i] + z], told: c.ground[3 * s + k] - c.height });
+    });
+  }
+  return out;
+};
+
+// Lines from where the joints are to where they would be in AHEAD frames.
+export const jointVelocities = (c) => {
+  const out = [];
+  for (let j = 0; j < c.velocities.length; j += 3) {
+    const v = [c.velocities[j], c.velocities[j + 1], c.velocities[j + 2]], from = [c.pose[j], c.pose[j + 1], c.pose[j + 2]];
+    if (Math.hypot(...v) >= LEAST) out.push({ from, to: from.map((p, i) => p + AHEAD * v[i]) });
+  }
+  return out;
+};
+
+export const drawInputs = ({ marks, over, paint }, c, spec) => {
+  for (const { place: [x, y, z], told } of groundSamples(c, spec)) {
+    const rgb = Math.abs(told) < 1 ? paint.ink : told > 0 ? paint.high : paint.predicted, r = 3;
+    marks.piece([[x - r, y + .6, z - r], [x + r, y + .6, z - r], [x + r, y + .6, z + r], [x - r, y + .6, z + r]], rgb, .8);
+  }
+  for (const { from, to } of jointVelocities(c)) over.needle(from, to, 1.6, paint.predicted, .9);
+};

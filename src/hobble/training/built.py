@@ -1,0 +1,85 @@
+"""A network that is built from the clips at once instead of trained, such as motion matching."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from hobble.core.errors import HobbleError
+from hobble.core.files import save_npz
+from hobble.core.skeleton import Skeleton
+from hobble.database.reader import Database
+from hobble.models import model
+from hobble.models.load import load_network
+from hobble.models.model import Built, Made
+from hobble.models.network import Network
+from hobble.models.options import Options
+from hobble.training.batches import TRAIN
+from hobble.training.held_out import HeldOut
+from hobble.training.history import duration, write_history
+from hobble.training.weights import write_weights
+
+log = logging.getLogger("hobble.training")
+
+
+def run_built(
+    database: Database,
+    clips: Mapping[str, str | Path],
+    *,
+    configuration: str,
+    network: Options,
+    weights: Path,
+    history: Path,
+    checkpoint: Path,
+    terrain_side: float,
+) -> None:
+    """Build it and write the three files that a training writes.
+
+    clips: name -> file of its rows in order, for the training clips of the database at least. The history is
+    one row: every frame is read once. The checkpoint says what was built; nothing can go on from it.
+    """
+    began = time.perf_counter()
+    made, frames = build(database, network, clips)
+    seconds = time.perf_counter() - began
+    log.info("%s, from %d rows in %s", made.described, frames, duration(seconds))
+    facts = {"passes": 1, "samples": frames, "steps": 0, "terrain_side": terrain_side}
+    write_weights(weights, made, database, configuration, facts)
+    blocks = database.layout.blocks("y")
+    errors = HeldOut(database, torch.device("cpu"), 0).whole(Standardised(load_network(weights)))
+    log.info("held out, every row: %.4f", errors[0])
+    write_history(history, blocks, [[1, 1, frames, seconds, float("nan"), *errors]])
+    save_npz(checkpoint, network=np.array(made.described), sections=np.array(0))
+
+
+def build(database: Database, network: Options, clips: Mapping[str, str | Path]) -> tuple[Made, int]:
+    """What is built of the database's training clips, and how many rows they have.
+
+    Raises InputError where a file does not fit the database, HobbleError where one is missing.
+    """
+    kind = model(network.kind)
+    assert isinstance(kind, Built), "what is trained is not built"
+    used = [clip for clip in database.manifest.clips if clip["split"] == TRAIN and clip["rows"]]
+    if missing := [clip["clip"] for clip in used if clip["clip"] not in clips]:
+        raise HobbleError(f"the database has rows of {', '.join(missing)}, whose files were not given")
+    files = [clips[clip["clip"]] for clip in used]
+    made = kind.build(network, files, database.layout, Skeleton.from_dict(database.skeleton))
+    return made, sum(clip["rows"] for clip in used)
+
+
+class Standardised:
+    """A network that is read, asked in standardised units as one that is trained."""
+
+    def __init__(self, network: Network) -> None:
+        self.network, self.outputs = network, len(network.y_mean)
+
+    def __call__(self, x: Tensor, p: Tensor) -> Tensor:
+        """Standardised outputs (B, Y) of standardised inputs x (B, X) at phases p (B,)."""
+        n = self.network
+        y = n.predict(x.numpy() * n.x_std + n.x_mean, p.numpy())
+        return torch.from_numpy((y - n.y_mean) / np.maximum(n.y_std, 1e-30))

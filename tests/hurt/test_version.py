@@ -1,0 +1,82 @@
+"""A version of a clip: its severities are those that it shows, and none in between where none is wanted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hurt_gait import measures
+
+from hobble.hurt.clip import hurt_clip
+from hobble.hurt.effects import POWER
+from hobble.hurt.options import Hurt
+from hobble.hurt.version import NEAR, hurt_version
+from hobble.labels.label import mirror_labels
+from hobble.labels.model import LabelReport
+from hobble.motion.mirror import mirror_clip
+
+REPORT = LabelReport("straight", "automatic", "automatic", "right", "extend", 0)
+THIGH = "RightUpLeg-RightLeg"
+
+
+@pytest.fixture(scope="module")
+def changing(made, hurting):
+    """A walk of 20 s whose thigh hurts at 10 from 5 s on and at 3 from 12 s on: what is asked, the result."""
+    clip, labels, flat = made("straight")
+    asked = hurting(len(clip), {THIGH: 10.0})
+    asked[:300] = 0.0
+    asked[720:] *= 0.3
+    return asked, hurt_clip(clip, labels, asked, flat=flat)
+
+
+def test_severities_are_those_asked_for_away_from_a_change(changing, holden31) -> None:
+    asked, hurt = changing
+    column = holden31.link_names.index(THIGH)
+    when = np.clip(hurt.when.astype(int), 0, len(asked) - 1)
+    calm = np.ptp([asked[np.clip(when + d, 0, len(asked) - 1), column] for d in (-80, 0, 80)], axis=0) == 0
+    assert calm.mean() > 0.6
+    np.testing.assert_allclose(hurt.severity[calm], asked[when][calm], atol=0.01)
+    assert not np.delete(hurt.severity, column, axis=1).any()
+
+
+def test_a_change_sets_in_over_a_second_with_the_motion(changing, holden31) -> None:
+    _, hurt = changing
+    severity = hurt.severity[:, holden31.link_names.index(THIGH)]
+    assert np.abs(np.diff(severity)).max() < 0.6
+    at = int(np.argmin(np.abs(hurt.when - 299.5)))  # the moment of the change: half of the strength of 10
+    assert severity[at] == pytest.approx(10 * 0.5 ** (1 / POWER), abs=0.25)
+
+
+def test_a_stretch_that_shows_a_severity_is_as_fast_as_a_clip_with_it(changing, made, hurting) -> None:
+    _, hurt = changing
+    clip, labels, flat = made("straight")
+    throughout = hurt_clip(clip, labels, hurting(len(clip), {THIGH: 10.0}), flat=flat)
+    inside = np.flatnonzero(hurt.severity.max(axis=1) > 9.9)
+    other = np.searchsorted(throughout.when, hurt.when[inside])
+    hips = clip.skeleton.role("hips")
+
+    def speed(one, frames):
+        return np.linalg.norm(np.diff(one.clip.positions[frames, hips][:, ::2], axis=0), axis=1).mean()
+
+    assert speed(hurt, inside) == pytest.approx(speed(throughout, other), rel=0.03)
+    assert speed(hurt, inside) < 0.75 * measures(clip, labels)["speed"] / 60
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_without_severities_in_between_no_cycle_shows_one(made, mirrored) -> None:
+    clip, labels, _ = made("straight")
+    options = Hurt(severities=(10.0,), seconds=5, at_once=1, in_between=False, longest=1)
+    hurt, report = hurt_version(clip, labels, REPORT, options, name="a_hurt1", turn=0, ground="flat")
+    severity, own = hurt.severity, hurt.labels
+    if mirrored:
+        own, _ = mirror_labels(own, report, mirror_clip(hurt.clip, "image"))
+    inside = np.concatenate([np.arange(a, b + 1) for a, b in own.cycles])
+    assert len(inside) > 200
+    shown = severity[inside]
+    assert (np.minimum(shown, np.abs(shown - 10)) <= NEAR).all()
+    assert (shown > 9).any(axis=1).mean() > 0.9
+    kept, _ = hurt_version(
+        clip, labels, REPORT, options.model_copy(update={"in_between": True}), name="a_hurt1", turn=0,
+        ground="flat",
+    )  # fmt: skip
+    everything = np.concatenate([np.arange(a, b + 1) for a, b in kept.labels.cycles])
+    assert (np.abs(kept.severity[everything] - 5) < 3).any()

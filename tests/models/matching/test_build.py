@@ -1,0 +1,97 @@
+"""What is kept of the clips: every frame once, in runs, on the mean of its ground."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import InputError
+from hobble.core.skeleton import Skeleton
+from hobble.models import model
+from hobble.models.matching.build import in_runs, on_mean_ground
+from hobble.models.matching.features import groups
+from hobble.models.matching.options import MatchingOptions
+from hobble.rows.clip_rows import pairs, save_clip_rows
+from hobble.rows.layout import RowLayout
+
+from .example import CUT, FRAMES, built, clip, layout_of
+
+
+def test_a_frame_that_two_cycles_share_is_kept_once(holden31: Skeleton) -> None:
+    rows = clip(holden31, 0)
+    one, left = in_runs(rows)
+    np.testing.assert_array_equal(rows.frame[one], 100 + np.arange(FRAMES[0]))
+    assert rows.cycle[one[CUT]] == 1, "the row with which a cycle begins"
+    np.testing.assert_array_equal(left, np.arange(FRAMES[0])[::-1])
+
+
+def test_a_gap_between_cycles_ends_a_run(holden31: Skeleton) -> None:
+    rows = clip(holden31, 0)
+    rows = replace(rows, frame=np.where(rows.cycle > 0, rows.frame + 30, rows.frame))
+    one, left = in_runs(rows)
+    assert len(one) == len(rows)
+    np.testing.assert_array_equal(left, [*range(CUT, -1, -1), *range(len(rows) - CUT - 2, -1, -1)])
+
+
+def test_a_clip_without_rows_gives_none(holden31: Skeleton) -> None:
+    rows = clip(holden31, 0)
+    cut = {n: getattr(rows, n)[:0] for n in ("x", "y", "p", "frame", "cycle", "fits", "heights", "mean")}
+    rows = replace(rows, **cut, channels={"injury": rows.channels["injury"][:0]})
+    assert [len(part) for part in in_runs(rows)] == [0, 0]
+    assert [len(part) for part in on_mean_ground(rows, rows.layout)] == [0, 0]
+
+
+def test_rows_lie_on_the_mean_of_their_fits(holden31: Skeleton) -> None:
+    rows, layout = clip(holden31, 0), layout_of(holden31)
+    x, y = on_mean_ground(rows, layout)
+    first = rows.first_fit
+    each = [pairs(rows, layout, np.arange(len(rows)), first + k) for k in range(2)]
+    np.testing.assert_allclose(x, (each[0].x + each[1].x) / 2, atol=1e-5)
+    np.testing.assert_allclose(y, (each[0].y + each[1].y) / 2, atol=1e-5)
+
+
+def test_tables_hold_the_clips_in_order(holden31: Skeleton, tmp_path: Path) -> None:
+    tables, _, network = built(holden31, tmp_path)
+    each = [
+        on_mean_ground(rows, rows.layout)[1][in_runs(rows)[0]] for rows in map(clip, [holden31] * 2, (0, 1))
+    ]
+    np.testing.assert_allclose(tables.y, np.concatenate(each), atol=1e-6)
+    assert tables.left[FRAMES[0] - 1] == tables.left[-1] == 0
+    assert set(network.starts) == {*range(1, FRAMES[0] - 20), *range(FRAMES[0] + 1, sum(FRAMES) - 20)}
+
+
+def test_the_features_are_the_columns_that_they_are_called_by(holden31: Skeleton) -> None:
+    layout, options = layout_of(holden31), MatchingOptions()
+    found = {name: columns for name, columns, _ in groups(layout, holden31, options)}
+    # A third, two thirds and the whole of the window ahead: frames 20, 40 and the last sample, 50.
+    assert found["path"] == [7, 9, 11, 19, 21, 23]
+    assert found["facing"] == [24 + c for c in found["path"]]
+    start = layout.x_joint_velocity.start
+    assert found["hips velocity"] == [start, start + 1, start + 2]
+    heel = layout.x_joint_position.start + 3 * holden31.index("RightFoot")
+    assert found["right_heel position"] == [heel, heel + 1, heel + 2]
+    assert found["gait"] == [48 + 12 * g + 6 for g in range(6)]
+    assert len(found["injury"]) == 30
+
+
+def test_a_group_weighs_as_much_as_is_said(holden31: Skeleton, tmp_path: Path) -> None:
+    tables, _, _ = built(holden31, tmp_path, path=3.0, channels=20.0, gait=0.0)
+    spread = tables.features[:, :6].std(axis=0)
+    assert spread.mean() == pytest.approx(3.0, rel=1e-4)
+    assert spread.std() > 0.01, "its columns are divided by one number, not each by its own"
+    gait = [i for i, column in enumerate(tables.columns) if 48 <= column < 120]
+    assert not tables.weights[gait].any()
+    # Severity 7 of at most 10.
+    np.testing.assert_allclose(tables.features[FRAMES[0] :, -26], 14.0, rtol=1e-6)
+
+
+def test_rows_of_another_layout_are_refused(holden31: Skeleton, tmp_path: Path) -> None:
+    save_clip_rows(tmp_path / "one.npz", clip(holden31, 0))
+    kind, layout = model("matching"), RowLayout(len(holden31.joints), window=30)
+    with pytest.raises(InputError, match=r"one\.npz"):
+        kind.build(MatchingOptions(), [tmp_path / "one.npz"], layout, holden31)
+    with pytest.raises(InputError, match="no frame"):
+        kind.build(MatchingOptions(), [], layout_of(holden31), holden31)

