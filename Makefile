@@ -3,6 +3,11 @@ PYTHON ?= python3
 CORES ?= 2
 BIN := .venv/bin
 
+# Snakemake keeps files of its own under HOME. In a container there may be none, or one that cannot be written.
+ifneq ($(shell test -w "$$HOME" && echo writable),writable)
+export HOME := $(CURDIR)/.home
+endif
+
 .PHONY: help env report test faults browser cluster-test check docs format clean
 
 help:            ## list these targets

@@ -7,6 +7,7 @@ from hobble.channels import NAMES, modules_of, shown_modules
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import modules
 from hobble.workflow import lifetime
+from hobble.workflow.account import check_may_write, ensure_user_name
 from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
@@ -14,7 +15,10 @@ from hobble.workflow.project import Project
 from hobble.workflow.targets import check, notes
 from hobble.workflow.channel_sources import channels_of_folder
 
+ensure_user_name()
 try:
+    if workflow.is_main_process:
+        check_may_write(sys.argv[1:])
     # A relative path, so that moving the checkout re-runs nothing.
     project = Project(Path(os.path.relpath(workflow.basedir)), config)
     targets = [argument for argument in sys.argv[1:] if argument.startswith("results/")]

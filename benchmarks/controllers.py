@@ -69,10 +69,11 @@ def main() -> None:
     parser.add_argument("--laps", type=int, default=19)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--rollouts", action="store_true")
+    parser.add_argument("--no-times", action="store_true", help="where frame times are not wanted")
     options = parser.parse_args()
     paths = {name: Path(path) for name, _, path in (one.partition("=") for one in options.networks)}
     networks = {name: load_network(path) for name, path in paths.items()}
-    for count, turns in ((1, TURNS), (CROWD, 4)):
+    for count, turns in () if options.no_times else ((1, TURNS), (CROWD, 4)):
         for name, (us, ratio) in frame_ratios(networks, count, turns).items():
             print(f"{name}: {count} characters, {us:,.0f} us a frame, {ratio:.2f} times", flush=True)
     for name, network in networks.items():

@@ -65,6 +65,28 @@ def layers(path: str | Path, arrays: Mapping[str, Any], *prefixes: str) -> int:
     return len(found)
 
 
+def stacked(
+    path: str | Path, arrays: Mapping[str, Any], names: tuple[str, str], axes: int, inputs: int, outputs: int
+) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """Weights (..., out, in) and biases (..., out) of layers of which each takes what the last one gives.
+
+    names: of weights and biases, ("W", "b") for W0, b0, W1, ... axes: of the weights. The leading axes are
+    those of the first layer. inputs: of the first layer; outputs: of the last one.
+    """
+    count = layers(path, arrays, *names)
+    weights = tuple(numbers(path, arrays, f"{names[0]}{i}", axes) for i in range(count))
+    biases = tuple(numbers(path, arrays, f"{names[1]}{i}", axes - 1) for i in range(count))
+    size, sets = inputs, weights[0].shape[:-2]
+    for i, (w, b) in enumerate(zip(weights, biases, strict=True)):
+        if w.shape[:-2] != sets or w.shape[-1] != size or b.shape != w.shape[:-1]:
+            found = f"{names[0]}{i} {w.shape} and {names[1]}{i} {b.shape}"
+            raise InputError(path, f"{found} do not follow a layer of {size} units")
+        size = w.shape[-2]
+    if size != outputs:
+        raise InputError(path, f"its last layer {names[0]}{i} has {size} units for {outputs} outputs")
+    return weights, biases
+
+
 def statistics(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Array]:
     """x_mean, x_std (X,), y_mean, y_std (Y,)."""
     out = {}

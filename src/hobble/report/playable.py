@@ -18,7 +18,7 @@ from hobble.rows.layout import RowLayout
 from hobble.runtime import animation, controller, feet, trajectory
 from hobble.runtime.bounds import Bounds
 from hobble.runtime.character import start
-from hobble.runtime.limits import LAME_BELOW
+from hobble.runtime.limits import HURRIED, LAME_BELOW
 from hobble.runtime.options import Runtime
 
 UNSEEN = 1e-7  # an input that is scaled by less than this says nothing
@@ -169,6 +169,7 @@ def _constants() -> dict[str, float]:
         "turnInPlace": float(animation.TURN_IN_PLACE),
         "jogFrom": animation.JOG_FROM,
         "lameBelow": LAME_BELOW,
+        "hurried": HURRIED,
         "lockAt": feet.LOCK_AT,
         "release": feet.RELEASE,
         "tooFar": feet.TOO_FAR,

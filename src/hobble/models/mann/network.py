@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.models.checks import layers, numbers
+from hobble.models.checks import stacked
 from hobble.models.mann.forward import forward, softmax
 from hobble.models.network import Export, Network, standardised
 from hobble.models.packing import packed_rows
@@ -39,31 +39,18 @@ class Mann(Network):
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Mann:
         """From the arrays W0 (K, out, in), b0 (K, out), ..., V0 (out, in), d0 (out,), ... and `gate` (G,)."""
-        found: dict[str, tuple[Array, ...]] = {}
-        for name, partner, axes in (("W", "b", 3), ("V", "d", 2)):
-            count = layers(path, arrays, name, partner)
-            found[name] = tuple(numbers(path, arrays, f"{name}{i}", axes) for i in range(count))
-            found[partner] = tuple(numbers(path, arrays, f"{partner}{i}", axes - 1) for i in range(count))
-        inputs, outputs, experts = len(common["x_mean"]), len(common["y_mean"]), len(found["W"][0])
+        inputs, outputs = len(common["x_mean"]), len(common["y_mean"])
         columns = _columns(path, arrays, inputs)
+        weights, biases = stacked(path, arrays, ("W", "b"), 3, inputs, outputs)
+        experts = len(weights[0])
         if not 2 <= experts <= MOST_EXPERTS:
             raise InputError(path, f"{experts} experts; 2 to {MOST_EXPERTS} are read")
-        for name, partner, size, last in (("W", "b", inputs, outputs), ("V", "d", len(columns), experts)):
-            for i, (w, b) in enumerate(zip(found[name], found[partner], strict=True)):
-                fits = w.shape[-1] == size and b.shape == w.shape[:-1]
-                if not fits or (name == "W" and len(w) != experts):
-                    raise InputError(
-                        path,
-                        f"{name}{i} {w.shape} and {partner}{i} {b.shape} do not follow {size} units",
-                    )
-                size = w.shape[-2]
-            if size != last:
-                raise InputError(path, f"{name}{i} has {size} units, and {last} are needed")
+        gate_weights, gate_biases = stacked(path, arrays, ("V", "d"), 2, len(columns), experts)
         return cls(
-            weights=found["W"],
-            biases=found["b"],
-            gate_weights=found["V"],
-            gate_biases=found["d"],
+            weights=weights,
+            biases=biases,
+            gate_weights=gate_weights,
+            gate_biases=gate_biases,
             columns=columns,
             **common,
         )

@@ -5,67 +5,37 @@ from __future__ import annotations
 from typing import Any
 
 import numba
-import numpy as np
-import torch
 from torch import Tensor
 
 from hobble.core.compiled import njit
-from hobble.models.kernels import bits, draw, further, rounded, team, widened
+from hobble.models.fused import Fused
+from hobble.models.kernels import bits, rounded, team, widened
 from hobble.models.pfnn.step import Step
-from hobble.models.pfnn.trainable import TrainablePfnn
-from hobble.models.trainable import EVERY
 
 
-class FusedStep(Step):
+class FusedStep(Fused, Step):
     """As `Step`, several times faster outside the products, in buffers that are kept from batch to batch."""
-
-    def __init__(self, network: TrainablePfnn, dropout: float, half: bool = False) -> None:
-        super().__init__(network, dropout, half)
-        self.counter = np.uint64(0)
-        self.buffers: dict[tuple[str, int], Tensor] = {}
-
-    def seed(self, seed: int) -> None:
-        """Begin a new sequence of dropout masks, 0 <= seed < 2^63."""
-        self.counter = np.uint64(seed)
-
-    def masks(self, rows: int, own: slice = EVERY) -> list[Tensor]:
-        """As in `Step`, from another generator; valid until the next call."""
-        first, stop, _ = own.indices(rows)
-        masks = []
-        for number, width in enumerate(self.network.sizes[:-1]):
-            masks.append(self._buffer(f"mask {number}", stop - first, width))
-            team((stop - first) * width)
-            draw(masks[-1].numpy(), further(self.counter, first * width), self.keep)
-            self.counter = further(self.counter, rows * width)
-        return masks
 
     def coefficients(self, p: Tensor) -> Tensor:
         """(B, K) of phases (B,)."""
-        c = self._buffer("c", len(p), self.network.control_points)
+        c = self.buffer("c", len(p), self.network.control_points)
         _coefficients(p.numpy(), c.numpy())
         return c
 
     def expanded(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
         """As in `Step`, in one sweep."""
-        e = self._buffer(f"e {number}", len(x), c.shape[1] * (x.shape[1] + 1), self.factors.dtype)
-        slope = self._buffer(f"slope {number}", *x.shape)
+        e = self.buffer(f"e {number}", len(x), c.shape[1] * (x.shape[1] + 1), self.factors.dtype)
+        slope = self.buffer(f"slope {number}", *x.shape)
         team(e.numel())
         _expand(x.numpy(), c.numpy(), mask.numpy(), bits(e), slope.numpy())
         return e, slope
 
     def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
         """As in `Step`, in one sweep."""
-        d = self._buffer(f"d {number}", *slope.shape)
+        d = self.buffer(f"d {number}", *slope.shape)
         team(de.numel())
         _contract(bits(de), c.numpy(), slope.numpy(), d.numpy())
         return d
-
-    def _buffer(self, name: str, rows: int, width: int, dtype: torch.dtype | None = None) -> Tensor:
-        """(rows, width) of uninitialised memory; the same memory whenever the name and the width are."""
-        key = (name, width)
-        if key not in self.buffers or len(self.buffers[key]) < rows:
-            self.buffers[key] = torch.empty(rows, width, dtype=dtype or self.network.flat.dtype)
-        return self.buffers[key][:rows]
 
 
 @njit

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.models.checks import layers, numbers
+from hobble.models.checks import stacked
 from hobble.models.network import Export, Network, standardised
 from hobble.models.packing import packed_rows
 from hobble.models.pfnn.forward import binned, forward
@@ -38,22 +38,13 @@ class Pfnn(Network):
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Pfnn:
         """From the arrays W0 (K, out, in), b0 (K, out), ... of a file; see `hobble.models.load`."""
-        count = layers(path, arrays, "W", "b")
-        weights = tuple(numbers(path, arrays, f"W{i}", 3) for i in range(count))
-        biases = tuple(numbers(path, arrays, f"b{i}", 2) for i in range(count))
-        size, points = len(common["x_mean"]), len(weights[0])
+        inputs, outputs = len(common["x_mean"]), len(common["y_mean"])
+        weights, biases = stacked(path, arrays, ("W", "b"), 3, inputs, outputs)
+        points = len(weights[0])
         if not FEWEST <= points <= MOST:
             raise InputError(
                 path, f"{points} control points; there are {FEWEST} or more in a cyclic cubic, {MOST} at most"
             )
-        for i, (w, b) in enumerate(zip(weights, biases, strict=True)):
-            if w.shape[0] != points or w.shape[2] != size or b.shape != w.shape[:2] or not w.shape[1]:
-                raise InputError(
-                    path, f"W{i} {w.shape} and b{i} {b.shape} do not follow a layer of {size} units"
-                )
-            size = w.shape[1]
-        if size != len(common["y_mean"]):
-            raise InputError(path, f"its last layer has {size} units for {len(common['y_mean'])} outputs")
         return cls(weights=weights, biases=biases, **common)
 
     @property

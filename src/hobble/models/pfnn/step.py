@@ -37,6 +37,7 @@ class Step:
         self.generator = torch.Generator(network.flat.device)
         self.gradients: list[Tensor] = []
         self.error = torch.empty(0, network.sizes[-1], device=network.flat.device)
+        self.widths = network.sizes[:-1]
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
         """Find `gradients` for x (B, X), y (B, Y), p (B,); returns the mean squared error, a scalar tensor.
@@ -70,7 +71,7 @@ class Step:
 
     def masks(self, rows: int, own: slice = EVERY) -> list[Tensor]:
         """What each layer's inputs (rows, in) are multiplied by: 0 for those dropped, 1 / keep for others."""
-        flat, widths = self.network.flat, self.network.sizes[:-1]
+        flat, widths = self.network.flat, self.widths
         drawn = torch.rand(rows, sum(widths), generator=self.generator, device=flat.device)[own]
         return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(widths, dim=1))
 

@@ -11,9 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hobble.core.errors import InputError
 from hobble.core.quat import Array
-from hobble.models.checks import layers, numbers
+from hobble.models.checks import stacked
 from hobble.models.network import Export, Network, standardised
 from hobble.models.packing import packed_rows
 from hobble.models.stack import Stack, StackPredictor
@@ -33,18 +32,8 @@ class Plain(Network):
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Plain:
         """From the arrays W0 (out, in), b0 (out,), ... of a file; see `hobble.models.load`."""
-        count = layers(path, arrays, "W", "b")
-        weights = tuple(numbers(path, arrays, f"W{i}", 2) for i in range(count))
-        biases = tuple(numbers(path, arrays, f"b{i}", 1) for i in range(count))
-        size = len(common["x_mean"]) + OF_PHASE
-        for i, (w, b) in enumerate(zip(weights, biases, strict=True)):
-            if w.shape[1] != size or b.shape != w.shape[:1]:
-                raise InputError(
-                    path, f"W{i} {w.shape} and b{i} {b.shape} do not follow a layer of {size} units"
-                )
-            size = w.shape[0]
-        if size != len(common["y_mean"]):
-            raise InputError(path, f"its last layer has {size} units for {len(common['y_mean'])} outputs")
+        inputs, outputs = len(common["x_mean"]) + OF_PHASE, len(common["y_mean"])
+        weights, biases = stacked(path, arrays, ("W", "b"), 2, inputs, outputs)
         return cls(weights=weights, biases=biases, **common)
 
     @property

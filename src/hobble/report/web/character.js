@@ -104,7 +104,9 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const hold = (velocity, gait) => {
     if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.told[first + l] > 0))) return velocity;
     const each = gaits.map((_, g) => allowed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");
+    let hurry = 1;
     if (each[jog] < k.lameBelow) {
+      hurry += (k.hurried - 1) * gait[jog];
       gait[walk] += gait[jog];
       gait[jog] = 0;
     }
@@ -114,7 +116,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       whole += gait[g];
       most += gait[g] * each[g];
     });
-    const held = whole > 0 ? min(1, most / whole / max(hypot(...velocity), 1e-9)) : 1;
+    const held = whole > 0 ? min(1, hurry * most / whole / max(hypot(...velocity), 1e-9)) : 1;
     return velocity.map((v) => v * held);
   };
 

@@ -13,7 +13,7 @@ from hobble.report.summary import Hint
 
 
 def injury_hints(found: Json) -> Iterator[Hint]:
-    """Whether each link is felt, steadily, and left again; next to how far an unhurt walk drifts."""
+    """Whether each link is felt, by how much, and left again; next to how far an unhurt walk drifts."""
     responses = [r for r in found.get("responses") or () if r["gait"] == "walk"]
     walks = [r for r in responses if r.get("trained", True)]
     if not walks:
@@ -34,13 +34,6 @@ def injury_hints(found: Json) -> Iterator[Hint]:
             "(under half a centimetre a joint, or no different from an unhurt walk): "
             f"{', '.join(deaf[:4])}{' …' if len(deaf) > 4 else ''}. Add clips in which more of it hurts.",
         )
-    rough = [r["link"] for r in walks if _rho(r) < 0.7 and r["link"] not in deaf]
-    if rough:
-        yield Hint(
-            "note",
-            f"The pose does not follow severity steadily for {', '.join(rough[:4])}.",
-            "See whether its curve jumps: then in-between severities are missing from the data.",
-        )
     stuck = [
         r["link"]
         for r in walks
@@ -52,12 +45,13 @@ def injury_hints(found: Json) -> Iterator[Hint]:
             f"After healing, the walk does not quite come back for {', '.join(stuck[:4])}.",
             "The network is caught in a limp that it would see as a gait of its own.",
         )
-    if not deaf and not rough:
+    if not deaf:
+        felt = [r["from_healthy_cm"] for r in walks]
         yield Hint(
             "good",
             f"The {_plural(len(walks), 'link')} hurt in training, of {len(responses)}, "
-            f"shift{'s' if len(walks) == 1 else ''} the walk with severity, and steadily.",
-            "",
+            f"change{'s' if len(walks) == 1 else ''} the walk at severity 10",
+            f"by {number(min(felt))} to {number(max(felt))} cm a joint.",
         )
 
 
@@ -74,8 +68,3 @@ def _plural(count: int, word: str) -> str:
     ('1 link', '2 links')
     """
     return f"{count} {word}{'' if count == 1 else 's'}"
-
-
-def _rho(response: Mapping[str, Any]) -> float:
-    value = (response.get("spearman") or {}).get("from_healthy")
-    return 0.0 if value is None else float(value)

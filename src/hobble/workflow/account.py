@@ -1,0 +1,40 @@
+"""Who runs the workflow, and whether they may: a user without a name in a container, or one of two."""
+
+from __future__ import annotations
+
+import getpass
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from hobble.core.errors import InputError
+
+OWN = Path(".snakemake")  # Snakemake's folder, in the one where it runs
+DRY_RUN = re.compile(r"-[a-zA-Z]*n[a-zA-Z]*|--dry-?run")
+
+
+def ensure_user_name() -> None:
+    """Set USER, which jobs inherit, to the number of the user where the system knows no name.
+
+    Snakemake and PyTorch ask for the name.
+    """
+    try:
+        getpass.getuser()
+    except (KeyError, OSError):  # Python 3.13 raises OSError
+        os.environ["USER"] = str(os.getuid())
+
+
+def check_may_write(arguments: Sequence[str], own: Path = OWN) -> None:
+    """Raise InputError where Snakemake could not take its lock, as in another user's checkout.
+
+    arguments: of the command line; a dry run writes nothing and is let through.
+    """
+    if any(DRY_RUN.fullmatch(argument) for argument in arguments):
+        return
+    for folder in (own / "locks", own, own.parent):
+        if folder.is_dir():
+            if not os.access(folder, os.W_OK | os.X_OK):
+                fix = "Work in a clone of your own, or ask its owner for permission."
+                raise InputError(folder, f"cannot be written by the user {getpass.getuser()}", fix=fix)
+            return
