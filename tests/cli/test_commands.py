@@ -20,13 +20,12 @@ def folder(tmp_path_factory, root: Path) -> Path:
     out = tmp_path_factory.mktemp("clips")
     skeleton = {"name": "holden31", **yaml.safe_load((root / "config/skeletons/holden31.yaml").read_text())}
     for name in ("one", "two"):
-        others = {kind: out / f"{name}.{kind}" for kind in ("footsteps", "gait", "status")}
+        others = {kind: out / f"{name}.{kind}" for kind in ("footsteps", "gait")}
         write_clip(
             name,
             skeleton,
             400,
             "walk",
-            None,
             Synthetic(),
             bvh=out / f"{name}.bvh",
             **others,

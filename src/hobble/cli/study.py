@@ -1,9 +1,10 @@
-"""Tables III to XVI of the injury study from people's answers to its questionnaire.
+"""Write tables III to XVI of the injury study from the answers to its questionnaire.
 
 hobble study results/limp/questionnaire/films.json ANSWERS.json ... --out FOLDER
 
 The page results/<configuration>/questionnaire/questionnaire.html saves a file of answers for each person.
-This writes a table for each film (how many ticked each part), one for all films, and tables.md with all.
+This writes a table for each film (how many people ticked each part of the body), a table for all films, and
+tables.md with all tables.
 """
 
 from __future__ import annotations
@@ -18,14 +19,18 @@ from hobble.report.gather import PUBLISHED
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What `hobble study` takes."""
+    """Add the arguments of `hobble study`."""
     parser.add_argument("films", type=Path, help="films.json beside the questionnaire")
-    parser.add_argument("answers", type=Path, nargs="+", help="files that the page saved, one a person")
-    parser.add_argument("--out", type=Path, default=Path("tables"), help="folder of the tables (tables)")
+    parser.add_argument(
+        "answers", type=Path, nargs="+", help="files that the page saved, one for each person"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("tables"), help="folder to write the tables into (default tables)"
+    )
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the tables and print what all films together say; returns the exit status."""
+    """Write the tables and print the result over all films. Returns the exit status."""
     study = read_study(options.films)
     people = [read_answers(path, study) for path in options.answers]
     theirs = read_yaml(PUBLISHED)["recognition"]["share"]

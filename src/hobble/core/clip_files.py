@@ -13,7 +13,7 @@ from hobble.core.errors import InputError
 from hobble.core.untrusted import check_regular
 
 SUFFIX = ".bvh"
-# Label and status files are called as their clip, plus one of these. Longer suffixes come first.
+# The name of a label or status file is that of its clip plus one of these. Longer suffixes come first.
 SIDE_FILE_SUFFIXES = ("_footsteps.txt", "_injuries.txt", "_injuries", "_gait.txt", ".phase", ".gait")
 VALID_NAME = re.compile(r"(?![.\s])[^{}<>\\/]+(?<!\s)")  # Snakemake fills in {x} and <x>
 CLIP_NAME_RULE = (

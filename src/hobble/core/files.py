@@ -194,9 +194,9 @@ def _array(archive: zipfile.ZipFile, member: str) -> np.ndarray:
 
 
 def load_npy(path: str | Path) -> np.ndarray:
-    """Read the array of an npy file, never a pickle or an archive.
+    """Read the array of an npy file. Refuses pickles and archives.
 
-    Raises InputError where the file is missing, damaged or does not hold what its header says.
+    Raises InputError if the file is missing or damaged, or if its size does not match its header.
     """
     try:
         size = check_regular(path).st_size
@@ -213,15 +213,15 @@ def load_npy(path: str | Path) -> np.ndarray:
 
 
 def _check_header(file: IO[bytes], size: int) -> None:
-    """Raise ValueError where the header of an array is none, or asks for other than the `size` bytes hold.
+    """Raise ValueError if an array's header is damaged or does not match the `size` bytes of the array.
 
-    NumPy reads a header as Python, whose parser ends in errors of many kinds.
+    NumPy parses the header as Python, which raises many kinds of errors if it is damaged.
     """
     try:
         shape, _, dtype = HEADER_READERS[np.lib.format.read_magic(file)](file)
     except OSError:
         raise
-    except (Exception, MemoryError):  # of a header of 10,000 letters at most: too deeply nested
+    except (Exception, MemoryError):  # MemoryError here means nested too deeply: a header is short
         raise ValueError("an array whose header cannot be understood") from None
     count = 1
     for length in shape:

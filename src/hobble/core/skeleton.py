@@ -87,7 +87,7 @@ class Skeleton:
         }
 
     def index(self, joint: str) -> int:
-        """Index of a joint by name. Raises KeyError with the names there are."""
+        """Index of a joint by name. Raises KeyError, which lists the names of all joints."""
         try:
             return self.joints.index(joint)
         except ValueError:

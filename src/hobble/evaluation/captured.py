@@ -81,7 +81,7 @@ def captured_clips(paths: Iterable[str | Path]) -> Iterator[Captured]:
 
 
 def headings(turn: Array) -> Array:
-    """(F,) yaw of a root, starting at 0. turn: (F,) turn of the world seen from the root (opposite sign)."""
+    """(F,) yaw of a root, starting at 0. turn: (F,) minus the root's change of yaw in each frame, radians."""
     return np.concatenate([[0.0], -np.cumsum(turn)[:-1]])
 
 
@@ -101,7 +101,7 @@ def rotate_by_yaw(vectors: Array, yaw: Array) -> Array:
 
 
 def _accelerations(velocity: Array, turn: Array) -> Array:
-    """(F,) largest change of any joint's velocity (F, J, 3), which is in the root frame of each frame."""
+    """(F,) largest change of any joint's velocity. velocity: (F, J, 3) in the root frame of each frame."""
     carried = velocity[:-1].copy()
     carried[..., ::2] = rotate_by_yaw(velocity[:-1, :, ::2], turn[:-1, None])
     change = np.linalg.norm(velocity[1:] - carried, axis=-1)

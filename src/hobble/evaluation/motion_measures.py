@@ -87,7 +87,7 @@ def gait_measures(
     local: (F, J, 3) positions in the root frame. contacts: (F, 4). travelled: (F, 3) world root positions.
     Returns speed (cm/s, straight-line distance), stance shares, step lengths (distance of the landing heel
     ahead of the other, cm), knee and arm ranges (degrees, 5th to 95th percentile), trunk lean (degrees,
-    forward and to the left), hip height (cm) and asymmetries. Values without any step are None.
+    forward and to the left), hip height (cm) and asymmetries. Step lengths are None if there is no step.
     """
     role = skeleton.role
     seconds = (len(local) - 1) / 60

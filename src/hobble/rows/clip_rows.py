@@ -117,7 +117,7 @@ def expanded(rows: ClipRows, layout: RowLayout, batch: int = 2048) -> Iterator[P
 
 
 def pairs(rows: ClipRows, layout: RowLayout, row: np.ndarray, fit: np.ndarray) -> Pairs:
-    """Pairs in raw units of the rows `row` (n,) with the fits `fit` (n,), which index `heights`."""
+    """The pairs of row[i] and fit[i], in raw units. row: (n,) indices of rows. fit: (n,) indices of fits."""
     x = np.empty((len(row), layout.x_size), np.float32)
     y = rows.y[row].astype(np.float32)
     told = {name: rows.channels[name][row] for name, _ in layout.channels}

@@ -68,12 +68,12 @@ class RowLayout:
 
     @property
     def samples(self) -> int:
-        """Trajectory samples in X (12)."""
+        """Number of trajectory samples in X (12)."""
         return 2 * self.window // self.step
 
     @property
     def future(self) -> int:
-        """Trajectory samples in Y (6)."""
+        """Number of trajectory samples in Y (6)."""
         return self.window // self.step
 
     @cached_property

@@ -23,8 +23,8 @@ from hobble.terrain.soles import Mask
 
 STANCE_PIECE = 8  # most frames of a stance that become one point
 COVERED_PIECE = 4  # the same for feet below the ground
-BESIDE_CM = (35.0, 50.0)  # distances from the path at which a beam must have no ground
-PATH_CLEARANCE_CM = 25.0  # such points closer than this to another part of the path are left out
+BESIDE_CM = (35.0, 50.0)  # beside a beam there must be no ground at these distances from the path
+PATH_CLEARANCE_CM = 25.0  # points beside the path that are closer than this to any part of it are left out
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from hobble.terrain.generate import generate
 
 MAX_CELLS = 1 << 26  # of a map: 8192 x 8192, 512 MB, 322 x 322 m with cells of 3.9 cm
 MAX_TEXT_BYTES = 1 << 28  # of a map as text
-MAX_LINE_LETTERS = 1 << 20  # of a line of it
-MAX_HEIGHT = 1e7  # cm, 100 km, as for the ground of a character
+MAX_LINE_LETTERS = 1 << 20  # of a line of such a map
+MAX_HEIGHT = 1e7  # cm (100 km); the runtime has the same limit
 
 ESRI_HEADER = {
     "ncols",
@@ -31,11 +31,7 @@ ESRI_HEADER = {
     "cellsize",
     "nodata_value",
 }
-IMAGE_FORMATS = {
-    ".png": ("PNG",),
-    ".tif": ("TIFF",),
-    ".tiff": ("TIFF",),
-}  # a suffix, and what the file must be
+IMAGE_FORMATS = {".png": ("PNG",), ".tif": ("TIFF",), ".tiff": ("TIFF",)}  # suffix -> Pillow's formats
 GDAL_NODATA = 42113  # the TIFF tag with the value that means "no data", as text
 
 

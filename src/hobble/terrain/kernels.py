@@ -130,7 +130,7 @@ def lowest_cone(x, z, place_x, place_z, heights, steepness):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _down_means(heights, rows, columns, a, points):
-    """Height of the patch above the first foot in contact; mean and mean square of the others minus this one.
+    """Heights of the patch above feet in contact: the first, and mean and mean square of all minus it.
 
     Subtracting the first keeps the numbers small, so that single precision is enough.
     """
@@ -166,7 +166,7 @@ def _up_sum(heights, rows, columns, a, offset, points, jumps):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _beside_sum(heights, rows, columns, a, points):
-    """Sum of squares of the height by which ground beside the path is above (path - BEAM_HEIGHT)."""
+    """Sum over points beside the path of max(0, height - height of the path + BEAM_HEIGHT) squared."""
     u, v, path_u, path_v = points
     (ru, rv, r0), (cu, cv, c0) = a
     squares = np.float32(0)

@@ -145,9 +145,9 @@ def load_patches(path: str | Path) -> Patches:
 
 
 def _with_holes_marked(heightmap: Heightmap, cell: float) -> Array:
-    """Heights in which holes (nan) and their surroundings are so high that no view with a hole passes.
+    """Heights in which holes (nan) and the cells around them are HOLE_HEIGHT, so that no view of them passes.
 
-    The surroundings count because the cells of a patch may be wider apart than a hole.
+    The cells around a hole count because a coarse patch could skip the hole itself.
     """
     holes = np.isnan(heightmap.heights)
     if not holes.any():

@@ -1,1 +1,1 @@
-"""What the Snakefile and its scripts need: fingerprints of code, paths, and a frame for every job."""
+"""Code for the Snakefile and its scripts: paths, options, fingerprints of code, and the context of a job."""

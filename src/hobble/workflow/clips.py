@@ -101,7 +101,7 @@ class Clips:
         return {name: turn for turn, name in enumerate(names)}
 
     def hurt(self, dataset: str, clip: str) -> Hurt:
-        """The section `hurt` of a data set that has one, with what the clip's entry overrules."""
+        """The section `hurt` of a data set that has it, with the values of the clip's entry."""
         options, amount = self.catalogue.dataset(dataset).hurt, self.entry(dataset, clip).hurt
         assert options is not None
         if amount is None:

@@ -77,11 +77,11 @@ class Configurations:
         return f"{DATASETS}/{self.dataset(configuration)}/database/{folder}"
 
     def is_built(self, configuration: str) -> bool:
-        """Whether its network is built from rows in their order, and not trained."""
+        """Whether its network is built directly from rows instead of trained."""
         return isinstance(model(self.catalogue.configuration(configuration).network.kind), Built)
 
     def rows_in_order(self, configuration: str) -> list[str]:
-        """The rows of each training clip, for a network that is built; [] for one that is trained."""
+        """Paths of the training clips' rows if the network is built; [] if it is trained."""
         if not self.is_built(configuration):
             return []
         root = f"{DATASETS}/{self.dataset(configuration)}/database/clips"

@@ -71,7 +71,7 @@ class Datasets:
     def compared(self, dataset: str, channels: Sequence[str]) -> list[str]:
         """The clips that the merge compares, so that no motion is in both parts of the split.
 
-        These are the original clips from files. None if nothing is held out or the clips are synthetic.
+        These are the original clips from files. Empty if nothing is held out or the clips are synthetic.
         """
         if self.catalogue.dataset(dataset).synthetic is not None:
             return []

@@ -79,8 +79,8 @@ class Demands:
     def training_memory(self, configuration: str, attempt: int = 1) -> int:
         """MB on each machine for a training.
 
-        Each process holds PyTorch, its part of the database, the weights and the optimiser state. A network
-        that is built holds every row of the clips instead, three times at most.
+        Each process holds PyTorch, its part of the database, the weights and the optimiser state. If the
+        network is built and not trained, the process holds up to three copies of all rows.
         """
         training = self.project.configurations.section(configuration, "training")
         each = 500 + training["memory_mb"] + 32e-6 * self.weights(configuration)
@@ -108,7 +108,7 @@ class Demands:
         return self.project.catalogue.configuration(configuration).training
 
     def training_threads(self, configuration: str) -> int:
-        """Threads of a training job: 2, or one for each of several CPU processes. Per GPU with `gpus`."""
+        """Threads of a training job: 2 (for each GPU, if SLURM gives GPUs), or 1 for each CPU process."""
         machines = self.machines(configuration)
         return 2 if machines.gpus else max(2, machines.processes)
 

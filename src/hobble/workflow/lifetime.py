@@ -38,7 +38,7 @@ def this_process() -> str:
 
 
 def record_lock_owner(locks: Path = LOCKS) -> None:
-    """Write the owner of the lock that Snakemake has just taken next to the lock."""
+    """Write this process as the owner into the folder of Snakemake's lock."""
     if locks.is_dir():
         owner = {"host": platform.node(), "pid": os.getpid(), "began": _start_time(os.getpid())}
         with contextlib.suppress(OSError):

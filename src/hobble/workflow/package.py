@@ -23,7 +23,7 @@ class Package:
         return fingerprint(path, self.base / "src", modules)
 
     def templates(self) -> list[str]:
-        """The pages' templates; a change in one re-makes only the pages."""
+        """The pages' templates. A change in them makes only the pages again."""
         kinds = {".j2", ".css", ".js", ".yaml"}
         files = [str(path) for path in (self.folder / "report").iterdir() if path.suffix in kinds]
         return sorted([*files, self.published()])

@@ -64,7 +64,7 @@ def _check_configuration(project: Project, name: str) -> None:
 
 
 def _check_continues(project: Project, name: str, model: Configuration) -> None:
-    """Check that a training can continue from another: same network, same sections, more passes."""
+    """Check that a training can continue from another: same network and sections, and not fewer passes."""
     begun = model.training.continues
     if project.configurations.is_built(name):
         raise HobbleError(f"configuration {name} is not trained, so it cannot continue from {begun}")
