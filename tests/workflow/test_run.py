@@ -1,4 +1,4 @@
-"""The whole workflow on tiny synthetic data: it ends, it is reproducible, it re-runs what it should."""
+"""The whole workflow on tiny synthetic data: it finishes, is reproducible, and re-runs the right jobs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MEASURED = {"milliseconds", "seconds", "machine"}
 
 
 def without_times(value: Any) -> Any:
-    """JSON without what a clock measured."""
+    """JSON without measured times."""
     if isinstance(value, dict):
         return {k: without_times(v) for k, v in value.items() if k not in MEASURED}
     return [without_times(v) for v in value] if isinstance(value, list) else value
@@ -34,7 +34,7 @@ def artefacts(folder: Path) -> dict[str, bytes]:
     files = [p for p in root.rglob("*") if p.suffix in {".npz", ".npy", ".bvh", ".txt", ".bin"}]
     files = [
         p for p in files if "checkpoints" not in p.parts and p.name != "checkpoint.npz"
-    ]  # they hold seconds
+    ]  # they contain seconds
     return {str(p.relative_to(root)): p.read_bytes() for p in sorted(files)}
 
 
@@ -111,7 +111,7 @@ def test_editing_a_comment_in_the_code_reruns_nothing(copied) -> None:
     assert "Nothing to be done" in copied.run("-n", TARGET)
 
 
-def test_a_default_said_aloud_reruns_nothing(copied) -> None:
+def test_writing_out_a_default_reruns_nothing(copied) -> None:
     copied.edit("config/datasets/tiny.yaml", "held_out:", "motion: {fps: 60.0}\nheld_out:")
     assert "Nothing to be done" in copied.run("-n", TARGET)
 
@@ -149,7 +149,7 @@ def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> Non
     assert len(rows) == 1 + 3 * 10
 
 
-def test_no_job_took_more_than_its_rule_asks_of_a_cluster(finished) -> None:
+def test_no_job_used_more_than_its_rule_requests(finished) -> None:
     jobs = list(with_use(planned_jobs(finished.run("-np", "-F", TARGET)), finished.folder))
     assert {"motion_clip", "terrain_fits", "training", "report"} <= {job.rule for job in jobs if job.used_mb}
     assert [
