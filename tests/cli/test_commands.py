@@ -1,4 +1,4 @@
-"""The command `hobble`, as a person types it."""
+"""The command `hobble`, called as on a command line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hobble.synthetic.options import Synthetic
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory, root: Path) -> Path:
-    """Two walks of the embedded walker, and a file that is no BVH."""
+    """Two clips of the embedded walker, and a file that is not BVH."""
     out = tmp_path_factory.mktemp("clips")
     skeleton = {"name": "holden31", **yaml.safe_load((root / "config/skeletons/holden31.yaml").read_text())}
     for name in ("one", "two"):
@@ -64,7 +64,7 @@ def test_labels_are_written_once(folder, tmp_path, capsys):
     assert main(["labels", source, str(tmp_path), "--overwrite"]) == 0
 
 
-def test_a_report_that_is_not_there_is_told_with_its_command(tmp_path, monkeypatch, capsys):
+def test_a_missing_report_is_named_with_the_command_that_makes_it(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["play", "results/injured/report.html"]) == 1
     assert "snakemake -c2 results/injured/report.html" in capsys.readouterr().err

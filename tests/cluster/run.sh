@@ -97,7 +97,7 @@ wait "$local_run"
 # The same batches once more by two tasks, as on two machines: srun starts torchrun twice, on the one node there is.
 weights=results/test/network/weights.npz
 rm -r "$folder/cluster/results/test/checkpoints" "$folder/cluster/$weights"
-two_tasks=("${through_slurm[@]:0:${#through_slurm[@]}-1}" --set-resources training:nodes=1 training:processes=1
+two_tasks=("${through_slurm[@]:0:${#through_slurm[@]}-1}" --set-resources training:nodes=1 --set-threads training=1
     --config 'training={nodes: 2, stretches: 1}' -- "$weights")
 "${two_tasks[@]}" >"$log" 2>&1 || fail "the training of two tasks failed"
 "$python" "$here/near.py" "$folder/local/$weights" "$folder/cluster/$weights" || fail "two tasks learnt something else"

@@ -50,7 +50,7 @@ def test_overrides_go_on_top_of_every_configuration(folder: Path) -> None:
 
 
 def test_a_training_can_be_named(folder: Path) -> None:
-    """It stands for the whole section, from a file or the command line, and can be said more of."""
+    """`training: NAME` stands for the whole section, in files and on the command line."""
     (folder / "quick.yaml").write_text("extends: base\ntraining: {batch: 256}\n")
     (folder / "like.yaml").write_text("channels: [injury]\ntraining: quick\n")
     (folder / "more.yaml").write_text("extends: like\ntraining: {seed: 5}\n")
@@ -62,7 +62,7 @@ def test_a_training_can_be_named(folder: Path) -> None:
     assert named.configuration("like").channels == ("injury",)
 
 
-def test_a_training_that_is_not_there_is_told(folder: Path) -> None:
+def test_a_missing_training_is_reported(folder: Path) -> None:
     with pytest.raises(HobbleError, match=r"slow\.yaml: no such file\. There are: base, child"):
         Catalogue(folder, {"training": "slow"}).configuration("base")
     (folder / "like.yaml").write_text("training: like\n")
@@ -78,7 +78,7 @@ def test_a_name_that_yaml_takes_for_a_number_belongs_in_quotes(tmp_path: Path, t
         Catalogue(tmp_path).dataset("mine")
 
 
-def test_a_circle_of_extends_is_told(folder: Path) -> None:
+def test_a_loop_of_extends_is_reported(folder: Path) -> None:
     (folder / "base.yaml").write_text("extends: child\n")
     with pytest.raises(HobbleError, match=r"child\.yaml: extends itself through child -> base"):
         read_layers(folder, "child")
@@ -104,7 +104,7 @@ def test_a_wrong_value_names_file_key_and_what_is_allowed(values: dict, message:
         validate(Configuration, values, "x.yaml")
 
 
-def test_every_problem_is_told_at_once() -> None:
+def test_all_problems_are_reported_at_once() -> None:
     with pytest.raises(HobbleError) as caught:
         validate(Configuration, {"foo": 1, "training": {"passes": 0}}, "x.yaml")
     assert len(str(caught.value).splitlines()) == 2
@@ -128,7 +128,7 @@ def test_every_problem_is_told_at_once() -> None:
         ({"skeleton": "../s", "folder": "f"}, "skeleton: string should match"),
     ],
 )
-def test_a_data_set_that_cannot_be_is_refused(values: dict, message: str) -> None:
+def test_an_impossible_data_set_is_refused(values: dict, message: str) -> None:
     with pytest.raises(HobbleError, match=message):
         validate(Dataset, values, "d.yaml")
 
@@ -143,7 +143,7 @@ def test_a_data_set_that_cannot_be_is_refused(values: dict, message: str) -> Non
         ({"share": 4}, r"clips\.a\.share: only clips of a `synthetic` data set"),
     ],
 )
-def test_what_only_the_walker_reads_is_refused_of_other_clips(entry: dict, message: str) -> None:
+def test_keys_of_the_walker_are_refused_for_other_clips(entry: dict, message: str) -> None:
     values = {"skeleton": "s", "clips": {"a": entry, "b": None}}
     assert validate(Dataset, {**values, "synthetic": {}}, "d.yaml").clips["a"] == ClipEntry(**entry)
     with pytest.raises(HobbleError, match=message):
@@ -168,7 +168,7 @@ def test_a_key_given_twice_is_refused_with_its_lines(
         read_yaml(tmp_path / "x.yaml")
 
 
-def test_a_key_may_stand_in_several_places_and_over_what_is_merged(tmp_path: Path) -> None:
+def test_a_key_may_be_in_several_sections_and_override_merged_ones(tmp_path: Path) -> None:
     (tmp_path / "x.yaml").write_text("a: &a {x: 1, y: 2}\nb: *a\nc: {<<: *a, x: 3}\n")
     assert read_yaml(tmp_path / "x.yaml")["c"] == {"x": 3, "y": 2}
 
@@ -193,7 +193,7 @@ def test_yaml_cannot_make_objects(tmp_path: Path) -> None:
         ({"roles": {"hips": "Hip"}}, "roles: there is no joint 'Hip'"),
     ],
 )
-def test_a_skeleton_that_does_not_hang_together_is_refused(change: dict, message: str) -> None:
+def test_an_inconsistent_skeleton_is_refused(change: dict, message: str) -> None:
     good = {"joints": {"Hips": {"parent": None, "offset": [0, 0, 0]}}, "roles": {"hips": "Hips"}}
     with pytest.raises(HobbleError, match=message):
         validate(SkeletonFile, {**good, **change}, "s.yaml")
@@ -229,7 +229,7 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
 
 
 def test_the_release_has_its_forty_clips_on_their_ground(root: Path) -> None:
-    """As the generator of the original database has them: 40 clips, and the mirrors of all."""
+    """Like the list of the original database: 40 clips and their mirrors."""
     release = Catalogue(root / "config").dataset("pfnn")
     grounds = Counter(entry.ground if entry else "flat" for entry in release.clips.values())
     assert grounds == {"flat": 19, "rocky": 15, "jumpy": 5, "beam": 1}

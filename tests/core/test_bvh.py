@@ -1,4 +1,4 @@
-"""What is written as BVH is read as the same motion."""
+"""A clip written as BVH is read back as the same motion."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def clip(holden31):
 
 
 @pytest.mark.parametrize("order", ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"])
-def test_every_order_leads_back(tmp_path, clip, order):
+def test_every_rotation_order_round_trips(tmp_path, clip, order):
     write_bvh(tmp_path / "a.bvh", clip, order=order, decimals=8)
     file = read_bvh(tmp_path / "a.bvh")
     assert file.names == clip.skeleton.joints

@@ -1,4 +1,4 @@
-"""Compiled functions run where nothing can be cached: read-only places, damaged files, a full disk."""
+"""Compiled functions run without a cache: read-only folders, damaged files, a full disk."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ print(twice(4), thrice(4.0))
 
 
 def run(folder: Path, **environment: str) -> subprocess.CompletedProcess:
-    """Run the module in a process of its own, as an installed package would be."""
+    """Run the module in its own process, like an installed package."""
     (folder / "job.py").write_text(MODULE)
     source = Path(__file__).resolve().parents[2] / "src"
     keep = {key: value for key, value in os.environ.items() if not key.startswith("NUMBA")}
@@ -41,7 +41,7 @@ def cached(folder: Path) -> list[Path]:
     return sorted(folder.rglob("*.nb[ic]"))
 
 
-def test_what_is_compiled_is_kept(tmp_path):
+def test_compiled_code_is_cached(tmp_path):
     first = run(tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
     assert (first.stdout, first.stderr) == ("8 12.0\n", "")
     files = {path: path.stat().st_mtime_ns for path in cached(tmp_path)}
@@ -50,8 +50,8 @@ def test_what_is_compiled_is_kept(tmp_path):
     assert {path: path.stat().st_mtime_ns for path in cached(tmp_path)} == files
 
 
-def test_nowhere_to_write_costs_one_warning(tmp_path):
-    """A folder below a file cannot be made, not even by root."""
+def test_no_writable_folder_gives_one_warning(tmp_path):
+    """Nobody, not even root, can make a folder inside a file."""
     (tmp_path / "file").write_text("")
     (tmp_path / "__pycache__").write_text("")
     below = str(tmp_path / "file" / "cache")
@@ -82,8 +82,8 @@ def test_a_cache_that_is_a_folder_of_folders_is_a_miss(tmp_path):
     shutil.rmtree(cache)
 
 
-def test_every_compiled_function_may_lose_its_cache():
-    """numba's own `njit(cache=True)` ends the program where nothing can be written."""
+def test_every_compiled_function_works_without_its_cache():
+    """numba's own `njit(cache=True)` ends the program if it can write nowhere."""
     source = Path(__file__).resolve().parents[2] / "src"
     own = [path for path in source.rglob("*.py") if path.name != "compiled.py"]
     assert len(own) > 100
@@ -94,7 +94,7 @@ def test_every_compiled_function_may_lose_its_cache():
 
 
 def test_the_runtime_starts_on_a_full_disk(tmp_path):
-    """The package on a disk of 1 MB that is full, and no home: one warning, and the figure moves."""
+    """With the package on a full disk and no home folder, there is one warning and everything works."""
     disk = tmp_path / "disk"
     disk.mkdir()
     if (

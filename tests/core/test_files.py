@@ -1,4 +1,4 @@
-"""Files are whole or absent, equal values give equal bytes, and failures say what to do."""
+"""Files are written completely or not at all, equal values give equal bytes, and errors say what to do."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_some_arrays_only(tmp_path):
         load_npz(tmp_path / "a.npz", ["z"])
 
 
-def test_clips_come_back(tmp_path, holden31):
+def test_clips_round_trip(tmp_path, holden31):
     rng = np.random.default_rng(3)
     rotations = rng.normal(size=(9, 31, 4))
     rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
@@ -120,7 +120,7 @@ def test_errors_name_file_line_and_frame():
     assert str(error) == "a.bvh, line 3, frame 7: it is broken. Mend it."
 
 
-def test_what_a_killed_process_left_is_swept_and_a_living_ones_kept(tmp_path):
+def test_leftovers_of_killed_processes_are_removed(tmp_path):
     path = tmp_path / "a[1].json"
     child = subprocess.Popen(["true"])
     child.wait()

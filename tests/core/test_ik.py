@@ -1,4 +1,4 @@
-"""Two bones reach where they can, bend where they are told, and stay as long as they are."""
+"""Two bones reach the target if they can, bend towards the pole, and keep their lengths."""
 
 from __future__ import annotations
 

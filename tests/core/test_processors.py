@@ -20,7 +20,7 @@ def test_two_threads_of_one_core_count_once(tmp_path: Path) -> None:
     assert cores([0, 1, 4, 5], folder) == 2
 
 
-def test_where_nothing_is_known_each_processor_counts(tmp_path: Path) -> None:
+def test_without_topology_each_processor_counts(tmp_path: Path) -> None:
     assert cores([0, 1, 2], tmp_path) == 3
     assert cores([], tmp_path) == 1
 

@@ -1,4 +1,4 @@
-"""Rotations against scipy, which knows, and against what must hold for all of them."""
+"""Rotations compared with SciPy's, and properties that hold for all rotations."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def scipy(q):
 
 
 def same(a, b, tolerance=1e-7):
-    """Whether two rotations are one, whatever their signs."""
+    """Whether two quaternions are the same rotation, with either sign."""
     return np.all(quat.angle(a, b) < tolerance)
 
 
@@ -38,7 +38,7 @@ def test_product_inverse_and_rotation_agree_with_scipy(a, b, v):
 
 @FEW
 @given(rotations)
-def test_matrices_agree_with_scipy_and_lead_back(q):
+def test_matrices_agree_with_scipy_and_round_trip(q):
     matrix = quat.to_matrix(q)
     np.testing.assert_allclose(matrix, scipy(q).as_matrix(), atol=1e-12)
     assert same(quat.from_matrix(matrix), q)
@@ -48,7 +48,7 @@ def test_matrices_agree_with_scipy_and_lead_back(q):
 @pytest.mark.parametrize("order", ORDERS)
 @FEW
 @given(arrays(float, (3,), elements=st.floats(-3.1, 3.1)))
-def test_euler_angles_are_intrinsic_and_lead_back(order, angles):
+def test_euler_angles_are_intrinsic_and_round_trip(order, angles):
     q = quat.from_euler(angles, order)
     assert same(q, Rotation.from_euler(order, angles).as_quat(scalar_first=True))
     assert same(quat.from_euler(quat.to_euler(q, order), order), q, 1e-5)
@@ -57,7 +57,7 @@ def test_euler_angles_are_intrinsic_and_lead_back(order, angles):
 
 @pytest.mark.parametrize("order", ["ZYX", "XYZ", "YZX"])
 @pytest.mark.filterwarnings("error")
-def test_with_the_middle_angle_upright_any_angles_lead_back(order: str) -> None:
+def test_gimbal_lock_keeps_the_rotation(order: str) -> None:
     q = quat.from_euler(np.array([0.4, np.pi / 2, -1.1]), order)
     assert same(quat.from_euler(quat.to_euler(q, order), order), q, 1e-5)
 
@@ -74,11 +74,11 @@ def test_log_is_half_the_angle_and_exp_its_inverse(q):
     v = quat.log(q)
     assert np.linalg.norm(v) <= np.pi / 2 + 1e-9
     assert same(quat.exp(v), q)
-    if abs(q[0]) > 1e-6:  # half a turn has two axes
+    if abs(q[0]) > 1e-6:  # a rotation by 180 degrees has two possible axes
         np.testing.assert_allclose(2 * v, scipy(quat.positive(q)).as_rotvec(), atol=1e-7)
 
 
-def test_log_and_exp_near_nothing():
+def test_log_and_exp_near_identity():
     np.testing.assert_array_equal(quat.log(quat.IDENTITY), np.zeros(3))
     tiny = np.array([1e-15, 0, 0])
     np.testing.assert_allclose(quat.log(quat.exp(tiny)), tiny)

@@ -33,14 +33,14 @@ def random_pose(skeleton, frames=3, seed=0):
     return rotations, rng.normal(size=(frames, 3)) * 100
 
 
-def test_files_are_valid_and_hang_together(root, skeleton):
+def test_skeleton_files_are_valid_and_consistent(root, skeleton):
     Catalogue(root / "config").skeleton(skeleton.name)
     assert skeleton.parents[0] == -1
     assert all(p < j for j, p in enumerate(skeleton.parents))
     assert len(set(skeleton.joints)) == len(skeleton.joints)
 
 
-def test_maps_name_joints_that_there_are(root, skeleton):
+def test_maps_name_joints_that_exist(root, skeleton):
     data = yaml.safe_load((root / f"config/skeletons/{skeleton.name}.yaml").read_text())
     for other, pairs in data.get("maps", {}).items():
         theirs = yaml.safe_load((root / f"config/skeletons/{other}.yaml").read_text())["joints"]
@@ -62,21 +62,21 @@ def test_rest_poses_are_people_standing_upright(skeleton):
     np.testing.assert_allclose(get("left_hip")[1], get("right_hip")[1], atol=0.1)
 
 
-def test_plain_data_leads_back(skeleton):
+def test_plain_data_round_trip(skeleton):
     again = Skeleton.from_dict(skeleton.to_dict())
     assert again.to_dict() == skeleton.to_dict()
     np.testing.assert_allclose(again.offsets, skeleton.offsets, atol=1e-6)
     assert again.links == skeleton.links
 
 
-def test_mirroring_joints_twice_is_nothing(skeleton):
+def test_mirroring_joints_twice_changes_nothing(skeleton):
     swap = skeleton.mirror_joints
     np.testing.assert_array_equal(swap[swap], np.arange(len(swap)))
     assert skeleton.joints[swap[skeleton.role("left_toe")]] == skeleton.roles["right_toe"]
 
 
 def renamed(skeleton, left, right):
-    """The skeleton with LeftLeg, LHipJoint and so on called `left` and `right`, with Leg in them."""
+    """The skeleton with joints such as LeftLeg renamed; `left` and `right` are names that contain Leg."""
 
     def name(joint):
         match = re.fullmatch("(Left|L(?=[HT])|Right|R(?=[HT]))(.*)", joint)
@@ -101,13 +101,13 @@ def test_sides_are_known_by_the_common_ways_to_name_them(holden31, left, right):
     np.testing.assert_array_equal(other.mirror_links, holden31.mirror_links)
 
 
-def test_a_skeleton_whose_sides_its_names_do_not_tell_is_not_mirrored(holden31):
+def test_a_skeleton_without_side_names_is_not_mirrored(holden31):
     for swap in ("mirror_joints", "mirror_links"):
         with pytest.raises(HobbleError, match="1Arm is the left shoulder and 2Arm the right"):
             getattr(renamed(holden31, "1{}", "2{}"), swap)
 
 
-def test_a_link_that_can_hurt_on_one_side_alone_is_not_mirrored(holden31):
+def test_a_link_on_only_one_side_is_not_mirrored(holden31):
     links = tuple(link for link in holden31.links if link != ("RightLeg", "RightFoot"))
     with pytest.raises(HobbleError, match="have LeftLeg-LeftFoot but not RightLeg-RightFoot"):
         _ = replace(holden31, links=links).mirror_links
@@ -133,7 +133,7 @@ def test_unseen_joints_are_those_of_the_facts_page(holden31):
     assert (holden31.index("Head"), holden31.role("left_heel"), holden31.role("right_toe")) == (16, 4, 10)
 
 
-def test_an_unknown_joint_is_named_with_those_there_are(holden31):
+def test_an_unknown_joint_is_named_with_all_joints(holden31):
     with pytest.raises(KeyError, match="no joint 'Tail' in skeleton holden31: Hips, "):
         holden31.index("Tail")
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.database import merge
+from hobble.database import ordered, plan, scatter
 from hobble.database.buckets import INDEX, Buckets
 from hobble.database.merge import write_database
 from hobble.database.reader import Database
@@ -58,8 +58,8 @@ def test_rows_survive_their_file_and_files_merge_as_rows_do(rows_of, tmp_path):
 
 
 def test_every_row_is_there_once_wherever_the_buckets_cut(rows_of, tmp_path, monkeypatch):
-    monkeypatch.setattr(merge, "BUCKET_BYTES", 90_000)
-    monkeypatch.setattr(merge, "PART_ROWS", 17)
+    monkeypatch.setattr(plan, "BUCKET_BYTES", 90_000)
+    monkeypatch.setattr(scatter, "PART_ROWS", 17)
     rows = {name: rows_of(name, 150, None, seed=i) for i, name in enumerate("ab")}
     manifest = write_database(tmp_path / "db", rows, {"a": "train", "b": "held_out"}, **OPTIONS)
     chunks = manifest.chunks["train"]
@@ -129,7 +129,7 @@ def test_size_against_the_original_layout(rows_of, tmp_path):
 
 
 def test_memory_does_not_grow_with_the_number_of_clips(rows_of, tmp_path, monkeypatch):
-    monkeypatch.setattr(merge, "BUCKET_BYTES", 200_000)
+    monkeypatch.setattr(plan, "BUCKET_BYTES", 200_000)
     files = {}
     for i in range(12):
         files[f"c{i}"] = tmp_path / f"c{i}.npz"
@@ -192,7 +192,7 @@ def test_a_full_disk_is_said_and_the_database_before_stays(rows_of, tmp_path, mo
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(merge, "write_chunk", full)
+    monkeypatch.setattr(ordered, "write_chunk", full)
     with pytest.raises(HobbleError, match="disk is full"):
         write_database(tmp_path / "db", {"a": rows_of("a", 61)}, {"a": "train"}, **OPTIONS)
     assert contents(tmp_path / "db") == before

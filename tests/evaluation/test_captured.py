@@ -1,4 +1,4 @@
-"""Rows of a clip become motion again: path, accelerations, heights are those of the world they came from."""
+"""Rows converted back to motion have the path, accelerations and heights of the original motion."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FRAMES = 50
 
 @pytest.fixture
 def world() -> dict[str, np.ndarray]:
-    """A figure of three joints on a curved way."""
+    """A figure of three joints on a curved path."""
     rng = np.random.default_rng(1)
     t = np.arange(FRAMES + 1) / 20
     yaw = 0.4 + 0.8 * np.sin(t)
@@ -33,7 +33,7 @@ def level(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
 
 @pytest.fixture
 def rows(world) -> ClipRows:
-    """As the format is defined; the ground lies 3 cm under the world's zero on the first fit."""
+    """Rows by the definition of the format. The first fit's ground is 3 cm below the world's zero."""
     yaw, root, joints = world["yaw"], world["root"], world["joints"]
     y = np.zeros((FRAMES, LAYOUT.y_size))
     here = yaw[:-1]
@@ -54,7 +54,7 @@ def rows(world) -> ClipRows:
     return ClipRows("a", LAYOUT, {}, x, y, phase, {"injury": severity}, frame, 0 * frame, fits, heights, mean)
 
 
-def test_motion_comes_back(rows, world) -> None:
+def test_motion_round_trips(rows, world) -> None:
     (found,) = captured(rows)
     assert len(found) == FRAMES
     yaw, root, joints = world["yaw"], world["root"][:-1], world["joints"][:-1]
@@ -69,7 +69,7 @@ def test_motion_comes_back(rows, world) -> None:
     np.testing.assert_array_equal(found.told["injury"], rows.channels["injury"])
 
 
-def test_a_gap_parts_stretches(rows, tmp_path) -> None:
+def test_a_gap_separates_stretches(rows, tmp_path) -> None:
     rows.frame[30:] += 2
     first, second = captured(rows)
     assert (len(first), len(second)) == (30, 20)
@@ -81,6 +81,6 @@ def test_a_gap_parts_stretches(rows, tmp_path) -> None:
     assert [len(c) for c in captured_clips(paths)] == [30, 20, 30, 20]
 
 
-def test_no_rows_are_no_motion() -> None:
+def test_no_rows_give_no_motion() -> None:
     assert unbroken(np.zeros(0, int)) == []
     assert root_path(np.zeros((1, 2)), np.zeros(1)).tolist() == [[0, 0, 0]]

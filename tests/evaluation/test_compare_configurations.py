@@ -1,4 +1,4 @@
-"""Configurations side by side: eq. 3.2, lines through points, published counts, different data sets."""
+"""Comparison of configurations: eq. 3.2, fitted lines, published counts, different data sets."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def timed(ms: float) -> dict[str, Any]:
 
 
 def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[int, ...]) -> dict[str, Path]:
-    """Files of one configuration, whose frame time is exactly .1 ms and a nanosecond per computation."""
+    """Files of one configuration with a frame time of exactly .1 ms plus 1 ns per computation."""
     counts = parameter_counts(sizes)
     modes = []
     for k, mode in enumerate(MODES, 1):
@@ -120,7 +120,7 @@ def compared(tmp_path: Path, published: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_the_counts_are_those_of_table_6_1(compared, published) -> None:
-    """The published numbers, from the layers alone."""
+    """The published numbers follow from the layers."""
     for row in published["computations"]:
         counts = parameter_counts(row["sizes"])
         assert (counts["true"], counts["table_6_1_as_printed"]) == (row["parameters"], row["table_6_1"])

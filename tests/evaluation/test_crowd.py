@@ -1,4 +1,4 @@
-"""Figures side by side: each walks as it would alone."""
+"""Each figure of a crowd walks as it would alone."""
 
 from __future__ import annotations
 

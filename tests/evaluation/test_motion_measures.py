@@ -20,7 +20,7 @@ from hobble.evaluation.motion_measures import (
 )
 
 
-def test_slide_is_the_way_of_the_toe_in_stance() -> None:
+def test_slide_is_the_distance_of_the_toe_in_stance() -> None:
     frames = 40
     contacts = np.zeros((frames, 4))
     contacts[5:15, 1] = 1.0
@@ -65,7 +65,7 @@ def test_root_frame_is_turned_and_moved() -> None:
     np.testing.assert_allclose(in_root_frame(world, root, yaw), [body, body], atol=1e-12)
 
 
-def test_a_walk_in_numbers(holden31: Skeleton) -> None:
+def test_gait_measures_of_a_known_walk(holden31: Skeleton) -> None:
     """A figure with a stiff right knee, an arm that swings through 40 degrees and a trunk that leans."""
     frames = 240
     t = 2 * np.pi * np.arange(frames) / 60

@@ -1,4 +1,4 @@
-"""The soak: what it says of characters that keep whole, and that it sees the ones that do not."""
+"""The long test accepts plausible characters and finds implausible ones."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HIPS = 93.0  # cm above the ground, of the figures of `mean_output`
 
 
 def on_its_feet(network: Pfnn) -> Pfnn:
-    """The network with what it would have seen of figures whose hips keep within 8 cm, feet in contact."""
+    """The network with the bounds of figures whose hips move by at most 8 cm, feet in contact."""
     mean = network.y_mean.copy()
     mean[network.layout.y_contacts] = 1.0
     x = np.zeros(network.layout.x_size, np.float32)
@@ -37,7 +37,7 @@ def test_hips_stay_above_the_ground_under_them(hurtable: Pfnn) -> None:
     assert found["holds"]
 
 
-def test_without_the_ground_under_them_they_do_not(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_hips_without_ground_under_them_are_found(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatch) -> None:
     still = {name: getattr(feet, name) for name in ("leg_joints", "sole_heights", "carried", "place_feet")}
     monkeypatch.setattr(controller, "feet", SimpleNamespace(**still, carry_body=lambda *_: None))
     found = soak(on_its_feet(hurtable), 20, 150)
@@ -74,7 +74,7 @@ def test_slides_are_those_of_whole_stances() -> None:
         toes = before + np.array([[0.5, 1.0, 0.0], [0.0, 0.0, 0.0]])
         slides.add(toes, before, np.array([[k < 6, k < 2]]))
         before = toes
-    np.testing.assert_allclose(np.concatenate(slides.done), [2.5])  # the right foot's was a flicker
+    np.testing.assert_allclose(np.concatenate(slides.done), [2.5])  # the right foot's contact was too short
 
 
 def test_grounds_are_of_many_kinds() -> None:

@@ -1,4 +1,4 @@
-"""Whether a figure falls apart: the measure, and the released network's ten minutes."""
+"""The measure of stability, and ten minutes of the released network."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_the_released_network_holds_for_ten_minutes(shared: Path, holden31) -> N
 
 
 @pytest.mark.shared
-def test_what_falls_apart_is_told(shared: Path, holden31, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_implausible_motion_is_reported(shared: Path, holden31, monkeypatch: pytest.MonkeyPatch) -> None:
     network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
     whole = stability(network, 0.25)
     assert whole["stable"]

@@ -11,7 +11,7 @@ from hobble.core.errors import HobbleError
 from hobble.database.sides import refuse_both_sides
 from hobble.motion.axes import turned
 from hobble.motion.mirror import mirror_clip
-from hobble.motion.same import likeness, same_pairs
+from hobble.motion.same import likeness, load_likenesses, same_pairs, save_likenesses
 
 
 def test_a_turned_a_shortened_and_a_mirrored_copy_are_found(walker, holden31):
@@ -39,6 +39,22 @@ def test_a_turned_a_shortened_and_a_mirrored_copy_are_found(walker, holden31):
         ("b", "d"),
         ("c", "d"),
     }
+
+
+def test_what_clips_are_compared_by_survives_a_file(walker, holden31, tmp_path):
+    clip = walker(holden31, 120, 60.0)
+    found = [likeness(replace(clip, name=name), name) for name in "ab"]
+    found.append(replace(found[0], name="c", mirrored=None))
+    save_likenesses(tmp_path / "some.npz", found)
+    back = load_likenesses(tmp_path / "some.npz")
+    assert [(one.name, one.sha256, one.seconds) for one in back] == [
+        (one.name, one.sha256, one.seconds) for one in found
+    ]
+    for one, other in zip(back, found, strict=True):
+        np.testing.assert_array_equal(one.poses, other.poses)
+    np.testing.assert_array_equal(back[1].mirrored, found[1].mirrored)
+    assert back[2].mirrored is None
+    assert same_pairs(back) == same_pairs(found)
 
 
 def test_files_with_one_digest_are_the_same_file(walker, holden31):

@@ -1,4 +1,4 @@
-"""Rows: those of the original database, and what they must be on motion known in closed form."""
+"""Rows compared with the original database, and with exact values for simple motions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from hobble.terrain.patches import draw_patches
 
 NAME = "LocomotionFlat09_000"
 OPTIONS = {"window": 60, "step": 10, "facing_sigma": 20.0}
-# The data set of the original release, whose sections are to make the original's rows.
+# The data set of the original release. Its options must give the original's rows.
 RELEASE = Catalogue(Path(__file__).parents[2] / "config").dataset("pfnn")
 IN_CENTIMETRES = ("position", "joint_position")
 
@@ -52,13 +52,13 @@ def original(shared: Path) -> dict[str, np.ndarray]:
 
 
 def options(section: str, **changed: object) -> dict[str, Any]:
-    """A section of the original's data set, as its stage gets it."""
+    """A section of the original's data set, in the form that its stage gets."""
     model = getattr(sections, section.capitalize())
     return model(**getattr(RELEASE, section).model_dump() | changed).model_dump(mode="json")
 
 
 def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrain: object) -> ClipRows:
-    """The rows of the reference clip, stage by stage, by nothing but the configuration."""
+    """The rows of the reference clip, made by all stages with the options of the configuration."""
     skeletons = root / "config" / "skeletons"
     folder = shared / "mocap" / "pfnn"
     clip, report = make_clip(
@@ -125,7 +125,7 @@ def test_the_comparison_would_notice_a_millimetre(rows, original):
     "change", [{"flat_level": "zero"}, {"held_up": 2.0}, {"heel_height": "auto"}, {"toe_height": "auto"}]
 )
 def test_each_of_the_originals_settings_is_needed(shared, root, original, change):
-    """All but `deepest` and `bend_flat`, since this clip's feet are nowhere off by that much."""
+    """`deepest` and `bend_flat` do not matter, because the feet of this clip are never that far off."""
     other = rows_as_configured(shared, root, **change)
     with pytest.raises(AssertionError, match="x joint_position"):
         test_the_original_rows_column_by_column(other, original)
@@ -133,7 +133,7 @@ def test_each_of_the_originals_settings_is_needed(shared, root, original, change
 
 @pytest.fixture(scope="module")
 def walk() -> Clip:
-    """A stiff figure that goes 2 cm a frame along +X while it turns by a hundredth of a radian a frame."""
+    """A rigid figure that moves 2 cm a frame along +X and turns by 0.01 radians a frame."""
     names = ("Hips", "LeftUpLeg", "RightUpLeg", "LeftArm", "RightArm")
     offsets = np.array([[0, 0, 0], [10, -5, 0], [-10, -5, 0], [20, 40, 3], [-20, 40, 3]], float)
     roles = dict(
@@ -169,7 +169,7 @@ def terrain(labels) -> dict[str, np.ndarray]:
     return flat_terrain(labels["cycles"], np.array([3.0, 4.0, 5.0]))
 
 
-def test_a_stiff_turning_figure_in_closed_form(walk, labels, terrain):
+def test_a_rigid_turning_figure_has_exact_rows(walk, labels, terrain):
     severity = np.random.default_rng(0).random((300, 2)) * 10
     rows = clip_rows("walk", walk, labels, {"injury": severity}, terrain, **{**OPTIONS, "facing_sigma": 0.0})
     layout, frame = rows.layout, rows.frame
@@ -274,7 +274,7 @@ def test_severities_and_cycles_that_do_not_fit_are_refused(walk, labels, terrain
 
 
 def test_past_the_ends_of_the_clip_the_root_goes_straight_on_and_the_gait_is_held(walk, labels):
-    """Rows next to an end are those of a longer clip that does so."""
+    """Rows near an end equal those of a longer clip that really continues like this."""
     ends = {**labels, "cycles": np.array([[1, 40], [260, 298]])}
     still = replace(walk, rotations=np.tile(walk.rotations[:1], (300, 1, 1)))
     once = clip_rows(

@@ -1,4 +1,4 @@
-"""A figure whose feet go exactly where a test wants them, and patches of every generated kind."""
+"""A figure with feet at exactly given positions, and patches of every generated kind."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hobble.terrain.patches import Patches, draw_patches
 CELL = 3.937007874
 HEEL, TOE = 7.0, 2.5
 KINDS = ("fractal", "hills", "stairs", "slope", "boxes", "beams")
-PLACES = {  # where the joints of the figure are beside its root, and what they are for
+PLACES = {  # positions of the joints relative to the root, and their roles
     "hips": (0, 0, 0),
     "left_hip": (9, -8, 0),
     "right_hip": (-9, -8, 0),
@@ -60,7 +60,7 @@ class Walk:
 
 
 def walk(ground: Height, frames: int = 420, speed: float = 2.2, period: int = 64, seed: int = 0) -> Walk:
-    """A figure that walks along +Z over `ground`, its feet exactly on it in stance, clear of it in swing."""
+    """A figure that walks along +Z over `ground`. Feet are exactly on it in stance and above it in swing."""
     rng = np.random.default_rng(seed)
     stride, feet = speed * period, np.zeros((frames, 4, 3))
     contacts = np.zeros((frames, 4), bool)

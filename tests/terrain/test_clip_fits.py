@@ -1,4 +1,4 @@
-"""Whole clips: honest geometry, the order of heights, flat clips, and refusals."""
+"""Whole clips: exact geometry, the order of heights, flat clips, and errors."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ GROUNDS = {
 
 @pytest.mark.parametrize("kind", ["rocky", "jumpy", "beam"])
 @pytest.mark.parametrize("name", GROUNDS)
-def test_feet_stand_on_the_ground_and_never_in_it(
+def test_feet_stand_on_the_ground_and_are_never_below_it(
     made: SimpleNamespace, patches: Patches, name: str, kind: str
 ) -> None:
     walk = made.walk(GROUNDS[name])
@@ -52,9 +52,7 @@ def test_patch_and_feet_are_level_with_each_other_on_average(made: SimpleNamespa
     assert np.allclose(ground.centre, soles[contacts][:, [0, 2]].mean(axis=0))
 
 
-def test_as_in_the_original_nobody_looks_at_feet_below_the_ground(
-    made: SimpleNamespace, patches: Patches
-) -> None:
+def test_without_deepest_feet_may_be_below_the_ground(made: SimpleNamespace, patches: Patches) -> None:
     walk = made.walk(GROUNDS["steps"])
     fits = clip_fits(walk.clip, walk.labels, patches, "rocky", made.options(deepest=None), made.database())
     assert fits.foot_error[..., 0].max() < 1
@@ -79,7 +77,7 @@ def test_rows_are_each_cycles_frames_and_heights_those_of_the_fits(
 
 
 def test_heights_are_left_then_centre_then_right_from_the_past_to_the_future() -> None:
-    """On a ground whose height tells the place, the numbers tell where they were taken."""
+    """On ground whose height identifies the place, heights show where they were sampled."""
     frames = 200
     angle = np.linspace(0, 2, frames)
     direction = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=-1)
@@ -151,7 +149,7 @@ def test_a_foot_that_dips_into_a_flat_floor_makes_a_pit_and_nothing_else(
 def test_a_heel_held_up_over_its_standing_toe_is_not_on_a_flat_floor(
     made: SimpleNamespace, patches: Patches
 ) -> None:
-    """As in a crouch on the balls of the feet: the heels keep still, so that their labels say contact."""
+    """Like a crouch on the balls of the feet: heels that do not move are labelled as contacts."""
     walk = made.walk(GROUNDS["level"])
     feet = walk.clip.positions[:, -4:].copy()
     feet[:, [0, 2], 1] += 5
@@ -214,7 +212,7 @@ def test_no_cycles_no_rows(made: SimpleNamespace, patches: Patches, tmp_path: Pa
         assert len(fits.frame) == len(fits.fits) == 0
 
 
-def test_where_no_foot_ever_stands_the_lowest_points_count(
+def test_without_contacts_the_lowest_points_count(
     made: SimpleNamespace, patches: Patches, caplog: pytest.LogCaptureFixture
 ) -> None:
     walk = made.walk(GROUNDS["level"])
@@ -271,7 +269,7 @@ def test_a_single_low_frame_lowers_the_soles_a_fault_of_capture_does_not(made: S
 
 
 def honest_over(heightmap: dict, files: list[Path], made: SimpleNamespace) -> None:
-    """A walk over waves stands on patches of one heightmap."""
+    """A walk over waves, fitted to patches of one heightmap."""
     options = made.options(patches=100)
     maps = heightmaps([Heightmap(**heightmap)], files, cell=options.cell, height_scale=3.0)
     drawn = options.model_dump(include={"cell", "size", "highest", "seed"})
@@ -288,12 +286,12 @@ def test_real_landscape_is_ground_to_walk_on(made: SimpleNamespace) -> None:
 
 
 @pytest.mark.shared
-def test_so_is_the_originals_heightmap(shared: Path, made: SimpleNamespace) -> None:
+def test_the_originals_heightmap_is_ground_to_walk_on(shared: Path, made: SimpleNamespace) -> None:
     honest_over({"kind": "file", "path": "x"}, [shared / "mocap/pfnn/hmap_001_smooth.txt"], made)
 
 
 @pytest.mark.shared
-def test_real_clips_are_honest_too(shared: Path, root: Path, made: SimpleNamespace) -> None:
+def test_real_clips_stand_on_their_ground(shared: Path, root: Path, made: SimpleNamespace) -> None:
     """Uneven ground, a limp, and the original's own flat clip, whose ground stays at zero."""
     from hobble.config.sections import Labels, Terrain
     from hobble.labels.label import label_clip

@@ -1,4 +1,4 @@
-"""The surface that is added to meet the feet, and what is dug out."""
+"""The surface that is added to meet the feet, and the pits."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_a_point_that_counts_m_times_is_m_points_at_one_place() -> None:
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000))
 def test_large_residuals_are_met_and_small_ones_left_as_in_the_original(seed: int) -> None:
-    """As under feet beside a beam: half a metre apart, and closer together than the smoothing likes."""
+    """Like feet beside a beam: heights differ by half a metre over a short distance."""
     rng = np.random.default_rng(seed)
     place = rng.uniform(-60, 60, (40, 2))
     at = Stances(place, np.zeros(40), rng.integers(1, 9, 40).astype(float))
@@ -68,7 +68,7 @@ def test_large_residuals_are_met_and_small_ones_left_as_in_the_original(seed: in
     assert np.array_equal(once[0].weights, met[0].weights)
 
 
-def test_points_that_are_all_at_one_place_bend_nothing() -> None:
+def test_points_at_one_place_give_a_flat_surface() -> None:
     at = Stances(np.full((3, 2), 7.0), np.zeros(3), np.ones(3))
     (surface,) = fit_surfaces(at, np.ones((1, 3)), 0.1)
     assert np.all(surface.at(np.zeros((4, 2))) == 0)
@@ -91,7 +91,7 @@ def test_stances_are_runs_of_one_joint_cut_to_length() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10_000))
-def test_digging_lets_feet_through_and_touches_nothing_that_is_far(seed: int) -> None:
+def test_pits_are_below_the_feet_and_change_nothing_far_away(seed: int) -> None:
     rng = np.random.default_rng(seed)
     soles = rng.uniform(-50, 50, (5, 3)) * [1, 0.1, 1] - [0, 5, 0]
     standing = Stances(rng.uniform(-50, 50, (4, 2)), np.full(4, -20.0), np.ones(4))
@@ -105,7 +105,7 @@ def test_digging_lets_feet_through_and_touches_nothing_that_is_far(seed: int) ->
     assert dig_pits(soles[:0], standing, 0.5).of(ground, where) is ground
 
 
-def test_digging_is_as_steep_as_it_may_be_and_as_it_must_be() -> None:
+def test_walls_of_pits_are_steep_only_beside_other_feet() -> None:
     along = np.column_stack([np.linspace(-40, 40, 801), np.zeros(801)])
     sole = np.array([[0.0, -8.0, 0.0]])
     far = Stances(np.array([[30.0, 0.0]]), np.array([3.0]), np.ones(1))

@@ -37,7 +37,10 @@ def test_beams_are_narrow_and_stand_more_than_40_cm_above_the_floor() -> None:
 
 def test_the_elevation_model_is_true_to_scale() -> None:
     heights = elevation(CELL)
-    assert heights.shape == (344, 323)  # 3 arc seconds are shorter from east to west: 403 columns before
+    assert heights.shape == (
+        344,
+        323,
+    )  # 3 arc seconds are shorter from east to west; the source has 403 columns
     assert np.ptp(heights) == pytest.approx((1076 - 236) * CELL / 92.6, rel=0.01)
     steepest = np.degrees(np.arctan(np.hypot(*np.gradient(heights, CELL)).max()))
     assert 25 < steepest < 40
@@ -70,7 +73,7 @@ def test_every_kind_of_file_is_read_alike(tmp_path: Path, suffix: str) -> None:
 def test_a_geotiff_has_heights_below_zero_and_holes(
     tmp_path: Path, dtype: type[np.number], compression: str | None
 ) -> None:
-    """With the tags that GDAL writes: the size of a cell, where it lies, and what stands for no data."""
+    """With GDAL's tags: size of a cell, position, and the value that means no data."""
     heights = (RAMP - 7).astype(dtype)
     heights[1, 2] = -9999
     tags = ImageFileDirectory_v2()

@@ -61,8 +61,8 @@ def test_every_patch_has_mean_zero_and_no_cell_beyond_the_limit(patches: Patches
     assert np.abs(heights).max() <= 50.001
 
 
-def test_no_crop_that_passes_is_left_out() -> None:
-    """On a cliff only the crops that pass are drawn, wherever the cliff runs through them."""
+def test_no_view_that_passes_is_left_out() -> None:
+    """On a cliff only views that pass are drawn, whatever part of the cliff they contain."""
     cliff = np.zeros((400, 400))
     cliff[200:] = 60.0
     heights = draw(Heightmap("cliff", cliff, CELL), count=200).at(range(200), CELLS)
@@ -98,7 +98,7 @@ def test_a_map_with_wider_cells_is_seen_at_its_own_scale() -> None:
 
 
 def test_no_patch_shows_a_hole() -> None:
-    """Not even where its cells, four times as wide as those of the map, pass by on both sides of one."""
+    """Not even if its cells are four times as wide as those of the map and skip the hole."""
     heights = plane(0.02, 0.02, 800, 800).heights.copy()
     heights[100:-100:150, 100:-100:150] = np.nan
     patches = draw_patches(
@@ -121,7 +121,7 @@ def test_the_same_seed_draws_the_same_and_another_does_not(tmp_path: Path) -> No
     assert files[0].read_bytes() != files[2].read_bytes()
 
 
-def test_patches_come_back_from_their_file_and_are_small(tmp_path: Path, patches: Patches) -> None:
+def test_patches_round_trip_and_are_small(tmp_path: Path, patches: Patches) -> None:
     save_patches(tmp_path / "p.npz", patches)
     back = load_patches(tmp_path / "p.npz")
     assert np.array_equal(back.at(range(9), CELLS), patches.at(range(9), CELLS))
@@ -129,7 +129,7 @@ def test_patches_come_back_from_their_file_and_are_small(tmp_path: Path, patches
     assert views / len(patches) * 20_000 < 1e6
 
 
-def test_what_cannot_be_drawn_is_refused_by_name() -> None:
+def test_maps_without_patches_are_refused_by_name() -> None:
     with pytest.raises(InputError, match="plane: none of 1000 views of 128 cells stay within 50 cm"):
         draw(plane(0, 0), plane(3, 3))
     with pytest.raises(InputError, match="plane: 90 x 300 cells are too few for patches of 128 x 128"):
@@ -145,7 +145,7 @@ def test_a_damaged_file_is_refused(tmp_path: Path, patches: Patches) -> None:
         load_patches(path)
 
 
-def test_beyond_its_edge_a_patch_goes_on_as_at_its_edge(patches: Patches) -> None:
+def test_outside_a_patch_the_height_is_that_of_its_edge(patches: Patches) -> None:
     world = np.array([[400.0, 0.0], [63 * CELL, 0.0], [0.0, -400.0], [0.0, -64 * CELL]])
     heights = patches.at([3], patches.cells(world, np.zeros(2)))[0]
     assert heights[0] == heights[1]

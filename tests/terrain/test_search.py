@@ -1,4 +1,4 @@
-"""The error of a patch, and that the search finds exactly the lowest."""
+"""The error of a patch; the search finds exactly the patches with the lowest errors."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_the_search_finds_the_lowest_of_all(
     assert len(set(chosen.tolist())) == count
 
 
-def test_feet_on_the_plane_have_no_error_and_feet_in_it_what_they_are_deep() -> None:
+def test_feet_on_a_plane_have_no_error_and_feet_below_it_their_depth() -> None:
     slope = Heightmap("plane", np.add.outer(0.2 * np.arange(200), np.zeros(200)), CELL)
     patches = draw_patches([slope], count=4, cell=CELL, size=128, highest=50.0, seed=1)
     rng = np.random.default_rng(0)
@@ -91,7 +91,7 @@ def test_feet_on_the_plane_have_no_error_and_feet_in_it_what_they_are_deep() -> 
         assert patch_errors(patches, Footing(bent, table[40:]))[p] == pytest.approx(0.4, rel=1e-3)
 
 
-def test_of_equal_patches_the_first_are_found() -> None:
+def test_among_equal_patches_the_first_are_found() -> None:
     flat = Heightmap("flat", np.zeros((200, 200)), CELL)
     patches = draw_patches([flat], count=20, cell=CELL, size=128, highest=50.0, seed=1)
     chosen, error = best_patches(patches, made_up(1), 10)

@@ -1,4 +1,4 @@
-"""Running the real workflow on tiny data, from a copy of the checkout that a test may change."""
+"""Runs the real workflow on tiny data in a copy of the checkout, which tests may change."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ import pytest
 
 @dataclass
 class Workflow:
-    """A clone of the checkout, in which commands are given as the README gives them."""
+    """A clone of the checkout in which the commands of the README run."""
 
     checkout: Path
 
     @property
     def folder(self) -> Path:
-        """Where results lie: in the checkout itself, as without any option."""
+        """The folder of the run: the checkout itself, the default."""
         return self.checkout
 
     def command(self, *arguments: str) -> list[str]:
-        """The README's own: `snakemake -c2 results/...`, and no option that it does not show."""
+        """The command of the README, `snakemake -c2 results/...`, without other options."""
         return [str(Path(sys.executable).with_name("snakemake")), *arguments]
 
     def start(self, *arguments: str, said: Path | None = None) -> subprocess.Popen[bytes]:
-        """The same in a session of its own, not waited for; what it says goes to the file `said`."""
+        """Start it in its own session without waiting. Its output goes to the file `said`."""
         with open(said or os.devnull, "wb") as out:
             return subprocess.Popen(
                 self.command(*arguments),
@@ -45,7 +45,7 @@ class Workflow:
         return {**os.environ, "PYTHONPATH": path.rstrip(os.pathsep), "PYTHONDONTWRITEBYTECODE": "1"}
 
     def run(self, *arguments: str, ok: bool = True) -> str:
-        """Run snakemake; returns stdout and stderr. Fails the test where it ends otherwise than `ok` says."""
+        """Run snakemake and return stdout and stderr. Fails the test if its success is not `ok`."""
         done = subprocess.run(
             self.command(*arguments),
             cwd=self.checkout,
@@ -81,7 +81,7 @@ class Workflow:
 
 
 def copy_of(root: Path, folder: Path) -> Workflow:
-    """Rules are copied, the package is linked, so that what numba compiled is found again."""
+    """Rules are copied and the package is linked, so that numba's cache is found."""
     checkout = folder / "checkout"
     checkout.mkdir(parents=True)
     shutil.copy2(root / "Snakefile", checkout)
@@ -99,7 +99,7 @@ def workflow(root: Path, tmp_path: Path) -> Workflow:
 
 @pytest.fixture(scope="session")
 def finished(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Workflow:
-    """The `test` configuration, run to its report once; not to be changed by a test."""
+    """The finished run of configuration `test`. Tests must not change it."""
     made = copy_of(root, tmp_path_factory.mktemp("finished"))
     made.run("-c2", "results/test/report.html")
     return made
@@ -107,7 +107,7 @@ def finished(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Workflow:
 
 @pytest.fixture
 def copied(finished: Workflow, tmp_path: Path) -> Workflow:
-    """A copy of the finished run that a test may change (times are kept, so nothing is out of date)."""
+    """A copy of the finished run that a test may change. File times are kept, so nothing is out of date."""
     target = tmp_path / "copy"
     shutil.copytree(finished.checkout.parent, target, symlinks=True)
     return Workflow(target / "checkout")

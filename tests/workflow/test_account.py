@@ -1,4 +1,4 @@
-"""Where a user has no name and no HOME that can be written, as in a container."""
+"""A user without a name and without a writable HOME, as in a container."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A channel that nobody shipped: one folder, one word in the list, and a network that is told it."""
+"""A new channel needs one folder and its name in the list. Then a network can have it as an input."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ print(json.dumps([told, network.layout.to_dict()["channels"], list(network.chann
 """
 
 
-def test_a_channel_is_one_folder_and_one_word_in_the_list(workflow) -> None:
+def test_a_channel_needs_one_folder_and_one_name_in_the_list(workflow) -> None:
     package = workflow.own_source()
     (package / "channels/toy").mkdir()
     (package / "channels/toy/__init__.py").write_text(TOY)
@@ -67,5 +67,5 @@ def test_a_channel_is_one_folder_and_one_word_in_the_list(workflow) -> None:
     )  # fmt: skip
     values, channels, labels = json.loads(walk.stdout)
     assert (channels, labels) == ([["toy", 2], ["injury", 30]], ["one", "other"])
-    rising = np.minimum(np.arange(1, 13) * 6.0 / 60, 1.0)  # at its own rate, to what it was told
+    rising = np.minimum(np.arange(1, 13) * 6.0 / 60, 1.0)  # towards its value, at the channel's rate
     np.testing.assert_allclose(values, np.stack([rising, 0 * rising], axis=1))

@@ -1,4 +1,4 @@
-"""One clip more: its own jobs and the merge, and nothing of the clips that were there."""
+"""A new clip runs its own jobs and the merge, but no job of another clip."""
 
 from __future__ import annotations
 

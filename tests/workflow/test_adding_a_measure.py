@@ -1,4 +1,4 @@
-"""A measurement that nobody has heard of: a folder, and one line in the list."""
+"""A new measurement needs a folder and one line in the list."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files that no longer are what their jobs wrote, and files that change while a job reads them."""
+"""Files that differ from what their jobs wrote, and files that change while a job reads them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def made(tmp_path: Path) -> Path:
     return path
 
 
-def test_records_lie_beside_the_logs_of_what_they_vouch_for() -> None:
+def test_checksums_are_in_the_results_folder_of_their_files() -> None:
     where = {
         "results/test/evaluation/injury.csv": "results/test/checksums/evaluation/injury.csv.crc32",
         "results/datasets/tiny/motion/a.json": "results/datasets/tiny/checksums/motion/a.json.crc32",
@@ -46,7 +46,7 @@ def test_every_flipped_bit_is_noticed(made: Path) -> None:
                 checksums.verify([str(made)])
 
 
-def test_a_damaged_record_is_noticed_and_a_missing_one_let_pass(made: Path) -> None:
+def test_damaged_checksums_are_noticed_and_missing_ones_pass(made: Path) -> None:
     record = checksums.record_of(made)
     record.write_bytes(b"\xff\0")
     with pytest.raises(InputError, match="damaged"):
@@ -55,7 +55,7 @@ def test_a_damaged_record_is_noticed_and_a_missing_one_let_pass(made: Path) -> N
     checksums.verify([str(made), "no/such/results/test/file.json"])
 
 
-def test_a_folder_is_vouched_for_by_the_files_right_in_it(tmp_path: Path) -> None:
+def test_checksums_of_a_folder_cover_the_files_directly_in_it(tmp_path: Path) -> None:
     folder = tmp_path / "results/datasets/tiny/database/injury"
     write_json(folder / "manifest.json", {"rows": 3})
     checksums.record([str(folder)])
@@ -79,7 +79,7 @@ def run(made: Path, work, output: str = "results/datasets/tiny/labels/walk.json"
         work(root / output)
 
 
-def test_a_job_refuses_a_damaged_input_and_vouches_for_its_output(made: Path, capsys) -> None:
+def test_a_job_refuses_a_damaged_input_and_writes_checksums(made: Path, capsys) -> None:
     done: list[Path] = []
 
     def work(output: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a cluster is asked for: how many jobs, and how much memory and time for each."""
+"""Requests to a cluster: number of jobs, and memory and time of each."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ def test_thousands_of_clips_make_a_hundred_jobs(root, workflow, tmp_path) -> Non
 @pytest.mark.parametrize("name", ["slurm", "kubernetes", "s3"])
 def test_a_profile_keeps_what_the_default_one_says(root, name: str) -> None:
     ours, default = profile(root, name), profile(root, "default")
-    del default["logger"]  # on a cluster Snakemake's own words say which job went where
+    del default["logger"]  # on a cluster Snakemake's full output says which job went where
     asked = default.pop("default-resources")
     assert {key: ours.get(key) for key in default} == default
     assert ours["default-resources"].items() >= asked.items()
 
 
-def test_a_pod_is_what_a_job_is(root) -> None:
+def test_a_pod_gets_the_requests_of_its_job(root) -> None:
     for key in ("groups", "group-components", "cores", "retries"):
         assert profile(root, "kubernetes")[key] == profile(root, "slurm")[key]
 
@@ -88,7 +88,7 @@ def test_a_gpu_is_asked_for_where_training_is_told_to_use_one(workflow) -> None:
     assert "gpu=1" not in workflow.run("-np", weights)
 
 
-def test_more_motion_asks_for_more_and_a_second_attempt_too(demands) -> None:
+def test_requests_grow_with_motion_and_attempt(demands) -> None:
     short, long = (demands.memory("synthetic", clip, 20) for clip in ("jog-2", "jog-1"))
     assert short < long
     assert demands.memory("synthetic", "jog-1", 20, attempt=2) == pytest.approx(2 * long, abs=1)
@@ -109,7 +109,7 @@ def test_the_length_of_a_clip_is_that_of_its_rows_not_what_its_header_promises(t
     assert bvh_seconds(tmp_path / "not there.bvh") is None
 
 
-def test_what_a_job_took_stands_beside_what_its_rule_asks_for(tmp_path) -> None:
+def test_used_and_requested_resources_of_a_job(tmp_path) -> None:
     plan = (
         "rule motion_clip:\n    input: a\n    log: results/x/logs/motion/motion_clip/a.log\n"
         "    resources: tmpdir=/tmp, mem_mb=1000, mem=1 GB, runtime=2, gpu=0\n[now]\n"

@@ -1,4 +1,4 @@
-"""What `make env` says while pip works."""
+"""The output of `make env` while pip works."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ def test_in_a_file_a_line_comes_now_and_then() -> None:
     out = io.StringIO()
     follow(SAID * 20, Line(out))
     lines = out.getvalue().splitlines()
-    assert len(lines) == 1 + 20  # and at once what pip is then silent about
+    assert len(lines) == 1 + 20  # and the unpacking at once, because pip prints nothing about it
     assert "unpacking 2 packages" in lines[-1]
 
 
-def test_pip_s_last_words_are_said_where_it_fails(tmp_path: Path) -> None:
+def test_pips_last_lines_are_printed_if_it_fails(tmp_path: Path) -> None:
     script = f"import sys; sys.path.insert(0, {str(Path(environment.__file__).parents[2])!r})\n" + (
         "from pathlib import Path\nfrom hobble.workflow.environment import *\n"
         "install(Path(sys.executable), ['no-such-folder/x.whl'], Line(sys.stdout))\n"

@@ -1,4 +1,4 @@
-"""Bad input through the real workflow: one message with file and place, and what was whole stays whole."""
+"""Bad input in the real workflow gives one message with file and place. Finished files stay."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def make(workflow, *targets: str, ok: bool) -> str:
 
 
 def refused(workflow, stage: str, *pieces: str) -> None:
-    """The bad clip's job ends with one message that holds `pieces`; the good clip's job is done."""
+    """The job of the bad clip ends with one message that contains `pieces`. The good clip's job succeeds."""
     text = make(workflow, f"{stage}/{workflow.clip}.npz", f"{stage}/{workflow.other}.npz", ok=False)
     rule = "channel_clip" if stage.startswith("channels/") else f"{stage}_clip"
     message = [line for line in text.splitlines() if line.startswith(f"{rule}: ")]

@@ -15,7 +15,7 @@ from hobble.workflow.costs import DATASET_STAGES
 
 @pytest.fixture
 def source(tmp_path: Path) -> Path:
-    """A script and a package in which every kind of word and of code stands."""
+    """A script and a package with every kind of text and code."""
     package = tmp_path / "src" / "pkg"
     package.mkdir(parents=True)
     (package / "__init__.py").write_text('"""Package."""\n')
@@ -119,7 +119,7 @@ def test_the_closure_follows_imports_through_modules_but_not_into_the_frame(sour
         ("src/hobble/workflow/job.py", "x = 1", "x = 2", False),
     ],
 )
-def test_code_counts_words_do_not(source: Path, file: str, old: str, new: str, changes: bool) -> None:
+def test_code_counts_and_text_does_not(source: Path, file: str, old: str, new: str, changes: bool) -> None:
     before = mark(source)
     path = source / file
     assert old in path.read_text()
@@ -127,7 +127,7 @@ def test_code_counts_words_do_not(source: Path, file: str, old: str, new: str, c
     assert (mark(source) != before) is changes
 
 
-def test_what_has_no_part_in_a_result_is_there_and_has_a_reason(root: Path) -> None:
+def test_infrastructure_modules_exist_and_have_a_reason(root: Path) -> None:
     for name, reason in fp.INFRASTRUCTURE.items():
         assert list(fp._found(name, root / "src"))[1:], name
         assert reason
@@ -154,7 +154,7 @@ def test_no_stage_imports_from_below(root: Path) -> None:
 
 @pytest.mark.parametrize("measure", MEASURES, ids=lambda measure: measure.name)
 def test_a_measurement_depends_neither_on_the_page_nor_on_the_list(root: Path, measure: Measure) -> None:
-    """Else a new measurement, or another word on a page, would measure everything again."""
+    """Otherwise a new measurement or another text on a page would run all measurements again."""
     files = fp.closure(root / "workflow/scripts/measure.py", root / "src", [measure.module("run")])
     used = {path.relative_to(root / "src/hobble").as_posix() for path in files}
     assert "measures/registry.py" not in used

@@ -1,4 +1,4 @@
-"""The frame around a job's script: what a person sees when it ends badly."""
+"""The context of a job's script: what a user sees when the job fails."""
 
 import re
 import subprocess
@@ -33,14 +33,14 @@ def test_a_job_goes_on_though_the_log_cannot_be_written(log: str) -> None:
     assert (end.returncode, end.stdout, end.stderr) == (0, "done\n", "")
 
 
-def test_what_the_disk_refuses_is_no_fault_of_ours(tmp_path) -> None:
+def test_disk_errors_are_not_reported_as_bugs(tmp_path) -> None:
     end = ended(str(tmp_path / "job.log"), "open('/proc/1/nowhere')")
     assert end.returncode == 1
     assert end.stderr.startswith("stage: /proc/1/nowhere: No such file or directory. See ")
     assert "Traceback" in (tmp_path / "job.log").read_text()
 
 
-def test_a_fault_of_ours_leaves_its_traceback_in_the_log_only(tmp_path) -> None:
+def test_a_bug_writes_its_traceback_only_to_the_log(tmp_path) -> None:
     path = tmp_path / "logs" / "job.log"
     end = ended(str(path), "{}['left knee']")
     assert end.returncode == 1
@@ -52,7 +52,7 @@ def test_a_fault_of_ours_leaves_its_traceback_in_the_log_only(tmp_path) -> None:
 
 
 def test_the_log_ends_with_the_memory_that_the_job_took(tmp_path) -> None:
-    """All of it, though it was freed again and no sample was taken while it was there."""
+    """The peak counts, although the memory was freed again and no sample was taken meanwhile."""
     path = tmp_path / "job.log"
     assert ended(str(path), "b = b'x' * 300_000_000; del b").returncode == 0
     took = re.search(r"took (\d+) MB of memory at most$", path.read_text().strip())

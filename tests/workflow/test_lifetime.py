@@ -1,4 +1,4 @@
-"""Whose a lock is, and that a job ends when its run does."""
+"""Owners of locks, and jobs that end with their run."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def owned_by(locks: Path, **changed: object) -> None:
 
 
 def ended() -> int:
-    """The number of a process that is no more."""
+    """The id of a process that has ended."""
     process = subprocess.Popen([sys.executable, "-c", ""])
     process.wait()
     return process.pid
@@ -52,25 +52,25 @@ def test_the_lock_of_a_living_run_stays(locks: Path) -> None:
     assert (locks / "0.output.lock").is_file()
 
 
-def test_the_lock_of_a_dead_one_is_taken_away(locks: Path) -> None:
+def test_the_lock_of_a_dead_run_is_removed(locks: Path) -> None:
     owned_by(locks, pid=ended())
     assert lifetime.clear_stale_lock(locks)
     assert list(locks.iterdir()) == []
     assert [path.name for path in locks.parent.iterdir()] == ["locks"]
 
 
-def test_another_process_with_the_number_of_a_dead_one_owns_nothing(locks: Path) -> None:
+def test_a_new_process_with_the_same_id_does_not_own_the_lock(locks: Path) -> None:
     owned_by(locks, began="1")
     assert lifetime.clear_stale_lock(locks)
 
 
-def test_of_another_machine_nothing_is_known(locks: Path) -> None:
+def test_a_lock_of_another_machine_stays(locks: Path) -> None:
     owned_by(locks, host=f"not-{platform.node()}", pid=ended())
     assert not lifetime.clear_stale_lock(locks)
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", "not json", '{"host": 1, "pid": "x", "began": 2}'])
-def test_a_lock_that_does_not_say_whose_it_is_stays(locks: Path, text: str) -> None:
+def test_a_lock_without_an_owner_stays(locks: Path, text: str) -> None:
     (locks / lifetime.OWNER).write_text(text)
     assert not lifetime.clear_stale_lock(locks)
     (locks / lifetime.OWNER).unlink()
@@ -79,7 +79,7 @@ def test_a_lock_that_does_not_say_whose_it_is_stays(locks: Path, text: str) -> N
 
 
 def started(tmp_path: Path, work: str, run: int) -> subprocess.Popen[str]:
-    """A job of the run with that process, as soon as its work has begun."""
+    """A job of the run with that process id, after its work has begun."""
     script = JOB.format(log=str(tmp_path / "job.log"), work=work)
     environment = {**os.environ, lifetime.RUN_VARIABLE: f"{run} {lifetime._start_time(run)}"}
     command = [sys.executable, "-c", script]
@@ -101,7 +101,7 @@ def test_a_job_ends_soon_after_its_run(tmp_path: Path, work: str, status: int) -
     run = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
     process = started(tmp_path, work, run.pid)
     assert process.poll() is None
-    run.kill()  # and not waited for: a zombie is no run either
+    run.kill()  # not waited for, because a zombie does not count as a run either
     before = time.monotonic()
     assert process.wait(timeout=10) == status
     assert time.monotonic() - before < 5
@@ -110,7 +110,7 @@ def test_a_job_ends_soon_after_its_run(tmp_path: Path, work: str, status: int) -
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_job_that_is_told_to_end_tidies_up_without_a_word(tmp_path: Path, number: signal.Signals) -> None:
+def test_a_stopped_job_cleans_up_silently(tmp_path: Path, number: signal.Signals) -> None:
     path = str(tmp_path / "out.txt")
     work = f"""
     from hobble.core.files import atomic_path

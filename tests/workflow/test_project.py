@@ -110,7 +110,7 @@ def test_a_clip_can_be_configured_whatever_its_file_is_called(base: Path, name: 
         ("skeleton: s\nfolder: empty\n", "empty: no such folder"),
     ],
 )
-def test_a_data_set_that_cannot_work_is_told(base: Path, text: str, message: str) -> None:
+def test_a_data_set_that_cannot_work_is_reported(base: Path, text: str, message: str) -> None:
     (base / "config/datasets/mine.yaml").write_text(text)
     with pytest.raises(HobbleError, match=message):
         Project(base, {}).configurations.splits("one")
@@ -131,7 +131,7 @@ def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
         ("results/hurt/export/cubik.onnx", "export/cubik.onnx: the phase modes are constant, linear, cubic"),
     ],
 )
-def test_what_no_network_could_give_is_told_before_it_is_trained(
+def test_impossible_targets_are_reported_before_training(
     base: Path, monkeypatch: pytest.MonkeyPatch, target: str, message: str
 ) -> None:
     (base / "config/eyes.yaml").write_text("extends: hurt\nnetwork_of: one\n")
@@ -159,7 +159,7 @@ def test_the_walkers_frames_are_shared_out(root: Path) -> None:
     assert abs(total - 11_412) < 20
 
 
-def test_networks_that_others_make_are_read_where_they_lie(root: Path) -> None:
+def test_network_of_reads_the_other_configurations_files(root: Path) -> None:
     project = Project(root, {})
     assert project.configurations.network("ava-m", "weights.npz") == "results/ava/network/weights.npz"
     assert project.configurations.start("holden-xt") == ["results/holden/network/checkpoint.npz"]
@@ -194,7 +194,7 @@ WALKER = "skeleton: s\nsynthetic: {frames: 600}\nclips: {b: {%s}}\n"
         (WALKER % "recipe: wlak", "clips.b.recipe: no such recipe: wlak. There are walk-straight, walk, "),
     ],
 )
-def test_what_a_clip_names_wrongly_is_told_before_anything_runs(
+def test_wrong_names_in_clip_entries_are_reported_before_anything_runs(
     complete: Path, text: str, message: str
 ) -> None:
     (complete / "config/datasets/mine.yaml").write_text(text)
@@ -215,7 +215,7 @@ def test_one_file_on_both_sides_of_the_split_is_refused_before_anything_runs(com
     check(Project(complete, {}), ["results/hurt/report.html"])
 
 
-def test_a_skeleton_without_a_mirror_image_is_told_before_anything_runs(complete: Path) -> None:
+def test_a_skeleton_that_cannot_be_mirrored_is_reported_before_anything_runs(complete: Path) -> None:
     rig = complete / "config/skeletons/s.yaml"
     rig.write_text(rig.read_text().replace("RightFoot", "OtherFoot"))
     for mirror in (False, True):
@@ -239,11 +239,12 @@ def test_a_skeleton_without_a_mirror_image_is_told_before_anything_runs(complete
             "training: {passes: 19}",
             r"which has 20 passes\. Its training\.passes must not be fewer, but it is 19",
         ),
+        ("network: {kind: matching}", "but matching is built and not trained"),
         ("training: {learning_rate: 1.0e-3, batch: 64}", None),
         ("", None),
     ],
 )
-def test_what_cannot_be_gone_on_from_is_told_before_anything_runs(
+def test_an_impossible_continuation_is_reported_before_anything_runs(
     complete: Path, text: str, message: str | None
 ) -> None:
     (complete / "config/more.yaml").write_text("extends: one\ntraining: {passes: 40, continues: one}\n")
@@ -272,7 +273,7 @@ def test_what_is_compared(complete: Path) -> None:
     (base / "config/read.yaml").write_text("extends: one\nnetwork_of: one\n")
     read = Project(base, {"compare": ["read"]}).comparison.input_files()
     assert read["history"] == ["results/one/network/history.csv"]
-    # A list of configurations is no part of any of them.
+    # The list of compared configurations belongs to none of them.
     assert project.configurations.resolved("one") == Project(base, {}).configurations.resolved("one")
 
 
@@ -294,7 +295,7 @@ def test_what_cannot_be_compared(complete: Path, names: object, message: str) ->
 
 
 @pytest.mark.parametrize("name", ["compare", "datasets"])
-def test_folders_of_results_are_no_configurations(base: Path, name: str) -> None:
+def test_names_of_results_folders_are_reserved(base: Path, name: str) -> None:
     (base / f"config/{name}.yaml").write_text("extends: one\n")
     with pytest.raises(HobbleError, match=f"no configuration can be called {name}"):
         Project(base, {})
@@ -316,7 +317,7 @@ def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(bas
 
 
 def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path) -> None:
-    """As a collection kept elsewhere is linked into the data folder, though one link lead back."""
+    """A linked collection is found, even if one of its links leads back to it."""
     kept = base / "kept/day 1"
     kept.mkdir(parents=True)
     (kept / "d.bvh").write_text("")
@@ -334,7 +335,7 @@ def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path)
 
 
 @pytest.mark.parametrize("mirror", [True, False])
-def test_a_mirror_beside_its_original_is_left_out_and_made_anew_or_told(base: Path, mirror: bool) -> None:
+def test_a_mirror_beside_its_original_is_left_out(base: Path, mirror: bool) -> None:
     text = DATASET.replace("mirror: true", f"mirror: {str(mirror).lower()}")
     (base / "config/datasets/mine.yaml").write_text(text)
     (base / "data/mine/a_mirror_footsteps.txt").write_text("1 2\n")
@@ -347,7 +348,7 @@ def test_a_mirror_beside_its_original_is_left_out_and_made_anew_or_told(base: Pa
         Project(base, {}).clips.of("mine")
 
 
-def test_a_status_file_of_no_clip_is_told_with_the_nearest_name(base: Path) -> None:
+def test_a_status_file_without_a_clip_is_reported_with_the_nearest_name(base: Path) -> None:
     (base / "data/mine/orphan.bvh").write_text("")
     (base / "data/mine/orphn_injuries.txt").write_text("frames:9\n1-9 LeftLeg-LeftFoot[4];\n")
     (note,) = notes(Project(base, {}), ["results/one/report.html", "results/hurt/report.html"])
@@ -375,7 +376,7 @@ download: {url: 'https://host/{subject:0>3}/{clip}.bvh', checksums: far.sha256}
 """
 
 
-def test_what_the_folder_lacks_is_downloaded(base: Path) -> None:
+def test_missing_clips_are_downloaded(base: Path) -> None:
     (base / "config/datasets/far.yaml").write_text(FAR + "clips: {'2_1': , '2_2': , '2_3': }\n")
     (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'B' * 64} *2_2.bvh\n\n")
     project = Project(base, {})
@@ -415,13 +416,13 @@ def test_what_the_folder_lacks_is_downloaded(base: Path) -> None:
         ("clips: {'2_1': }\n", "", "lists them and names a `folder`"),
     ],
 )
-def test_an_address_that_cannot_work_is_told(base: Path, old: str, new: str, message: str) -> None:
+def test_a_bad_address_is_reported(base: Path, old: str, new: str, message: str) -> None:
     (base / "config/datasets/far.yaml").write_text((FAR + "clips: {'2_1': }\n").replace(old, new))
     with pytest.raises(HobbleError, match=message):
         Project(base, {}).catalogue.dataset("far")
 
 
-def test_a_manifest_that_does_not_read_is_told_with_its_line(base: Path) -> None:
+def test_a_bad_checksum_list_is_reported_with_its_line(base: Path) -> None:
     (base / "config/datasets/far.yaml").write_text(FAR + "clips: {'2_1': }\n")
     (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'a' * 63}  2_2.bvh\n")
     with pytest.raises(HobbleError, match=r"far\.sha256, line 2: expected a SHA-256"):
@@ -486,7 +487,7 @@ def test_motion_knows_what_the_clip_s_entry_says_of_it(root):
 
 
 @pytest.mark.parametrize("asked", [5, "", " ", ["a"], {"a": 1}, None, True])
-def test_a_mocap_folder_that_is_none_is_told(base: Path, asked: object) -> None:
+def test_a_mocap_that_is_not_a_folder_is_reported(base: Path, asked: object) -> None:
     with pytest.raises(HobbleError, match="--config mocap: must be the name of one folder"):
         Project(base, {"mocap": asked})
 
@@ -499,8 +500,8 @@ def test_sections_may_be_asked_for_some_of_their_keys(root: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["a.bvh", "map.txt"])
-def test_a_pipe_is_no_file_to_wait_for(base: Path, name: str) -> None:
-    """Refused when the run is planned: Snakemake would wait for it to end."""
+def test_a_pipe_is_refused_as_a_clip(base: Path, name: str) -> None:
+    """A pipe is refused during planning, because Snakemake would wait for its end."""
     text = DATASET + "terrain: {heightmaps: [{kind: file, path: mine/map.txt}]}\n"
     (base / "config/datasets/mine.yaml").write_text(text)
     (base / f"data/mine/{name}").unlink(missing_ok=True)

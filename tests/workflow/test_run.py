@@ -1,10 +1,11 @@
-"""The whole workflow on tiny synthetic data: it ends, it is reproducible, it re-runs what it should."""
+"""The whole workflow on tiny synthetic data: it finishes, is reproducible, and re-runs the right jobs."""
 
 from __future__ import annotations
 
 import json
 import os
 import signal
+import struct
 import time
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ MEASURED = {"milliseconds", "seconds", "machine"}
 
 
 def without_times(value: Any) -> Any:
-    """JSON without what a clock measured."""
+    """JSON without measured times."""
     if isinstance(value, dict):
         return {k: without_times(v) for k, v in value.items() if k not in MEASURED}
     return [without_times(v) for v in value] if isinstance(value, list) else value
@@ -34,7 +35,7 @@ def artefacts(folder: Path) -> dict[str, bytes]:
     files = [p for p in root.rglob("*") if p.suffix in {".npz", ".npy", ".bvh", ".txt", ".bin"}]
     files = [
         p for p in files if "checkpoints" not in p.parts and p.name != "checkpoint.npz"
-    ]  # they hold seconds
+    ]  # they contain seconds
     return {str(p.relative_to(root)): p.read_bytes() for p in sorted(files)}
 
 
@@ -111,7 +112,7 @@ def test_editing_a_comment_in_the_code_reruns_nothing(copied) -> None:
     assert "Nothing to be done" in copied.run("-n", TARGET)
 
 
-def test_a_default_said_aloud_reruns_nothing(copied) -> None:
+def test_writing_out_a_default_reruns_nothing(copied) -> None:
     copied.edit("config/datasets/tiny.yaml", "held_out:", "motion: {fps: 60.0}\nheld_out:")
     assert "Nothing to be done" in copied.run("-n", TARGET)
 
@@ -149,7 +150,7 @@ def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> Non
     assert len(rows) == 1 + 3 * 10
 
 
-def test_no_job_took_more_than_its_rule_asks_of_a_cluster(finished) -> None:
+def test_no_job_used_more_than_its_rule_requests(finished) -> None:
     jobs = list(with_use(planned_jobs(finished.run("-np", "-F", TARGET)), finished.folder))
     assert {"motion_clip", "terrain_fits", "training", "report"} <= {job.rule for job in jobs if job.used_mb}
     assert [
@@ -157,3 +158,26 @@ def test_no_job_took_more_than_its_rule_asks_of_a_cluster(finished) -> None:
         for job in jobs
         if max(job.memory_share, job.time_share) >= 1
     ] == []
+
+
+def test_what_leaves_the_page_is_made_by_name(copied) -> None:
+    """The exports for a game engine, for other pages and for the original's demo, each by its own rule."""
+    folder = "results/test/export"
+    targets = [f"{folder}/{name}" for name in ("character.glb", "web", "pfnn", "linear.onnx")]
+    planned = copied.planned(*targets)
+    assert planned == {"export_glb": 1, "export_web": 1, "export_release": 1, "export_onnx": 1}
+    assert copied.planned("results/test/questionnaire") == {"questionnaire": 1}
+    copied.run("-c2", *targets)
+    export = copied.folder / folder
+    magic, version, length, size = struct.unpack("<4sIII", (export / "character.glb").read_bytes()[:16])
+    assert (magic, version, length) == (b"glTF", 2, (export / "character.glb").stat().st_size)
+    scene = json.loads((export / "character.glb").read_bytes()[20 : 20 + size])
+    walks = {path.stem for path in (copied.folder / "results/test/runtime/bvh").glob("*.bvh")}
+    assert {animation["name"] for animation in scene["animations"]} == walks
+    spec = json.loads((export / "web/character.json").read_text())["spec"]
+    weights = np.load(copied.folder / "results/test/network/weights.npz")
+    assert spec["names"] == list(json.loads(str(weights["meta"]))["skeleton"]["joints"])
+    names = ("hobble.js", "hobble.d.ts", "index.html", "three.module.js")
+    assert all((export / "web" / name).stat().st_size > 500 for name in names)
+    assert len(list((export / "pfnn").glob("W0_*.bin"))) == 50
+    assert (export / "linear.onnx").stat().st_size > 1e4

@@ -22,7 +22,7 @@ LIMIT = 120  # seconds within which a job must have begun
 
 
 def started(workflow, *arguments: str, until: Callable[[], object]) -> subprocess.Popen[bytes]:
-    """The command, as soon as `until` says that it is where it shall be stopped."""
+    """Start the command and return when `until` is true, to stop it there."""
     process = workflow.start(*arguments, said=workflow.folder / "said.txt")
     deadline = time.monotonic() + LIMIT
     while not until() and time.monotonic() < deadline and process.poll() is None:
@@ -32,7 +32,7 @@ def started(workflow, *arguments: str, until: Callable[[], object]) -> subproces
 
 
 def without_network(workflow) -> Callable[[], object]:
-    """Take the network away, so that it is trained again; the sign that its training has begun."""
+    """Delete the network so that it is trained again. Returns a check that its training has begun."""
     for part in ("network", "checkpoints"):
         shutil.rmtree(workflow.folder / "results/test" / part)
     return lambda: list(workflow.folder.glob("results/test/checkpoints/*/*.npz"))
@@ -111,12 +111,12 @@ def test_a_second_run_beside_a_living_one_is_refused(copied) -> None:
         job.suspend()
     assert "cannot be locked" in copied.run("-c2", WEIGHTS, ok=False)
     os.kill(process.pid, signal.SIGTERM)
-    assert process.wait(timeout=5) == 1  # jobs that are deaf to SIGTERM are killed
+    assert process.wait(timeout=5) == 1  # jobs that ignore SIGTERM are killed
     assert not running(jobs)
 
 
 def test_after_touch_of_every_file_nothing_runs_again(copied) -> None:
-    """As in a fresh clone into which results are put: times say nothing, content does."""
+    """Like results copied into a fresh clone: content counts, not file times."""
     copied.own_source()
     for path in copied.folder.rglob("*"):
         inside = path.relative_to(copied.folder).parts[0]

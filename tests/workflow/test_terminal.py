@@ -1,4 +1,4 @@
-"""What a run says on the terminal: one line of progress, each failure once, a summary at the end."""
+"""The terminal output of a run: one line of progress, each failure once, a summary at the end."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Run:
         return self.out.getvalue().splitlines()
 
 
-def test_a_run_is_its_plan_a_line_now_and_then_and_a_summary() -> None:
+def test_a_run_prints_its_plan_some_progress_and_a_summary() -> None:
     run = Run()
     run.say("workflow_started", "SNAKEMAKE\n=====")
     run.say(None, "Building DAG of jobs...")
@@ -67,7 +67,7 @@ def test_a_run_is_its_plan_a_line_now_and_then_and_a_summary() -> None:
     assert len(run.lines) <= 2 + 200 / 10
 
 
-def test_on_a_terminal_one_line_is_written_over_and_wiped() -> None:
+def test_on_a_terminal_one_line_is_overwritten_and_cleared() -> None:
     run = Run(live=True)
     run.say("run_info", "", stats={"motion_clip": 2, "total": 2})
     run.job(1, "motion_clip", clip="a")
@@ -77,7 +77,7 @@ def test_on_a_terminal_one_line_is_written_over_and_wiped() -> None:
     assert run.out.getvalue().endswith("\r\x1b[Ksomething odd\n")
 
 
-def test_a_failure_is_told_once_and_named_in_the_end(tmp_path: Path) -> None:
+def test_a_failure_is_printed_once_and_listed_in_the_summary(tmp_path: Path) -> None:
     said, silent = tmp_path / "said.log", tmp_path / "silent.log"
     said.write_text("2026-01-01 00:00:00,000 INFO x\n2026-01-01 00:00:00,000 ERROR a.bvh: is torn\n")
     silent.write_text("2026-01-01 00:00:00,000 INFO x\n")
@@ -98,7 +98,7 @@ def test_a_failure_is_told_once_and_named_in_the_end(tmp_path: Path) -> None:
     ]
 
 
-def test_what_snakemake_itself_refuses_is_said() -> None:
+def test_snakemakes_own_errors_are_printed() -> None:
     run = Run()
     run.say("error", "WorkflowError:\nconfig/nope.yaml: no such file", logging.ERROR)
     run.say("error", "LockException:\nError: Directory cannot be locked.", logging.ERROR)
@@ -107,7 +107,7 @@ def test_what_snakemake_itself_refuses_is_said() -> None:
     assert "Error: Directory cannot be locked." in run.lines
 
 
-def test_jobs_that_end_because_the_run_is_stopped_have_not_failed() -> None:
+def test_jobs_of_a_stopped_run_do_not_count_as_failed() -> None:
     run = Run()
     run.say("run_info", "", stats={"training": 1, "total": 1})
     run.job(1, "training")
@@ -120,7 +120,7 @@ def test_jobs_that_end_because_the_run_is_stopped_have_not_failed() -> None:
     ]
 
 
-def test_a_dry_run_is_its_table_once_and_the_reasons() -> None:
+def test_a_dry_run_prints_its_table_once_and_the_reasons() -> None:
     run = Run(dryrun=True)
     for _ in range(2):
         run.say("run_info", "Job stats:\njob  count", stats={"total": 1})
@@ -145,8 +145,8 @@ def test_a_whole_run_takes_few_lines(workflow) -> None:
 
 
 @pytest.mark.workflow
-def test_on_a_terminal_a_failure_stands_on_a_line_of_its_own(workflow) -> None:
-    """In a pseudo-terminal, where progress is written over."""
+def test_on_a_terminal_a_failure_has_its_own_line(workflow) -> None:
+    """In a pseudo-terminal, on which the line of progress is overwritten."""
     folder = workflow.folder / "data/mine"
     folder.mkdir(parents=True)
     (folder / "torn.bvh").write_text("HIERARCHY\n")

@@ -1,4 +1,4 @@
-"""A kind of network is a folder: with a linear one, and no other file changed, the whole workflow runs."""
+"""A new kind of network needs only a folder. The whole workflow runs with a linear network."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TOY = Path(__file__).parent / "toy_network"
 def test_a_linear_network_goes_from_training_to_the_page(copied: Workflow) -> None:
     shutil.copytree(TOY, copied.own_source() / "models" / "toy")
     (copied.checkout / "config" / "toy.yaml").write_text("extends: test\nnetwork:\n  kind: toy\n")
-    # No network, row or measurement that there was is made again because of it.
+    # No existing network, row or measurement is made again because of it.
     assert set(copied.planned("results/test/report.html")) <= {"page_bundle", "report"}
     copied.run("-c2", "results/toy/report.html")
     results = copied.folder / "results" / "toy"

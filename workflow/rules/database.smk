@@ -1,4 +1,5 @@
 from hobble.database.options import Merging, Rows
+from hobble.workflow.datasets import shard_of
 
 
 rule database_clip:
@@ -13,6 +14,7 @@ rule database_clip:
         terrain="results/datasets/{dataset}/terrain/clips/{rows}.npz",
     output:
         rows="results/datasets/{dataset}/database/clips/{rows}.npz",
+        facts="results/datasets/{dataset}/database/clips/{rows}.json",
     log:
         "results/datasets/{dataset}/logs/database/database_clip/{rows}.log",
     benchmark:
@@ -32,22 +34,108 @@ rule database_clip:
         "../scripts/database_clip.py"
 
 
+def clips_of(dataset, channels, file):
+    """That file of each clip of a database."""
+    return expand(
+        f"results/datasets/{dataset}/{file}",
+        clip=datasets.selected(dataset, channels_of_folder(channels)),
+    )
+
+
+def compared(w, file):
+    """That file of the clips that must not be one motion on both sides of the split; of one shard, if asked."""
+    names = datasets.compared(w.dataset, channels_of_folder(w.channels))
+    if hasattr(w, "number"):
+        names = shard_of(names, int(w.number), datasets.parts(w.dataset))
+    return expand(f"results/datasets/{w.dataset}/{file}", clip=names)
+
+
+def pieces(w, kind):
+    """The folders of a database's shards, or of its parts; none where one job merges it."""
+    count = datasets.parts(w.dataset)
+    return [
+        f"results/datasets/{w.dataset}/database/parts/{w.channels}/{kind}-{number}"
+        for number in range(count if count > 1 else 0)
+    ]
+
+
+rule database_shard:
+    """The rows of some clips, scattered over the parts of the database."""
+    input:
+        clips=lambda w: clips_of(w.dataset, w.channels, "database/clips/{clip}.npz"),
+        compared=lambda w: compared(w, "motion/{clip}.npz"),
+        reports=lambda w: compared(w, "motion/{clip}.json"),
+    output:
+        shard=temp(
+            directory(
+                "results/datasets/{dataset}/database/parts/{channels}/shard-{number}"
+            )
+        ),
+    log:
+        "results/datasets/{dataset}/logs/database/database_shard/{channels}-{number}.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/database/database_shard/{channels}-{number}.tsv"
+    threads: 1
+    resources:
+        mem_mb=lambda w, attempt: demands.memory_of_longest(w.dataset, 10, 24, attempt),
+        runtime=lambda w, attempt: demands.minutes_of_part(w.dataset, 0.1, attempt),
+    params:
+        number=lambda w: int(w.number),
+        parts=lambda w: datasets.parts(w.dataset),
+        splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.channels)),
+        channels=lambda w: channels_of_folder(w.channels),
+        sources=lambda w: datasets.sources(w.dataset, channels_of_folder(w.channels)),
+        options=lambda w: datasets.part(w.dataset, "database", Merging),
+        code=lambda w: package.code(
+            "database_shard", *modules_of(channels_of_folder(w.channels))
+        ),
+    script:
+        "../scripts/database_shard.py"
+
+
+rule database_part:
+    """A stretch of the shuffled rows, in chunks."""
+    input:
+        shards=lambda w: pieces(w, "shard"),
+    output:
+        part=temp(
+            directory(
+                "results/datasets/{dataset}/database/parts/{channels}/part-{number}"
+            )
+        ),
+    log:
+        "results/datasets/{dataset}/logs/database/database_part/{channels}-{number}.log",
+    benchmark:
+        "results/datasets/{dataset}/benchmarks/database/database_part/{channels}-{number}.tsv"
+    threads: 1
+    resources:
+        mem_mb=lambda w, attempt: demands.part_memory(w.dataset, attempt),
+        runtime=lambda w, attempt: demands.minutes_of_part(w.dataset, 0.1, attempt),
+    params:
+        number=lambda w: int(w.number),
+        parts=lambda w: datasets.parts(w.dataset),
+        options=lambda w: datasets.part(w.dataset, "database", Merging),
+        code=lambda w: package.code(
+            "database_part", *modules_of(channels_of_folder(w.channels))
+        ),
+    script:
+        "../scripts/database_part.py"
+
+
 rule database_merge:
     """The rows of all clips, shuffled and in chunks, with their statistics."""
     input:
-        clips=lambda w: expand(
-            f"results/datasets/{w.dataset}/database/clips/{{clip}}.npz",
-            clip=datasets.selected(w.dataset, channels_of_folder(w.channels)),
+        clips=lambda w: (
+            []
+            if pieces(w, "part")
+            else clips_of(w.dataset, w.channels, "database/clips/{clip}.npz")
         ),
         # To check that no motion is on both sides of the split.
-        compared=lambda w: expand(
-            f"results/datasets/{w.dataset}/motion/{{clip}}.npz",
-            clip=datasets.compared(w.dataset, channels_of_folder(w.channels)),
-        ),
-        reports=lambda w: expand(
-            f"results/datasets/{w.dataset}/motion/{{clip}}.json",
-            clip=datasets.compared(w.dataset, channels_of_folder(w.channels)),
-        ),
+        compared=lambda w: [] if pieces(w, "part") else compared(w, "motion/{clip}.npz"),
+        reports=lambda w: [] if pieces(w, "part") else compared(w, "motion/{clip}.json"),
+        # Of more than one job there is what these have made.
+        shards=lambda w: pieces(w, "shard"),
+        parts=lambda w: pieces(w, "part"),
     output:
         database=directory("results/datasets/{dataset}/database/{channels}"),
     log:

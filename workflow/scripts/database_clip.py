@@ -6,6 +6,7 @@ from hobble.core.files import load_npz
 from hobble.database.options import Rows
 from hobble.rows.build import clip_rows
 from hobble.rows.clip_rows import save_clip_rows
+from hobble.rows.facts import facts, save_facts
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
@@ -24,4 +25,5 @@ with job(snakemake) as log:
         facing_sigma=options.facing_sigma,
     )
     save_clip_rows(snakemake.output.rows, rows)
+    save_facts(snakemake.output.facts, facts(rows))
     log.info("%d rows, %d fits", len(rows), rows.fits.sum())

@@ -1,4 +1,4 @@
-"""Creates the shuffled database in chunks, and its statistics, from the rows of all clips."""
+"""Creates the shuffled, chunked database and its statistics from the rows of all clips, or from its parts."""
 
 from pathlib import Path
 
@@ -6,25 +6,32 @@ from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.database.merge import write_database
 from hobble.database.options import Merging
+from hobble.database.parts import join_parts
 from hobble.database.sides import refuse_both_sides
-from hobble.motion.same import likeness, same_pairs
+from hobble.motion.same import likeness, load_likenesses, same_pairs
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
     options = Merging.model_validate(snakemake.params.options)
+    database, shards = Path(snakemake.output.database), [Path(s) for s in snakemake.input.get("shards", [])]
     files = zip(snakemake.input.compared, snakemake.input.reports, strict=True)
     like = [likeness(load_clip(clip), read_json(report)["sha256"]) for clip, report in files]
+    like += [one for shard in shards for one in load_likenesses(shard / "likenesses.npz")]
     refuse_both_sides(f"data set {snakemake.params.dataset}", same_pairs(like), snakemake.params.splits)
-    manifest = write_database(
-        snakemake.output.database,
-        {Path(file).stem: file for file in snakemake.input.clips},
-        snakemake.params.splits,
-        channels=snakemake.params.channels,
-        sources=snakemake.params.sources,
-        joint_weight=options.joint_weight,
-        dtype=options.dtype,
-        seed=options.seed,
-    )
+    if shards:
+        parts = [Path(part) for part in snakemake.input.parts]
+        manifest = join_parts(database, shards, parts, joint_weight=options.joint_weight, dtype=options.dtype)
+    else:
+        manifest = write_database(
+            database,
+            {Path(file).stem: file for file in snakemake.input.clips},
+            snakemake.params.splits,
+            channels=snakemake.params.channels,
+            sources=snakemake.params.sources,
+            joint_weight=options.joint_weight,
+            dtype=options.dtype,
+            seed=options.seed,
+        )
     part = manifest.bytes / manifest.original_bytes
     rows = {split: manifest.rows(split) for split in manifest.chunks}
     log.info("%s rows, %d bytes: %.1f%% of the original layout", rows, manifest.bytes, 100 * part)

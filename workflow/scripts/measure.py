@@ -12,12 +12,13 @@ from hobble.workflow.job import job
 with job(snakemake) as log:
     # Imported by name, so that adding another measurement does not re-run this one.
     measure = importlib.import_module(snakemake.params.package).MEASURE
-    files = {need: Path(file) for need, file in snakemake.input.items() if need != "clips"}
+    files = {need: Path(file) for need, file in snakemake.input.items() if need not in ("clips", "facts")}
     given = Given(
         snakemake.params.configuration,
         files,
         {Path(file).stem: Path(file) for file in snakemake.input.get("clips", ())},
         snakemake.params.splits,
+        [Path(file) for file in snakemake.input.get("facts", ())],
         Runtime.model_validate(snakemake.params.runtime),
     )
     found = measure.part("run").run(given, measure.options.model_validate(snakemake.params.options))

@@ -10,7 +10,7 @@ from hobble.workflow.training_processes import on_machines, train_together
 
 with job(snakemake):
     recipe = Training.model_validate(snakemake.params.training)
-    machines = Machines(nodes=snakemake.resources.nodes, processes=snakemake.resources.processes)
+    machines = Machines(nodes=snakemake.resources.tasks, processes=snakemake.resources.processes)
     gpus = bool(snakemake.resources.get("gpu") or snakemake.resources.get("gres"))
     training = on_machines(recipe, machines, gpus)
     start = Path(snakemake.input.checkpoint[0]) if snakemake.input.checkpoint else None

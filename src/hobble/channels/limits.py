@@ -131,6 +131,18 @@ class Pace:
         kept = _Cycles(**{name: getattr(cycles, name)[keep] for name in vars(cycles)})
         self._clips[clip] = (source, kept)
 
+    def to_arrays(self, clip: str) -> dict[str, np.ndarray]:
+        """The cycles of a clip that was added, for a file; nothing where it was not."""
+        if clip not in self._clips:
+            return {}
+        source, cycles = self._clips[clip]
+        return {"source": np.array(source or ""), **vars(cycles)}
+
+    def add_arrays(self, clip: str, arrays: Mapping[str, np.ndarray]) -> None:
+        """Add a clip by what `to_arrays` gave of it."""
+        named = {name: values for name, values in arrays.items() if name != "source"}
+        self._clips[clip] = (str(arrays["source"]) or None, _Cycles(**named))
+
     def learn(self) -> Limits | None:
         """The limits; None where nothing is told in any cycle."""
         levels = np.linspace(0, self.highest, LEVELS)

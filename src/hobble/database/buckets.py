@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from hobble.core.errors import InputError
 from hobble.core.quat import Array
 
+HINT = "Delete the folder; the next run makes it again."
 INDEX = np.dtype([("place", "<i8"), ("count", "<i4"), ("clip", "<i4"), ("frame", "<i4"), ("phase", "<f4")])
 
 
@@ -21,13 +23,18 @@ def gather_fits(fits: Array, count: np.ndarray, order: np.ndarray) -> Array:
 
 
 class Buckets:
-    """Files of up to `rows_each` rows, each of consecutive places; rows arrive in any order."""
+    """Files of up to `rows_each` rows, each of consecutive places; rows arrive in any order.
 
-    def __init__(self, folder: Path, rows: int, rows_each: int, columns: int, fit_columns: int) -> None:
+    there: whether the folder may be there, with what was added before.
+    """
+
+    def __init__(
+        self, folder: Path, rows: int, rows_each: int, columns: int, fit_columns: int, there: bool = False
+    ) -> None:
         self.folder, self.rows_each = folder, rows_each
         self.columns, self.fit_columns = columns, fit_columns
         self.count = -(-rows // rows_each)
-        folder.mkdir(parents=True)
+        folder.mkdir(parents=True, exist_ok=there)
 
     def add(self, frames: Array, fits: Array, index: np.ndarray) -> None:
         """Scatter rows: frames (R, columns), their fits (S, fit_columns) and index (R,) of INDEX."""
@@ -47,12 +54,30 @@ class Buckets:
     def _file(self, bucket: int, table: str) -> Path:
         return self.folder / f"{bucket:05d}.{table}"
 
+    def read(self, bucket: int) -> tuple[Array, Array, np.ndarray]:
+        """A bucket's frames, fits and index as they came; of a bucket that nothing was added to none.
+
+        Raises InputError where a file is not as long as the others say.
+        """
+        if not self._file(bucket, "index").exists():
+            return self._tables(np.empty(0, "<f4"), np.empty(0, "<f4"), np.empty(0, INDEX))
+        frames, fits = (np.fromfile(self._file(bucket, table), "<f4") for table in ("frames", "fits"))
+        index = np.fromfile(self._file(bucket, "index"), INDEX)
+        for table, values, size in (
+            ("frames", frames, len(index) * self.columns),
+            ("fits", fits, int(index["count"].sum()) * self.fit_columns),
+        ):
+            if len(values) != size:
+                raise InputError(self._file(bucket, table), "truncated or overwritten", fix=HINT)
+        return self._tables(frames, fits, index)
+
+    def _tables(self, frames: Array, fits: Array, index: np.ndarray) -> tuple[Array, Array, np.ndarray]:
+        return frames.reshape(-1, self.columns), fits.reshape(-1, self.fit_columns), index
+
     def drain(self) -> Iterator[tuple[Array, Array, np.ndarray]]:
         """Each bucket's frames, fits and index in the final order; its files are removed as they are read."""
         for b in range(self.count):
-            index = np.fromfile(self._file(b, "index"), INDEX)
-            frames = np.fromfile(self._file(b, "frames"), "<f4").reshape(-1, self.columns)
-            fits = np.fromfile(self._file(b, "fits"), "<f4").reshape(-1, self.fit_columns)
+            frames, fits, index = self.read(b)
             for table in ("index", "frames", "fits"):
                 self._file(b, table).unlink()
             order = np.argsort(index["place"])

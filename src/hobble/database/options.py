@@ -36,6 +36,10 @@ class Merging(Section):
 
 
 class Database(Rows, Merging):
-    """What a row holds and how rows lie on disk."""
+    """What a row holds, how rows lie on disk, and by how many jobs they are merged."""
+
+    parts: Annotated[int, Field(gt=0, le=1000)] = Field(
+        1, description="jobs that read and shuffle the rows side by side; the result does not depend on it"
+    )
 
     terrain_side: PositiveFloat = Field(25.0, description="centimetres from the path to the side heights")

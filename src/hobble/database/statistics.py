@@ -37,6 +37,10 @@ class Moments:
         squares = self.squares + other.squares + delta**2 * (self.weight * other.weight / weight)
         return Moments(weight, mean, squares)
 
+    def __mul__(self, times: float) -> Moments:
+        """Of the same values, each weighing so many times as much."""
+        return Moments(self.weight * times, self.mean, self.squares * times)
+
     def columns(self, block: slice) -> Moments:
         """Of some of the columns."""
         return Moments(self.weight, self.mean[block], self.squares[block])

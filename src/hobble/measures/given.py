@@ -22,14 +22,16 @@ Row = Mapping[str, Any]  # of a CSV table: column -> number, text or None
 class Given:
     """The inputs of one measurement of one configuration; what it did not ask for is not there.
 
-    clips: clip -> its file of rows; splits: clip -> "train" or "held_out"; runtime: with the keys that it
-    asked for, the others at their defaults; measured: other measurement -> its JSON file.
+    clips: clip -> its file of rows; facts: the same clips' files of `hobble.rows.facts`; splits: clip ->
+    "train" or "held_out"; runtime: with the keys that it asked for, the others at their defaults; measured:
+    other measurement -> its JSON file.
     """
 
     configuration: str
     files: Mapping[str, Path] = field(default_factory=dict, repr=False)
     clips: Mapping[str, Path] = field(default_factory=dict, repr=False)
     splits: Mapping[str, str] = field(default_factory=dict, repr=False)
+    facts: Sequence[Path] = field(default=(), repr=False)
     runtime: Runtime = field(default_factory=Runtime)
 
     def file(self, name: str) -> Path:

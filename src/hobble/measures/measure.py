@@ -20,7 +20,7 @@ from types import ModuleType
 from hobble.core.section import Section
 
 # What a measurement can ask for; anything else is the name of another measurement, whose JSON it then reads.
-INPUTS = ("weights", "clips", "skeleton", "published")
+INPUTS = ("weights", "clips", "facts", "skeleton", "published")
 
 
 @dataclass(frozen=True)

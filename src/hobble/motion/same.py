@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
+from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import facing
 
@@ -47,6 +49,32 @@ def likeness(clip: Clip, sha256: str) -> Likeness:
     except HobbleError:
         mirrored = None
     return Likeness(clip.name, sha256, len(clip) / clip.fps, poses, mirrored)
+
+
+def save_likenesses(path: Path, clips: Sequence[Likeness]) -> None:
+    """Write them to one file."""
+    arrays = {
+        f"{number}.{name}": np.array(value)
+        for number, clip in enumerate(clips)
+        for name, value in vars(clip).items()
+        if value is not None
+    }
+    save_npz(path, count=np.array(len(clips)), **arrays)
+
+
+def load_likenesses(path: Path) -> list[Likeness]:
+    """The inverse of `save_likenesses`."""
+    data = load_npz(path)
+    return [
+        Likeness(
+            str(data[f"{number}.name"]),
+            str(data[f"{number}.sha256"]),
+            float(data[f"{number}.seconds"]),
+            data[f"{number}.poses"],
+            data.get(f"{number}.mirrored"),
+        )
+        for number in range(int(data["count"]))
+    ]
 
 
 def same_pairs(clips: Sequence[Likeness]) -> list[tuple[str, str, str]]:

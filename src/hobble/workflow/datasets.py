@@ -11,6 +11,11 @@ from hobble.core.section import Section
 from hobble.workflow.clips import MIRROR_SUFFIX, Clips, original
 
 
+def shard_of(clips: Sequence[str], shard: int, shards: int) -> list[str]:
+    """The clips that job `shard`, from 0, of `shards` merges: neighbours by name are spread over them."""
+    return sorted(clips)[shard::shards]
+
+
 class Datasets:
     """The data sets of a project."""
 
@@ -78,6 +83,10 @@ class Datasets:
         splits = self.selected(dataset, channels)
         both = len(set(splits.values())) > 1
         return [clip for clip in splits if both and clip == original(clip)]
+
+    def parts(self, dataset: str) -> int:
+        """By how many jobs the rows of a database are merged, side by side."""
+        return int(self.options(dataset, "database", "parts")["parts"])
 
     def sources(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
         """Hurt version -> the healthy clip it is made from, for the selected clips."""

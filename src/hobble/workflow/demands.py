@@ -30,6 +30,7 @@ MEASURED_JOINTS = 31  # of the figure in the measurements
 ASSUMED_FRAMES = 20_000  # of a clip that is not downloaded yet
 VISITS_PER_PASS = 10  # how often a pass of training uses a row
 HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
+ROW_KB = 5  # of a row of 31 joints before it is standardised, with its fits
 WEEK_MINUTES = 7 * 24 * 60  # longest time that a job requests
 
 
@@ -56,6 +57,16 @@ class Demands:
         """Minutes for a job that takes `each` seconds for a thousand frames, over all clips and mirrors."""
         return _minutes(each * self.all_thousands(dataset), attempt, least)
 
+    def minutes_of_part(self, dataset: str, each: float, attempt: int = 1) -> int:
+        """Minutes for a job that takes `each` seconds for a thousand frames of its part of a database."""
+        thousands = self.all_thousands(dataset) / self.project.datasets.parts(dataset)
+        return _minutes(each * thousands, attempt, least=5)
+
+    def part_memory(self, dataset: str, attempt: int = 1) -> int:
+        """Megabytes for a job that orders its part of a database: what one shard has for it, and buckets."""
+        parts = self.project.datasets.parts(dataset)
+        return _megabytes(400 + ROW_KB * self.all_thousands(dataset) / parts**2, attempt)
+
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
         """MB for the measurement `name`."""
         cost = measure(name).cost
@@ -65,7 +76,17 @@ class Demands:
     def measure_minutes(self, configuration: str, name: str, attempt: int = 1) -> int:
         """Minutes for the measurement `name`."""
         cost = measure(name).cost
-        return self.evaluation_minutes(configuration, cost.seconds_each, attempt, cost.minutes)
+        each = cost.seconds_each * self._measured_share(configuration, name)
+        return self.evaluation_minutes(configuration, each, attempt, cost.minutes)
+
+    def _measured_share(self, configuration: str, name: str) -> float:
+        """The share of a data set's frames that a measurement reads: all, or those of a sample."""
+        if "sample_frames" not in measure(name).options.model_fields:
+            return 1.0
+        section = self.project.configurations.section(configuration, "evaluation", "sample_frames")
+        dataset = self.project.configurations.dataset(configuration)
+        frames = 1e3 * self.all_thousands(dataset) * MEASURED_JOINTS / self._joints(dataset)
+        return min(1.0, section["sample_frames"] / max(frames, 1.0))
 
     def evaluation_memory(self, configuration: str, each: float, attempt: int = 1) -> int:
         """MB for a measurement that reads one clip of the data set after another."""

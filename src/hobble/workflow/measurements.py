@@ -33,6 +33,8 @@ class Measurements:
             return configurations.network(configuration, "weights.npz")
         if asked == "clips":
             return configurations.of_dataset(configuration, "database/clips/{clip}.npz")
+        if asked == "facts":
+            return configurations.of_dataset(configuration, "database/clips/{clip}.json")
         if asked == "skeleton":
             return self.clips.skeleton_file(configurations.dataset(configuration))
         if asked == "published":

@@ -1,4 +1,4 @@
-"""A linear network, as small as a kind of network can be: y = W x + b, whatever the phase."""
+"""The smallest possible kind of network, a linear one: y = W x + b, for any phase."""
 
 from hobble.models.model import Trained
 

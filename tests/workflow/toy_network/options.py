@@ -1,4 +1,4 @@
-"""The keys of `network` where its kind is toy."""
+"""The keys of `network` for kind toy."""
 
 from typing import Literal
 

@@ -2,11 +2,17 @@
 
 from hobble.measures.joints import Joints
 from hobble.measures.measure import Cost, Measure
+from hobble.measures.sampling import Sampling
+
+
+class Options(Joints, Sampling):
+    """Its keys of the section `evaluation`."""
+
 
 MEASURE = Measure(
     name="accuracy",
     package=__name__,
-    inputs=("weights", "clips", "skeleton"),
-    options=Joints,
+    inputs=("weights", "clips", "facts", "skeleton"),
+    options=Options,
     cost=Cost(memory_each=12, seconds_each=0.2, minutes=10),
 )

@@ -182,7 +182,7 @@ def section(found: Json, material: Material) -> Section:
     return Section(
         "accuracy",
         [
-            Part(0, Words(INTRODUCTION)),
+            Part(0, Words(INTRODUCTION + sampled(found))),
             Part(10, beside_published(found, material), open=True, short=True),
             Part(20, clip_bars(found, material), tall=True),
             Part(30, clip_boxes(found), tall=True),
@@ -192,6 +192,22 @@ def section(found: Json, material: Material) -> Section:
         title="Accuracy",
         at=10,
         long=True,
+    )
+
+
+def sampled(found: Json) -> str:
+    """A sentence on which clips were measured, where not all of them were; else nothing."""
+    sample = found.get("sample")
+    if not sample:
+        return ""
+    widths = [
+        f"{NAMES[split]} {100 * found[split]['mean']:.2f} ± {100 * found[split]['interval']['mean']:.2f} %"
+        for split in ("held_out", "train")
+        if (found.get(split) or {}).get("interval")
+    ]
+    return (
+        f" Measured on {sample['clips']:,} of {sample['of']:,} clips, drawn by gait, speed, channel and "
+        f"split; each counts for the clips of its kind. The 95 % intervals: {', '.join(widths)}."
     )
 
 

@@ -18,11 +18,14 @@ import numpy as np
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
+from hobble.measures.accuracy import Options
 from hobble.measures.given import Given, Outcome
 from hobble.measures.joints import Joints
+from hobble.measures.sample import Sample, drawn
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
+from hobble.rows.facts import load_facts
 from hobble.rows.layout import RowLayout
 
 LEAST = 1e-3  # cm; below this a joint stands at the root itself and a relative error says nothing
@@ -48,6 +51,10 @@ class Errors:
         return Errors(
             self.frames + other.frames, self.moments + other.moments, self.histogram + other.histogram
         )
+
+    def weighing(self, weight: float) -> Errors:
+        """The same, each frame of which stands for so many."""
+        return self if weight == 1 else Errors(self.frames, self.moments * weight, self.histogram * weight)
 
     def quantile(self, share: float) -> float:
         """The relative error that `share` of frames and joints stay below, to a hundredth of itself."""
@@ -100,10 +107,12 @@ def measure(
     splits: Mapping[str, str],
     configuration: str,
     equivalents: Sequence[str] | None = None,
+    sample: Sample | None = None,
 ) -> dict[str, Any]:
     """accuracy.json: `train` and `held_out` over their frames, and `clips`, one entry a clip in name order.
 
-    clips: name -> file of rows. equivalents: names of the joints to measure; all by default.
+    clips: name -> file of rows. equivalents: names of the joints to measure; all by default. sample: the
+    clips that are measured for all of them; then `sample` says how many, and `interval` how sure means are.
     `mean_of_clips` is the mean over clips that the published tables print. Raises InputError where rows and
     network differ.
     """
@@ -111,11 +120,11 @@ def measure(
     joints = joint_indices(network, equivalents)
     entries = []
     totals = dict.fromkeys(SPLITS, Errors())
-    for name in sorted(clips):
+    for name, weight in (sample.weights if sample else dict.fromkeys(sorted(clips), 1.0)).items():
         rows = load_clip_rows(clips[name])
         check_layout(clips[name], rows, network)
         errors = clip_errors(network, rows, joints)
-        totals[splits[name]] += errors
+        totals[splits[name]] += errors.weighing(weight)
         entries.append({"clip": name, "split": splits[name], **errors.to_dict()})
         log.info("%s: %s", name, entries[-1])
     result: dict[str, Any] = {"configuration": configuration, "joints": len(joints), "clips": entries}
@@ -123,7 +132,23 @@ def measure(
         means = [e["mean"] for e in entries if e["split"] == split and e["frames"]]
         result[split] = {**totals[split].to_dict(), "clips": len(means)}
         result[split]["mean_of_clips"] = float(np.mean(means)) if means else None
-    return result
+    return result if sample is None else with_sample(result, sample)
+
+
+def with_sample(result: dict[str, Any], sample: Sample) -> dict[str, Any]:
+    """The result with what was drawn, and the half widths of the 95 % intervals of each split."""
+    for split in SPLITS:
+        clips = [clip for clip in result["clips"] if clip["split"] == split]
+        weights = [sample.clip_weights[clip["clip"]] for clip in clips]
+        if clips:
+            means = [clip["mean"] for clip in clips]
+            result[split]["mean_of_clips"] = float(np.average(means, weights=weights))
+        result[split]["interval"] = {
+            key: sample.half_width(split, {clip["clip"]: clip[key] for clip in clips})
+            for key in ("mean", "position_error_cm")
+            if clips
+        }
+    return {**result, "sample": sample.to_dict()}
 
 
 def equivalent_joints(skeleton: Mapping[str, Any], of: str = REFERENCE) -> list[str] | None:
@@ -165,9 +190,10 @@ def clip_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
     return [{key: clip.get(key) for key in COLUMNS} for clip in result["clips"]]
 
 
-def run(given: Given, options: Joints) -> Outcome:
+def run(given: Given, options: Options) -> Outcome:
     """accuracy.json, and its `clips` as a table."""
+    sample = drawn(map(load_facts, given.facts), given.splits, options.sample_frames)
     result = measure(
-        given.weights, given.clips, given.splits, given.configuration, chosen_joints(given, options)
+        given.weights, given.clips, given.splits, given.configuration, chosen_joints(given, options), sample
     )
     return Outcome(result, {"clips": clip_rows(result)})

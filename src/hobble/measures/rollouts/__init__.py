@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field
 from hobble.core.section import Positive
 from hobble.measures.joints import Joints
 from hobble.measures.measure import Cost, Measure
+from hobble.measures.sampling import Sampling
 
 
 def _some(lengths: tuple[int, ...]) -> tuple[int, ...]:
@@ -18,7 +19,7 @@ def _some(lengths: tuple[int, ...]) -> tuple[int, ...]:
     return lengths
 
 
-class Options(Joints):
+class Options(Joints, Sampling):
     """Its keys of the section `evaluation`."""
 
     rollouts: Annotated[tuple[Positive, ...], AfterValidator(_some)] = Field(
@@ -29,7 +30,7 @@ class Options(Joints):
 MEASURE = Measure(
     name="rollouts",
     package=__name__,
-    inputs=("weights", "clips", "skeleton"),
+    inputs=("weights", "clips", "facts", "skeleton"),
     options=Options,
     runtime=("mode",),
     cost=Cost(memory_each=27, seconds_each=0.6, minutes=30),

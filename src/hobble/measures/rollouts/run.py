@@ -29,9 +29,11 @@ from hobble.measures.accuracy.run import (
 )
 from hobble.measures.given import Given, Outcome
 from hobble.measures.rollouts import Options
+from hobble.measures.sample import Sample, drawn
 from hobble.models.load import load_network
 from hobble.models.network import Predictor
 from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
+from hobble.rows.facts import load_facts
 from hobble.rows.layout import GAITS, RowLayout
 
 LENGTHS = (1, 10, 60, 300)  # frames
@@ -45,14 +47,15 @@ log = logging.getLogger("hobble")
 class Strayed:
     """Relative error and position error (cm) over `frames` frames of roll-outs.
 
-    last: over the last frame of those that came to their end, position error and how far the phase is off
-    (cycles).
+    last: over the last frame of the `ended` that came to their end, position error and how far the phase is
+    off (cycles).
     """
 
     frames: int = 0
     starts: int = 0
     moments: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
     last: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
+    ended: int = 0
 
     def __add__(self, other: Strayed) -> Strayed:
         return Strayed(
@@ -60,20 +63,27 @@ class Strayed:
             self.starts + other.starts,
             self.moments + other.moments,
             self.last + other.last,
+            self.ended + other.ended,
         )
+
+    def weighing(self, weight: float) -> Strayed:
+        """The same, each frame of which stands for so many."""
+        if weight == 1:
+            return self
+        return Strayed(self.frames, self.starts, self.moments * weight, self.last * weight, self.ended)
 
     def to_dict(self, phase: bool = True) -> dict[str, Any]:
         """Plain data; None where there was no frame, or no roll-out that came to its end.
 
         phase: whether the network goes by the phase; of one that does not, how far it is off says nothing.
         """
-        known, ended = self.frames > 0, self.last.weight > 0
+        known, ended = self.frames > 0, self.ended > 0
         return {
             "frames": self.frames,
             "mean": float(self.moments.mean[0]) if known else None,
             "sd": float(self.moments.std[0]) if known else None,
             "position_error_cm": float(self.moments.mean[1]) if known else None,
-            "ended": int(self.last.weight),
+            "ended": self.ended,
             "last_cm": float(self.last.mean[0]) if ended else None,
             "last_phase": float(self.last.mean[1]) if ended and phase else None,
         }
@@ -203,7 +213,7 @@ def _strayed(
         return Strayed(frames, len(starts), moments)
     off = np.abs(np.mod(phase[:ended] - asked.phase[starts[:ended] + length] + 0.5, 1.0) - 0.5)
     last = np.stack([errors[:ended, :, 1].mean(axis=1), off], axis=1)
-    return Strayed(frames, len(starts), moments, Moments.of(last))
+    return Strayed(frames, len(starts), moments, Moments.of(last), ended)
 
 
 def measure_roll_outs(
@@ -214,25 +224,27 @@ def measure_roll_outs(
     equivalents: Sequence[str] | None = None,
     lengths: Sequence[int] = LENGTHS,
     mode: str = "cubic",
+    sample: Sample | None = None,
 ) -> dict[str, Any]:
     """rollouts.json: `lengths`, one entry for each, with `train`, `held_out` and `clips` in name order.
 
     clips: name -> file of rows, one in memory at a time. equivalents: names of the joints to measure. mode:
-    how phase is looked up. Raises InputError where rows and network differ.
+    how phase is looked up. sample: the clips that are measured for all of them; then `sample` says how many,
+    and `interval` how sure each mean is. Raises InputError where rows and network differ.
     """
     network = load_network(weights)
     predictor = network.predictor(mode)
     joints = joint_indices(network, equivalents)
     total = {length: dict.fromkeys(SPLITS, Strayed()) for length in lengths}
     entries: dict[int, list[dict[str, Any]]] = {length: [] for length in lengths}
-    for name in sorted(clips):
+    for name, weight in (sample.weights if sample else dict.fromkeys(sorted(clips), 1.0)).items():
         rows = load_clip_rows(clips[name])
         check_layout(clips[name], rows, network)
         for length, found in clip_roll_outs(predictor, rows, joints, lengths).items():
-            total[length][splits[name]] += found
+            total[length][splits[name]] += found.weighing(weight)
             entries[length].append({"clip": name, "split": splits[name], **found.to_dict(network.phase)})
         log.info("%s: %s", name, entries[lengths[-1]][-1])
-    return {
+    result: dict[str, Any] = {
         "configuration": configuration,
         "joints": len(joints),
         "mode": mode,
@@ -245,6 +257,25 @@ def measure_roll_outs(
             for length in lengths
         ],
     }
+    return result if sample is None else _with_sample(result, sample)
+
+
+def _with_sample(result: dict[str, Any], sample: Sample) -> dict[str, Any]:
+    """The result with what was drawn, and the half widths of the 95 % intervals of each split and length.
+
+    A clip too short for any roll-out counts as the others of its split.
+    """
+    for entry in result["lengths"]:
+        for split in SPLITS:
+            usual = entry[split]["position_error_cm"]
+            values = {
+                clip["clip"]: usual if clip["position_error_cm"] is None else clip["position_error_cm"]
+                for clip in entry["clips"]
+                if clip["split"] == split
+            }
+            if usual is not None:
+                entry[split]["interval"] = {"position_error_cm": sample.half_width(split, values)}
+    return {**result, "sample": sample.to_dict()}
 
 
 def roll_out_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -259,6 +290,7 @@ def roll_out_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def run(given: Given, options: Options) -> Outcome:
     """rollouts.json, and its rows as a table."""
+    sample = drawn(map(load_facts, given.facts), given.splits, options.sample_frames)
     result = measure_roll_outs(
         given.weights,
         given.clips,
@@ -267,5 +299,6 @@ def run(given: Given, options: Options) -> Outcome:
         chosen_joints(given, options),
         options.rollouts,
         given.runtime.mode,
+        sample,
     )
     return Outcome(result, {"lengths": roll_out_rows(result)})

@@ -1,0 +1,42 @@
+"""Pass 2 of the shuffle: buckets put in order, standardised and written as chunks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from hobble.database.buckets import Buckets
+from hobble.database.chunks import Chunk, write_chunk
+from hobble.database.plan import Plan
+from hobble.database.precision import narrow
+from hobble.database.split import split_rows
+from hobble.database.statistics import Statistics
+from hobble.rows.compose import x_columns
+
+
+def write_chunks(
+    work: Path, split: str, buckets: Buckets, plan: Plan, statistics: Statistics, dtype: str, number: int = 0
+) -> Iterator[Chunk]:
+    """Each bucket in order, standardised, as chunks of `chunk_rows` rows, of which the first is `number`."""
+    columns = x_columns(plan.layout)
+    for frames, fits, index in buckets.drain():
+        ends = np.cumsum(index["count"])
+        for start in range(0, len(index), plan.chunk_rows):
+            part = slice(start, min(start + plan.chunk_rows, len(index)))
+            count = index["count"][part]
+            fit_part = slice(int(ends[start] - count[0]), int(ends[part.stop - 1]))
+            raw = frames[part, :columns], frames[part, columns:], fits[fit_part]
+            x, y, ground = split_rows(plan.layout, statistics, *raw, count)
+            arrays = {
+                "x": narrow(x, dtype),
+                "y": narrow(y, dtype),
+                "fits": narrow(ground, dtype),
+                "count": count,
+                "clip": index["clip"][part],
+                "frame": index["frame"][part],
+                "phase": index["phase"][part],
+            }
+            yield write_chunk(work, f"{split}/{number:05d}.safetensors", arrays)
+            number += 1

@@ -1,0 +1,66 @@
+"""Pass 1 of the shuffle: the rows of clips, scattered over buckets by their places in the final order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.database.buckets import INDEX, Buckets
+from hobble.database.manifest import SPLITS
+from hobble.database.plan import Plan, Source
+from hobble.rows.clip_rows import ClipRows, load_clip_rows
+from hobble.rows.compose import fit_columns, frame_inputs, x_columns
+from hobble.rows.layout import RowLayout
+
+PART_ROWS = 8192  # of a clip that are scattered at a time
+
+
+def make_buckets(folder: Path, plan: Plan, rows_each: Mapping[str, int]) -> dict[str, Buckets]:
+    """Buckets for each split, of `rows_each` rows of it."""
+    columns, of_fits = x_columns(plan.layout) + plan.layout.y_size, fit_columns(plan.layout)
+    return {
+        split: Buckets(folder / f"buckets-{split}", plan.rows(split), rows_each[split], columns, of_fits)
+        for split in SPLITS
+    }
+
+
+def scatter(
+    buckets: Mapping[str, Buckets], clips: Mapping[str, Source], plan: Plan, seed: int
+) -> Iterator[tuple[dict[str, Any], ClipRows]]:
+    """Put each of `clips`, some of the plan's, into the buckets of its split; then its entry and its rows.
+
+    One permutation of all rows of a split says where each row comes to lie.
+    """
+    places = {
+        split: np.random.default_rng([seed, number]).permutation(plan.rows(split))
+        for number, split in enumerate(SPLITS)
+    }
+    done = dict.fromkeys(SPLITS, 0)
+    for number, entry in enumerate(plan.clips):
+        split, start = entry["split"], done[entry["split"]]
+        done[split] += entry["rows"]
+        if entry["clip"] not in clips:
+            continue
+        source = clips[entry["clip"]]
+        clip = source if isinstance(source, ClipRows) else load_clip_rows(source)
+        index = np.zeros(len(clip), INDEX)
+        index["place"] = places[split][start : done[split]]
+        index["count"], index["clip"] = clip.fits, number
+        index["frame"], index["phase"] = clip.frame, clip.p
+        for first in range(0, len(clip), PART_ROWS):
+            part = slice(first, first + PART_ROWS)
+            buckets[split].add(*_tables(clip, part, plan.layout), index[part])
+        yield entry, clip
+
+
+def _tables(clip: ClipRows, part: slice, layout: RowLayout) -> tuple[Array, Array]:
+    """The frames and fits of a part of a clip's rows, raw."""
+    told = {name: clip.channels[name][part] for name, _ in layout.channels}
+    frames = np.concatenate([frame_inputs(layout, clip.x[part], told), clip.y[part]], axis=1)
+    first = clip.first_fit[part]
+    ground = slice(int(first[0]), int(first[-1] + clip.fits[part][-1]))
+    return frames, np.concatenate([clip.heights[ground], clip.mean[ground, None]], axis=1)

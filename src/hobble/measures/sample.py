@@ -1,0 +1,132 @@
+"""Measuring some clips of a large data set for all: which, how much each counts, and how sure that is.
+
+The clips are put into strata by split, gait, speed (the slow, middle and fast third of a gait) and channel.
+Of each stratum some are drawn, in proportion to its rows; each split gets half of the rows that are to be
+measured, since the held-out clips are few. A clip drawn counts for all rows of its stratum (Cochran,
+Sampling Techniques, 1977, chapters 5 and 6: stratified sampling, ratio estimates).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hobble.rows.facts import Facts
+
+LEAST = 2  # clips of a stratum: of one alone nobody knows how much it differs from the others
+SPEEDS = 3  # strata of a gait by speed
+SURE = 1.96  # standard errors to each side that hold 95 %
+
+
+@dataclass(frozen=True)
+class Stratum:
+    """Clips of a kind. clips: how many there are, rows: theirs together; drawn: name -> rows."""
+
+    split: str
+    clips: int
+    rows: int
+    drawn: Mapping[str, int] = field(repr=False)
+
+    @property
+    def weight(self) -> float:
+        """How many rows each row that is measured stands for."""
+        return self.rows / max(sum(self.drawn.values()), 1)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The clips that are measured; all of them where there is no stratum. of: clips that there are."""
+
+    strata: tuple[Stratum, ...]
+    of: int
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """Clip that is drawn -> how many rows each of its rows stands for, in the order of the names."""
+        return dict(sorted((name, stratum.weight) for stratum in self.strata for name in stratum.drawn))
+
+    @property
+    def clip_weights(self) -> dict[str, float]:
+        """Clip that is drawn -> how many clips it stands for."""
+        return {name: s.clips / len(s.drawn) for s in self.strata for name in s.drawn}
+
+    def half_width(self, split: str, values: Mapping[str, float]) -> float:
+        """Half the width of the 95 % confidence interval of the mean over a split's rows.
+
+        values: clip -> its mean; the clips of a stratum differ, and what was not drawn is not known.
+        """
+        strata = [stratum for stratum in self.strata if stratum.split == split and stratum.rows]
+        total = sum(stratum.rows for stratum in strata)
+        variance = sum((stratum.rows / total) ** 2 * _variance(stratum, values) for stratum in strata)
+        return SURE * math.sqrt(variance)
+
+    def to_dict(self) -> dict[str, int]:
+        """Plain data for a measurement's JSON."""
+        drawn = sum(len(stratum.drawn) for stratum in self.strata)
+        return {"clips": drawn, "of": self.of, "strata": len(self.strata)}
+
+
+def _variance(stratum: Stratum, values: Mapping[str, float]) -> float:
+    """Of the mean over a stratum's rows, as a ratio of sums over the clips drawn."""
+    n = len(stratum.drawn)
+    if n == stratum.clips or n < LEAST:
+        return 0.0
+    rows = np.array(list(stratum.drawn.values()), float)
+    mean = np.array([values[name] for name in stratum.drawn])
+    off = rows / rows.mean() * (mean - np.average(mean, weights=rows))
+    return float((1 - n / stratum.clips) * (off**2).sum() / (n - 1) / n)
+
+
+def drawn(facts: Iterable[Facts], splits: Mapping[str, str], frames: int) -> Sample | None:
+    """The clips to measure, of about `frames` rows; None where that is all of them.
+
+    The same clips give the same sample, and one clip more changes little of it.
+    """
+    clips = [one for one in facts if one.rows]
+    if sum(one.rows for one in clips) <= frames:
+        return None
+    strata = []
+    for members in _kinds(clips, splits).values():
+        split = splits[members[0].clip]
+        rows = sum(one.rows for one in members)
+        of_split = sum(one.rows for one in clips if splits[one.clip] == split)
+        wanted = frames * _share(clips, splits, split, frames) * rows / of_split
+        strata.append(Stratum(split, len(members), rows, _first(members, wanted)))
+    return Sample(tuple(strata), len(clips))
+
+
+def _share(clips: Sequence[Facts], splits: Mapping[str, str], split: str, frames: int) -> float:
+    """Of the rows to measure those of one split: half, or what the other leaves that has fewer."""
+    rows = dict.fromkeys(splits.values(), 0)
+    for one in clips:
+        rows[splits[one.clip]] += one.rows
+    others = sum(n for name, n in rows.items() if name != split)
+    return max(0.5, 1 - others / frames) if others else 1.0
+
+
+def _kinds(clips: Iterable[Facts], splits: Mapping[str, str]) -> dict[tuple[Any, ...], list[Facts]]:
+    """Stratum -> its clips."""
+    by_gait: dict[str, list[float]] = {}
+    for one in clips:
+        by_gait.setdefault(one.gait, []).append(one.speed)
+    edges = {g: np.quantile(s, np.arange(1, SPEEDS) / SPEEDS) for g, s in by_gait.items()}
+    kinds: dict[tuple[Any, ...], list[Facts]] = {}
+    for one in sorted(clips, key=lambda one: one.clip):
+        speed = int(np.searchsorted(edges[one.gait], one.speed))
+        kinds.setdefault((splits[one.clip], one.gait, speed, one.told), []).append(one)
+    return kinds
+
+
+def _first(members: Sequence[Facts], rows: float) -> dict[str, int]:
+    """Clips of a stratum, `LEAST` of them and as many more as have so many rows, by chance."""
+    out: dict[str, int] = {}
+    for one in sorted(members, key=lambda one: hashlib.sha256(one.clip.encode()).digest()):
+        if len(out) >= LEAST and sum(out.values()) >= rows:
+            break
+        out[one.clip] = one.rows
+    return out
