@@ -239,6 +239,7 @@ def test_a_skeleton_that_cannot_be_mirrored_is_reported_before_anything_runs(com
             "training: {passes: 19}",
             r"which has 20 passes\. Its training\.passes must not be fewer, but it is 19",
         ),
+        ("network: {kind: matching}", "but matching is built and not trained"),
         ("training: {learning_rate: 1.0e-3, batch: 64}", None),
         ("", None),
     ],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import struct
 import time
 from pathlib import Path
 from typing import Any
@@ -157,3 +158,26 @@ def test_no_job_used_more_than_its_rule_requests(finished) -> None:
         for job in jobs
         if max(job.memory_share, job.time_share) >= 1
     ] == []
+
+
+def test_what_leaves_the_page_is_made_by_name(copied) -> None:
+    """The exports for a game engine, for other pages and for the original's demo, each by its own rule."""
+    folder = "results/test/export"
+    targets = [f"{folder}/{name}" for name in ("character.glb", "web", "pfnn", "linear.onnx")]
+    planned = copied.planned(*targets)
+    assert planned == {"export_glb": 1, "export_web": 1, "export_release": 1, "export_onnx": 1}
+    assert copied.planned("results/test/questionnaire") == {"questionnaire": 1}
+    copied.run("-c2", *targets)
+    export = copied.folder / folder
+    magic, version, length, size = struct.unpack("<4sIII", (export / "character.glb").read_bytes()[:16])
+    assert (magic, version, length) == (b"glTF", 2, (export / "character.glb").stat().st_size)
+    scene = json.loads((export / "character.glb").read_bytes()[20 : 20 + size])
+    walks = {path.stem for path in (copied.folder / "results/test/runtime/bvh").glob("*.bvh")}
+    assert {animation["name"] for animation in scene["animations"]} == walks
+    spec = json.loads((export / "web/character.json").read_text())["spec"]
+    weights = np.load(copied.folder / "results/test/network/weights.npz")
+    assert spec["names"] == list(json.loads(str(weights["meta"]))["skeleton"]["joints"])
+    names = ("hobble.js", "hobble.d.ts", "index.html", "three.module.js")
+    assert all((export / "web" / name).stat().st_size > 500 for name in names)
+    assert len(list((export / "pfnn").glob("W0_*.bin"))) == 50
+    assert (export / "linear.onnx").stat().st_size > 1e4

@@ -67,7 +67,8 @@ def _check_continues(project: Project, name: str, model: Configuration) -> None:
     """Check that a training can continue from another: same network and sections, and not fewer passes."""
     begun = model.training.continues
     if project.configurations.is_built(name):
-        raise HobbleError(f"configuration {name} is not trained, so it cannot continue from {begun}")
+        kind = model.network.kind
+        raise HobbleError(f"configuration {name} continues from {begun}, but {kind} is built and not trained")
     assert begun is not None
     start = project.catalogue.configuration(begun)
     for key, mine, of_start in (

@@ -30,7 +30,7 @@ HEALTHY, HURT, CHANGED = 3.0, 7.0, 5.0  # seconds that are shown; where the gait
 ONE, SEVERAL, GAIT = "one part", "several parts", "change of gait"
 # What a person may tick: the parts that are hurt in some film, on both sides, and parts that never are.
 SIDED = ("thigh", "shank", "foot", "upper arm", "forearm")
-PARTS = (*(f"{side} {part}" for side in ("left", "right") for part in SIDED), "lower back", "neck")
+PARTS = (*(f"{side} {part}" for part in SIDED for side in ("left", "right")), "lower back", "neck")
 
 
 @dataclass(frozen=True)

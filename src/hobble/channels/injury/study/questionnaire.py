@@ -29,8 +29,8 @@ from hobble.runtime.export import jointed
 from hobble.runtime.options import Runtime
 
 STRIDE = 2  # frames of the motion to one of the film
-SIZE = 420  # pixels a side
-QUALITY = 55
+SIZE = 360  # pixels a side
+QUALITY = 45
 STEADY = 25.0  # frames, sigma with which the camera's way is smoothed
 LOOK_AT, DISTANCE = 82.0, 400.0  # cm: how high the camera looks, and from how far
 
