@@ -491,7 +491,7 @@ def catalogue(root: Path, tmp_path: Path) -> Path:
     return folder
 
 
-OUTSIDE = ["../outside", "/etc/passwd", "..", ".", "a/../../outside", "", "a\nb", "~root"]
+OUTSIDE = ["../outside", "/etc/passwd", "..", ".", "a/../../outside", "", "a\nb", "~root", "x" * 5000]
 
 
 @pytest.mark.parametrize("name", OUTSIDE)
@@ -528,7 +528,7 @@ def test_a_configuration_cannot_ask_for_a_mountain(catalogue: Path) -> None:
             refused(lambda read=read: read("mine"), "mine.yaml", f"{section}.{key}")
 
 
-@pytest.mark.parametrize("value", ["../x", "/etc", "a/../../x", "a\nb"])
+@pytest.mark.parametrize("value", ["../x", "/etc", "a/../../x", "a\nb", "x" * 5000, "x/" * 900])
 @pytest.mark.parametrize("key", ["folder", "path", "skeleton", "source", "clips", "held_out"])
 def test_a_data_set_names_nothing_outside_the_mocap_folder(catalogue: Path, key: str, value: str) -> None:
     given: dict[str, Any] = {"skeleton": "holden31", "folder": "mine"}
@@ -540,6 +540,25 @@ def test_a_data_set_names_nothing_outside_the_mocap_folder(catalogue: Path, key:
     write(catalogue / "datasets/mine.yaml", json.dumps(given | more.get(key, {key: value})))
     with pytest.raises(HobbleError, match=r"mine\.yaml"):
         Catalogue(catalogue).dataset("mine")
+
+
+@pytest.mark.parametrize("value", [10**400, "x" * 9000, [1], None, "\x1b[31m"])
+def test_a_skeleton_with_an_offset_that_is_no_number_is_refused(tmp_path: Path, value: Any) -> None:
+    data = yaml.safe_load(SKELETON.read_text())
+    data["joints"]["LHipJoint"]["offset"][1] = value
+    path = write(tmp_path / "mine.yaml", yaml.safe_dump(data))
+    with pytest.raises(InputError, match=r"mine\.yaml: not a skeleton file") as refusal:
+        load_skeleton(path)
+    assert len(str(refusal.value)) < 400
+    assert str(refusal.value).isprintable()
+
+
+def test_of_thousands_of_problems_twenty_are_listed(catalogue: Path) -> None:
+    given = {"skeleton": "holden31", "folder": "mine", **{f"key {i}": 1 for i in range(5000)}}
+    write(catalogue / "datasets/mine.yaml", yaml.safe_dump(given))
+    refused(
+        lambda: Catalogue(catalogue).dataset("mine"), "mine.yaml", "and 4980 more problems", letters=30_000
+    )
 
 
 @pytest.mark.parametrize(
@@ -555,6 +574,7 @@ def test_a_data_set_names_nothing_outside_the_mocap_folder(catalogue: Path, key:
         "\x1b[31m",
         "a\\b",
         "\u202egpj",
+        "é" * 101,
     ],
 )
 def test_clips_that_cannot_be_said_are_refused_with_their_folder(

@@ -17,10 +17,12 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.models import DEFAULT, MODELS
 
 Model = TypeVar("Model", bound=BaseModel)
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")  # so that no name leads out of its folder
+# So that no name leads out of its folder, and none is too long for a file.
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
+MOST_PROBLEMS = 20  # of a file that are listed
 NOT_STRINGS = (bool, int, float, date)  # types that YAML makes of unquoted 02_01, 1e5, 2020-01-01 or on
 QUOTES_HINT = 'Put the name in quotes, as in "02_01"; otherwise YAML reads it as a number or a date.'
-NAME_HINT = "Names may have letters, digits, dots, dashes and underscores."
+NAME_HINT = "Names may have letters, digits, dots, dashes and underscores, 100 at most."
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
@@ -85,6 +87,10 @@ def with_training(folder: Path, values: dict[str, Any], within: tuple[str, ...] 
     name = values.get("training")
     if not isinstance(name, str):
         return values
+    if within and not NAME.fullmatch(name):
+        raise InputError(
+            folder / f"{within[-1]}.yaml", f"training: {name!r:.80} is not a name", fix=NAME_HINT
+        )
     if name in within:
         raise InputError(folder / f"{name}.yaml", f"`training: {name}` refers to itself")
     return {**values, "training": read_layers(folder, name, within)[0].get("training", {})}
@@ -95,7 +101,10 @@ def validate(model: type[Model], values: Mapping[str, Any], where: str) -> Model
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        lines = [f"{where}: {_problem(item, model)}" for item in error.errors()]
+        found = error.errors()
+        lines = [f"{where}: {_problem(item, model)}" for item in found[:MOST_PROBLEMS]]
+        if len(found) > MOST_PROBLEMS:
+            lines.append(f"{where}: and {len(found) - MOST_PROBLEMS} more problems.")
         raise HobbleError("\n".join(lines)) from None
 
 

@@ -35,7 +35,7 @@ def _channel(name: str) -> str:
     return name
 
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}$")]
 ClipName = Annotated[str, AfterValidator(_clip_name)]
 ChannelName = Annotated[str, AfterValidator(_channel)]
 OLD_KEYS = {key: one.name for one in every() for key in one.former}

@@ -18,13 +18,15 @@ SIDE_FILE_SUFFIXES = ("_footsteps.txt", "_injuries.txt", "_injuries", "_gait.txt
 VALID_NAME = re.compile(r"(?![.\s])[^{}<>\\/]+(?<!\s)")  # Snakemake fills in {x} and <x>
 CLIP_NAME_RULE = (
     "no control characters, braces, angle brackets, slashes or backslashes, no dot or space first and no "
-    "space last"
+    "space last, 200 bytes at most"
 )
+LONGEST_CLIP_NAME = 200  # bytes; the names of its files, while they are written, are up to 50 longer
 
 
 def is_valid_clip_name(clip: str) -> bool:
     """Whether a clip's name works in a path, a log and a Snakemake wildcard; see CLIP_NAME_RULE."""
-    return clip.isprintable() and VALID_NAME.fullmatch(clip) is not None
+    short = len(clip.encode(errors="surrogateescape")) <= LONGEST_CLIP_NAME
+    return short and clip.isprintable() and VALID_NAME.fullmatch(clip) is not None
 
 
 def find_clips(folder: Path) -> dict[str, list[Path]]:

@@ -7,11 +7,18 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+LONGEST_FILE_NAME = 255  # bytes, of Linux and others
+LONGEST_PATH = 1000
+
 
 def _inside(path: str) -> str:
     """Check that a path is relative and does not leave the mocap folder."""
     if Path(path).is_absolute() or ".." in Path(path).parts or not path.isprintable():
         raise ValueError("must be relative to the mocap folder and stay in it")
+    if any(len(part.encode()) > LONGEST_FILE_NAME for part in Path(path).parts) or len(path) > LONGEST_PATH:
+        raise ValueError(
+            f"must be a path of {LONGEST_PATH} letters at most, with names of {LONGEST_FILE_NAME}"
+        )
     return path
 
 

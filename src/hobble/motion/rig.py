@@ -16,7 +16,7 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
-from hobble.core.untrusted import read_text, read_yaml
+from hobble.core.untrusted import printable, read_text, read_yaml
 
 # Centimetres per unit of the file; the CMU files count in inches / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
@@ -28,6 +28,7 @@ NAME = re.compile(
 # Degrees by which bones of two rest poses may differ that are taken for one, by the role at the bone's end.
 LIKE = {"elbow": 20.0, "wrist": 25.0, "knee": 35.0, "heel": 35.0, "toe": 35.0}
 LEG_RANGE = (50.0, 125.0)
+FARTHEST = 1e5  # cm from a joint to its parent
 LIMBS = ("shoulder", "hip", "knee", "heel", "toe")
 MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") for part in LIMBS))
 
@@ -68,9 +69,12 @@ def _loaded(path: Path, name: str, changed: int, size: int) -> Target:
     data: Any = read_yaml(path)
     try:
         maps = data.pop("maps", None) or {}
-        return Target(Skeleton.from_dict({**data, "name": name}), maps)
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(path, f"not a skeleton file: {error}") from None
+        skeleton = Skeleton.from_dict({**data, "name": name})
+        if not (np.abs(skeleton.offsets) <= FARTHEST).all():
+            raise ValueError(f"an offset is not three numbers of {FARTHEST:g} cm at most")
+        return Target(skeleton, maps)
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
+        raise InputError(path, f"not a skeleton file: {printable(error)}") from None
 
 
 def nearest(names: Collection[str], target: Target, folder: str | Path) -> Target:

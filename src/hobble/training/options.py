@@ -41,7 +41,7 @@ class Recipe(Section):
     memory_mb: Positive = Field(
         512, description="largest part of the database held in memory, by each process"
     )
-    continues: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")] | None = Field(
+    continues: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}$")] | None = Field(
         None, description="a configuration whose last checkpoint is the start"
     )
     device: Literal["auto", "cpu", "cuda"] = "auto"

@@ -1,0 +1,102 @@
+"""The file of a trained network: what the network is, what its columns mean, what it saw."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hobble.core import files
+from hobble.core.errors import HobbleError
+from hobble.core.files import load_npz
+from hobble.core.skeleton import Skeleton
+from hobble.database.reader import Database
+from hobble.models import model
+from hobble.models.pfnn.options import PfnnOptions
+from hobble.models.seen import Seen
+from hobble.rows.layout import CONTACTS, GAITS, RowLayout
+from hobble.training.weights import write_weights
+
+from .conftest import figure
+
+
+@pytest.fixture
+def data(small_database: Path) -> Database:
+    return Database.open(small_database, 64)
+
+
+def write(path: Path, data: Database, seed: int = 1) -> dict[str, np.ndarray]:
+    """Write an untrained network; the arrays that it should have."""
+    made = model("pfnn").trainable(PfnnOptions(units=6), data.layout, figure(), seed)
+    write_weights(path, made, data, "mine", {"passes": 3})
+    return {name: np.array(array) for name, array in made.arrays().items()}
+
+
+def test_the_file_holds_the_network_bit_for_bit(data: Database, tmp_path: Path) -> None:
+    expected = write(tmp_path / "weights.npz", data)
+    found = load_npz(tmp_path / "weights.npz")
+    assert len(expected) == 6
+    for name, array in expected.items():
+        assert found[name].dtype == array.dtype
+        np.testing.assert_array_equal(found[name], array)
+    for name in ("x_mean", "x_std", "y_mean", "y_std"):
+        np.testing.assert_array_equal(found[name[0].upper() + name[2:]], getattr(data.statistics, name))
+
+
+def test_the_file_says_what_its_columns_are(data: Database, tmp_path: Path) -> None:
+    write(tmp_path / "weights.npz", data)
+    meta = json.loads(str(load_npz(tmp_path / "weights.npz")["meta"]))
+    assert RowLayout.from_dict(meta["layout"]) == data.layout
+    assert Skeleton.from_dict(meta["skeleton"]).joints == figure().joints, (
+        "their order is that of the columns"
+    )
+    assert (meta["gaits"], meta["contacts"]) == (list(GAITS), list(CONTACTS))
+    assert meta["channels"] == {"injury": ["Hips-LeftLeg"]}
+    assert "severity 0 to 10" in meta["units"]
+    assert (meta["kind"], meta["configuration"], meta["passes"]) == ("pfnn", "mine", 3)
+
+
+def test_the_file_says_what_was_seen_in_training_and_not_what_was_held_out(
+    data: Database, tmp_path: Path
+) -> None:
+    write(tmp_path / "weights.npz", data)
+    arrays = load_npz(tmp_path / "weights.npz")
+    seen = Seen.read("weights.npz", arrays, data.layout.x_size, data.layout.y_size)
+    assert seen is not None
+    blocks = list(data.blocks("train", 0, 0, 1, 0))
+    s = data.statistics
+    y = np.concatenate([block.y for block in blocks]) * s.y_std + s.y_mean
+    np.testing.assert_allclose(seen.y_low, y.min(axis=0), atol=1e-4)
+    np.testing.assert_allclose(seen.y_high, y.max(axis=0), atol=1e-4)
+    apart = np.concatenate([block.y for block in data.blocks("held_out", 0, 0, 1, 0)]) * s.y_std + s.y_mean
+    assert (apart.max(axis=0) > seen.y_high + 1e-3).any(), "else this test could not tell"
+    speed = np.linalg.norm(y[:, data.layout.y_joint_velocity].reshape(len(y), -1, 3), axis=-1)
+    assert seen.fastest == pytest.approx(float(speed.max()), rel=1e-5)
+
+
+def test_equal_networks_give_equal_bytes_and_others_do_not(data: Database, tmp_path: Path) -> None:
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+        write(tmp_path / name, data, seed)
+    a, b, c = ((tmp_path / name).read_bytes() for name in "abc")
+    assert a == b
+    assert a != c
+
+
+def test_a_disk_that_fills_up_leaves_the_old_file(
+    data: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "weights.npz"
+    write(path, data)
+    before = path.read_bytes()
+
+    def full(file, **arrays) -> None:
+        file.write(b"half of it")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(files.np, "savez", full)
+    with pytest.raises(HobbleError, match=r"weights\.npz: the disk is full"):
+        write(path, data, 2)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
