@@ -18,7 +18,7 @@ from hobble.core.quat import Array
 UNLIMITED = 1e4  # cm a frame: of a gait in which no healthy clip goes ahead
 LEVELS = 5  # values for which a speed is kept, from 0 to the highest; between them it is interpolated
 TOP = 95  # percentile of the speeds of healthy cycles in a gait: that of a body that is told nothing
-USUAL = 50  # percentile of those, of which a hurt body keeps its share
+USUAL = 65  # percentile of those, of which a hurt body keeps its share; clips start and stop, so no median
 LAME = (
     0.85  # who keeps this share of the usual speed, or less, cannot hurry; who keeps all is as fast as ever
 )

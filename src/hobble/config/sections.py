@@ -53,4 +53,4 @@ __all__ = [
 
 # The configurations in results/compare/ unless --config compare names others: the published networks, and the
 # character that can be hurt.
-COMPARED = ("holden", "holden-xl", "holden-xt", "injured")
+COMPARED = ("holden", "holden-xl", "holden-xt", "ava", "ava-m", "injured")

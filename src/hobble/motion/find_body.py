@@ -21,8 +21,8 @@ from hobble.motion.tree import above, common, path
 SAMPLES = 150
 ALIKE = 0.15  # by how much of its length a bone may differ from the one across the body
 RIGID = 0.03  # by how much of its length a bone that is none in the file may change
-RATIOS = {"leg": (0.6, 1.6), "arm": (0.55, 1.6)}  # shank to thigh, forearm to upper arm
-APART = {"leg": 0.2, "arm": 0.5}  # of hips to knees, of shoulders to elbows
+RATIOS = {"leg": (0.6, 1.6), "arm": (0.48, 1.6)}  # shank to thigh, forearm to upper arm
+APART = {"leg": 0.2, "arm": 0.4}  # of hips to knees, of shoulders to elbows, which may be spread for balance
 FEWEST = 3  # joints of a limb
 LEAST = 0.15  # length of a limb to the size of the body
 AWAY = -0.2  # cosine between legs and trunk from which on they lead away from each other

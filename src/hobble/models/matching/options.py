@@ -29,6 +29,6 @@ class MatchingOptions(Options):
     foot_position: Weight = 5.0
     foot_velocity: Weight = 1.0
     hip_velocity: Weight = 2.0
-    gait: Weight = Field(5.0, description="weight of the gait now")
+    gait: Weight = Field(2.0, description="weight of the gait now")
     ground: Weight = Field(0.5, description="weight of the heights ahead")
     channels: Weight = Field(50.0, description="weight of what the body is told; high, since it has to agree")
