@@ -14,7 +14,7 @@ from .damage import DAMAGES
 from .grammar import Case, mutated
 from .lab import Lab
 from .same import same
-from .throws import FAULT, REFUSED, UNHARMED
+from .throws import FAULT, REFUSED, REMADE, UNHARMED
 
 pytestmark = pytest.mark.workflow
 SEED = 20
@@ -60,6 +60,20 @@ def test_harm_to_what_a_job_reads(lab: Lab, rule: str) -> None:
 def test_two_snakemakes_at_once(lab: Lab) -> None:
     thrown = runs.two_runs(lab, Random(SEED))
     assert thrown.happened in (REFUSED, UNHARMED), thrown
+
+
+def test_a_stale_lock_of_either_kind_is_no_end(lab: Lab) -> None:
+    """Of this machine it is taken away; of another the message says how, and that helps."""
+    kinds = {}
+    for number in range(8):
+        if (Random(number).random() < 0.5) not in kinds:
+            kinds[Random(number).random() < 0.5] = runs.stale_lock(lab, Random(number))
+    assert [kinds[elsewhere].happened for elsewhere in (False, True)] == [REMADE, REFUSED], kinds
+
+
+def test_after_touch_of_every_tracked_file_nothing_runs_again(lab: Lab) -> None:
+    thrown = runs.touched(lab, Random(SEED))
+    assert thrown.happened == UNHARMED, thrown
 
 
 @pytest.fixture(scope="module")

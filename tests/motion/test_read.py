@@ -209,3 +209,17 @@ def test_whatever_happens_to_a_file_ends_in_a_clip_or_one_message(tmp_path_facto
         assert np.isfinite(clip.values).all()
         assert np.isfinite(clip.offsets).all()
         assert clip.values.shape == (len(clip), sum(len(c) for c in clip.channels))
+
+
+def test_an_end_site_without_a_place_is_refused(tmp_path) -> None:
+    text = (
+        "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 1 Xposition\nEnd Site\n{\nOFFSET 0 1 0\n}\n}\n"
+        "MOTION\nFrames: 1\nFrame Time: 0.01\n1\n"
+    )
+    lines = text.splitlines(keepends=True)
+    end = next(i for i, line in enumerate(lines) if line.strip().lower().startswith("end site"))
+    assert lines[end + 2].strip().startswith("OFFSET")
+    path = tmp_path / "a.bvh"
+    path.write_text("".join(lines[: end + 2] + lines[end + 3 :]))
+    with pytest.raises(InputError, match=f"line {end + 3}: an end site has no OFFSET"):
+        read_bvh(path)

@@ -128,6 +128,7 @@ class _Hierarchy:
         self.header = _Header()
         self.open: list[int] = []
         self.pending: int | None = None
+        self.end_placed = True
         self.seen: dict[str, int] = {}
 
     def fail(self, problem: str) -> NoReturn:
@@ -178,6 +179,7 @@ class _Hierarchy:
         if not self.open:
             self.fail("an end site outside of any joint")
         self.pending = -1
+        self.end_placed = False
 
     def _brace(self, rest: str) -> None:
         if self.pending is None:
@@ -189,6 +191,8 @@ class _Hierarchy:
         if not self.open:
             self.fail("a closing brace too many")
         joint = self.open.pop()
+        if joint < 0 and not self.end_placed:
+            self.fail("an end site has no OFFSET")
         if joint >= 0 and np.isnan(self.header.offsets[joint][0]):
             self.fail(f"joint {self.header.names[joint]!r} has no OFFSET")
 
@@ -205,6 +209,7 @@ class _Hierarchy:
         if joint >= 0:
             self.header.offsets[joint] = (x, y, z)
         else:
+            self.end_placed = True
             name = self.header.names[self.open[-2]]
             self.header.end_sites.setdefault(name, []).append((x, y, z))
 
