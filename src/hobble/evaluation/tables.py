@@ -12,7 +12,7 @@ from hobble.core.files import write_text
 
 
 def write_csv(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows. None, or a key that only other rows have, is an empty field; without rows, an empty file."""
+    """Write rows. None, or a key that only other rows have, is an empty field; no rows are an empty file."""
     out = io.StringIO()
     if rows:
         writer = csv.DictWriter(
