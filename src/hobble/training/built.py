@@ -17,7 +17,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.models import model
 from hobble.models.load import load_network
-from hobble.models.model import Built, Made
+from hobble.models.model import Built, FinishedNetwork
 from hobble.models.network import Network
 from hobble.models.options import Options
 from hobble.training.batches import TRAIN
@@ -57,7 +57,9 @@ def run_built(
     save_npz(checkpoint, network=np.array(made.described), sections=np.array(0))
 
 
-def build(database: Database, network: Options, clips: Mapping[str, str | Path]) -> tuple[Made, int]:
+def build(
+    database: Database, network: Options, clips: Mapping[str, str | Path]
+) -> tuple[FinishedNetwork, int]:
     """What is built of the database's training clips, and how many rows they have.
 
     Raises InputError where a file does not fit the database, HobbleError where one is missing.

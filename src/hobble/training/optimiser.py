@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from hobble.core.compiled import njit
-from hobble.models.kernels import bits, team, widened
+from hobble.models.kernels import as_numpy, to_float32, use_threads
 from hobble.models.trainable import Trainable
 
 EPSILON = 1e-8
@@ -68,9 +68,9 @@ class Adam:
         """One pass over memory, whose bandwidth is all that bounds it on a CPU."""
         views = [self.network.layers, self.network.views(self.first), self.network.views(self.second)]
         for *layer, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
-            arrays = [bits(array.flatten(0, 1)) for array in layer]
-            arrays.append(bits(gradient.view(layer[0].shape).flatten(0, 1)))
-            team(layer[0].numel())
+            arrays = [as_numpy(array.flatten(0, 1)) for array in layer]
+            arrays.append(as_numpy(gradient.view(layer[0].shape).flatten(0, 1)))
+            use_threads(layer[0].numel())
             numbers = (self.beta1, self.beta2, rate, root, slope, EPSILON)
             _fused(*arrays, *(arrays[0].dtype.type(number) for number in numbers))
 
@@ -95,7 +95,7 @@ def _fused(
     half = g.itemsize == 2
     for row in numba.prange(w.shape[0]):
         for i in range(w.shape[1]):
-            d = w.dtype.type(widened(g[row, i])) if half else w.dtype.type(g[row, i])
+            d = w.dtype.type(to_float32(g[row, i])) if half else w.dtype.type(g[row, i])
             if i < last:  # the last column holds the biases
                 d += slope * (one if w[row, i] > zero else (-one if w[row, i] < zero else zero))
             m[row, i] = b1 * m[row, i] + (one - b1) * d

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from hobble.character.rule import met
+from hobble.character.rule import joint_place
 from hobble.database.reader import Database
 
 
@@ -63,7 +63,7 @@ class RollOut:
         rows = len(error)
         place, speed = error[:, self.y_place], error[:, self.y_speed]
         made = place * self.place_of_place + speed * self.place_of_speed
-        self.place[:rows] = met(self.place[:rows], made)
+        self.place[:rows] = joint_place(self.place[:rows], made)
         torch.mul(speed, self.speed_of_speed, out=self.speed[:rows])
         self.batches += 1
         ended = slice((self.batches - self.first) % self.frames, None, self.frames)

@@ -13,7 +13,7 @@ from hobble.channels import channel
 from hobble.core.files import save_npz
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
-from hobble.models.model import Made
+from hobble.models.model import FinishedNetwork
 from hobble.models.seen import Seen
 from hobble.rows.layout import CONTACTS, GAITS
 from hobble.training.batches import TRAIN
@@ -22,7 +22,7 @@ UNITS = "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z
 
 
 def write_weights(
-    path: Path, network: Made, database: Database, configuration: str, facts: Mapping[str, Any]
+    path: Path, network: FinishedNetwork, database: Database, configuration: str, facts: Mapping[str, Any]
 ) -> None:
     """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd`, those of `Seen` and `meta`, a JSON
     text.
@@ -36,7 +36,7 @@ def write_weights(
     save_npz(path, **arrays, meta=np.array(meta(network, database, configuration, facts)))
 
 
-def meta(network: Made, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
+def meta(network: FinishedNetwork, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
     """What the columns mean and where the network comes from, as JSON; the joints keep their order."""
     rig = Skeleton.from_dict(database.skeleton)
     channels = [channel(name) for name, _ in database.layout.channels]

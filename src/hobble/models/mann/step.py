@@ -16,7 +16,7 @@ from torch import Tensor
 
 from hobble.models.mann.trainable import TrainableMann, with_one
 from hobble.models.products import product
-from hobble.models.trainable import EVERY
+from hobble.models.trainable import ALL_ROWS
 
 Kept = tuple[Tensor, Tensor]
 
@@ -72,7 +72,7 @@ class Step:
         """Begin a new sequence of dropout masks, 0 <= seed < 2^63."""
         self.generator.manual_seed(seed)
 
-    def masks(self, rows: int, own: slice = EVERY) -> list[Tensor]:
+    def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
         """What each layer's inputs (rows, in) are multiplied by, those of the gate first: 0 or 1 / keep."""
         flat = self.network.flat
         drawn = torch.rand(rows, sum(self.widths), generator=self.generator, device=flat.device)[own]

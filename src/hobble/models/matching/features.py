@@ -17,7 +17,7 @@ from hobble.models.matching.options import MatchingOptions
 from hobble.rows.layout import GAITS, RowLayout
 
 FEET = ("left_heel", "right_heel")
-LEAST = 1e-6  # spread below which a group of columns tells nothing
+LEAST_SPREAD = 1e-6  # spread below which a group of columns tells nothing
 
 
 def groups(
@@ -63,7 +63,7 @@ def columns_and_weights(
         else:
             spread = float(x[:, group].std(axis=0, dtype=np.float64).mean())
         columns += group
-        weights.append(np.full(len(group), weight / spread if spread > LEAST else 0.0, np.float32))
+        weights.append(np.full(len(group), weight / spread if spread > LEAST_SPREAD else 0.0, np.float32))
     return np.array(columns, np.int64), np.concatenate(weights)
 
 

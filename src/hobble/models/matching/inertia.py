@@ -17,17 +17,17 @@ import numpy as np
 from hobble.core.compiled import njit
 
 ROW, SINCE, OFFSETS = 0, 1, 2  # places in the memory: 1 + the row shown last, frames since the search
-OF_JOINT = 12  # offsets of position, velocity, rotation and turn, three numbers each
+OFFSETS_PER_JOINT = 12  # offsets of position, velocity, rotation and turn, three numbers each
 FASTEST_PULL = 0.002  # cycles a frame by which a phase may go beyond that of the clips to catch up
 
 
-def remembered(joints: int) -> int:
+def memory_size(joints: int) -> int:
     """Numbers that are remembered of one character."""
-    return OFFSETS + OF_JOINT * joints
+    return OFFSETS + OFFSETS_PER_JOINT * joints
 
 
 @njit
-def go_on(memory: Any, left: Any, every: int, before: Any, following: Any, due: Any) -> None:
+def find_following(memory: Any, left: Any, every: int, before: Any, following: Any, due: Any) -> None:
     """Where each character's run goes on, and who is due for a search.
 
     memory: (C, M); left: (R,) frames that follow each row in its run. before: (C,) the row shown last, or -1;
@@ -43,7 +43,7 @@ def go_on(memory: Any, left: Any, every: int, before: Any, following: Any, due: 
 
 
 @njit(error_model="numpy")
-def show(
+def show_rows(
     memory: Any, frames: Any, scale: Any, phases: Any, before: Any, following: Any, shown: Any, due: Any,
     phase: Any, joints: int, at: Any, halflife: float, out: Any,
 ) -> None:  # fmt: skip
@@ -61,7 +61,7 @@ def show(
             memory[c] = 0.0
         else:
             if row != following[c]:
-                _begin(memory[c], frames, scale, before[c], following[c], row, joints, at)
+                _start_transition(memory[c], frames, scale, before[c], following[c], row, joints, at)
             _decay(memory[c, OFFSETS:], damping)
             _add(memory[c, OFFSETS:], joints, at, out[c])
             off = phases[row] - phase[c]
@@ -72,7 +72,7 @@ def show(
 
 
 @njit(forceinline=True, cache=False)
-def _begin(
+def _start_transition(
     memory: Any, frames: Any, scale: Any, before: int, following: int, row: int, joints: int, at: Any
 ) -> None:
     """Add to the offsets what the pose that would have come next differs by from that of `row`."""
@@ -82,7 +82,7 @@ def _begin(
     before_old, before_new = frames[before] * scale, frames[max(row - 1, 0)] * scale
     q, p, r = np.empty(4), np.empty(4), np.empty(3)
     for j in range(joints):
-        k = OF_JOINT * j
+        k = OFFSETS_PER_JOINT * j
         for i in range(3):
             o[k + i] += old[at[0] + 3 * j + i] - new[at[0] + 3 * j + i]
             o[k + 3 + i] += old[at[1] + 3 * j + i] - new[at[1] + 3 * j + i]
@@ -117,7 +117,7 @@ def _add(o: Any, joints: int, at: Any, y: Any) -> None:
     """Add the offsets to a row Y."""
     q, p = np.empty(4), np.empty(4)
     for j in range(joints):
-        k, turn = OF_JOINT * j, at[2] + 3 * j
+        k, turn = OFFSETS_PER_JOINT * j, at[2] + 3 * j
         for i in range(3):
             y[at[0] + 3 * j + i] += o[k + i]
             y[at[1] + 3 * j + i] += o[k + 3 + i]

@@ -15,14 +15,14 @@ from scipy.spatial import cKDTree
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.models import checks
-from hobble.models.matching.inertia import remembered
+from hobble.models.matching.inertia import memory_size
 from hobble.models.matching.predictor import MatchingPredictor
 from hobble.models.network import Network, standardised
 from hobble.models.packing import packed, packed_columns
 
 MOST_ROWS = 1 << 24  # more would not be told apart by the page's float32
 MOST_WEIGHT = 1e9
-LONGEST = 1_000_000  # frames
+MOST_FRAMES = 1_000_000  # frames
 FEWEST_LEFT = 20  # frames that have to follow a row for a run to begin there
 MOST_ON_PAGE = 8000  # rows, about 8 MB of text; a page of several characters is to stay below 20 MB
 
@@ -79,8 +79,8 @@ class Matching(Network):
             left=left,
             columns=columns,
             weights=weights,
-            every=checks.whole(path, "every", meta.get("every"), 1, LONGEST),
-            halflife=checks.length(path, "halflife", meta.get("halflife"), LONGEST),
+            every=checks.whole(path, "every", meta.get("every"), 1, MOST_FRAMES),
+            halflife=checks.length(path, "halflife", meta.get("halflife"), MOST_FRAMES),
             **common,
         )
 
@@ -121,7 +121,7 @@ class Matching(Network):
     @property
     def memory(self) -> int:
         """As in `Network`: the row shown, the frames since the search, and what inertialisation adds."""
-        return remembered(self.layout.joints)
+        return memory_size(self.layout.joints)
 
     @property
     def sizes(self) -> tuple[int, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hobble.core.quat import Array
-from hobble.models.matching.inertia import go_on, show
+from hobble.models.matching.inertia import find_following, show_rows
 from hobble.models.network import STORAGES, inverse
 from hobble.models.stack import standardise
 
@@ -56,12 +56,12 @@ class MatchingPredictor:
             memory = np.zeros((count, network.memory))
         before, following = np.empty(count, np.int64), np.empty(count, np.int64)
         due = np.empty(count, np.bool_)
-        go_on(memory, network.left, network.every, before, following, due)
+        find_following(memory, network.left, network.every, before, following, due)
         shown = following.copy()
         if due.any():
             some = np.flatnonzero(due)
             shown[some] = self._searched(network.queries(z[some]), following[some])
-        show(
+        show_rows(
             memory, self._frames, self._scale, network.phases, before, following, shown, due, phase,
             network.layout.joints, self._at, network.halflife, out,
         )  # fmt: skip

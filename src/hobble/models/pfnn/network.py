@@ -19,7 +19,7 @@ from hobble.models.packing import packed_rows
 from hobble.models.pfnn.forward import binned, forward
 from hobble.models.pfnn.predictor import MODES, PfnnPredictor
 
-FEWEST, MOST = 4, 64  # control points: a cyclic cubic needs four
+FEWEST_POINTS, MOST_POINTS = 4, 64  # control points: a cyclic cubic needs four
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,10 @@ class Pfnn(Network):
         inputs, outputs = len(common["x_mean"]), len(common["y_mean"])
         weights, biases = stacked(path, arrays, ("W", "b"), 3, inputs, outputs)
         points = len(weights[0])
-        if not FEWEST <= points <= MOST:
+        if not FEWEST_POINTS <= points <= MOST_POINTS:
             raise InputError(
-                path, f"{points} control points; there are {FEWEST} or more in a cyclic cubic, {MOST} at most"
+                path,
+                f"{points} control points; from {FEWEST_POINTS} to {MOST_POINTS} are allowed",
             )
         return cls(weights=weights, biases=biases, **common)
 

@@ -42,7 +42,7 @@ class PfnnPredictor:
             np.ascontiguousarray(a, np.float32)
             for a in (network.x_mean, inverse(network.x_std), network.y_mean, network.y_std)
         )
-        self._weights, self._numbers, self._plan = _flat(tables, storage, y_mean, y_std)
+        self._weights, self._numbers, self._plan = _flatten(tables, storage, y_mean, y_std)
         self._kind = 4 if mode == "cubic" else 2 if mode == "linear" else 1
 
     def predict(self, x: Array, phase: Array, out: Array | None = None) -> Array:
@@ -85,13 +85,13 @@ def phase_tables(network: Pfnn, mode: str) -> list[tuple[Array, Array]]:
 INPUTS, OUTPUTS, WEIGHTS, SCALES, BIASES = range(5)
 
 
-def _flat(
+def _flatten(
     tables: list[tuple[Array, Array]], storage: str, y_mean: Array, y_std: Array
 ) -> tuple[Array, Array, Array]:
     """All layers as compiled code takes them: weights (n,) in panels, point by point; numbers (n,) float32:
     y_mean, y_std, and of each layer the factors of its rows and its biases at each point; and the plan."""
     numbers, plan, at, size = [y_mean, y_std], [], 0, 2 * len(y_mean)
-    weights = aligned(sum(_room(w) for w, _ in tables), storage)
+    weights = aligned(sum(_panel_numbers(w) for w, _ in tables), storage)
     for table, biases in tables:
         points, outputs, inputs = table.shape
         stored, scales = _pack(table, storage)
@@ -103,7 +103,7 @@ def _flat(
     return weights, np.concatenate(numbers), np.array(plan, np.int64)
 
 
-def _room(table: Array) -> int:
+def _panel_numbers(table: Array) -> int:
     points, outputs, inputs = table.shape
     return int(points * panels_of(outputs) * WIDTH * inputs)
 
@@ -188,7 +188,7 @@ def _evaluate(
         padded = -(-outputs // WIDTH) * WIDTH
         y[: count * outputs] = np.float32(0)
         for point in range(points):
-            rows = _who(point, index, share, members, shares)
+            rows = _characters_at(point, index, share, members, shares)
             if rows == 0:
                 continue
             for m in range(rows):
@@ -211,7 +211,7 @@ def _evaluate(
 
 
 @njit(forceinline=True, cache=False)
-def _who(point: int, index: Any, share: Any, members: Any, shares: Any) -> int:
+def _characters_at(point: int, index: Any, share: Any, members: Any, shares: Any) -> int:
     """Write down which characters blend `point`, and their shares of it; returns how many."""
     rows = 0
     for c in range(index.shape[0]):

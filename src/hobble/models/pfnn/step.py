@@ -16,7 +16,7 @@ from torch import Tensor
 
 from hobble.models.pfnn.trainable import TrainablePfnn, coefficients, expand
 from hobble.models.products import product
-from hobble.models.trainable import EVERY
+from hobble.models.trainable import ALL_ROWS
 
 
 class Step:
@@ -69,7 +69,7 @@ class Step:
         """Begin a new sequence of dropout masks, 0 <= seed < 2^63."""
         self.generator.manual_seed(seed)
 
-    def masks(self, rows: int, own: slice = EVERY) -> list[Tensor]:
+    def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
         """What each layer's inputs (rows, in) are multiplied by: 0 for those dropped, 1 / keep for others."""
         flat, widths = self.network.flat, self.widths
         drawn = torch.rand(rows, sum(widths), generator=self.generator, device=flat.device)[own]
