@@ -226,7 +226,7 @@ def test_wishes_that_make_no_sense(network) -> None:
         ValueError, match=r"facing has to be a vector of 2 or 3 .* each of 2, not of shape \(3, 2\)"
     ):
         character.next_pose((0, 1), np.ones((3, 2)))
-    with pytest.raises(ValueError, match=r"target_velocity is a vector .* not of shape \(4,\)"):
+    with pytest.raises(ValueError, match=r"target_velocity has to be a vector .* not of shape \(4,\)"):
         character.next_pose((0, 1, 2, 3))
     with pytest.raises(ValueError, match=r"terrain returned heights of shape \(2,\) for 72 points"):
         character.next_pose((0, 1), terrain=lambda x, z: np.zeros(2))

@@ -1,4 +1,4 @@
-"""The step on a CPU: what lies between the experts' products, as compiled loops over rows."""
+"""The step on a CPU: compiled loops over rows for everything but the experts' products."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hobble.models.mann.step import Step
 
 
 class FusedStep(FusedBase, Step):
-    """As `Step`, several times faster outside the products, in buffers that are kept from batch to batch."""
+    """As `Step`, but several times faster outside the products, with buffers reused for every batch."""
 
     def prepared(self, number: int, x: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
         """As in `Step`, in one sweep."""
@@ -75,10 +75,10 @@ def _blend(outputs: Any, c: Any, h: Any) -> None:
                     h[row, i] += share * outputs[row, start + i]
 
 
-# The sums may be taken in any order, and so several at a time.
+# Reassociation lets the compiler sum several terms at a time.
 @njit(parallel=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 def _spread(d: Any, outputs: Any, c: Any, da: Any, dc: Any) -> None:
-    """da (B, K out) from d (B, out), and what it adds to dc (B, K)."""
+    """Write da (B, K out) from d (B, out), and add this layer's part to dc (B, K)."""
     rows, width = d.shape
     half = outputs.itemsize == 2
     for row in numba.prange(rows):

@@ -1,4 +1,4 @@
-"""The step on a CPU: what lies between the products, as compiled loops over rows."""
+"""The step on a CPU: compiled loops over rows for everything but the products."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from hobble.models.pfnn.step import Step
 
 
 class FusedStep(FusedBase, Step):
-    """As `Step`, several times faster outside the products, in buffers that are kept from batch to batch."""
+    """As `Step`, but several times faster outside the products, with buffers reused for every batch."""
 
     def coefficients(self, p: Tensor) -> Tensor:
-        """(B, K) of phases (B,)."""
+        """Spline coefficients (B, K) of phases (B,)."""
         c = self.buffer("c", len(p), self.network.control_points)
         _coefficients(p.numpy(), c.numpy())
         return c

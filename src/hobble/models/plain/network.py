@@ -1,4 +1,4 @@
-"""A feed-forward network with sine and cosine of the phase behind its inputs: `Plain.predict` is it."""
+"""A feed-forward network with sine and cosine of the phase as extra inputs; see `Plain.predict`."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from hobble.models.network import Export, Network, standardised
 from hobble.models.packing import packed_rows
 from hobble.models.stack import Stack, StackPredictor
 
-PHASE_COLUMNS = 2  # columns behind those of X: sine, cosine
+PHASE_COLUMNS = 2  # inputs after the columns of X: sine and cosine of the phase
 
 
 @dataclass(frozen=True)
 class Plain(Network):
-    """weights: per layer (out, in) float32; biases: (out,). The first has PHASE_COLUMNS more inputs than X."""
+    """weights: per layer (out, in) float32; biases: (out,). The first layer gets X and PHASE_COLUMNS more."""
 
     kind: ClassVar[str] = "plain"
 
@@ -87,7 +87,7 @@ class Plain(Network):
 
 
 class PlainPredictor(StackPredictor):
-    """It prepared to run, its weights stored as float32 or int16."""
+    """The plain network prepared to run, with weights stored as float32 or int16."""
 
     network: Plain
 

@@ -1,4 +1,4 @@
-"""The plain network while it is trained, and its step: that of layers with one set of weights each."""
+"""The plain network in training. Its step is that of `pfnn` with one set of weights."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from hobble.models.trainable import ALL_ROWS, Step, Trainable, uniform_start
 
 @dataclass(frozen=True)
 class TrainablePlain(Trainable):
-    """units: of each layer, the columns of X first; the first layer has PHASE_COLUMNS more inputs."""
+    """units: of each layer, the columns of X first. The first layer has PHASE_COLUMNS more inputs."""
 
     kind: ClassVar[str] = "plain"
-    control_points: ClassVar[int] = 1  # as the step calls sets of weights
+    control_points: ClassVar[int] = 1  # the step's name for sets of weights
 
     units: tuple[int, ...]
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Inputs of each layer, those of the phase among them, and the outputs."""
+        """Inputs of each layer, with those of the phase, then the outputs."""
         return (self.units[0] + PHASE_COLUMNS, *self.units[1:])
 
     @property
@@ -84,14 +84,14 @@ class TrainablePlain(Trainable):
 
 
 class _WithPhase:
-    """Puts sine and cosine behind the inputs of a step whose layers have one set of weights."""
+    """Appends sine and cosine of the phase to the inputs of a step with one set of weights."""
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
         """As in `Step`."""
         return super().__call__(with_phase(x, p), y, p, masks)  # type: ignore[misc]
 
     def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
-        """As in `Step`; the phase is never dropped, no more than where control points follow it."""
+        """As in `Step`, but the phase is never dropped, as it never is in `pfnn`."""
         masks: list[Tensor] = super().masks(rows, own)  # type: ignore[misc]
         masks[0][:, -PHASE_COLUMNS:] = 1
         return masks
@@ -102,15 +102,15 @@ class _WithPhase:
 
 
 class PlainStep(_WithPhase, BlendedStep):  # type: ignore[misc]
-    """Its gradient in PyTorch, on any device."""
+    """The plain network's step in PyTorch, on any device."""
 
 
 class FusedPlainStep(_WithPhase, FusedStep):  # type: ignore[misc]
-    """Its gradient on a CPU."""
+    """The plain network's step in compiled loops on a CPU."""
 
 
 def with_phase(x: Tensor, p: Tensor) -> Tensor:
-    """x (B, X) with sine and cosine of phases (B,) behind it."""
+    """x (B, X) with sine and cosine of phases (B,) appended."""
     angle = 2 * torch.pi * p[:, None]
     return torch.cat([x, torch.sin(angle), torch.cos(angle)], dim=1)
 
