@@ -48,8 +48,9 @@ class Channel(ABC):
     second at run time, unless the configuration says otherwise. suffix: of a file beside a clip that holds
     values, or None. former: keys that older files have for this channel. Options: the data set's section
     `channels.<name>`; a channel that has one is known of a data set that gives it, any other of every data
-    set. slows: whether what is told makes the body slower; then how fast it goes is learnt with the rows, and
-    the character is asked for no more (see `hobble.channels.limits`).
+    set. slows: whether values above 0 make the body slower; then its speed limits are learnt from the rows
+    (see `hobble.channels.limits`). targets: folders of results/<configuration>/ that only a configuration
+    with this channel can have.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Channel(ABC):
     former: Sequence[str] = ()
     Options: type[Section] | None = None
     slows: bool = False
+    targets: Sequence[str] = ()
 
     @abstractmethod
     def columns(self, rig: Rig) -> tuple[str, ...]:

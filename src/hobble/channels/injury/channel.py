@@ -32,6 +32,7 @@ class Injury(Channel):
     suffix = "_injuries.txt"
     former = ("links", "injury", "status", "severity")
     slows = True
+    targets = ("questionnaire",)
 
     def columns(self, rig: Rig) -> tuple[str, ...]:
         """The links: "LeftUpLeg-LeftLeg"."""
