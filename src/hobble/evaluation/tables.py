@@ -12,10 +12,12 @@ from hobble.core.files import write_text
 
 
 def write_csv(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows with equal keys. None becomes an empty field; without rows the file is empty."""
+    """Write rows. None, or a key that only other rows have, is an empty field; no rows are an empty file."""
     out = io.StringIO()
     if rows:
-        writer = csv.DictWriter(out, fieldnames=list(rows[0]), lineterminator="\n")
+        writer = csv.DictWriter(
+            out, fieldnames=list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n"
+        )
         writer.writeheader()
         writer.writerows(rows)
     write_text(path, out.getvalue())

@@ -58,7 +58,7 @@ def _sizes(measured: ConfigurationResults) -> dict[str, Any]:
     found = measured.found(NAME)
     counts = found["parameters"]
     return {
-        "computations": {key: counts[key] for key in COUNTS} if counts else None,
+        "computations": {key: counts[key] if counts else None for key in COUNTS},
         "weights_bytes": {mode: count * FLOAT for mode, count in found["stored"].items()},
         "exact": found["exact"],
     }
