@@ -6,17 +6,18 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 
-from hobble.cli import injury, labels, motion, play, study
+from hobble.channels.commands import channel_commands
+from hobble.cli import labels, motion, play
 from hobble.core.errors import HobbleError
 
-COMMANDS = {"motion": motion, "labels": labels, "injury": injury, "play": play, "study": study}
+COMMANDS = {"motion": motion, "labels": labels, **channel_commands(), "play": play}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command. Returns 0, or 1 if something failed. Wrong arguments exit with status 2."""
     parser = argparse.ArgumentParser(
         prog="hobble",
-        description="Converts and labels clips, writes their injury files, and opens a trained character. "
+        description="Converts and labels clips, and opens a trained character. "
         "A Snakemake workflow trains a character from clips: see README.md.",
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from hobble.channels import every
 from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
 from hobble.workflow.comparison import COMPARE
@@ -15,7 +16,6 @@ from hobble.workflow.project import Project
 if TYPE_CHECKING:
     from hobble.config.models import ClipEntry, Configuration, Dataset, SkeletonFile
 
-INJURY = "injury"  # the channel that the questionnaire asks about
 PAGE = "page"  # the folder in results/ with the files that all reports share
 
 
@@ -145,11 +145,12 @@ def _check_possible(project: Project, name: str, folder: str, file: str) -> None
             f"results/{name}/stimuli: configuration {owner} has no `channels`, so it has only one walk to "
             "show. Use a configuration with channels."
         )
-    if folder == "questionnaire" and INJURY not in project.catalogue.configuration(owner).channels:
-        raise HobbleError(
-            f"results/{name}/questionnaire: the network of configuration {owner} is not told what hurts. Ask "
-            f"for that of a configuration with `channels: [{INJURY}]`."
-        )
+    for channel in every():
+        if folder in channel.targets and channel.name not in project.catalogue.configuration(owner).channels:
+            raise HobbleError(
+                f"results/{name}/{folder}: the network of configuration {owner} has no channel "
+                f"{channel.name}. Use a configuration with `channels: [{channel.name}]`."
+            )
     stem, _, suffix = file.rpartition(".")
     if folder == "export" and suffix == "onnx" and stem not in get_args(PhaseMode):
         raise HobbleError(
