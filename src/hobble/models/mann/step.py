@@ -113,7 +113,7 @@ class Step:
         return torch.softmax(h, dim=1), kept
 
     def _gate_gradients(self, c: Tensor, dc: Tensor, kept: list[Kept]) -> list[Tensor]:
-        """Gradients (out, in + 1) of the gate's layers, from the gradient dc (B, K) of the shares c (B, K)."""
+        """Gradients (out, in + 1) of the gate's layers. c, dc: (B, K) shares and their gradient."""
         d = c * (dc - torch.sum(c * dc, dim=1, keepdim=True))
         found: list[Tensor] = []
         for number in range(self.gates - 1, -1, -1):

@@ -32,6 +32,4 @@ class MatchingOptions(Options):
     hip_velocity: Weight = 2.0
     gait: Weight = Field(2.0, description="weight of the present gait")
     ground: Weight = Field(0.5, description="weight of the heights ahead")
-    channels: Weight = Field(
-        50.0, description="weight of the channel values; high, because they have to match"
-    )
+    channels: Weight = Field(50.0, description="weight of the channel values; high, since they have to match")

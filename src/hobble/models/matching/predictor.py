@@ -70,9 +70,8 @@ class MatchingPredictor:
         apart = queries - network.features[following]
         known = np.where(following >= 0, np.sqrt(np.square(apart).sum(axis=1)), np.inf)
         _, found = network.tree.query(queries, distance_upper_bound=float(known.max()))
-        rows = network.starts[
-            np.minimum(found, len(network.starts) - 1)
-        ]  # found == len(starts): no row is nearer
+        # The tree returns len(starts) where no row is nearer.
+        rows = network.starts[np.minimum(found, len(network.starts) - 1)]
         nearer = np.square(queries - network.features[rows]).sum(axis=1) < known**2
         stay = ~nearer | (np.abs(rows - following) <= SURROUNDING)
         return np.where(stay & (following >= 0), following, rows)

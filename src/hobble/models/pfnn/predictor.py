@@ -80,7 +80,7 @@ def phase_tables(network: Pfnn, mode: str) -> list[tuple[Array, Array]]:
 
 
 # Columns of the plan, one row per layer: numbers of inputs and outputs, and where weights, scales and biases
-# begin. Everything is in a few flat arrays, since each array argument of compiled code costs 0.3 microseconds.
+# begin. Everything is in a few flat arrays, since each array argument costs 0.3 microseconds.
 INPUTS, OUTPUTS, WEIGHTS, SCALES, BIASES = range(5)
 
 
