@@ -1,4 +1,4 @@
-"""network/weights.npz: what the runtime needs of a trained network, and nothing else."""
+"""Write network/weights.npz, which holds everything that the runtime needs."""
 
 from __future__ import annotations
 
@@ -24,11 +24,9 @@ UNITS = "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z
 def write_weights(
     path: Path, network: FinishedNetwork, database: Database, configuration: str, facts: Mapping[str, Any]
 ) -> None:
-    """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd`, those of `Seen` and `meta`, a JSON
-    text.
+    """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd`, the arrays of `Seen`, and `meta` (JSON).
 
-    facts: numbers about the training and its rows that go into `meta` as they are. Equal networks give equal
-    bytes.
+    facts: numbers about the training, which are added to `meta`. Equal networks give equal bytes.
     """
     s = database.statistics
     arrays = {**network.arrays(), "Xmean": s.x_mean, "Xstd": s.x_std, "Ymean": s.y_mean, "Ystd": s.y_std}
@@ -37,7 +35,7 @@ def write_weights(
 
 
 def meta(network: FinishedNetwork, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
-    """What the columns mean and where the network comes from, as JSON; the joints keep their order."""
+    """The file's meta as JSON: meaning of the columns and origin of the network."""
     rig = Skeleton.from_dict(database.skeleton)
     channels = [channel(name) for name, _ in database.layout.channels]
     return json.dumps(
@@ -54,4 +52,4 @@ def meta(network: FinishedNetwork, database: Database, configuration: str, facts
             **network.about,
             **facts,
         }
-    )  # not sorted: the order of the skeleton's joints is that of the columns
+    )  # keys not sorted: the order of the skeleton's joints is that of the columns
