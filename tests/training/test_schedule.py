@@ -33,7 +33,8 @@ def test_a_cosine_falls_from_one_to_nothing() -> None:
 
 def test_a_constant_rate_rises_and_stays() -> None:
     recipe = Training(warm_up=2.0, passes=10)
-    assert [learning_rate_share(recipe, passes) for passes in (0, 0.5, 1, 2, 5, 10)] == [0, 0.25, 0.5, 1, 1, 1]
+    shares = [learning_rate_share(recipe, passes) for passes in (0, 0.5, 1, 2, 5, 10)]
+    assert shares == [0, 0.25, 0.5, 1, 1, 1]
 
 
 def test_each_batch_has_the_rate_of_its_place(

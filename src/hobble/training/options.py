@@ -61,9 +61,7 @@ class Recipe(Section):
     @model_validator(mode="after")
     def _can_go_on(self) -> Recipe:
         if self.continues and self.schedule != "constant":
-            raise ValueError(
-                "`continues` needs `schedule: constant`; another schedule ends at a rate of 0"
-            )
+            raise ValueError("`continues` needs `schedule: constant`; another schedule ends at a rate of 0")
         if self.stretches and self.stretches > self.batch:
             raise ValueError(f"`stretches` ({self.stretches}) is above `batch` ({self.batch})")
         return self

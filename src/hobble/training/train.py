@@ -40,13 +40,14 @@ def train(
 ) -> State:
     """Train to `training.passes` passes over the database's training clips; returns where that ends.
 
-    network, training: those sections of a configuration. checkpoints: a folder in which the run keeps its
-    state, by the hash of all that determines it; a run that finds its own there goes on from it. start: a
-    checkpoint to begin from where there is none yet; a run from another start is another run. processes: who
-    trains together, each calling this; the first reads and writes checkpoints and keeps the history. The
-    result depends on the arguments and the number of threads, never on interruptions. Raises HobbleError
-    where an error is no finite number, naming the batch (the last checkpoint stays), where there are fewer
-    samples than sections, and where `keep` or `patience` ask for a held-out error that there is not.
+    network, training: these sections of a configuration. checkpoints: a folder with one subfolder for each
+    run, named by the hash of everything that determines it; a run resumes from its own checkpoint there.
+    start: a checkpoint to start from if the run has none of its own; it is part of the hash. processes: those
+    that train together, each of which calls this; the first reads and writes checkpoints and the history.
+
+    The result depends on the arguments and the number of threads, never on interruptions. Raises HobbleError
+    if an error is not finite (the message names the batch, and the last checkpoint stays), if there are fewer
+    samples than sections, and if `keep` or `patience` need a held-out error but no clip is held out.
     """
     use_threads(threads)
     if (training.patience or training.keep == "best") and not database.rows(SPLIT):
