@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.channels.limits import LAME, TOP, UNLIMITED, USUAL, Limits, Pace
+from hobble.channels.limits import CANNOT_HURRY, TOP, UNLIMITED, USUAL, Limits, Pace
 
 WALK, JOG, GAITS = 1, 2, 6
 LIMITS = Limits(np.array([0.0, 5.0, 10.0]), np.array([[[4.0, 3.0, 1.0], [4.0, 4.0, 2.0]]]))
@@ -58,7 +58,7 @@ def test_a_version_is_set_beside_its_own_source() -> None:
         [speeds, np.full(400, 1.0), np.full(80, 1.0)]
     )  # 80 of the hurt version do not hurt
     (top, usual), share = np.percentile(healthy, [TOP, USUAL]), 1 - 0.05 * limits.levels
-    slowed = usual * share + (top - usual) * np.maximum(share - LAME, 0.0) / (1 - LAME)
+    slowed = usual * share + (top - usual) * np.maximum(share - CANNOT_HURRY, 0.0) / (1 - CANNOT_HURRY)
     np.testing.assert_allclose(limits.speeds[WALK, 0], slowed, atol=0.02)
     np.testing.assert_allclose(limits.speeds[WALK, 1], top)  # never hurt: as fast as the healthy
     # A gait in which nothing healthy goes is not limited; one that was never hurt keeps the same share.

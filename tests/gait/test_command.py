@@ -25,7 +25,7 @@ def walker(holden31) -> Callable[[float], Clip]:
 
     def make(speed: float) -> Clip:
         segments = [Segment(WALK, speed, seconds=12.0)]
-        return walk(f"at-{speed:g}", holden31, segments, 600, None, "flat", 60.0, 1).clip
+        return walk(f"at-{speed:g}", holden31, segments, 600, "flat", 60.0, 1).clip
 
     return make
 

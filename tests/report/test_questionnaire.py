@@ -31,7 +31,7 @@ def made(
     """Four of the films, small and short."""
     folder = tmp_path_factory.mktemp("questionnaire")
     with pytest.MonkeyPatch.context() as patch:
-        for name, seconds in (("WALKED_IN", 0.1), ("HEALTHY", 0.1), ("HURT", 0.3)):
+        for name, seconds in (("WARM_UP", 0.1), ("HEALTHY", 0.1), ("HURT", 0.3)):
             patch.setattr(films, name, seconds)
         return folder, write_questionnaire(network, folder, examples.RUNTIME, "example", SHORT, size=48)
 
@@ -127,7 +127,7 @@ def test_films_in_which_nothing_can_be_seen_are_told() -> None:
     ]
     assert doubts({"films": rows[:1]}) == []
     same, never = doubts({"films": rows})
-    assert same.startswith("film 2: nothing hurts that can be seen")
+    assert same.startswith("film 2: nobody can see the injury")
     assert never == "Never hurt in training: A-B."
 
 
@@ -149,7 +149,7 @@ def test_a_network_that_is_not_told_what_hurts_says_which_is(
     examples: ModuleType, holden31: Skeleton, tmp_path: Path
 ) -> None:
     examples.weights(tmp_path / "weights.npz", holden31, links=False)
-    with pytest.raises(HobbleError, match="not told what hurts"):
+    with pytest.raises(HobbleError, match="no injury channel"):
         write_questionnaire(
             load_network(tmp_path / "weights.npz"), tmp_path / "out", examples.RUNTIME, "plain"
         )

@@ -233,7 +233,7 @@ def test_confusions_are_shares_of_what_hurts_and_name_how_often_it_was_right() -
     found = {"applies": True, "classes": ["knee", "back"], "chance": 0.5, "people": 0.82}
     chart = recognition_chart({**found, "generated": part, "captured": {}})
     assert chart is not None
-    assert list(chart.options) == ["generated walks, window by window: 83 % right"]
+    assert list(chart.options) == ["generated walks, by window: 83 % right"]
     (trace,) = next(iter(chart.options.values()))
     assert trace["z"] == [[0.75, 0.25], [None, 1.0]]
     assert "50 %" in chart.caption

@@ -1,4 +1,4 @@
-"""What the body is told beside where to go: each channel in a folder of its own, named in the list below."""
+"""Channels: inputs of the network besides motion and ground. Each has a folder here, listed in NAMES."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from hobble.channels.channel import Channel, Source
 
 __all__ = ["NAMES", "Channel", "Source", "channel", "every", "formerly", "modules_of", "shown_modules"]
 
-# Every channel that there is: the folder NAME beside this file, whose package has the channel as CHANNEL.
+# All channels. Each is a package beside this file, and its CHANNEL is the channel.
 NAMES = ("injury", "mood", "diagnosis")
 
 
 @functools.cache
 def channel(name: str) -> Channel:
-    """The channel `name`. Raises KeyError, naming those that there are, where there is none.
+    """The channel `name`. Raises KeyError with all names if there is no such channel.
 
-    A channel is imported when it is asked for, so that a job depends on the code of its own channels alone.
+    The module is imported here and not at the top, so that a job depends only on the code of its own
+    channels.
     """
     if name not in NAMES:
         raise KeyError(f"no channel {name!r}: there are {', '.join(NAMES)}")
@@ -35,20 +36,20 @@ def every() -> tuple[Channel, ...]:
 
 
 def modules_of(names: Iterable[str]) -> list[str]:
-    """Full names of the modules of channels: what a job that is told their names depends on."""
+    """Full names of the modules of these channels. A job with the channels depends on them."""
     return [f"{__name__}.{name}" for name in names]
 
 
 def shown_modules() -> list[str]:
-    """Full names of the modules in which channels say how they are shown."""
+    """Full names of the modules that say how channels are shown."""
     found = (f"{__name__}.{name}.shown" for name in NAMES)
     return [module for module in found if importlib.util.find_spec(module) is not None]
 
 
 def formerly(key: str) -> str:
-    """The channel that files written before there were channels mean by `key`.
+    """The channel that `key` stands for in files from before channels had names.
 
-    Raises ValueError where it is no such key.
+    Raises ValueError for an unknown key.
     """
     for one in every():
         if key in one.former:

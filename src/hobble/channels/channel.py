@@ -1,4 +1,4 @@
-"""What a channel says of itself. The body is told values of 0 or more, 0 where there is nothing to tell."""
+"""The base class of channels. A channel's values are 0 or more; 0 means no effect."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-# What brings numpy is imported by the methods that compute: the list of clips is read without it.
+# Methods import numpy themselves, because the list of clips is read without it.
 if TYPE_CHECKING:
     from hobble.core.clip import Clip
     from hobble.core.quat import Array
@@ -17,20 +17,20 @@ if TYPE_CHECKING:
 
 
 class Rig(Protocol):
-    """What the columns of a channel may depend on: the skeleton of a clip, or the file that describes it."""
+    """What the columns of a channel may depend on: a clip's skeleton, or a skeleton file."""
 
     @property
     def links(self) -> Sequence[tuple[str, str]]:
-        """Pairs of joints (parent, child) that can be told something."""
+        """Pairs of joints (parent, child) that can have a value."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where the values of one clip come from, as a data set has it; plain data, but for the files.
+    """Where the values of one clip come from.
 
-    clip: its name (a mirror's original). entry: its entry in the data set, and `value` what stands there for
-    this channel. options: the data set's section `channels.<name>`. files: those beside the clip and the
-    tables of the data set, as far as they are there.
+    clip: its name (for a mirrored clip, the original's). entry: its entry in the data set. value: the part of
+    the entry for this channel. options: the data set's section `channels.<name>`. files: the existing files
+    beside the clip, and the tables that the data set names.
     """
 
     clip: str
@@ -41,16 +41,16 @@ class Source:
 
 
 class Channel(ABC):
-    """One thing that the body is told. A subclass in channels/<name>/ says what differs from this.
+    """An input of the network. Each channel is a subclass in channels/<name>/.
 
-    name: of the folder, in configurations, and the keyword of `next_pose`. title, value: for people: the
-    channel and one of its values. highest: values are 0 to this. rate: most that a value may change in a
-    second at run time, unless the configuration says otherwise. suffix: of a file beside a clip that holds
-    values, or None. former: keys that older files have for this channel. Options: the data set's section
-    `channels.<name>`; a channel that has one is known of a data set that gives it, any other of every data
-    set. slows: whether values above 0 make the body slower; then its speed limits are learnt from the rows
-    (see `hobble.channels.limits`). targets: folders of results/<configuration>/ that only a configuration
-    with this channel can have.
+    name: name of the folder, in configurations, and the keyword of `next_pose`. title, value: words for the
+    channel and for one of its values on the page. highest: the values are 0 to this. rate: how much a value
+    may change in a second at run time, unless the configuration says otherwise. suffix: of a file beside a
+    clip that holds values, or None. former: keys of this channel in older files. Options: model of the data
+    set's section `channels.<name>`. If it is None, every data set has the channel; else only those with the
+    section. slows: whether values above 0 make the body slower. Then its speed limits are learnt from the
+    rows (see `hobble.channels.limits`). targets: folders of results/<configuration>/ that only a
+    configuration with this channel can have.
     """
 
     name: str
@@ -66,47 +66,50 @@ class Channel(ABC):
 
     @abstractmethod
     def columns(self, rig: Rig) -> tuple[str, ...]:
-        """The labels of its columns for a figure, each once."""
+        """Labels of the columns for a skeleton. No label appears twice."""
 
     @abstractmethod
     def is_neutral(self, source: Source) -> bool:
-        """Whether nothing is told in any frame, by what the data set says: a clip for every network.
+        """Whether the values are 0 in all frames. Every network may train on such a clip.
 
-        Raises InputError where the data set cannot be understood.
+        Raises InputError if the source cannot be read.
         """
 
     @abstractmethod
     def read(self, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
-        """Values (F, C) float32 of a clip, a column for each label, and warnings.
+        """Values (F, C) float32 of a clip, one column for each label, and warnings.
 
-        motion: the report of the motion stage. Raises InputError where the source cannot be understood.
+        motion: the report of the motion stage. Raises InputError if the source cannot be read.
         """
 
-    def check(self, source: Source, rig: Rig) -> None:  # noqa: B027 - most have nothing to check
-        """Raise InputError for what a clip's entry or the options say that cannot be, before any job runs."""
+    def check(self, source: Source, rig: Rig) -> None:  # noqa: B027 - most channels check nothing
+        """Raise InputError if the clip's entry or the options are wrong. Called before any job runs."""
 
     def tables(self, options: Mapping[str, Any]) -> Sequence[str]:
-        """Files inside the mocap folder that the options name."""
+        """Files in the mocap folder that the options name."""
         return ()
 
     def mirror(self, values: Array, rig: Any) -> Array:
-        """Values (F, C) of the mirrored clip; the same, unless a channel tells left from right."""
+        """Values (F, C) of the mirrored clip. By default they stay the same."""
         return values
 
     def deviation(self, std: Array) -> Array:
-        """What columns of these standard deviations (C,) are divided by, for the network's input.
+        """What the network's input columns are divided by. std: their standard deviations (C,).
 
-        All by one: the length of the vector of deviations, never less than a tenth of `highest`. Taking each
-        column's own would turn what is told in 1 frame of 1,000 into an input of 30 deviations. A column that
-        never varies is silenced: the network cannot know what it does.
+        All columns get the same divisor: the length of the vector `std`, but at least a tenth of `highest`.
+        With its own deviation, a column that is above 0 in 1 frame of 1,000 would become an input of 30
+        deviations. A column that never varies gets an infinite divisor in effect, because the network cannot
+        know its meaning.
         """
         import numpy as np
 
         whole = float(np.sqrt(np.sum(std**2)))
-        return np.where(std > LEAST, max(self.highest / 10, whole), SILENT)
+        return np.where(std > CONSTANT, max(self.highest / 10, whole), SILENT)
 
-    def told(self, values: Array, labels: Sequence[str], fps: float) -> dict[str, Any]:
-        """For the clip's report: label -> `seconds` above 0, `highest` value and `spells`, where any is."""
+    def summary(self, values: Array, labels: Sequence[str], fps: float) -> dict[str, Any]:
+        """For the clip's report: label -> `seconds` above 0, `highest` value and `spells`. Labels without
+        values are left out.
+        """
         import numpy as np
 
         return {
@@ -120,15 +123,17 @@ class Channel(ABC):
         }
 
 
-SILENT = 1e10  # the deviation of an input that is to have no effect: it standardises to nothing
-JUMP = 0.05  # of a channel's highest value, from one frame to the next
-LEAST = 1e-6  # below this a column does not vary at all
+SILENT = 1e10  # divisor of an input that must have no effect
+JUMP = 0.05  # a larger change between two frames starts a new spell; share of the highest value
+CONSTANT = 1e-6  # a column with a smaller deviation does not vary
 
 
 def spells(column: Array, fps: float, highest: float) -> list[list[float]]:
-    """[from, to, highest value] in seconds of each stretch above 0; a jump of the value begins another.
+    """[from, to, highest value] of each stretch above 0, in seconds.
 
-    A value that rises or falls over many frames makes no jump.
+    A jump of the value starts a new stretch.
+
+    A value that rises or falls over many frames does not jump.
     """
     import numpy as np
 

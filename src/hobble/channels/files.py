@@ -1,4 +1,4 @@
-"""The values of one channel in each frame of a clip: made from their source or their mirror, and kept."""
+"""Makes and keeps the values of one channel in each frame of a clip."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from hobble.core.quat import Array
 def clip_values(name: str, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
     """Values (F, C) float32 of channel `name` for a clip, and warnings.
 
-    motion: the report of the motion stage. Raises InputError where they cannot be read, are no finite numbers
-    or leave the channel's range.
+    motion: the report of the motion stage. Raises InputError if the values cannot be read, are not finite or
+    are outside the channel's range.
     """
     one = channel(name)
     values, warnings = one.read(clip, source, motion)
     labels = one.columns(clip.skeleton)
     if values.shape != (len(clip), len(labels)):
         expected = (len(clip), len(labels))
-        raise InputError(clip.name, f"{one.title.lower()}: {values.shape} values where {expected} belong")
+        raise InputError(clip.name, f"{one.title.lower()}: {values.shape} values instead of {expected}")
     wrong = ~((values >= 0) & (values <= one.highest))
     if wrong.any():
         frame, column = (int(i) for i in np.argwhere(wrong)[0])
@@ -44,15 +44,15 @@ def load_values(path: str | Path) -> tuple[Array, tuple[str, ...]]:
     """Values (F, C) and the labels of their columns."""
     data = load_npz(path)
     if set(data) != {"values", "labels"} or data["values"].shape[1:] != data["labels"].shape:
-        raise InputError(path, "holds no channel's values", fix="Delete it; the next run makes it again.")
+        raise InputError(path, "is no file of channel values", fix="Delete it; the next run makes it again.")
     return data["values"], tuple(str(label) for label in data["labels"])
 
 
 def write_report(
     path: str | Path, name: str, clip: Clip, values: Array, labels: Sequence[str], warnings: Sequence[str]
 ) -> None:
-    """Write the JSON beside the values: what was told, for how long, how much at most, and when."""
+    """Write the JSON beside the values: for each label the time above 0, the highest value, and when."""
     one = channel(name)
-    told = one.told(values, labels, clip.fps)
+    told = one.summary(values, labels, clip.fps)
     report = {"clip": clip.name, "channel": name, "title": one.title, "told": told}
     write_json(path, {**report, "highest": one.highest, "warnings": list(warnings)})

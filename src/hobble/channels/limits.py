@@ -1,8 +1,8 @@
-"""How fast a body goes that is told something: learnt from the rows of a database, saved with the network.
+"""Speed limits of a hurt or sad body, learnt from the rows of a database and saved with the network.
 
-A hurt body cannot do what the healthy one can. What it does stands in the rows: the speed of a cycle beside
-that of the same cycle of the healthy clip of which it is a version, or beside the usual speed of the gait
-where it has no healthy counterpart, as captured injuries have none.
+A hurt body cannot go as fast as a healthy one. The rows show how fast it goes: the speed of a cycle of a hurt
+version relative to the same cycle of the healthy clip. A captured injury has no healthy counterpart, so it is
+compared with the usual speed of its gait.
 """
 
 from __future__ import annotations
@@ -15,33 +15,37 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-UNLIMITED = 1e4  # cm a frame: of a gait in which no healthy clip goes ahead
-LEVELS = 5  # values for which a speed is kept, from 0 to the highest; between them it is interpolated
-TOP = 95  # percentile of the speeds of healthy cycles in a gait: that of a body that is told nothing
-USUAL = 65  # percentile of those, of which a hurt body keeps its share; clips start and stop, so no median
-LAME = (
-    0.85  # who keeps this share of the usual speed, or less, cannot hurry; who keeps all is as fast as ever
-)
-AHEAD = 0.9  # share of its speed that a cycle makes forward, of those that say how fast a gait is
-STEADY = 0.35  # of the highest value: a cycle in which a value changes by more says nothing of either
-FAINT = 0.05  # of the highest value: less, as a mean over a cycle, is nothing told
-RESOLUTE = 0.1  # cm a frame; a slower cycle of a healthy body is no measure of anything
-FIRM = 2.0  # cycles that the expectation counts as much as, where cycles are few
-SLOWEST = 0.1  # share of the healthy speed that everybody keeps
+UNLIMITED = 1e4  # cm a frame: limit of a gait in which no healthy clip goes forward
+LEVELS = 5  # number of values (0 to the highest) with a speed; others are interpolated
+TOP = 95  # percentile of the speeds of healthy cycles in a gait: the limit of a healthy body
+# Percentile of the same speeds that counts as usual. The median is too low, because clips start and stop.
+USUAL = 65
+# A body with this share of the usual speed, or less, cannot hurry. With all of it, it can go as fast as a
+# healthy one.
+CANNOT_HURRY = 0.85
+AHEAD = 0.9  # a cycle counts if at least this share of its speed is forward
+STEADY = 0.35  # of the highest value: a cycle in which a value changes by more is left out
+FAINT = 0.05  # of the highest value: a smaller mean over a cycle counts as 0
+MOVING = 0.1  # cm a frame: slower cycles of a healthy body are left out
+EXPECTED_WEIGHT = 2.0  # the expected curve counts as much as this many cycles
+SLOWEST = 0.1  # least share of the healthy speed
 
 
 @dataclass(frozen=True)
 class Limits:
-    """levels: (K,) values from 0 to a channel's highest; speeds: (G, L, K) cm a frame at those, for each gait
-    and label: never rising with the value."""
+    """Speed limits of a channel.
+
+    levels: (K,) values from 0 to the channel's highest. speeds: (G, L, K) cm a frame at these values, for
+    each gait and label; they never rise with the value.
+    """
 
     levels: Array = field(repr=False)
     speeds: Array = field(repr=False)
 
     def allowed(self, values: Array) -> Array:
-        """(C, G) cm a frame at most in each gait, for values (C, L): the least over what is above 0.
+        """(C, G) highest speed in cm a frame in each gait, for values (C, L).
 
-        inf where nothing is told. Several values are as slow as the worst of them.
+        With several values above 0 it is the lowest of their limits; with none it is inf.
         """
         at = np.clip(np.searchsorted(self.levels, values, side="right") - 1, 0, len(self.levels) - 2)
         low, high = self.levels[at], self.levels[at + 1]
@@ -57,7 +61,7 @@ class Limits:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], gaits: int, labels: int, highest: float) -> Limits:
-        """The inverse of `to_dict`. Raises ValueError for what is no table of so many gaits and labels."""
+        """The inverse of `to_dict`. Raises ValueError for a table of other numbers of gaits and labels."""
         try:
             levels, speeds = (np.array(data[key], float) for key in ("levels", "speeds"))
         except (KeyError, TypeError, ValueError, OverflowError):
@@ -89,8 +93,8 @@ class _Cycles:
 class Pace:
     """Gathers the cycles of clips, one clip at a time, and learns the limits of a channel from them.
 
-    highest: of the channel's values. across: (L,) for each label its counterpart on the body's other side:
-    both sides are taken to be alike.
+    highest: of the channel's values. across: (L,) for each label the label on the other side of the body.
+    Both sides get the same limits.
     """
 
     def __init__(self, highest: float, across: np.ndarray, gaits: int) -> None:
@@ -107,8 +111,11 @@ class Pace:
         cycle: np.ndarray,
         source: str | None = None,
     ) -> None:
-        """A clip's rows. gait: (R, G) shares; velocity: (R, 2) of the root, seen from itself, cm a frame;
-        values: (R, L); cycle: (R,) their numbers; source: the healthy clip that it is a version of."""
+        """Add a clip's rows.
+
+        gait: (R, G) shares. velocity: (R, 2) of the root in its own frame, cm a frame. values: (R, L). cycle:
+        (R,) numbers of the cycles. source: the healthy clip, if this is a hurt version of it.
+        """
         numbers, of_row, count = np.unique(cycle, return_inverse=True, return_counts=True)
 
         def mean(rows: Array) -> Array:
@@ -132,19 +139,19 @@ class Pace:
         self._clips[clip] = (source, kept)
 
     def to_arrays(self, clip: str) -> dict[str, np.ndarray]:
-        """The cycles of a clip that was added, for a file; nothing where it was not."""
+        """The cycles of an added clip, for a file. Empty if the clip was not added."""
         if clip not in self._clips:
             return {}
         source, cycles = self._clips[clip]
         return {"source": np.array(source or ""), **vars(cycles)}
 
     def add_arrays(self, clip: str, arrays: Mapping[str, np.ndarray]) -> None:
-        """Add a clip by what `to_arrays` gave of it."""
+        """Add a clip from the arrays of `to_arrays`."""
         named = {name: values for name, values in arrays.items() if name != "source"}
         self._clips[clip] = (str(arrays["source"]) or None, _Cycles(**named))
 
     def learn(self) -> Limits | None:
-        """The limits; None where nothing is told in any cycle."""
+        """The limits, or None if no cycle has a value above 0."""
         levels = np.linspace(0, self.highest, LEVELS)
         healthy = self._healthy()
         top = np.full(self.gaits, UNLIMITED)
@@ -166,24 +173,20 @@ class Pace:
             expected = _fitted(levels, s, r, np.maximum(1 - fall * levels, SLOWEST))
             for k in np.flatnonzero(top < UNLIMITED):
                 own = _fitted(levels, s[gaits == k], r[gaits == k], expected)
-                hurries = np.maximum(own - LAME, 0.0) / (1 - LAME)
+                hurries = np.maximum(own - CANNOT_HURRY, 0.0) / (1 - CANNOT_HURRY)
                 speeds[k, label] = usual[k] * own + (top[k] - usual[k]) * hurries
         return Limits(levels, speeds)
 
     def _healthy(self) -> Array:
-        """(n, 2) gait and speed of the cycles in which nothing is told and the body goes ahead."""
+        """(n, 2) gait and speed of the cycles in which all values are 0 and the body goes forward."""
         found = [np.zeros((0, 2))]
         for _, cycles in self._clips.values():
-            on = (
-                ~cycles.values.any(axis=1)
-                & (cycles.ahead >= AHEAD * cycles.speed)
-                & (cycles.speed > RESOLUTE)
-            )
+            on = ~cycles.values.any(axis=1) & (cycles.ahead >= AHEAD * cycles.speed) & (cycles.speed > MOVING)
             found.append(np.stack([cycles.gait[on], cycles.speed[on]], axis=1))
         return np.concatenate(found)
 
     def _shares(self, usual: Array) -> tuple[np.ndarray, Array, Array]:
-        """Of cycles in which something is told: gait (n,), share of the healthy speed (n,), values (n, L)."""
+        """Gait (n,), share of the healthy speed (n,) and values (n, L) of the cycles with a value above 0."""
         parts = []
         for source, cycles in self._clips.values():
             told = cycles.values.any(axis=1)
@@ -191,10 +194,10 @@ class Pace:
                 own = self._clips[source][1]
                 speed_of = dict(zip(own.number.tolist(), own.speed.tolist(), strict=True))
                 beside = np.array([speed_of.get(n, 0.0) for n in cycles.number.tolist()])
-            else:  # captured: only what goes ahead can be set beside the usual speed
+            else:  # captured: only forward cycles can be compared with the usual speed
                 ahead = cycles.ahead >= AHEAD * cycles.speed
                 beside = np.where(ahead, usual[cycles.gait], 0.0)
-            on = told & (beside > RESOLUTE)
+            on = told & (beside > MOVING)
             share = np.clip(cycles.speed[on] / beside[on], SLOWEST, 1.0)
             parts.append((cycles.gait[on], share, cycles.values[on]))
         if not parts:
@@ -204,9 +207,10 @@ class Pace:
 
 
 def _of_label(label: int, values: Array, across: np.ndarray) -> Sequence[tuple[np.ndarray, Array]]:
-    """Which cycles tell of a label, and its values there: of either side, those that tell nothing else.
+    """Which cycles count for a label, and its values in them.
 
-    Where there are none, those in which nothing else is told more of.
+    Cycles of both sides count in which no other label has a value. If there are none, those in which no other
+    label has a higher value.
     """
     sides = sorted({label, int(across[label])})
     alone = [np.flatnonzero((values[:, k] > 0) & ((values > 0).sum(axis=1) == 1)) for k in sides]
@@ -217,9 +221,9 @@ def _of_label(label: int, values: Array, across: np.ndarray) -> Sequence[tuple[n
 
 
 def _fitted(levels: Array, values: Array, shares: Array, expected: Array) -> Array:
-    """(K,) the shares at `levels` whose interpolation is nearest to the shares (n,) at values (n,).
+    """(K,) shares at `levels` whose interpolation is nearest to the shares (n,) at values (n,).
 
-    1 at 0, never rising; `expected` (K,) counts as FIRM cycles at each level.
+    The first is 1 and they never rise. `expected` (K,) counts as EXPECTED_WEIGHT cycles at each level.
     """
     at = np.clip(np.searchsorted(levels, values, side="right") - 1, 0, len(levels) - 2)
     far = (values - levels[at]) / (levels[at + 1] - levels[at])
@@ -227,7 +231,7 @@ def _fitted(levels: Array, values: Array, shares: Array, expected: Array) -> Arr
     rows = np.arange(len(values))
     basis[rows, at], basis[rows, at + 1] = 1 - far, far
     inner = basis[:, 1:]
-    left = inner.T @ inner + FIRM * np.eye(len(levels) - 1)
-    right = inner.T @ (shares - basis[:, 0]) + FIRM * expected[1:]
+    left = inner.T @ inner + EXPECTED_WEIGHT * np.eye(len(levels) - 1)
+    right = inner.T @ (shares - basis[:, 0]) + EXPECTED_WEIGHT * expected[1:]
     found = np.concatenate([[1.0], np.linalg.solve(left, right)])
     return np.minimum.accumulate(np.clip(found, SLOWEST, 1.0))

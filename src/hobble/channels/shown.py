@@ -1,7 +1,7 @@
-"""How channels are shown of one figure.
+"""How channels are shown for a skeleton: words, sliders, presets, sweeps and loops.
 
-What differs from the usual lies in channels/<name>/shown.py, found by name: its WORDS, `shown`, `sweeps` and
-`loops`, each as below. Nothing that trains or measures depends on it.
+A channel may have a module channels/<name>/shown.py with its own WORDS, `shown`, `sweeps` and `loops`. The
+functions here find them by name and have defaults. Neither training nor measurements depend on them.
 """
 
 from __future__ import annotations
@@ -19,25 +19,28 @@ from hobble.core.skeleton import Skeleton
 
 @dataclass(frozen=True)
 class Words:
-    """rest: the button that tells nothing. step: of a slider. key: what stands before its values in
-    the address of
-    a page; by default its name. grows: a sentence about a column that is told more and more. never: of
-    a column
-    that was told nothing in training."""
+    """Words of a channel on the page.
+
+    rest: label of the button that sets all values to 0. step: of a slider. key: name of its values in the
+    address of a page, by default the channel's name. grows: a sentence about a column that rises. never: a
+    sentence about a column that was 0 in all of training.
+    """
 
     rest: str = "Neutral"
     step: float = 0.05
     key: str | None = None
     grows: str = "Walks {} more and more"
-    never: str = "never told in training, so telling it would change nothing"
+    never: str = "always 0 in training, so it has no effect"
 
 
 @dataclass(frozen=True)
 class Shown:
-    """spoken: a name for each column. sliders: their labels -> the column, of those that stand there from the
-    beginning. presets: the button of each -> column -> value. regions: for each bone of the body the
-    columns, by
-    index, that lie in the part which it moves; empty for a channel that lies nowhere, and colours nothing."""
+    """How a channel is shown.
+
+    spoken: a name for each column. sliders: label -> column, of the sliders that are there at the start.
+    presets: button -> column -> value. regions: for each bone the indices of the columns whose body part it
+    moves; empty for a channel that has no place on the body.
+    """
 
     spoken: Sequence[str]
     sliders: Mapping[str, str]
@@ -47,7 +50,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Loop:
-    """A walk to be looked at: what is `told`, column -> value, and whether it is `coloured` in the body."""
+    """A walk to look at. told: column -> value. coloured: whether the values colour the body."""
 
     name: str
     told: Mapping[str, float]
@@ -61,7 +64,7 @@ def words(name: str) -> Words:
 
 
 def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]) -> Shown:
-    """How a channel is shown; by default with a slider for each column that was told in training."""
+    """How a channel is shown. By default there is a slider for each column that was above 0 in training."""
     if own := _own(name, "shown"):
         return own(skeleton, columns, trained)
     return Shown(tuple(columns), {column: column for column in columns if column in trained})
@@ -70,16 +73,19 @@ def shown(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collec
 def sweeps(
     name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]
 ) -> Mapping[str, str]:
-    """Walks along which one column is told from 0 to the highest: name -> column; by default all
-    trained ones."""
+    """Walks in which one column rises from 0 to the highest: name -> column. By default one for each trained
+    column.
+    """
     if own := _own(name, "sweeps"):
         return own(skeleton, columns, trained)
     return {column.replace(" ", "_"): column for column in columns if column in trained}
 
 
 def loops(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collection[str]) -> list[Loop]:
-    """Walks to be looked at, the first of which is told nothing; by default each trained column at its
-    highest."""
+    """Walks to look at. All values are 0 in the first.
+
+    By default there is one for each trained column, at its highest value.
+    """
     if own := _own(name, "loops"):
         return own(skeleton, columns, trained)
     told, highest = [column for column in columns if column in trained], channel(name).highest
@@ -87,9 +93,9 @@ def loops(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collec
 
 
 def speaker(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
-    """A function from a column's label to what a reader calls it; what is no column stays as it is.
+    """A function from a column's label to the name that readers see. Other texts stay the same.
 
-    skeleton: as a network's file holds it, empty where that is not known.
+    skeleton: as in a network's file; empty if unknown.
     """
     if not skeleton:
         return str
@@ -102,7 +108,7 @@ def speaker(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
 
 
 def module(name: str) -> ModuleType | None:
-    """What a channel says of how it is shown; None where it says nothing."""
+    """The channel's own module `shown`, or None."""
     full = f"hobble.channels.{name}.shown"
     return importlib.import_module(full) if importlib.util.find_spec(full) is not None else None
 

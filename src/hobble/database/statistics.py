@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
-from hobble.channels.channel import LEAST, SILENT
+from hobble.channels.channel import CONSTANT, SILENT
 from hobble.core.quat import Array
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.compose import TERRAIN, body_layout
@@ -145,7 +145,7 @@ def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
     out = np.array(std, np.float64)
     for group in groups:
         mean = float(np.mean(std[group]))
-        out[group] = mean if mean > LEAST else constant
+        out[group] = mean if mean > CONSTANT else constant
     return out
 
 

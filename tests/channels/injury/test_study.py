@@ -147,7 +147,7 @@ def test_the_command_writes_fourteen_tables(folder: Path, capsys: pytest.Capture
         (lambda d: d | {"answers": [d["answers"][0] | {"film": 14}]}, "there is no film 14"),
         (lambda d: d | {"answers": ["\x1b[31m"]}, r"answer 1 is no answer: \?\[31m"),
         (lambda d: d | {"answers": 3}, "has no list `answers`"),
-        (lambda d: [d], "holds no keys and values"),
+        (lambda d: [d], "is not an object of keys"),
     ],
 )
 def test_a_file_that_cannot_be_counted_says_where_it_is_wrong(

@@ -43,7 +43,7 @@ def test_a_clip_is_in_the_same_mood_all_through(clip: Clip, name: str, value: ob
 def test_a_name_that_no_pattern_fits_is_told(clip: Clip) -> None:
     values, warnings = clip_values("mood", clip, source("jump"), {})
     assert not values.any()
-    assert warnings == ["no pattern of channels.mood fits jump; it is in no mood."]
+    assert warnings == ["no pattern of channels.mood fits jump; it counts as neutral."]
 
 
 @pytest.mark.parametrize("value", ["sad", {"glad": 1}, {"sad": 2}, {"sad": "much"}])

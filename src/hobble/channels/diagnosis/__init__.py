@@ -1,4 +1,4 @@
-"""What a patient has, by a table of the recordings: the whole body walks by it, wherever it sits."""
+"""The diagnosis channel. A patient's diagnosis comes from a table of the recordings."""
 
 from hobble.channels.diagnosis.channel import CHANNEL
 

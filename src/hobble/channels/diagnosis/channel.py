@@ -1,4 +1,4 @@
-"""The channel: three groups of diagnoses from 0 to 1; who has none of them is healthy."""
+"""The diagnosis channel: three groups of diagnoses, 0 or 1. All are 0 for healthy people."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ if TYPE_CHECKING:
     from hobble.core.clip import Clip
     from hobble.core.quat import Array
 
-# The groups that Rueangsirarak et al. (2018) tell apart by gait.
+# The groups of Rueangsirarak et al. (2018), who distinguish them by gait.
 DIAGNOSES = ("joint problem", "muscle weakness", "neurological defect")
 HEALTHY = "healthy"
-COLUMNS = ("file", "diagnosis")  # of the table; others are not read
+COLUMNS = ("file", "diagnosis")  # columns that the table needs; others are ignored
 
 
 class Table(Section):
-    """Who has what."""
+    """The section `channels.diagnosis` of a data set."""
 
     table: Inside = Field(
-        description="a CSV in the mocap folder, with `file` (a BVH file) and `diagnosis` of each recording"
+        description="CSV in the mocap folder with the columns `file` (a BVH file) and `diagnosis`"
     )
 
 
 class Diagnosis(Channel):
-    """What the walker of a clip has, all through it."""
+    """The diagnosis of a clip's person, the same in all frames."""
 
     name = "diagnosis"
     title = "Diagnosis"
@@ -50,31 +50,31 @@ class Diagnosis(Channel):
         return DIAGNOSES
 
     def tables(self, options: Mapping[str, Any]) -> tuple[str, ...]:
-        """The one that the data set names."""
+        """The table that the data set names."""
         return (options["table"],) if options else ()
 
     def is_neutral(self, source: Source) -> bool:
-        """Whether the clip's walker is healthy, or nothing says what they have."""
+        """Whether the person is healthy or the diagnosis is unknown."""
         return _of(source) in (HEALTHY, None)
 
     def check(self, source: Source, rig: Rig) -> None:
-        """The entry of a clip is a diagnosis that there is."""
+        """Raise InputError if the clip's entry is not a known diagnosis."""
         if source.value is not None and source.value not in (*DIAGNOSES, HEALTHY):
             where = f"{source.clip}.channels.{self.name}"
             raise InputError(where, f"cannot be {source.value!r:.80}", fix=f"Write one of {_known()}.")
 
     def read(self, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
-        """1 for the walker's diagnosis in every frame; a warning where the table has no such clip."""
+        """1 for the person's diagnosis in every frame, and a warning if the table lacks the clip."""
         import numpy as np
 
         found = _of(source)
         row = [float(diagnosis == found) for diagnosis in DIAGNOSES]
-        warnings = [] if found else [f"{source.clip} is not in the table; its walker is taken to be healthy."]
+        warnings = [] if found else [f"{source.clip} is not in the table. The person is taken to be healthy."]
         return np.tile(np.array(row, np.float32), (len(clip), 1)), warnings
 
 
 def _of(source: Source) -> str | None:
-    """What the walker of a clip has, or HEALTHY; None where neither the entry nor the table says."""
+    """The diagnosis of a clip's person, or HEALTHY. None if neither the entry nor the table has it."""
     if source.value is not None:
         return str(source.value)
     found: str | None = None
@@ -87,14 +87,13 @@ def _of(source: Source) -> str | None:
 def read_table(path: str) -> dict[str, str]:
     """Clip -> diagnosis.
 
-    Raises InputError, naming the line, for a table without its columns, a diagnosis that there is not, or a
-    clip that is there twice with different ones.
+    Raises InputError with the line for a missing column, an unknown diagnosis, or a clip with two diagnoses.
     """
     reader = csv.DictReader(
         io.StringIO(read_bytes(path, MAX_TEXT_BYTES).decode("utf-8-sig", "replace"), newline="")
     )
     if missing := [name for name in COLUMNS if name not in (reader.fieldnames or ())]:
-        fix = f"Its first line has to name them: {','.join(COLUMNS)}."
+        fix = f"The first line must name them: {','.join(COLUMNS)}."
         raise InputError(path, f"has no column {' and no '.join(missing)}", line=1, fix=fix)
     out: dict[str, str] = {}
     for row in reader:

@@ -1,4 +1,4 @@
-"""What hurts, and how much: status files, and the severity of each link in each frame."""
+"""The injury channel: status files and the severity of each link in each frame."""
 
 from hobble.channels.injury.channel import CHANNEL
 

@@ -1,4 +1,6 @@
-"""Status files from a table: python -m hobble.channels.injury TABLE.csv FOLDER --skeleton SKELETON.yaml."""
+"""Writes status files from a table: python -m hobble.channels.injury TABLE.csv FOLDER --skeleton
+SKELETON.yaml.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,13 @@ from hobble.core.untrusted import read_yaml
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns the exit status."""
+    """Run the command. Returns the exit status."""
     parser = argparse.ArgumentParser(
         prog="python -m hobble.channels.injury", description="Status files from a table."
     )
     parser.add_argument("table", help="CSV with the columns clip, link, severity, from, to")
-    parser.add_argument("folder", help="where the clips' BVH files lie; the status files go beside them")
-    parser.add_argument("--skeleton", default="config/skeletons/holden31.yaml", help="names the links")
+    parser.add_argument("folder", help="folder of the clips' BVH files; the status files are written there")
+    parser.add_argument("--skeleton", default="config/skeletons/holden31.yaml", help="defines the links")
     options = parser.parse_args(arguments)
     try:
         for path in write_statuses(options.table, options.folder, _links(Path(options.skeleton))):

@@ -1,4 +1,4 @@
-"""The channel: severities from 0 to 10, one for each link of the skeleton."""
+"""The injury channel: a severity from 0 to 10 for each link of the skeleton."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ if TYPE_CHECKING:
     from hobble.core.clip import Clip
     from hobble.core.quat import Array
 
-NOTHING = re.compile(r"\s*0+(\.0*)?\s*")
+ZERO = re.compile(r"\s*0+(\.0*)?\s*")
 
 
 def hurts(text: str) -> bool:
-    """Whether a status (`A-B[4];`), or the text of a status file, has a severity other than 0."""
-    return any(NOTHING.fullmatch(severity) is None for severity in re.findall(r"\[([^\]]*)", text))
+    """Whether a status (`A-B[4];`) or a status file's text has a severity above 0."""
+    return any(ZERO.fullmatch(severity) is None for severity in re.findall(r"\[([^\]]*)", text))
 
 
 class Injury(Channel):
-    """What hurts: a status file beside the clip, or a status in its entry that holds for all its frames."""
+    """Severities from a status file beside the clip, or from a status in its entry, which holds for all
+    frames.
+    """
 
     name = "injury"
     title = "Injury"
@@ -45,9 +47,10 @@ class Injury(Channel):
         return not any(hurts(read_bytes(file, MAX_TEXT_BYTES).decode("latin-1")) for file in source.files)
 
     def check(self, source: Source, rig: Rig) -> None:
-        """The status of an entry has to follow the grammar of a status file.
+        """Raise InputError if the entry's status breaks the grammar of status files.
 
-        Where the skeleton names no links it only says that the clip is hurt, so that it is left out.
+        A skeleton without links has no columns. Then the status only marks the clip as hurt, so that it is
+        left out.
         """
         from hobble.channels.injury.status import parse_links
         from hobble.core.errors import InputError
@@ -56,7 +59,7 @@ class Injury(Channel):
             return
         where = f"{source.clip}.channels.{self.name}"
         if not isinstance(source.value, str):
-            raise InputError(where, "is no text", fix="Write Joint-Joint[severity];")
+            raise InputError(where, "is not a text", fix="Write Joint-Joint[severity];")
         if links := self.columns(rig):
             parse_links(source.value, links, where)
 
@@ -67,7 +70,7 @@ class Injury(Channel):
         return clip_severity(clip, next(iter(source.files), None), source.value, motion)
 
     def mirror(self, values: Array, rig: Any) -> Array:
-        """What hurt on the left hurts on the right."""
+        """Swap left and right."""
         from hobble.channels.injury.severity import mirror_severity
 
         return mirror_severity(values, rig.mirror_links)

@@ -1,4 +1,4 @@
-"""The looping picture at the top of the README: a healthy walk beside the same character hurt."""
+"""The looping picture at the top of the README: a healthy walk next to the same character hurt."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from hobble.runtime.options import Runtime
 
 Picture = NDArray[np.uint8]
 
-HURT = {"left thigh": 8.0, "left shank": 8.0}
+INJURIES = {"left thigh": 8.0, "left shank": 8.0}
 CAPTIONS = ("healthy", "left knee hurts: 8 of 10")
 SIZE = 360  # pixels of each half
 MOST_BYTES = 1_000_000
@@ -30,27 +30,27 @@ QUALITIES = (80, 65, 50, 35, 20)
 
 
 def write_limp_picture(network: Network, path: str | Path, runtime: Runtime) -> int:
-    """Write an animated WebP that goes round for ever, of at most MOST_BYTES; returns its bytes.
+    """Write an endless animated WebP of at most MOST_BYTES. Returns its size in bytes.
 
-    Both halves are asked for the same speed. Raises HobbleError for a network that is not told what hurts,
-    and where no quality makes the picture small enough.
+    Both halves are asked for the same speed. Raises HobbleError if the network has no injury channel, or if
+    the picture is too large at the lowest quality.
     """
     known = links(network)
     if network.skeleton is None or not known:
-        raise HobbleError("this network is not told what hurts; make the picture of a configuration that is")
+        raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
     parts = body_parts(network.skeleton, known, hurt_links(network))
-    hurt = {known[parts[label]]: value for label, value in HURT.items()}
+    hurt = {known[parts[label]]: value for label, value in INJURIES.items()}
     studio = Studio(body(network.skeleton), regions(network.skeleton, known))
     halves = []
     for injury in ({}, hurt):
         share = np.array([injury.get(link, 0.0) for link in known]) / 10
         loop = walk(network, {"injury": injury}, runtime)
         halves.append(frames(studio, network.skeleton, loop, share, SIZE))
-    return _save(Path(path), beside(*halves))
+    return _save(Path(path), side_by_side(*halves))
 
 
-def beside(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Image.Image]:
-    """Two loops side by side, as long as `hurt`; `healthy` goes round a whole number of times."""
+def side_by_side(healthy: Sequence[Picture], hurt: Sequence[Picture]) -> list[Image.Image]:
+    """Two loops side by side, as long as `hurt`. The loop `healthy` plays a whole number of times."""
     rounds = max(1, round(len(hurt) / len(healthy)))
     out = []
     for number, right in enumerate(hurt):

@@ -1,4 +1,4 @@
-"""What is measured of a character that can be hurt, in its order."""
+"""The measurements of the injury channel, in the order of the report."""
 
 from hobble.channels.injury import limp, recognition, response
 

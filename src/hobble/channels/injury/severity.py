@@ -1,4 +1,4 @@
-"""Severities: frames x links, from a status file or from what a data set says hurts all the while."""
+"""Severities as frames x links, from a status file or from a status for the whole clip."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ def severity_matrix(status: Status, links: Sequence[str]) -> Array:
 
 
 def odd_ranges(status: Status, path: str | Path) -> list[str]:
-    """A sentence for each range that starts at 0, leaves the clip, or changes what an earlier line says."""
+    """A sentence for each range that starts at 0, goes past the clip's end or contradicts an earlier line."""
     said = []
     overlaps = _overlaps(status.spells)
     for i, spell in enumerate(status.spells):
         place = f"{Path(path).name}, line {spell.line}: the range {spell.first}-{spell.last}"
         if spell.first > status.frames:
-            said.append(f"{place} lies past the last of {status.frames} frames and says nothing.")
+            said.append(f"{place} lies past the last of {status.frames} frames and was ignored.")
         elif spell.last > status.frames:
             said.append(f"{place} goes past the last of {status.frames} frames; it was cut there.")
         if spell.first == 0:
@@ -45,7 +45,7 @@ def odd_ranges(status: Status, path: str | Path) -> list[str]:
 
 
 def _overlaps(spells: Sequence[Spell]) -> dict[int, list[Spell]]:
-    """For each spell the earlier ones that share frames with it, in their order."""
+    """For each spell the earlier spells that share frames with it, in order."""
     found: dict[int, list[int]] = {}
     going: list[int] = []
     for i in sorted(range(len(spells)), key=lambda i: spells[i].first):
@@ -57,7 +57,7 @@ def _overlaps(spells: Sequence[Spell]) -> dict[int, list[Spell]]:
 
 
 def _contested(earlier: Spell, later: Spell) -> str:
-    """The links of which two spells that share frames say different things, with commas between."""
+    """The links for which two overlapping spells give different severities, separated by commas."""
     said = dict(earlier.links)
     return ", ".join(link for link, severity in later.links if said.get(link, severity) != severity)
 
@@ -67,13 +67,14 @@ def clip_severity(
 ) -> tuple[Array, list[str]]:
     """Severities (F, L) float32 of a clip, and warnings.
 
-    status_file: the file beside the clip. status: instead of it, what hurts in all frames ("A-B[4];C-D[8]").
-    motion: the report of the motion stage, for `source_frames` and `source_fps`.
-    Raises InputError where either cannot be read or the file counts other frames than the clip's; one more or
-    less is a warning.
+    status_file: the file beside the clip. status: used instead of a file, severities for all frames
+    ("A-B[4];C-D[8]"). motion: the report of the motion stage, for `source_frames` and `source_fps`.
+
+    Raises InputError if either cannot be read, or if the file has another number of frames than the clip. A
+    difference of one frame is only a warning.
     """
     links = clip.skeleton.link_names
-    if not links:  # a figure that nobody said where to hurt: there is no column to fill
+    if not links:  # the skeleton has no links, so there are no columns
         return np.zeros((len(clip), 0), np.float32), []
     if status is not None:
         where = f"status of {clip.name} in the data set's configuration"
@@ -87,7 +88,7 @@ def clip_severity(
             status_file,
             f"counts {read.frames} frames, but {motion['source']} has {motion['source_frames']}",
             line=1,
-            fix="Count the frames of the file, at its own rate, and check the ranges.",
+            fix="Count the frames of the BVH file, at its own rate, and check the ranges.",
         )
     said = odd_ranges(read, status_file)
     if read.frames != motion["source_frames"]:
@@ -101,12 +102,12 @@ def clip_severity(
 
 
 def source_rows(frames: int, rows: int, motion: Mapping[str, Any]) -> Array:
-    """(frames,) for each frame of a clip the row, from 0, of the source frame that shows at its moment."""
-    once = np.arange(frames) % motion.get("cycle_frames", frames)  # a looped clip comes back to its beginning
+    """(frames,) index, from 0, of the source frame that each frame of a clip shows."""
+    once = np.arange(frames) % motion.get("cycle_frames", frames)  # a looped clip starts again
     at = once * (motion["source_fps"] / FPS) + motion.get("source_start", 0)
     return np.clip(np.floor(at + 1e-6).astype(int), 0, rows - 1)
 
 
 def mirror_severity(severity: Array, mirror_links: Array) -> Array:
-    """Severities (F, L) of the mirrored clip: what hurt on the left hurts on the right."""
+    """Severities (F, L) of the mirrored clip: left and right swapped."""
     return np.ascontiguousarray(severity[:, mirror_links])

@@ -1,4 +1,4 @@
-"""How injuries are shown: the parts of the body in words, with sliders, colours and presets."""
+"""How injuries are shown: names of body parts, sliders, colours and presets."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ WORDS = Words(
     step=1,
     key="hurt",
     grows="Walks while the {} hurts more and more",
-    never="never hurt in training, so hurting it would change nothing",
+    never="never hurt in training, so it has no effect",
 )
-# Parts of the body that have a slider and a key of their own: label, roles of the ends.
+# Parts of the body with a slider and a key: label, roles of the two ends.
 PARTS = (
     ("left thigh", "left_hip", "left_knee"),
     ("left shank", "left_knee", "left_heel"),
@@ -28,7 +28,7 @@ PARTS = (
     ("left upper arm", "left_shoulder", "left_elbow"),
     ("right upper arm", "right_shoulder", "right_elbow"),
 )
-# Parts without a slider of their own, which still have a name.
+# Parts with a name but no slider.
 OTHERS = (
     ("left forearm", "left_elbow", "left_wrist"),
     ("right forearm", "right_elbow", "right_wrist"),
@@ -47,8 +47,8 @@ PRESETS = {
     "Knee and back": {"left thigh": 7, "left shank": 7, "lower back": 7},
 }
 SEVERITY = 8.0  # of the loops
-# Loops in which one part hurts, or several, without colour. The films of the questionnaire, in which
-# something begins to hurt, are those of `study/films.py`.
+# Loops without colour, in which one or several parts hurt. The films of the questionnaire, in which the
+# injury begins during the film, are in `study/films.py`.
 STUDY: dict[str, tuple[str, ...]] = {
     "healthy": (),
     "left-thigh": ("left thigh",),
@@ -64,7 +64,7 @@ STUDY: dict[str, tuple[str, ...]] = {
     "right-leg": ("right thigh", "right shank", "right foot"),
     "thigh-and-back": ("left thigh", "lower back"),
 }
-# What the scenarios hurt: name -> roles of the ends.
+# Parts that hurt in the scenarios: name -> roles of the two ends.
 HURT = {
     "left_knee": ("left_hip", "left_knee"),
     "right_knee": ("right_hip", "right_knee"),
@@ -75,7 +75,7 @@ HURT = {
 
 
 def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> Shown:
-    """Sliders of the parts that were hurt in training, presets of them, and where each link lies."""
+    """Sliders and presets of the parts that were hurt in training, and the region of each link."""
     parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
     felt = {label: link for label, link in parts.items() if link in trained}
     presets = {
@@ -87,7 +87,7 @@ def shown(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
 
 
 def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> list[Loop]:
-    """The thirteen walks of the study, and the presets in colours."""
+    """The thirteen walks of the study, and the coloured presets."""
     parts = {label: links[i] for label, i in body_parts(skeleton, links, trained).items()}
     out = [Loop(name, {parts[label]: SEVERITY for label in labels}, False) for name, labels in STUDY.items()]
     for title, values in PRESETS.items():
@@ -97,9 +97,10 @@ def loops(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) ->
 
 
 def sweeps(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -> dict[str, str]:
-    """Which links the scenarios hurt: name -> link, the one nearest the upper joint of those that were
-    hurt in
-    training if any."""
+    """The links that hurt in the scenarios: name -> link.
+
+    In each part it is the uppermost link that was hurt in training, or the uppermost of all.
+    """
     out = {}
     for name, (upper, lower) in HURT.items():
         child, top = skeleton.role(lower), skeleton.role(upper)
@@ -114,10 +115,10 @@ def sweeps(skeleton: Skeleton, links: Sequence[str], trained: Collection[str]) -
 
 
 def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] = ()) -> dict[str, int]:
-    """Label -> index of the link that the part is, for those that the network knows.
+    """Label -> index of the link that stands for the part, for the parts that the network knows.
 
-    Of the links between the part's two ends it is the uppermost of those that were `hurt` in training, or the
-    uppermost of all where none was: hurting another would change nothing.
+    It is the uppermost link between the part's two ends that was `hurt` in training. If there is none, it is
+    the uppermost of all. A link that was never hurt in training has no effect.
     """
     found = {}
     for label, upper, lower in PARTS:

@@ -1,14 +1,14 @@
-"""The status file: its grammar read, checked and written.
+"""Reads, checks and writes status files.
 
-The first line says how many frames the clip's file has, each further line what hurts in which of them::
+The first line has the number of frames of the clip's file. Each further line says what hurts in a range::
 
     frames:2500
     1-2500 RightUpLeg-RightLeg[10];
     500-2000 LeftShoulder-LeftArm[5];LeftUpLeg-LeftLeg[10];
 
-Frames count from 1 in the clip file's own rate, both ends included. A range from 0 is taken to start at 1 and
-one past the end to stop there. Where lines overlap, a later one counts for the links it names, from its first
-frame on.
+Frames count from 1 in the clip file's own rate, both ends included. A range from 0 starts at 1. A range past
+the end stops there. If lines overlap, the later line counts for the links that it names, from its first frame
+on.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from hobble.core.files import write_text
 from hobble.core.untrusted import read_text
 
 HIGHEST = 10.0
-MOST_SPELLS = 20_000  # a line for every frame of three minutes at 120 Hz
+MOST_SPELLS = 20_000  # a line for each frame of three minutes at 120 Hz
 RANGE = re.compile(r"(\d{1,12})\s*-\s*(\d{1,12})\s+(.*)")
 LINK = re.compile(r"\s*(.+?)\s*\[\s*([^\]]*?)\s*\]\s*")
 
 
 @dataclass(frozen=True)
 class Spell:
-    """Links hurt from frame `first` to `last`, both counted from 1 and included.
+    """Links that hurt from frame `first` to `last`, both counted from 1 and included.
 
-    links: (link, severity) pairs. line: where it stands in its file, if it comes from one.
+    links: (link, severity) pairs. line: its line in the file, if it comes from one.
     """
 
     first: int
@@ -43,17 +43,17 @@ class Spell:
 
 @dataclass(frozen=True)
 class Status:
-    """What hurts in a clip whose file has `frames` frames; later spells count over earlier ones."""
+    """What hurts in a clip. frames: of its file. If spells overlap, the later one counts."""
 
     frames: int
     spells: tuple[Spell, ...] = ()
 
 
 def read_status(path: str | Path, links: Sequence[str]) -> Status:
-    """Read a status file; `links` are the names that may be hurt ("LeftUpLeg-LeftLeg").
+    """Read a status file. links: the names that may hurt ("LeftUpLeg-LeftLeg").
 
-    Raises InputError with the line for anything that does not follow the grammar, an unknown link, a severity
-    outside 0..10 and a range that runs backwards.
+    Raises InputError with the line for a grammar error, an unknown link, a severity outside 0..10, or a range
+    that runs backwards.
     """
     path = Path(path)
     frames: int | None = None
@@ -76,9 +76,9 @@ def read_status(path: str | Path, links: Sequence[str]) -> Status:
 def parse_links(
     text: str, links: Sequence[str], path: str | Path, line: int | None = None
 ) -> tuple[tuple[str, float], ...]:
-    """The (link, severity) pairs of `A-B[4];C-D[8];`, as a status file or a data set's `status` writes them.
+    """The (link, severity) pairs of `A-B[4];C-D[8];`, as in status files and in a data set's `status`.
 
-    Raises InputError that names `path` and `line`.
+    Raises InputError with `path` and `line`.
     """
     pairs = []
     for part in text.split(";"):
@@ -105,7 +105,7 @@ def format_status(status: Status) -> str:
 
 
 def write_status(path: str | Path, status: Status) -> None:
-    """Write a status file, whole or not at all."""
+    """Write a status file. No partial file is left behind if this fails."""
     write_text(path, format_status(status))
 
 
@@ -139,7 +139,7 @@ def check_link(path: str | Path, line: int | None, name: str, links: Sequence[st
 
 
 def check_severity(path: str | Path, line: int | None, link: str, text: str) -> float:
-    """The severity that `text` says; raises InputError unless it is a number from 0 to 10."""
+    """The severity in `text`. Raises InputError unless it is a number from 0 to 10."""
     try:
         value = float(text)
     except ValueError:

@@ -1,7 +1,7 @@
-"""Status files from a short table, so that nobody types them by hand.
+"""Makes status files from a short table, so that nobody has to type them.
 
-The table is CSV with the columns clip, link, severity, from, to; frames count from 1 in the clip file's own
-rate, an empty `from` means the first and an empty `to` the last::
+The table is CSV with the columns clip, link, severity, from, to. Frames count from 1 in the clip file's own
+rate. An empty `from` is the first frame, an empty `to` the last::
 
     clip,link,severity,from,to
     walk_03,LeftUpLeg-LeftLeg,7,,
@@ -28,7 +28,7 @@ COLUMNS = ("clip", "link", "severity", "from", "to")
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table; `first` and `last` are None where the table leaves them out."""
+    """One line of the table. `first` and `last` are None if the table leaves them empty."""
 
     clip: str
     link: str
@@ -39,9 +39,12 @@ class Row:
 
 
 def read_table(path: str | Path, links: Sequence[str]) -> list[Row]:
-    """Read a table. Raises InputError with the line for no CSV and for what a status file would refuse."""
+    """Read a table.
+
+    Raises InputError with the line for bad CSV, and for anything that a status file must not hold.
+    """
     path = Path(path)
-    lines = io.StringIO(read_text(path), newline=None)  # an old Macintosh's lines end in \r
+    lines = io.StringIO(read_text(path), newline=None)  # lines of old Macintosh files end in \r
     reader = csv.DictReader(lines, skipinitialspace=True, restkey="more")
     try:
         names = [name.strip() for name in reader.fieldnames or ()]
@@ -59,10 +62,10 @@ def read_table(path: str | Path, links: Sequence[str]) -> list[Row]:
 def statuses(
     rows: Sequence[Row], frames: Mapping[str, int], path: str | Path = "the table"
 ) -> dict[str, Status]:
-    """The status of each clip that the rows name; `frames` says how many its file has.
+    """The status of each clip in the rows. frames: clip -> number of frames of its file.
 
-    Rows of one clip with the same range share a line. Raises InputError, with the row's line, for a clip that
-    is not in `frames` and a range that runs backwards or leaves the clip.
+    Rows of one clip with the same range share a line. Raises InputError with the row's line for a clip that
+    is not in `frames`, and for a range that runs backwards or leaves the clip.
     """
     spells: dict[str, dict[tuple[int, int], list[tuple[str, float]]]] = {}
     for row in rows:
@@ -83,7 +86,7 @@ def statuses(
 
 
 def bvh_frames(path: Path) -> int:
-    """How many frames a BVH file says it has; raises InputError where it does not say."""
+    """The number of frames that a BVH file states. Raises InputError if it states none."""
     try:
         with open(path, encoding="utf-8", errors="replace") as file:
             for line in file:
@@ -96,7 +99,7 @@ def bvh_frames(path: Path) -> int:
 
 
 def write_statuses(table: str | Path, folder: str | Path, links: Sequence[str]) -> list[Path]:
-    """Write `<clip>_injuries.txt` beside each clip below `folder` that the table names; returns the paths.
+    """Write `<clip>_injuries.txt` beside each clip in `folder` that the table names. Returns the paths.
 
     Everything is checked before the first file is written.
     """

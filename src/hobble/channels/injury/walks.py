@@ -1,4 +1,4 @@
-"""What figures of a crowd are told of this channel."""
+"""Links and severities of the figures in a crowd."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ INJURY = "injury"  # the channel
 
 
 def links(network: Network) -> tuple[str, ...]:
-    """The links that a network is told; none where it knows no injuries."""
+    """The links of a network's injury channel; empty if it has none."""
     return network.channels.get(INJURY, ())
 
 
 def hurt_links(network: Network) -> tuple[str, ...]:
-    """Those that were hurt in training."""
+    """The links that were hurt in training."""
     return network.trained(INJURY)
 
 
 def severities(network: Network, each: Sequence[Mapping[str, float]]) -> dict[str, Array]:
-    """What a stretch tells figures given as link -> severity."""
+    """The values of the injury channel for figures that are given as link -> severity."""
     return channel_values(network, INJURY, each)

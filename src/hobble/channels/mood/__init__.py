@@ -1,4 +1,4 @@
-"""The mood that the body is in, by the names of clips: one actor's recordings say it there."""
+"""The mood channel. Moods come from the names of clips."""
 
 from hobble.channels.mood.channel import CHANNEL
 

@@ -1,4 +1,4 @@
-"""The channel: five moods from 0 to 1; a body in none of them is as it always is."""
+"""The mood channel: five moods from 0 to 1. All are 0 in a neutral clip."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ Much = Annotated[float, Field(ge=0, le=1)]
 
 
 class Patterns(Section):
-    """Which clips are in which mood."""
+    """Which clips have which mood."""
 
     patterns: dict[str, dict[Name, Much]] = Field(
-        description="of clips' names, with * for anything: what a clip of such a name is; the first that fits"
+        description="pattern of clip names -> mood; * stands for any text; the first that fits counts"
     )
 
 
 class Mood(Channel):
-    """How the body feels, all through a clip: by a pattern of its name, or by its entry ({sad: .5})."""
+    """The mood of a whole clip, from a pattern of its name or from its entry ({sad: .5})."""
 
     name = "mood"
     title = "Mood"
     value = "amount"
     highest = 1.0
     rate = 1.0
-    slows = True  # sad people walk at half the speed
+    slows = True  # sad people walk at half the usual speed
     Options = Patterns
 
     def columns(self, rig: Rig) -> tuple[str, ...]:
@@ -43,11 +43,11 @@ class Mood(Channel):
         return get_args(Name)
 
     def is_neutral(self, source: Source) -> bool:
-        """Whether no pattern that fits, and no entry, says more than 0."""
+        """Whether the clip's entry or pattern has no mood above 0."""
         return not any(_moods(source).values())
 
     def check(self, source: Source, rig: Rig) -> None:
-        """The entry of a clip names moods."""
+        """Raise InputError if the clip's entry has unknown moods or values outside 0..1."""
         from hobble.core.errors import InputError
 
         given = source.value
@@ -55,18 +55,18 @@ class Mood(Channel):
         if given is not None and not (
             moods and all(isinstance(v, int | float) and 0 <= v <= 1 for v in given.values())
         ):
-            fix = f"Write some of {', '.join(self.columns(rig))} with a number from 0 to 1, as {{sad: .5}}."
+            fix = f"Use {', '.join(self.columns(rig))} with numbers from 0 to 1, as in {{sad: .5}}."
             raise InputError(f"{source.clip}.channels.{self.name}", f"cannot be {given!r:.80}", fix=fix)
 
     def read(self, clip: Clip, source: Source, motion: Mapping[str, Any]) -> tuple[Array, list[str]]:
-        """The same moods in every frame; a warning where no pattern fits."""
+        """The same values in all frames, and a warning if no pattern fits."""
         import numpy as np
 
         moods = _moods(source)
         row = [float(moods.get(mood, 0.0)) for mood in self.columns(clip.skeleton)]
         fits = source.value is not None or any(fnmatchcase(source.clip, p) for p in _patterns(source))
         warnings = (
-            [] if fits else [f"no pattern of channels.{self.name} fits {source.clip}; it is in no mood."]
+            [] if fits else [f"no pattern of channels.{self.name} fits {source.clip}; it counts as neutral."]
         )
         return np.tile(np.array(row, np.float32), (len(clip), 1)), warnings
 

@@ -1,4 +1,4 @@
-"""What is measured of a character that has moods."""
+"""The measurements of the mood channel."""
 
 from hobble.channels.mood import response
 

@@ -1,4 +1,6 @@
-"""How large the limp of each link is, beside people's and captured limps, and whether one would name it."""
+"""Measures the limp of each link: its size next to people's and captured limps, and whether recognisers see
+it.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +12,9 @@ from hobble.runtime.options import Runtime
 
 
 class Options(Section):
-    """Its keys of the section `evaluation`."""
+    """The keys of this measurement in the section `evaluation`."""
 
-    limp_seconds: PositiveFloat = Field(8.0, description="of each walk that is measured for its limp")
+    limp_seconds: PositiveFloat = Field(8.0, description="length of each walk whose limp is measured")
 
 
 MEASURE = Measure(

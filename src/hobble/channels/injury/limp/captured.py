@@ -1,4 +1,4 @@
-"""Captured clips as limps: their cycles, what hurts in them, and whether a generator made that."""
+"""Captured clips that limp: their cycles and injuries, and whether the motion was generated."""
 
 from __future__ import annotations
 
@@ -19,16 +19,14 @@ from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
 
-VERSION = re.compile(
-    r"_hurt[1-9](_mirror)?$"
-)  # at the end of the name of a clip that was hurt by a generator
+VERSION = re.compile(r"_hurt[1-9](_mirror)?$")  # end of the name of a generated hurt version
 MIRROR = "_mirror"
-PLAYED = re.compile(r"^([^_]+)_")  # the performer, in names such as 105_25
+PERFORMER = re.compile(r"^([^_]+)_")  # "105" in "105_25"
 
 
 @dataclass(frozen=True)
 class Limp:
-    """The walking of one clip. hurt: link -> severity, where the same hurts throughout. speed: cm a frame."""
+    """The walking of one clip. hurt: link -> severity, if they are constant. speed: cm a frame."""
 
     clip: str
     hurt: Mapping[str, float]
@@ -37,15 +35,18 @@ class Limp:
 
     @property
     def performer(self) -> str:
-        """The part of the clip's name before the first underline, mirrors apart from originals."""
-        found = PLAYED.match(self.clip)
+        """The part of the clip's name before the first underscore.
+
+        A mirrored clip has a performer of its own.
+        """
+        found = PERFORMER.match(self.clip)
         name = found[1] if found else self.clip
         return name + (MIRROR if self.clip.endswith(MIRROR) else "")
 
 
 @dataclass
 class Told:
-    """Seconds in which each link hurts, of captured motion and of motion that a generator made of healthy."""
+    """Seconds in which each link hurts in training, in captured motion and in generated hurt versions."""
 
     captured: dict[str, float] = field(default_factory=dict)
     made: dict[str, float] = field(default_factory=dict)
@@ -54,7 +55,7 @@ class Told:
 def limps(
     files: Iterable[Path], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
 ) -> tuple[list[Limp], Told]:
-    """The walks of all captured clips, and what hurts how long in those that are trained on."""
+    """The walks of all captured clips, and the seconds for which each link hurts in the training clips."""
     found, told = [], Told()
     for file in sorted(files, key=lambda file: Path(file).stem):
         rows = load_clip_rows(file)
@@ -71,7 +72,9 @@ def limps(
 
 
 def healthy_of(limp: Limp, every: Sequence[Limp]) -> tuple[Profile, str]:
-    """The healthy walk beside which a clip is set, and whose: the performer's, the data set's, people's."""
+    """The healthy walk to compare a clip with, and whose it is: the performer's, else the data set's, else
+    people's.
+    """
     well = [one for one in every if not one.hurt and len(one.walk)]
     own = [one for one in well if one.performer == limp.performer]
     for some, whose in ((own, "performer"), (well, "data set")):
@@ -81,7 +84,7 @@ def healthy_of(limp: Limp, every: Sequence[Limp]) -> tuple[Profile, str]:
 
 
 def _walked(rows: ClipRows, links: Sequence[str], skeleton: Skeleton) -> list[Limp]:
-    """A clip's stretches of walking together, where the same hurts throughout; none without a cycle."""
+    """All stretches of a clip in which it walks with constant severities, or None without a cycle."""
     severity = rows.channels.get(INJURY, np.zeros((len(rows), len(links))))
     if not len(rows) or np.ptp(severity, axis=0).any():
         return []
@@ -96,13 +99,13 @@ def _walked(rows: ClipRows, links: Sequence[str], skeleton: Skeleton) -> list[Li
     walk = joined(walks) if walks else Walk(FPS, (), ())
     if not len(walk):
         return []
-    # A network that is told of no injury names no link; its clips are those in which nothing hurts.
+    # A network without the injury channel has no links, and its clips are healthy.
     hurt = {link: float(value) for link, value in zip(links, severity[0], strict=False) if value > 0}
     return [Limp(rows.clip, hurt, walk, float(np.mean(speeds)))]
 
 
 def _placed(local: Array, root: Array, yaw: Array) -> Array:
-    """(F, J, 3) in the world, of positions in a root frame at `root` (F, 3) that faces `yaw` (F,)."""
+    """(F, J, 3) positions in the world. local: in a root frame at `root` (F, 3) that faces `yaw` (F,)."""
     out = local.copy()
     out[..., ::2] = rotate_by_yaw(local[..., ::2], yaw[:, None])
     return out + root[:, None]

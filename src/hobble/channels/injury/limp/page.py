@@ -1,4 +1,4 @@
-"""The limp in sizes, beside people's: in the section on the response to injury."""
+"""Shows the size of the limp next to people's, in the section on the response to injury."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ IMPAIRMENTS = {
 
 
 def section(found: Json, material: Material) -> Section:
-    """Charts of sizes, tables, the exam, and what in training was captured and what made."""
+    """Charts of sizes, tables, the comparison with held-out captured limps, and where the training data came
+    from.
+    """
     if not found.get("applies"):
         return Section("injury", [])
     name = material.name
@@ -35,7 +37,11 @@ def section(found: Json, material: Material) -> Section:
             Part(2, size_chart(found)),
             Part(
                 3,
-                Table(f"{name}-limp-named", *_named(found["named"]), "Would one name it? Legs hurt, walking"),
+                Table(
+                    f"{name}-limp-named",
+                    *_named(found["named"]),
+                    "Is the limp of a hurt leg recognised?",
+                ),
             ),
             Part(4, exam_table(name, found["exam"])),
             Part(80, size_table(name, found["sizes"])),
@@ -46,9 +52,9 @@ def section(found: Json, material: Material) -> Section:
 
 
 def provenance(told: Mapping[str, Mapping[str, float]]) -> str:
-    """Which injuries of the training data were captured and which were made of healthy clips."""
+    """Which injuries of the training data were captured and which were generated from healthy clips."""
     parts = []
-    for kind, words in (("captured", "were captured"), ("made", "were made of healthy clips by a generator")):
+    for kind, words in (("captured", "were captured"), ("made", "were generated from healthy clips")):
         if some := told[kind]:
             seconds = sum(some.values())
             parts.append(f"{len(some)} links {words} ({number(seconds, 3)} s: {', '.join(sorted(some))})")
@@ -56,7 +62,7 @@ def provenance(told: Mapping[str, Mapping[str, float]]) -> str:
 
 
 def size_chart(found: Json) -> Chart:
-    """Each effect over severity for a chosen effect; a line for each link, people's mean beside."""
+    """Each effect over severity, for a chosen effect: a line for each link, and people's mean."""
     options: dict[str, list[Trace]] = {}
     rows = [row for row in found["sizes"] if row["gait"] == "walk"]
     for effect in SHOWN:
@@ -83,9 +89,9 @@ def size_chart(found: Json) -> Chart:
         options[found["effects"][effect]] = traces
     return Chart(
         "limp-sizes",
-        "How large is the limp?",
-        "Each link at severities 3, 5, 7 and 10, walking, asked for 1.2 m/s, beside the healthy character. "
-        "Grey: the mean and the spread of ten people who imitated impairments strongly.",
+        "Size of the limp",
+        "The character walks at a target speed of 1.2 m/s with one link at severity 3, 5, 7 or 10, and is "
+        "compared with its healthy walk. Grey: mean and standard deviation of ten people who imitated strong limps.",
         layout={"xaxis": axis("severity", range=[2.5, 11]), "yaxis": axis("size")},
         height=360,
         choose="Effect",
@@ -97,24 +103,24 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Column], list[list[A
     columns = [
         Column.number("severity"),
         Column.count("walks"),
-        Column.number("called impaired by a classifier of strong limps"),
-        Column.number("named by a recogniser of mild ones"),
-        Column.number("the wrong side"),
+        Column.number("share that a classifier of strong limps calls impaired"),
+        Column.number("share recognised by the recogniser of mild limps"),
+        Column.number("share with the wrong side"),
     ]
     return columns, [[r["severity"], r["walks"], r["impaired"], r["named"], r["wrong_side"]] for r in rows]
 
 
 def exam_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """Captured limps kept from training."""
+    """Captured limps that were held out of training, compared with the character."""
     if not rows:
         return None
     columns = [
         Column("clip"),
         Column("hurt"),
         Column("healthy walk of"),
-        Column.number("healthy character, from it"),
-        Column.number("hurt character, from it"),
-        Column("nearer", lambda v: "yes" if v else "no"),
+        Column.number("distance of the healthy character"),
+        Column.number("distance of the hurt character"),
+        Column("hurt character is nearer", lambda v: "yes" if v else "no"),
     ]
     table = [
         [
@@ -131,23 +137,21 @@ def exam_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
         f"{name}-limp-exam",
         columns,
         table,
-        "Captured limps kept from training: is the hurt character nearer?",
+        "Held-out captured limps: is the hurt character nearer to them?",
     )
 
 
 def size_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """Every walk with its effects and what it is called."""
+    """Every walk with its effects and its recognised limp."""
     texts = ("gait", "link", "part", "side", "called", "graded")
     if not rows:
         return None
     columns = [Column(k) if k in texts else Column.number(k.replace("_", " ")) for k in rows[0]]
-    return Table(
-        f"{name}-limp-sizes", columns, [list(row.values()) for row in rows], "The size of every effect"
-    )
+    return Table(f"{name}-limp-sizes", columns, [list(row.values()) for row in rows], "Sizes of all effects")
 
 
 def captured_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """Captured limps with the same sizes."""
+    """Captured limps with the same effects."""
     if not rows:
         return None
     columns = [
@@ -165,11 +169,11 @@ def captured_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
         ]
         for r in rows
     ]
-    return Table(f"{name}-limp-captured", columns, table, "Captured limps in the same sizes")
+    return Table(f"{name}-limp-captured", columns, table, "Effects of captured limps")
 
 
 def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """A second injury over a first at 5 and at 10, with speed."""
+    """Speeds with a second injury on top of a first one at severities 5 and 10."""
     if not rows:
         return None
     keys = list(rows[0])
@@ -178,5 +182,5 @@ def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
         f"{name}-limp-second",
         columns,
         [[r[k] for k in keys] for r in rows],
-        "A second injury over a first, with speed",
+        "Speed with a second injury on top of a first",
     )

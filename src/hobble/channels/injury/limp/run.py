@@ -1,8 +1,8 @@
-"""The limp of each link in sizes, beside people's and captured ones, named by who learnt people's walks.
+"""Measures the limp of each link in sizes, and compares it with people's and captured limps.
 
-A rank correlation says nothing about size: 1 may be a change of 2 %. So each effect stands with its size at
-severities 3, 5, 7 and 10, relative to the same network's healthy character. The recognisers are those of
-`hobble.gait`, which know people's walks and nothing that Hobble made.
+A rank correlation says nothing about size: it is 1 even for a change of 2 %. So each effect is given with its
+size at severities 3, 5, 7 and 10, relative to the same network's healthy character. The recognisers are those
+of `hobble.gait`, which learnt from real people only.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
-REASON = "this network has no severity inputs"
-STILL = "its healthy character makes no cycle of a walk"
+NO_SEVERITIES = "this network has no severity inputs"
+NO_CYCLE = "its healthy character does not walk a whole cycle"
 SEVERITIES = (3.0, 5.0, 7.0, 10.0)
-ASKED = {"walk": 2.0, "jog": 7.0}  # cm a frame; 1.2 m/s, as people walk
-FIRSTS = (5.0, 10.0)  # severities of a first injury over which a second one comes
-SECONDS = (0.0, 5.0, 10.0)
+SPEEDS = {"walk": 2.0, "jog": 7.0}  # cm a frame; 2 is 1.2 m/s, as people walk
+FIRST_SEVERITIES = (5.0, 10.0)  # of an injury to which a second one is added
+SECOND_SEVERITIES = (0.0, 5.0, 10.0)
 LEG = ("hip", "thigh", "shank", "foot")
-WINDOW = 4.0  # seconds
+WINDOW = 4.0  # seconds of a walk that a recogniser judges at once
 
 
 def limp(
@@ -53,27 +53,28 @@ def limp(
     seconds: float,
     links: Sequence[str] | None = None,
 ) -> dict[str, Any]:
-    """limp.json; `applies` is false, with a `reason`, where nothing can be measured.
+    """The content of limp.json. If nothing can be measured, `applies` is false and `reason` says why.
 
-    every: the walks of the data set's captured clips. told: what hurts how long in training. links: to hurt,
-    by default all. `sizes`: a row for each gait, link and severity, with EFFECTS as if the link's side were
-    hurt and what the walk is called; `steady`: Spearman's rho of each effect with severity, beside its
-    size at 10; `named`: shares of windows by severity over the links of the legs; `people`: mean and spread
-    of each effect; `captured`: effects of captured clips; `exam`: see `examined`; `second`: see
-    `second_injuries`.
+    every: the walks of the data set's captured clips. told: seconds for which each link hurts in training.
+    links: links to hurt, by default all.
+
+    `sizes`: a row for each gait, link and severity with EFFECTS, as if the link's side were hurt, and the
+    recognised limp. `steady`: Spearman's rho of each effect with severity, and its size at 10. `named`:
+    shares of windows by severity, over the links of the legs. `people`: mean and spread of each effect.
+    `captured`: effects of captured clips. `exam`: see `examined`. `second`: see `second_injuries`.
     """
     head: dict[str, Any] = {"configuration": configuration}
     if not links_of(network) or network.skeleton is None:
-        return {**head, "applies": False, "reason": REASON}
+        return {**head, "applies": False, "reason": NO_SEVERITIES}
     links = list(links or links_of(network))
     rows: list[dict[str, Any]] = []
-    for gait, asked in ASKED.items():
+    for gait, asked in SPEEDS.items():
         cases = [(link, s) for link in links for s in SEVERITIES]
         figures = shown(network, [{}, *({link: s} for link, s in cases)], asked, gait, seconds, runtime)
         healthy = figures[0]
         if healthy.profile is None:
             if gait == "walk":
-                return {**head, "applies": False, "reason": STILL}
+                return {**head, "applies": False, "reason": NO_CYCLE}
             continue
         rows += [
             _row(network, gait, *case, figure, healthy)
@@ -82,7 +83,7 @@ def limp(
     return {
         **head,
         "applies": True,
-        "asked_cm_per_second": {gait: 60 * speed for gait, speed in ASKED.items()},
+        "asked_cm_per_second": {gait: 60 * speed for gait, speed in SPEEDS.items()},
         "seconds": seconds,
         "effects": EFFECTS,
         "trained": [link for link in links if link in hurt_links(network)],
@@ -101,7 +102,7 @@ def limp(
 
 
 def hurt_side(skeleton: Skeleton, link: str) -> str:
-    """The side of the body on which a link is; the right one for links on the midline."""
+    """The side of the body that a link is on; right for links on the midline."""
     side = part_of_link(skeleton, _pair(skeleton, link)).side
     return RIGHT if side is None else ("left", "right")[side]
 
@@ -113,7 +114,7 @@ def _pair(skeleton: Skeleton, link: str) -> tuple[str, str]:
 def _row(
     network: Network, gait: str, link: str, severity: float, figure: Shown, healthy: Shown
 ) -> dict[str, Any]:
-    """One walk: where it belongs, its effects (None without a cycle), and what it is called."""
+    """The row of one walk: its case, its effects (None without a cycle) and the recognised limp."""
     assert network.skeleton is not None
     assert healthy.profile is not None
     part = part_of_link(network.skeleton, _pair(network.skeleton, link))
@@ -150,7 +151,7 @@ def _share(values: Sequence[bool]) -> float | None:
 
 
 def _steady(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """For each gait, link and effect Spearman's rho with severity, never without its size at 10."""
+    """For each gait, link and effect: Spearman's rho with severity, and its size at 10."""
     out = []
     for gait, link in dict.fromkeys((row["gait"], row["link"]) for row in rows):
         some = [row for row in rows if (row["gait"], row["link"]) == (gait, link)]
@@ -163,7 +164,7 @@ def _steady(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _named(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """By severity, over the walks with a link of a leg hurt: how they are called."""
+    """How walks with a hurt leg are recognised, by severity."""
     out = []
     for severity in SEVERITIES:
         legs = [r for r in rows if r["gait"] == "walk" and r["severity"] == severity and r["part"] in LEG]
@@ -176,7 +177,7 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _of_clip(skeleton: Skeleton, one: Limp, every: Sequence[Limp]) -> dict[str, Any]:
-    """A captured clip's effects beside a healthy walk."""
+    """The effects of a captured clip relative to a healthy walk."""
     healthy, whose = healthy_of(one, every)
     side = hurt_side(skeleton, max(one.hurt, key=lambda link: one.hurt[link]))
     sizes = _plain(effects(profile(one.walk), healthy, side))
@@ -184,7 +185,7 @@ def _of_clip(skeleton: Skeleton, one: Limp, every: Sequence[Limp]) -> dict[str, 
 
 
 def distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Profile) -> float:
-    """How far two bodies' changes from their own healthy walks are apart, in spreads of people a feature."""
+    """How different two bodies' changes from their healthy walks are, in people's spreads per feature."""
     known = examples(people(), range(people().count))[0]
     spread = known.std(axis=0)
     a, b = (np.array(list(features(*pair).values())) for pair in ((walk, healthy), (other, other_healthy)))
@@ -194,16 +195,16 @@ def distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Pro
 def examined(
     network: Network, every: Sequence[Limp], splits: Mapping[str, str], seconds: float, runtime: Runtime
 ) -> list[dict[str, Any]]:
-    """Captured limps that were kept from training: does the character, told what hurts, come nearer to them?
+    """Whether the hurt character comes nearer to captured limps that were held out of training.
 
-    Each is set beside the character with the clip's status and beside the healthy character, both asked for
-    the speed at which the healthy walk of the performer is likely: 1.2 m/s. `hurt` and `healthy` are
-    distances; `nearer` is what has to be.
+    Each clip is compared with the character with the clip's severities, and with the healthy character. Both
+    are asked for 1.2 m/s, the likely speed of the performer's healthy walk. `hurt` and `healthy` are
+    distances. `nearer` should be true.
     """
     asked = [one for one in every if one.hurt and splits.get(one.clip) == "held_out"]
     if not asked:
         return []
-    figures = shown(network, [{}, *(one.hurt for one in asked)], ASKED["walk"], "walk", seconds, runtime)
+    figures = shown(network, [{}, *(one.hurt for one in asked)], SPEEDS["walk"], "walk", seconds, runtime)
     own = figures[0].profile
     out = []
     for one, figure in zip(asked, figures[1:], strict=True):
@@ -221,19 +222,20 @@ def examined(
 def second_injuries(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> list[dict[str, Any]]:
-    """Each link over a hurt right thigh, at 5 and at 10: `speed_share` of the healthy walk's speed.
+    """Each link in addition to a right thigh at severities 5 and 10.
 
-    `from_first`: share of the first's speed that is left; a second injury must not make it faster.
+    `speed_share`: of the healthy walk's speed. `from_first`: the share of the speed with the first injury
+    alone. A second injury must not make the walk faster, so it should be at most 1.
     """
     assert network.skeleton is not None
     first = next((link for link in links if _is(network.skeleton, link, "thigh", "right")), None)
     if first is None:
         return []
-    pairs = [(a, b, s) for a in FIRSTS for b in links if b != first for s in SECONDS[1:]]
-    each = [{}, *({first: a} for a in FIRSTS), *({first: a, b: s} for a, b, s in pairs)]
-    figures = shown(network, each, ASKED["walk"], "walk", min(seconds, 4.0), runtime)
+    pairs = [(a, b, s) for a in FIRST_SEVERITIES for b in links if b != first for s in SECOND_SEVERITIES[1:]]
+    each = [{}, *({first: a} for a in FIRST_SEVERITIES), *({first: a, b: s} for a, b, s in pairs)]
+    figures = shown(network, each, SPEEDS["walk"], "walk", min(seconds, 4.0), runtime)
     healthy = max(figures[0].speed, 1e-9)
-    alone = dict(zip(FIRSTS, figures[1:], strict=False))
+    alone = dict(zip(FIRST_SEVERITIES, figures[1:], strict=False))
     return [
         {
             "first": first,
@@ -243,7 +245,7 @@ def second_injuries(
             "speed_share": round(figure.speed / healthy, 5),
             "from_first": round(figure.speed / max(alone[a].speed, 1e-9), 5),
         }
-        for (a, b, s), figure in zip(pairs, figures[1 + len(FIRSTS) :], strict=True)
+        for (a, b, s), figure in zip(pairs, figures[1 + len(FIRST_SEVERITIES) :], strict=True)
     ]
 
 
@@ -253,11 +255,11 @@ def _is(skeleton: Skeleton, link: str, part: str, side: str) -> bool:
 
 
 def run(given: Given, options: Options) -> Outcome:
-    """limp.json, and its tables."""
+    """limp.json and its tables."""
     network = load_network(given.weights)
     if network.skeleton is None:
-        raise HobbleError(f"{given.weights} carries no skeleton")
-    # Without severities there is nothing to measure, whatever the clips say.
+        raise HobbleError(f"{given.weights} has no skeleton")
+    # Without severities there is nothing to measure.
     files = given.clips.values() if links_of(network) else ()
     every, told = limps(files, given.splits, links_of(network), network.skeleton)
     result = limp(

@@ -1,4 +1,4 @@
-"""One crowd in which every link hurts at every severity, and the cycles of each figure's walk."""
+"""Walks of one crowd in which every link hurts at every severity, and the cycles of each figure."""
 
 from __future__ import annotations
 
@@ -16,13 +16,15 @@ from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
-BEGIN = 5 * FPS  # frames that a figure has to get up to speed and to feel what hurts
-SLOW = 0.1  # cm a frame
+BEGIN = 5 * FPS  # frames before the measurement, in which figures reach their speed and start to limp
+STANDING = 0.1  # cm a frame; slower figures stand
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What one figure did in `frames` frames: its cycles, their profile (None without one), cm a frame."""
+    """The walk of one figure: its number of `frames`, its cycles, their profile (or None) and its speed, cm a
+    frame.
+    """
 
     walk: Walk = field(repr=False)
     profile: Profile | None = field(repr=False)
@@ -38,7 +40,7 @@ def shown(
     seconds: float,
     runtime: Runtime,
 ) -> list[Shown]:
-    """Figures that walk straight ahead, hurt as `each` says (link -> severity), asked for cm a frame."""
+    """Let figures walk straight ahead. each: link -> severity of each figure. speeds: wanted, cm a frame."""
     assert network.skeleton is not None
     count, frames = len(each), max(4, round(seconds * FPS))
     animation = ProceduralAnimation(network, characters=count, **dict(runtime))

@@ -1,4 +1,4 @@
-"""Whether it can be told what hurts: a classifier of the captured clips names generated walks."""
+"""Measures whether a classifier of captured clips recognises the hurt part of generated walks."""
 
 from hobble.measures.measure import Cost, Measure
 from hobble.runtime.options import Runtime

@@ -1,4 +1,4 @@
-"""Whether one can tell what hurts, of configurations side by side."""
+"""Compares how well hurt parts are recognised in several configurations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NAME = "recognition"
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """What each found, with the share that people named right beside it."""
+    """The result of each configuration, and the share that people recognised."""
     return SideBySide(
         entries=[{**m.found(NAME), "configuration": m.name} for m in all_measured],
         beside=[row for m in all_measured for row in _beside_people(m, published["recognition"])],
@@ -22,7 +22,7 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
 
 
 def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
-    """The confusion tables of all."""
+    """The confusion tables of all configurations."""
     found = [(entry["configuration"], row) for entry in compared[NAME] for row in rows(entry)]
     return {NAME: [{"configuration": name, **row} for name, row in found]}
 
@@ -34,13 +34,13 @@ def _beside_people(measured: ConfigurationResults, people: Json) -> list[dict[st
     named, generated = {**people, "configuration": measured.name}, found["generated"]
     shares = {
         "all severities": generated["right"],
-        "all severities, left and right taken for the same": generated["right_without_side"],
+        "all severities, left and right not distinguished": generated["right_without_side"],
     }
     hurt = [row for row in generated["by_severity"] if row["severity"] > 0]
     shares |= {f"severity {row['severity']:g}": row["right"] for row in hurt}
     return [
         published_row(
-            f"hurt part named right, {which} (published: by people)",
+            f"hurt part recognised, {which} (published: by people)",
             named,
             people["share"],
             ours,

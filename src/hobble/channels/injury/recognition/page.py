@@ -1,4 +1,4 @@
-"""Whether one can tell what hurts: in the section on the response to injury."""
+"""Shows whether hurt parts are recognised, in the section on the response to injury."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from hobble.report.parts import Part, Section
 
 
 def section(found: Json, material: Material) -> Section:
-    """The chart, a guest of the section on the response."""
+    """The chart, which is added to the section on the response to injury."""
     return Section("injury", [Part(30, recognition_chart(found))])
 
 
 def recognition_chart(found: Json) -> Chart | None:
-    """Confusion tables of the classifier that names what hurts."""
+    """Confusion tables of the classifier that recognises the hurt part."""
     if not found.get("applies"):
         return None
     generated, captured = found["generated"], found["captured"]
     tables = {
-        "generated walks, each named once": generated.get("by_walk"),
-        "generated walks, window by window": generated,
-        "captured clips, each left out in turn": captured.get("cross_validated"),
-        "captured clips kept from training": captured.get("held_out"),
+        "generated walks, whole": generated.get("by_walk"),
+        "generated walks, by window": generated,
+        "captured clips, cross-validated": captured.get("cross_validated"),
+        "captured clips held out of training": captured.get("held_out"),
     }
     options: dict[str, list[Trace]] = {}
     for label, table in tables.items():
@@ -50,26 +50,26 @@ def recognition_chart(found: Json) -> Chart | None:
                 "xgap": 2,
                 "ygap": 2,
                 "showscale": False,
-                "hovertemplate": "%{y} hurts, %{x} is named: %{customdata} (%{z:.0%})<extra></extra>",
+                "hovertemplate": "%{y} hurts, %{x} recognised: %{customdata} (%{z:.0%})<extra></extra>",
             }
         ]
     if not options:
         return None
     classes = len(found.get("classes") or ())
     people = found.get("people")
-    told = f" People named the part right {100 * people:.0f} % of the time" if people else ""
-    beside = f"{told} (Ferre 2019, of the figure of another network)." if told else ""
+    told = f" People recognised the part {100 * people:.0f} % of the time" if people else ""
+    beside = f"{told} (Ferre 2019, on the motion of another network)." if told else ""
     return Chart(
         "recognition",
-        "Can one tell what hurts?",
-        "A classifier of the captured clips names the hurt part of walks. Down: what hurts; across: what was "
-        f"named; the diagonal is right. Guessing would be right {100 * (found.get('chance') or 0):.0f} % of "
-        f"the time.{beside}",
+        "Is the hurt part recognised?",
+        "A classifier trained on captured clips says which part hurts. Rows: the part that hurts. Columns: "
+        "the answer of the classifier. The diagonal is right. A random guess is right "
+        f"{100 * (found.get('chance') or 0):.0f} % of the time.{beside}",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
         },
         height=max(300, 190 + 20 * classes),
-        choose="Of",
+        choose="Walks",
         options=options,
     )

@@ -1,8 +1,8 @@
-"""Whether it can be told what hurts: a classifier that knows captured motion looks at generated motion.
+"""Measures whether a classifier that learnt from captured motion recognises the hurt part of generated walks.
 
-It learns windows of the training clips, each labelled with the link that hurts. How well it names windows of
-captured motion that it has not seen is the ceiling; how well it names those of generated walks stands beside
-the share that people got right when shown figures (Ferre 2019).
+It learns windows of the training clips, labelled with the link that hurts. Its accuracy on other captured
+windows is the upper limit. Its accuracy on generated walks is compared with that of people who saw animated
+figures (Ferre 2019).
 """
 
 from __future__ import annotations
@@ -33,22 +33,24 @@ from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # the channel
 HEALTHY = "healthy"
-WINDOW = 60  # frames, about a cycle; captured motion that was left out is named less well by 75 or 90
+WINDOW = 60  # frames, about a cycle; windows of 75 or 90 are recognised less well
 STEP = 15
-PARTS = 4  # of each stretch, left out of the learning in turn
+FOLDS = 4  # of the cross-validation: quarters of each stretch
 GENERATED = (3.0, 5.0, 7.0, 10.0)  # severities
 SPEEDS = (1.8, 2.2, 2.6)  # cm a frame asked for
-WALKED_IN, SHOWN = 4 * FPS, 6 * FPS  # frames of a generated walk that are left out, and that are looked at
-AHEAD = 0.9  # share of the root's speed that goes forward in a window that counts as walking
-LEAST = 0.5  # cm a frame
+WARM_UP, USED = 4 * FPS, 6 * FPS  # frames of a generated walk that are skipped, and that are used
+AHEAD = 0.9  # a window counts as walking if at least this share of the root's speed is forward
+LEAST_SPEED = 0.5  # of a walking window, cm a frame
 Plain = Callable[[str], tuple[str, ...]]  # see `sides_of`
 REASON = "this network has no severity inputs"
-TOO_FEW = "fewer than two parts are hurt in the captured clips, or none of them walks"
+TOO_FEW = "fewer than two parts hurt in the captured clips, or no clip walks"
 
 
 @dataclass(frozen=True)
 class Window:
-    """A stretch of walking: whose, which link hurts (or HEALTHY), how much at most, its features and part."""
+    """A stretch of walking: its clip, the link that hurts (or HEALTHY), its highest severity, features and
+    fold.
+    """
 
     clip: str
     hurt: str
@@ -66,14 +68,16 @@ def recognition(
     runtime: Runtime,
     people: float,
 ) -> dict[str, Any]:
-    """recognition.json: what a classifier of the captured clips `motion` makes of generated walks.
+    """How well a classifier of captured clips recognises generated walks: the content of recognition.json.
 
-    splits: clip -> "train" or "held_out". people: the published share. Returns `classes`; `captured`:
-    `cross_validated` (a quarter of every stretch left out in turn) and `held_out`; `generated`: windows of
-    walks with each class's link at severities 3, 5, 7 and 10, and `by_walk`, where each walk is named once.
-    All have `windows` (or `walks`), the share `right`, `right_without_side`, `by_severity`, and the
-    `confusion`: counts of hurt -> named. `applies` is false, with a `reason`, for networks and clips with
-    which it cannot be tried.
+    motion: the captured clips. splits: clip -> "train" or "held_out". people: the published share.
+
+    `classes`: what the classifier can recognise. `captured`: results on captured clips, `cross_validated` (a
+    quarter of every stretch left out in turn) and `held_out`. `generated`: windows of walks with each class's
+    link at severities 3, 5, 7 and 10. `by_walk`: the same with one answer for a whole walk. All have
+    `windows` (or `walks`), the share `right`, `right_without_side`, `by_severity`, and the `confusion`:
+    counts of hurt -> recognised. If the network or the clips do not allow the measurement, `applies` is false
+    and `reason` says why.
     """
     head: dict[str, Any] = {"configuration": configuration, "people": people}
     if not links_of(network) or network.skeleton is None:
@@ -101,18 +105,18 @@ def recognition(
 
 
 def walking_windows(clip: Captured, network: Network) -> list[Window]:
-    """The windows of a captured stretch in which it walks ahead and the same link hurts throughout."""
+    """The windows of a captured stretch that walk straight ahead with constant severities."""
     assert network.skeleton is not None
     walk = clip.gait[:, network.gaits.index("walk")]
     hurts = clip.told[INJURY] > 0
     out = []
-    for part, start in product(range(PARTS), range(0, len(clip), STEP)):
-        first = part * len(clip) // PARTS + start
+    for part, start in product(range(FOLDS), range(0, len(clip), STEP)):
+        first = part * len(clip) // FOLDS + start
         span = slice(first, first + WINDOW)
-        if span.stop > (part + 1) * len(clip) // PARTS:
+        if span.stop > (part + 1) * len(clip) // FOLDS:
             continue
         speed = np.hypot(*clip.velocity[span].mean(axis=0))
-        ahead = clip.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST
+        ahead = clip.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST_SPEED
         same = np.all(hurts[span] == hurts[first])
         if walk[span].mean() > 0.5 and ahead and same:
             names = [links_of(network)[i] for i in np.flatnonzero(hurts[first])]
@@ -128,13 +132,11 @@ def generated(network: Network, classes: Sequence[str], healthy: bool, runtime: 
     asked = [(name, s, v) for name, s, v in product(classes, GENERATED, SPEEDS)]
     asked += [(HEALTHY, 0.0, v) for v in SPEEDS] if healthy else []
     hurt = [{} if name == HEALTHY else dict.fromkeys(name.split(" and "), s) for name, s, _ in asked]
-    script = Stretch(
-        WALKED_IN + SHOWN, ["walk"] * len(asked), severities(network, hurt), [v for *_, v in asked]
-    )
+    script = Stretch(WARM_UP + USED, ["walk"] * len(asked), severities(network, hurt), [v for *_, v in asked])
     walks = run_walks(network, [script], runtime)
     out = []
     for i, (name, severity, speed) in enumerate(asked):
-        for start in range(WALKED_IN, WALKED_IN + SHOWN - WINDOW + 1, STEP):
+        for start in range(WARM_UP, WARM_UP + USED - WINDOW + 1, STEP):
             span = slice(start, start + WINDOW)
             values = _values(
                 network.skeleton, walks.local[:, i], walks.contacts[:, i], walks.root[:, i], span
@@ -144,8 +146,10 @@ def generated(network: Network, classes: Sequence[str], healthy: bool, runtime: 
 
 
 def sides_of(skeleton: Skeleton) -> Plain:
-    """A function from a class to the same class without left and right, as people were asked: of one link,
-    "LeftLeg-LeftFoot", the parts of the body that it is in, ("shank",)."""
+    """A function from a class to the same class without left and right, as people were asked.
+
+    For one link, "LeftLeg-LeftFoot", it gives the parts of the body that the link is in, ("shank",).
+    """
     pairs = dict(zip(skeleton.link_names, skeleton.links, strict=True))
 
     def parts(name: str) -> tuple[str, ...]:
@@ -162,7 +166,7 @@ def table(windows: Sequence[Window]) -> Array:
 
 
 def rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The confusion tables as flat rows: of which motion, what hurts, what was named, how often."""
+    """The confusion tables as flat rows: kind of motion, what hurts, what was recognised, count."""
     if not result["applies"]:
         return []
     tables = {**result["captured"], "generated": result["generated"]}
@@ -175,8 +179,8 @@ def rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def run(given: Given, options: Section) -> Outcome:
-    """recognition.json, and its confusion tables as one."""
-    # What a generator made of healthy clips is no captured motion: from it, its own table would be learnt.
+    """recognition.json, and all its confusion tables as one table."""
+    # Generated hurt versions are left out: the classifier would learn the generator's table of injuries.
     files = [file for clip, file in given.clips.items() if not VERSION.search(clip)]
     result = recognition(
         load_network(given.weights),
@@ -195,10 +199,10 @@ def _values(skeleton: Skeleton, local: Array, contacts: Array, root: Array, span
 
 
 def _cross_validated(windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
-    """Each part of the clips judged by what was learnt from the others."""
+    """The classes of windows, each quarter judged by a classifier that learnt from the other three."""
     judged: list[Window] = []
     named: list[str] = []
-    for part in range(PARTS):
+    for part in range(FOLDS):
         rest = [w for w in windows if w.part != part]
         asked = [w for w in windows if w.part == part]
         if asked and len({w.hurt for w in rest}) > 1:
@@ -212,7 +216,7 @@ def _judged(judge: Discriminant, windows: Sequence[Window], sided: Plain) -> dic
 
 
 def _by_walk(judge: Discriminant, windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
-    """Each walk named once, by what all its windows say together."""
+    """One answer for each walk, from all its windows together."""
     scores = judge.scores(table(windows))
     walks, named = [], []
     for walk in dict.fromkeys(w.clip for w in windows):
@@ -229,7 +233,7 @@ def _confusion(
     sided: Plain,
     what: str = "windows",
 ) -> dict[str, Any]:
-    """Counts hurt -> named, a row for each class that is asked about and a column for each that is known."""
+    """Counts of hurt -> recognised: a row for each class that hurts, a column for each known class."""
     counts = {h: dict.fromkeys(classes, 0) for h in sorted({w.hurt for w in windows})}
     right: dict[float, list[bool]] = {}
     for w, name in zip(windows, named, strict=True):

@@ -1,4 +1,4 @@
-"""How the gait changes as the severity of each link is swept from 0 to 10 and back."""
+"""Measures how the gait changes as the severity of each link rises from 0 to 10 and falls again."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from hobble.runtime.options import Runtime
 
 
 class Options(Section):
-    """Its keys of the section `evaluation`."""
+    """The keys of this measurement in the section `evaluation`."""
 
-    seconds: PositiveFloat = Field(4.0, description="at each severity of the injury sweeps")
+    seconds: PositiveFloat = Field(4.0, description="time at each severity of the injury sweeps")
 
 
 MEASURE = Measure(

@@ -1,4 +1,4 @@
-"""Injury beside the sweep: a second one over a first, from walking into jogging, and divided severities."""
+"""Further tests of injuries: a second injury, a change from walking to jogging, and divided severities."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from hobble.hurt.parts import part_of_link
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
-FIRST = 7.0  # severity of the injury that stays while a second one comes
+FIRST = 7.0  # severity of the first injury, to which a second one is added
 SECOND = (0.0, 5.0, 10.0)
 DIVIDED = (0.0, 2.5, 5.0, 7.5, 10.0)
 SCALES = (1.0, 2.0, 5.0)
 INTO_A_JOG = (0.0, 5.0, 10.0)
-ARRIVED = 0.9  # share of the final speed at which a figure counts as jogging
+JOGGING = 0.9  # a figure jogs from this share of its final speed on
 
 
 def _frames(share: float, seconds: float) -> int:
@@ -52,13 +52,13 @@ def _speed(network: Network, walks: Walks, stretch: int, figure: int) -> float:
 def second_injuries(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> list[dict[str, Any]]:
-    """Every link hurt more and more over a first one at severity 7, while walking.
+    """Every link hurt more and more, in addition to a first one at severity 7, while walking.
 
-    The first is one link of each part of the body (`one_of_each_part`): with all 30 as firsts, this took
-    longer than everything else that is measured.
-    `from_first_cm`: how far the second at 10 takes the walk from that of the first alone; `share`: of what
-    it does to a healthy body; `from_second_cm`: how far the walk of both is from that of the second alone, 0
-    where the second hides the first; `spearman` of the distance from the first with the second's severity.
+    The first is one link of each part of the body (`one_of_each_part`), because all 30 would take longer than
+    everything else that is measured. `from_first_cm`: distance of the walk with the second at 10 from the
+    walk with the first alone. `share`: the same as a share of the second's effect on a healthy body.
+    `from_second_cm`: distance of the walk with both from the walk with the second alone; 0 if the second
+    hides the first. `spearman`: of the distance from the first with the second's severity.
     """
     assert network.skeleton is not None
     firsts = one_of_each_part(network.skeleton, links)
@@ -98,7 +98,7 @@ def second_injuries(
 
 
 def one_of_each_part(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
-    """The first of `links` in each part of the body, whichever side it is on."""
+    """The first of `links` in each part of the body, on either side."""
     pairs = dict(zip(skeleton.link_names, skeleton.links, strict=True))
     first: dict[str, str] = {}
     for link in links:
@@ -111,8 +111,9 @@ def into_a_jog(
 ) -> list[dict[str, Any]]:
     """From walking to jogging with each link at severities 0, 5 and 10.
 
-    `kept`: how far the jog is from the healthy jog, as a share of how far the walk was from the healthy walk:
-    0 where running forgets the injury. `reach_seconds`: from the call to nine tenths of the jog's speed.
+    `kept`: distance of the jog from the healthy jog, as a share of the distance of the walk from the healthy
+    walk. It is 0 if the jog shows no injury. `reach_seconds`: from the command to nine tenths of the jog's
+    speed.
     """
     each = [(link, s) for link, s in product(links, INTO_A_JOG) if s > 0]
     figures: list[tuple[str | None, float]] = [(None, 0.0), *each]
@@ -132,7 +133,7 @@ def into_a_jog(
         walking, jogging = (_from(walks, s, i, healthy[s]) - own[s] for s in (1, 2))
         speed = _speed(network, walks, 2, i)
         going = np.linalg.norm(np.diff(walks.root[at:, i, ::2], axis=0), axis=1) * FPS
-        fast = np.flatnonzero(going >= ARRIVED * speed)
+        fast = np.flatnonzero(going >= JOGGING * speed)
         out.append(
             {
                 "link": link,
@@ -152,7 +153,7 @@ def into_a_jog(
 def divided_severities(
     network: Network, links: Sequence[str], seconds: float, runtime: Runtime
 ) -> list[dict[str, Any]]:
-    """The walk with severities divided by 1, 2 and 5: what is left of each link's effect."""
+    """The walk with severities divided by 1, 2 and 5: how much of each link's effect remains."""
     gait = ["walk"] * len(links)
     script = [Stretch(_frames(WALK_IN, seconds), gait, severities(network, [{}] * len(links)))]
     script += [

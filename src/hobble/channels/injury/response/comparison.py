@@ -1,4 +1,4 @@
-"""The response to injury of configurations side by side."""
+"""Compares the response to injury of several configurations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ KEPT = ("applies", "reason", "summary")
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """Whether each can be hurt, and the means over its links."""
+    """For each configuration whether it can be hurt, and the means over its links."""
     return SideBySide(entries=[_entry(m) for m in all_measured])
 
 

@@ -1,4 +1,4 @@
-"""The response to injury of configurations side by side."""
+"""Shows the response to injury of several configurations."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from hobble.report.tables import Column, Table
 INTRODUCTION = (
     "One link at a time is hurt from severity 0 to 10 and back while the character walks or jogs; every "
     "figure is the mean over the links that were hurt in training. ρ is Spearman's rank correlation: 1 or −1 "
-    "means that every further severity moves the measure further, 0 that it does not follow severity."
+    "means that the measure always rises or always falls with severity, 0 that it does neither."
 )
-# Measures of the injury summary in words.
+# Keys of the injury summary -> words.
 INJURY = {
     "from_healthy_cm": "pose from healthy at severity 10, cm a joint",
     "speed_share": "share of the healthy speed at severity 10",
@@ -22,15 +22,15 @@ INJURY = {
     "spearman_back_from_healthy": "ρ of pose and severity, healing",
     "settle_seconds": "settles in, s",
     "heal_seconds": "heals in, s",
-    "after_healing_cm": "left after healing, cm a joint",
-    "way_back_cm": "way back from way there, cm a joint",
-    "acceleration_share": "largest acceleration, of the healthy walk's",
-    "clip_acceleration_share": "largest acceleration, of the captured clips'",
+    "after_healing_cm": "remaining distance after healing, cm a joint",
+    "way_back_cm": "falling from rising severity, cm a joint",
+    "acceleration_share": "largest acceleration, share of the healthy walk's",
+    "clip_acceleration_share": "largest acceleration, share of the captured clips'",
 }
 
 
 def section(compared: Compared) -> Section:
-    """A table of means, where any configuration can be hurt."""
+    """A table of means, if any configuration can be hurt."""
     table = injury_table(compared)
     words = Words(INTRODUCTION) if table else None
     parts = [Part(0, words), Part(10, table, open=True, short=True)]
@@ -38,7 +38,7 @@ def section(compared: Compared) -> Section:
 
 
 def injury_table(compared: Compared) -> Table | None:
-    """What severities do, on average, in the configurations that know them."""
+    """Mean effects of severities in the configurations with injuries."""
     rows = [
         (entry["configuration"], gait, summary)
         for entry in compared["injury"]
@@ -55,6 +55,6 @@ def injury_table(compared: Compared) -> Table | None:
     ]
     right = {e["configuration"]: e["generated"]["right"] for e in compared["recognition"] if e.get("applies")}
     if right:
-        row = ["share of hurt parts that a classifier names right", *(right.get(name) for name, *_ in rows)]
+        row = ["share of hurt parts that a classifier recognises", *(right.get(name) for name, *_ in rows)]
         table.append(row)
     return Table("compare-injury", columns, table, "Means over the links that were hurt in training")

@@ -1,4 +1,4 @@
-"""What the response to injury suggests, in sentences."""
+"""Sentences about the response to injury."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from hobble.report.summary import Hint
 
 
 def injury_hints(found: Json) -> Iterator[Hint]:
-    """Whether each link is felt, by how much, and left again; next to how far an unhurt walk drifts."""
+    """Whether and how much each link changes the walk, and whether the walk recovers, relative to a healthy
+    walk's drift.
+    """
     responses = [r for r in found.get("responses") or () if r["gait"] == "walk"]
     walks = [r for r in responses if r.get("trained", True)]
     if not walks:
@@ -22,8 +24,8 @@ def injury_hints(found: Json) -> Iterator[Hint]:
     if drift > 2:
         yield Hint(
             "warn",
-            f"A walk in which nothing hurts drifts as well, by {number(drift)} cm a joint.",
-            "What severity does can hardly be told from that: train for longer, or measure for longer.",
+            f"A healthy walk also drifts, by {number(drift)} cm per joint.",
+            "So the effect of severity is hard to measure. Train for longer, or measure for longer.",
         )
     deaf = [r["link"] for r in walks if (r.get("from_healthy_cm") or 0) < max(0.5, 2 * drift)]
     if deaf:
@@ -31,8 +33,8 @@ def injury_hints(found: Json) -> Iterator[Hint]:
             "note",
             f"{len(deaf)} of {_plural(len(walks), 'link')} hardly "
             f"{'changes' if len(deaf) == 1 else 'change'} the walk at severity 10",
-            "(under half a centimetre a joint, or no different from an unhurt walk): "
-            f"{', '.join(deaf[:4])}{' …' if len(deaf) > 4 else ''}. Add clips in which more of it hurts.",
+            "(by less than half a centimetre per joint, or by no more than a healthy walk drifts): "
+            f"{', '.join(deaf[:4])}{' …' if len(deaf) > 4 else ''}. Add clips in which they hurt.",
         )
     stuck = [
         r["link"]
@@ -42,8 +44,8 @@ def injury_hints(found: Json) -> Iterator[Hint]:
     if stuck:
         yield Hint(
             "note",
-            f"After healing, the walk does not quite come back for {', '.join(stuck[:4])}.",
-            "The network is caught in a limp that it would see as a gait of its own.",
+            f"After healing, the walk stays changed for {', '.join(stuck[:4])}.",
+            "The network keeps limping although nothing hurts any more.",
         )
     if not deaf:
         felt = [r["from_healthy_cm"] for r in walks]
@@ -51,12 +53,12 @@ def injury_hints(found: Json) -> Iterator[Hint]:
             "good",
             f"The {_plural(len(walks), 'link')} hurt in training, of {len(responses)}, "
             f"change{'s' if len(walks) == 1 else ''} the walk at severity 10",
-            f"by {number(min(felt))} to {number(max(felt))} cm a joint.",
+            f"by {number(min(felt))} to {number(max(felt))} cm per joint.",
         )
 
 
 def _unhurt(responses: Sequence[Mapping[str, Any]], key: str) -> float:
-    """What is measured of links that were never hurt in training: the drift of an unhurt walk."""
+    """The values of links that were never hurt in training. They show how far a healthy walk drifts."""
     values = [r[key] for r in responses if not r.get("trained", True) and r.get(key) is not None]
     return float(np.mean(values)) if values else 0.0
 

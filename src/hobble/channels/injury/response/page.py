@@ -1,4 +1,4 @@
-"""How the gait answers to injury: severity swept link by link."""
+"""Shows how the gait responds to injury, link by link."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from hobble.report.tables import Column, Table
 
 NOTHING = Markup(
     "This network has no severities among its inputs, so nothing can hurt it. The configuration "
-    "<code>injured</code> has."
+    "<code>injured</code> has them."
 )
-LINKS = ("link", "first", "second")  # keys under which the JSON names one
+LINKS = ("link", "first", "second")  # keys of the JSON that hold a link
 UNTRAINED = "never hurt in training"
 GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
 HOLLOW = {"symbol": "circle-open", "size": 8, "line": {"width": 1.2}}
 SIDES = (("left", "@accent"), ("right", "@g2"))
-# Small charts: name, title, unit, lines as (column, label, colour), the least that the axis spans.
+# Small charts: name, title, unit, lines as (column, label, colour), least range of the axis.
 PANELS: tuple[tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool], ...] = (
     (
         "pose",
@@ -62,19 +62,19 @@ PANELS: tuple[tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool
 
 
 def section(found: Json, material: Material) -> Section:
-    """Charts and tables, or that there are none for a network without severities."""
+    """Charts and tables. A network without severities has only a sentence."""
     found = in_words(found, material)
     parts = _parts(found, material.name) if found.get("applies") else [Part(0, Words(NOTHING, empty=True))]
     return Section("injury", parts, title="Injury response", at=20)
 
 
 def hints(found: Json, material: Material) -> Iterator[Hint]:
-    """What the response suggests."""
+    """Sentences about the response."""
     return placed(50, injury_hints(in_words(found, material)))
 
 
 def in_words(found: Json, material: Material) -> dict[str, Any]:
-    """The same with every link called as a reader calls it."""
+    """The same results with spoken names of links."""
     say = speaker(material.network["skeleton"])
 
     def told(value: Any, key: str = "") -> Any:
@@ -114,9 +114,9 @@ def curves(
     back: Sequence[Mapping[str, Any]] = (),
     untrained: Collection[str] = (),
 ) -> Family:
-    """A small chart for each measure over severity, for a chosen gait and link; dotted: on the way back.
+    """A small chart for each measure over severity, for a chosen gait and link.
 
-    Links that are `untrained` come last, and say so.
+    Dotted: falling severity. Links in `untrained` come last and are marked.
     """
 
     def label_of(row: Mapping[str, Any]) -> str:
@@ -167,12 +167,12 @@ def curves(
         )
     return Family(
         "sweeps",
-        "One link, hurt more and more",
-        "Every point is a walk of its own, healthy for a quarter and measured over its last half. Look for "
-        "lines that bend smoothly from left to right (a gradient), for left and right that part (a limp), "
-        "and for jumps between neighbours (the network switches between two gaits it knows). Pose distances "
-        "are means over joints at the same phase. Dotted: on the way back to 0. A link that was never hurt "
-        "in training shows how much an unhurt walk changes by itself.",
+        "One link at rising severity",
+        "Each point is a separate walk, healthy for the first quarter and measured over the last half. Dotted "
+        "lines: severity falls back to 0. A smooth curve means that the walk changes gradually. A gap "
+        "between left and right is a limp. A jump between neighbours means that the network switches between "
+        "two gaits. Pose distances are means over joints at the same phase. Links that were never hurt in "
+        "training show how much a healthy walk varies.",
         charts,
         "Link and gait",
     )
@@ -181,7 +181,10 @@ def curves(
 def y_range(
     rows: Sequence[Mapping[str, Any]], gait: str, columns: Sequence[str], span: float, from_zero: bool
 ) -> list[float] | None:
-    """One range for every link of a gait, so that links compare, and never so narrow that noise fills it."""
+    """The range of the vertical axis, the same for all links of a gait, so that they can be compared.
+
+    It spans at least `span`, so that noise looks small.
+    """
     found = [row[c] for row in rows if row["gait"] == gait for c in columns if row.get(c) is not None]
     if not found:
         return None
@@ -191,27 +194,27 @@ def y_range(
 
 
 def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
-    """What severity 10 does to pose and speed, link by link."""
+    """Effect of severity 10 on pose and speed, for each link."""
     charts = []
     for name, key, title, label, least, caption in (
         (
             "injury-pose",
             "from_healthy_cm",
-            "How far the pose goes",
-            "cm at severity 10",
+            "Change of the pose",
+            "cm per joint at severity 10",
             2.0,
-            "Mean distance over joints, at the same phase, from the healthy walk. Hollow dots are links that "
-            "were never hurt in training: their severity does nothing, and they show how far an unhurt walk "
-            "drifts in the meantime. A link whose dot lies no further out is not felt.",
+            "Distance from the healthy walk at the same phase, mean over joints. Hollow dots are links that "
+            "were never hurt in training. They have no effect and show how far a healthy walk drifts. A link "
+            "whose dot is no further out has no effect either.",
         ),
         (
             "injury-speed",
             "speed_share",
-            "What is left of the speed",
+            "Remaining speed",
             "share of the healthy speed",
             1.0,
-            "At severity 10; 1 means that the hurt character is as fast as the healthy one. Hollow: links "
-            "that were never hurt in training.",
+            "Speed at severity 10, divided by the healthy speed. Hollow dots are links that were never hurt "
+            "in training.",
         ),
     ):
         traces: list[Trace] = []
@@ -235,7 +238,7 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
                             "hovertemplate": "%{y}: %{x:.2f}<extra>%{fullData.name}</extra>",
                         }
                     )
-        # What was hurt in training stands on top; plotly counts from below.
+        # Links that were hurt in training are at the top. Plotly counts from below.
         downwards = sorted(responses, key=lambda r: not r.get("trained", True))
         links = list(dict.fromkeys(r["link"] for r in downwards))[::-1]
         furthest = max((r[key] for r in responses if r.get(key) is not None), default=0.0)
@@ -253,15 +256,15 @@ def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
         Column("gait"),
         Column("link"),
         Column("in training", lambda v: "hurt" if v else "never hurt"),
-        Column.number("pose at 10, cm"),
-        Column.number("speed share"),
-        Column.number("settles in, s"),
-        Column.number("heals in, s"),
-        Column.number("left after healing, cm"),
+        Column.number("change of the pose, cm"),
+        Column.number("share of the healthy speed"),
+        Column.number("time to settle, s"),
+        Column.number("time to heal, s"),
+        Column.number("change left after healing, cm"),
         Column.number("way back, cm"),
-        Column.number("acceleration share"),
-        Column.number("ρ pose"),
-        Column.number("ρ speed"),
+        Column.number("largest acceleration, times healthy"),
+        Column.number("ρ of pose"),
+        Column.number("ρ of speed"),
     ]
     rows = [
         [
@@ -280,12 +283,12 @@ def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
         ]
         for r in responses
     ]
-    title = "Every link at severity 10, and how steadily it gets there (ρ: Spearman's rank correlation)"
+    title = "Every link at severity 10, and its rank correlation with severity (Spearman's ρ)"
     return Table(f"{name}-injury-responses", columns, rows, title)
 
 
 def sweep_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
-    """Every walk of the sweep, as in injury.csv."""
+    """All walks of the sweep, as in injury.csv."""
     if not rows:
         return None
     keys = list(rows[0])

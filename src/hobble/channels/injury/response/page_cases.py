@@ -1,4 +1,4 @@
-"""More of the injury response: a second injury, a jog after a hurt walk, severities divided."""
+"""More charts of the response to injury: a second injury, a jog after a hurt walk, divided severities."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ COLOURS = ("@accent", "@g2", "@g3", "@g4", "@g5", "@g0")
 
 
 def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
-    """What a second injury adds to a first one: every pair, as injury.json has them under `second`."""
+    """The effect of a second injury in addition to a first, for every pair of injury.json's `second`."""
     if not rows:
         return None
     firsts, seconds = (list(dict.fromkeys(row[key] for row in rows)) for key in ("first", "second"))
     by_pair = {(row["first"], row["second"]): row for row in rows}
-    shown = {"centimetres a joint": ("from_first_cm", ".1f"), "share of what it does alone": ("share", ".0%")}
+    shown = {"centimetres per joint": ("from_first_cm", ".1f"), "share of its effect alone": ("share", ".0%")}
     options: dict[str, list[Trace]] = {}
     for label, (key, form) in shown.items():
         options[label] = [
@@ -37,16 +37,16 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         ]
     return Chart(
         "second-injury",
-        "A second injury over a first",
-        "Down: the first injury, at severity 7, one link of each part of the body. Across: the second, at "
-        "10. How far the second takes the walk from that of the first alone, and how much that is of what it "
-        "does to a healthy body. A pale field is a second injury that the first one hides.",
+        "A second injury in addition to a first",
+        "Rows: the first injury, at severity 7, one link of each part of the body. Columns: the second, at "
+        "10. Shown is how much the second changes the walk, in centimetres and as a share of its effect on a "
+        "healthy body. A pale field means that the first injury hides the second.",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
         },
         height=max(300, 190 + 24 * len(firsts)),
-        choose="In",
+        choose="Unit",
         options=options,
     )
 
@@ -65,7 +65,7 @@ def second_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
 
 
 def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
-    """What dividing severities does."""
+    """The effect of divided severities."""
     options: dict[str, list[Trace]] = {}
     scales = sorted({row["scale"] for row in rows})
     for link in dict.fromkeys(row["link"] for row in rows):
@@ -79,9 +79,8 @@ def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         return None
     return Chart(
         "divided",
-        "Severities divided",
-        "The same severities, divided by a scale before the network sees them: distance of the pose from the "
-        "healthy walk.",
+        "Divided severities",
+        "Distance of the pose from the healthy walk, if severities are divided before the network gets them.",
         layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm a joint", rangemode="tozero")},
         choose="Link",
         options=options,
@@ -89,7 +88,7 @@ def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
 
 
 def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()) -> Chart | None:
-    """How much of an injury is left when a walk becomes a jog; one line for all `untrained` links."""
+    """How much of an injury remains when a walk becomes a jog. All `untrained` links share one line."""
     links = [link for link in dict.fromkeys(row["link"] for row in rows) if link is not None]
     hurt = [link for link in links if link not in untrained]
     traces: list[Trace] = []
@@ -110,9 +109,9 @@ def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()
     return Chart(
         "into-a-jog",
         "From a hurt walk into a jog",
-        "How far the jog that follows is from the healthy jog. Links that were never hurt in training share "
-        "the dotted line, their mean: so far two unhurt jogs differ. A line that is no higher is an injury "
-        "that is forgotten when the figure begins to jog.",
+        "Distance of the jog from the healthy jog. The dotted line is the mean of links that were never hurt "
+        "in training. It shows how much two healthy jogs differ. If a line is no higher, the injury does not "
+        "show in the jog.",
         traces,
         {
             "xaxis": axis("severity", dtick=1),

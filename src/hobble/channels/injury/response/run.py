@@ -1,4 +1,4 @@
-"""The response to injury: every link of the body swept from healthy to fully hurt and back, in two gaits."""
+"""Measures the response to injury: every link from healthy to severity 10 and back, in two gaits."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from hobble.runtime.options import Runtime
 
 INJURY = "injury"  # the channel
 GAITS = tuple(SPEEDS)
-REASON = "this network has no severity inputs"
+NO_SEVERITIES = "this network has no severity inputs"
 SUMMARY = (
     "from_healthy_cm",
     "after_healing_cm",
@@ -43,16 +43,16 @@ def injury_response(
     seconds: float,
     links: Sequence[str] | None = None,
 ) -> dict[str, Any]:
-    """Sweep each of `links` (default: all).
+    """The content of injury.json: a sweep of each of `links` (default: all).
 
-    motion: the captured clips, whose largest accelerations ours stand against. seconds: at each severity.
-    Returns `rows`, one for each gait, link and severity on the way up, `back` for the way back, `responses`
-    for each gait and link (see `Sweep.response`), `second`, `into_a_jog` and `divided` (see `cases`), and
-    `summary`: means over the links that were hurt in training (`trained`) and, apart, over those that were
-    not. `applies` is false for a network without severities.
+    motion: the captured clips, whose largest accelerations are compared with the character's. seconds: time
+    at each severity. `rows`: one for each gait, link and rising severity. `back`: the same for falling
+    severity. `responses`: for each gait and link (see `Sweep.response`). `second`, `into_a_jog`, `divided`:
+    see `cases`. `summary`: means over the links that were hurt in training (`trained`) and over the others.
+    `applies` is false for a network without severities.
     """
     if not links_of(network):
-        return {"configuration": configuration, "applies": False, "reason": REASON}
+        return {"configuration": configuration, "applies": False, "reason": NO_SEVERITIES}
     links = list(links or links_of(network))
     trained = [link for link in links if link in hurt_links(network)]
     largest = largest_accelerations(motion, network)
@@ -102,8 +102,10 @@ def injury_response(
 def largest_accelerations(
     motion: Iterable[Captured], network: Network
 ) -> dict[tuple[str, str | None], float]:
-    """(gait, link) -> the largest joint acceleration (cm per frame squared) captured in that gait with that
-    link hurt; (gait, None): in that gait at all."""
+    """(gait, link) -> largest joint acceleration (cm per frame squared) in captured motion.
+
+    (gait, None): the largest in that gait with any or no injury.
+    """
     out: dict[tuple[str, str | None], float] = {}
     for clip in motion:
         for gait in GAITS:

@@ -1,8 +1,8 @@
-"""One gait while each link of a body in turn hurts more and more, and less and less again.
+"""Measures one gait while the severity of one link rises and falls.
 
-A figure for each link walks side by side with the others: healthy until it is up to speed, then at severities
-0, 1, ..., 10, 9, ..., 0, some time at each. A second crowd is hurt in one go and healed in one go, which
-tells how fast the walk follows.
+There is a figure for each link. It walks healthy until it has its speed, then at severities 0, 1, ..., 10, 9,
+..., 0, for the same time each. A second crowd is hurt at once and healed at once, which shows how fast the
+walk follows.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 SEVERITIES = np.arange(11.0)
-WALK_IN = 0.75  # stretches until a figure that stood is up to speed
-HURT = 2  # stretches in which a figure hurt in one go settles, and then heals
-# Which of a row's columns say where it belongs and not how it walks.
+WALK_IN = 0.75  # stretches until a figure has its speed
+HURT = 2  # stretches for which a figure is hurt at once, and then healed
+# Columns of a row that are not measures of the walk.
 NAMES = ("gait", "link", "way", "severity")
 
 
@@ -48,8 +48,10 @@ class Sweep:
         )
 
     def rows(self, figure: int) -> list[dict[str, Any]]:
-        """One row for each step: the gait's measures, distances of the pose from the healthy and from the
-        fully injured walk (cm, mean over joints at the same phase) and the largest acceleration of a joint.
+        """One row for each step.
+
+        It has the gait's measures, the distances of the pose from the healthy and the fully hurt walk (cm,
+        mean over joints at the same phase) and the largest acceleration of a joint.
         """
         walks = self.walks
         spans = [walks.measured(1 + step, figure) for step in range(len(self.steps))]
@@ -67,7 +69,7 @@ class Sweep:
             row |= gait_measures(self.skeleton, local, walks.contacts[span, figure], walks.root[span, figure])
             row["from_healthy"] = float(np.mean(distance_to_cycle(local, phase, cycles[0])))
             row["from_worst"] = float(np.mean(distance_to_cycle(local, phase, cycles[worst])))
-            # How far the walk is, at the same severity, from what it was on the way up.
+            # Distance of the walk from that at the same severity while it rose.
             same = cycles[step if step <= worst else 2 * worst - step]
             row["from_way_up"] = float(np.mean(distance_to_cycle(local, phase, same)))
             row["largest_acceleration"] = float(walks.acceleration[span, figure].max())
@@ -75,11 +77,13 @@ class Sweep:
         return rows
 
     def response(self, figure: int, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-        """How the measures answer to severity: Spearman's rho on the way up and back, None where a measure
-        does not change; at severity 10 distance from healthy (cm, less the healthy walk's own) and share of
-        the speed; what is left of that distance after healing, and the way back's distance from the way up;
-        seconds to settle when hurt, and healed, in one go; the largest joint acceleration of the whole sweep,
-        changes included, and its share of the healthy walk's.
+        """How the measures respond to severity.
+
+        Spearman's rho for rising and falling severity (None if a measure is constant). At severity 10:
+        distance from healthy (cm, minus the healthy walk's own) and share of the speed. After healing: the
+        remaining distance. The distance between falling and rising severity. Seconds to settle when hurt, and
+        healed, at once. The largest joint acceleration of the whole sweep, and its share of the healthy
+        walk's.
         """
         worst = len(SEVERITIES) - 1
         up, back = rows[: worst + 1], rows[worst:]

@@ -1,4 +1,4 @@
-"""Answers to the questionnaire: read from the files that its page saves, and checked."""
+"""Reads and checks the answers that the questionnaire page saves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FLUID = range(1, 6)
 
 @dataclass(frozen=True)
 class Shown:
-    """What hurt in one film that people were asked about."""
+    """A film of the questionnaire, and the parts that hurt in it."""
 
     number: int
     kind: str
@@ -24,7 +24,10 @@ class Shown:
 
 @dataclass(frozen=True)
 class Study:
-    """The films of a questionnaire. name: what its answers carry. parts: what could be ticked."""
+    """The films of a questionnaire.
+
+    name: the answers have the same one. parts: the parts that people can tick.
+    """
 
     name: str
     configuration: str
@@ -34,7 +37,7 @@ class Study:
 
 @dataclass(frozen=True)
 class Answer:
-    """What one person said of one film."""
+    """One person's answer to one film."""
 
     film: int
     parts: tuple[str, ...]
@@ -42,28 +45,28 @@ class Answer:
 
 
 def read_study(path: str | Path) -> Study:
-    """films.json, as the rule `questionnaire` writes it. Raises InputError."""
+    """Read films.json, which the rule `questionnaire` writes. Raises InputError."""
     data = _object(path, read_json(path))
     try:
         films = tuple(Shown(row["film"], row["kind"], tuple(row["parts"])) for row in data["films"])
         return Study(data["study"], data["configuration"], tuple(data["parts"]), films)
     except (KeyError, TypeError) as error:
-        fix = "Give the films.json that lies beside questionnaire.html."
+        fix = "Use the films.json in the folder of questionnaire.html."
         raise InputError(path, f"is no list of films: {printable(repr(error))}", fix=fix) from None
 
 
 def read_answers(path: str | Path, study: Study) -> list[Answer]:
-    """What one person answered, in the order in which the films were shown.
+    """One person's answers, in the order in which the films were shown.
 
-    Raises InputError that names the answer: for another study's file, a film that is missing or there twice,
-    a part that could not be ticked, a number that is not from 1 to 5.
+    Raises InputError with the answer's number for another study's file, a film that is missing or answered
+    twice, an unknown part, or a mark that is not from 1 to 5.
     """
     data = _object(path, read_json(path))
     if data.get("study") != study.name:
         raise InputError(
             path,
-            f"answers another questionnaire ({printable(data.get('study'), 40)}) than that of {study.name}",
-            fix="Give the films.json of the questionnaire that was answered.",
+            f"answers another questionnaire ({printable(data.get('study'), 40)}) than {study.name}",
+            fix="Use the films.json of the questionnaire that was answered.",
         )
     rows = data.get("answers")
     if not isinstance(rows, list):
@@ -94,5 +97,5 @@ def _answer(path: str | Path, number: int, row: Any, study: Study) -> Answer:
 
 def _object(path: str | Path, data: Any) -> dict[str, Any]:
     if not isinstance(data, dict):
-        raise InputError(path, "holds no keys and values", fix="Give the file that the page saved.")
+        raise InputError(path, "is not an object of keys and values", fix="Use the file that the page saved.")
     return data

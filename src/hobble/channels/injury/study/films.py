@@ -1,8 +1,10 @@
-"""The thirteen films: something begins to hurt while a healthy character walks; in some the gait changes too.
+"""The thirteen films.
 
-Quentin Ferre (2019) showed four with one part hurt, five with several and four with a change of gait, each
-with the transition from healthy to hurt. Which parts hurt in each we do not know; his clips hurt thigh, shank
-and forearm, and so do these.
+A healthy character walks, then something begins to hurt; in some films the gait changes, too.
+
+Quentin Ferre (2019) showed four films with one hurt part, five with several and four with a change of gait,
+each with the transition from healthy to hurt. We do not know which parts hurt in each. In his clips thigh,
+shank and forearm hurt, so they do here.
 """
 
 from __future__ import annotations
@@ -24,18 +26,18 @@ from hobble.runtime.options import Runtime
 
 FPS = 60
 SEVERITY = 10.0  # as in the study
-SPEEDS = {"walk": 2.5, "jog": 6.0}  # cm a frame, asked for
-WALKED_IN = 4.0  # seconds before a film begins
-HEALTHY, HURT, CHANGED = 3.0, 7.0, 5.0  # seconds that are shown; where the gait changes it does so half-way
+SPEEDS = {"walk": 2.5, "jog": 6.0}  # wanted, cm a frame
+WARM_UP = 4.0  # seconds of walking before a film begins
+HEALTHY, HURT, CHANGED = 3.0, 7.0, 5.0  # seconds of the parts of a film; a gait changes half-way
 ONE, SEVERAL, GAIT = "one part", "several parts", "change of gait"
-# What a person may tick: the parts that are hurt in some film, on both sides, and parts that never are.
+# Parts that people can tick: those that hurt in some film, on both sides, and others that never hurt.
 SIDED = ("thigh", "shank", "foot", "upper arm", "forearm")
 PARTS = (*(f"{side} {part}" for part in SIDED for side in ("left", "right")), "lower back", "neck")
 
 
 @dataclass(frozen=True)
 class Film:
-    """One film. number: from 1, in the order of the tables. gaits: the one it begins with and the last."""
+    """One film. number: from 1, in the order of the tables. gaits: the first and the last."""
 
     number: int
     kind: str
@@ -44,7 +46,7 @@ class Film:
 
     @property
     def seconds(self) -> float:
-        """How long it is."""
+        """Its length."""
         return HEALTHY + HURT + (CHANGED if self.gaits[0] != self.gaits[1] else 0.0)
 
 
@@ -67,8 +69,11 @@ FILMS = (
 
 @dataclass(frozen=True)
 class Motion:
-    """What a film shows at 60 Hz: positions (F, J, 3), cm, and rotations (F, J, 4); from_healthy: mean
-    distance (cm) of the joints from those of the same character that is told nothing, while it hurts."""
+    """What a film shows at 60 Hz.
+
+    positions: (F, J, 3) cm. rotations: (F, J, 4). from_healthy: mean distance (cm) of the joints from those
+    of the healthy character, while it hurts.
+    """
 
     positions: Array
     rotations: Array
@@ -76,32 +81,33 @@ class Motion:
 
 
 def without_side(part: str) -> str:
-    """ "left thigh" and "right thigh" are "thigh"."""
+    """The part without its side: "left thigh" and "right thigh" become "thigh" alone."""
     return part.removeprefix("left ").removeprefix("right ")
 
 
 def part_links(network: Network, parts: Sequence[str]) -> list[str]:
-    """The link that each part is: of those in it the uppermost that was hurt in training, or the uppermost.
+    """The link that stands for each part: its uppermost link that was hurt in training, else its uppermost
+    link.
 
-    Raises HobbleError for a network that is not told what hurts, or a figure that has no such part.
+    Raises HobbleError if the network has no injury channel, or the skeleton has no such part.
     """
     known, hurt = links_of(network), hurt_links(network)
     if network.skeleton is None or not known:
-        raise HobbleError("this network is not told what hurts; make the films of a configuration that is")
+        raise HobbleError("this network has no injury channel. Use a configuration with `channels: [injury]`")
     ends = {label: roles for label, *roles in (*SLIDERS, *OTHERS)}
     out = []
     for part in parts:
         there = [link for link in way(network.skeleton, *ends[part]) if link in known]
         if not there:
             raise HobbleError(
-                f"the figure of this network has no {part} that can hurt, which a film of it needs"
+                f"the skeleton of this network has no {part} that can hurt, but a film needs one"
             )
         out.append(next((link for link in there if link in hurt), there[0]))
     return out
 
 
-def acted(network: Network, film: Film, runtime: Runtime) -> Motion:
-    """The character in a film. It walks straight on; what hurts begins to hurt after HEALTHY seconds."""
+def act(network: Network, film: Film, runtime: Runtime) -> Motion:
+    """The character in a film. It walks straight ahead. The injury begins after HEALTHY seconds."""
     told = dict.fromkeys(part_links(network, film.parts), SEVERITY)
     hurt, well = _walked(network, film, told, runtime), _walked(network, film, {}, runtime)
     begun = round(HEALTHY * FPS)
@@ -110,7 +116,7 @@ def acted(network: Network, film: Film, runtime: Runtime) -> Motion:
 
 
 def wish(film: Film, frame: int) -> tuple[bool, str]:
-    """Whether it hurts at a frame of a film, and which gait is asked for then."""
+    """Whether it hurts at a frame of a film, and which gait is asked for."""
     hurts = frame >= HEALTHY * FPS
     changed = frame >= (HEALTHY + HURT) * FPS - CHANGED * FPS / 2
     return hurts, film.gaits[1] if changed else film.gaits[0]
@@ -118,7 +124,7 @@ def wish(film: Film, frame: int) -> tuple[bool, str]:
 
 def _walked(network: Network, film: Film, told: dict[str, float], runtime: Runtime) -> tuple[Array, Array]:
     animation = ProceduralAnimation(network, **dict(runtime))
-    before, frames = round(WALKED_IN * FPS), round(film.seconds * FPS)
+    before, frames = round(WARM_UP * FPS), round(film.seconds * FPS)
     positions, rotations = [], []
     for frame in range(-before, frames):
         hurts, gait = wish(film, frame)
@@ -132,5 +138,5 @@ def _walked(network: Network, film: Film, told: dict[str, float], runtime: Runti
 
 
 def _local(positions: Array) -> Array:
-    """Positions over the origin."""
+    """Positions relative to the root's place on the ground."""
     return positions - positions[:, :1] * [1.0, 0.0, 1.0]

@@ -1,4 +1,4 @@
-"""The page of the questionnaire, with its films in it, and the file that says what hurts in each."""
+"""Makes the page of the questionnaire, which contains its films, and the file with the right answers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from hobble.channels.injury.study.films import FILMS, FPS, PARTS, SEVERITY, Film, Motion, acted, part_links
+from hobble.channels.injury.study.films import FILMS, FPS, PARTS, SEVERITY, Film, Motion, act, part_links
 from hobble.channels.injury.walks import hurt_links
 from hobble.core.files import write_json, write_text
 from hobble.core.skeleton import Skeleton
@@ -28,11 +28,11 @@ from hobble.report.templates import questionnaire_script, style, template
 from hobble.runtime.export import jointed
 from hobble.runtime.options import Runtime
 
-STRIDE = 2  # frames of the motion to one of the film
-SIZE = 360  # pixels a side
+STRIDE = 2  # every second frame of the motion is shown
+SIZE = 360  # width and height of the films, pixels
 QUALITY = 45
-STEADY = 25.0  # frames, sigma with which the camera's way is smoothed
-LOOK_AT, DISTANCE = 82.0, 400.0  # cm: how high the camera looks, and from how far
+CAMERA_SMOOTHING = 25.0  # frames, sigma of the Gaussian over the camera's path
+LOOK_AT, DISTANCE = 82.0, 400.0  # cm: height of the point that the camera looks at, and its distance
 
 
 def write_questionnaire(
@@ -43,9 +43,9 @@ def write_questionnaire(
     films: Sequence[Film] = FILMS,
     size: int = SIZE,
 ) -> dict[str, Any]:
-    """Write questionnaire.html, which asks, and films.json, which the tables need; returns the latter.
+    """Write questionnaire.html and films.json, which has the right answers. Returns the latter's content.
 
-    The page names no film by what hurts in it. Raises HobbleError for a network that is not told what hurts.
+    Nothing on the page says what hurts in a film. Raises HobbleError if the network has no injury channel.
     """
     folder = Path(folder)
     for film in films:
@@ -54,7 +54,7 @@ def write_questionnaire(
     folder.mkdir(parents=True, exist_ok=True)
     studio, rows, shown = Studio(body(network.skeleton)), [], []
     for film in films:
-        motion = acted(network, film, runtime)
+        motion = act(network, film, runtime)
         data = encoded(pictures(studio, network.skeleton, motion, size))
         shown.append({"film": film.number, "webp": base64.b64encode(data).decode("ascii")})
         rows.append(_row(network, film, motion))
@@ -92,20 +92,18 @@ def _row(network: Network, film: Film, motion: Motion) -> dict[str, Any]:
 
 
 def doubts(told: dict[str, Any]) -> list[str]:
-    """What whoever asks people has to know of the films: those in which nothing can be seen."""
+    """Warnings about films in which nobody can see the injury."""
     same = [str(row["film"]) for row in told["films"] if row["from_healthy_cm"] < VISIBLE]
     never = sorted({link for row in told["films"] for link in row["never_told"]})
-    out = (
-        [f"film {', '.join(same)}: nothing hurts that can be seen (less than {VISIBLE} cm)."] if same else []
-    )
+    out = [f"film {', '.join(same)}: nobody can see the injury (less than {VISIBLE} cm)."] if same else []
     return out + ([f"Never hurt in training: {', '.join(never)}."] if never else [])
 
 
 def pictures(studio: Studio, skeleton: Skeleton, motion: Motion, size: int) -> list[NDArray[np.uint8]]:
-    """The pictures (size, size, 3) of a film; the camera goes along evenly, and nothing is coloured."""
+    """The pictures (size, size, 3) of a film, without colours for injuries. The camera follows smoothly."""
     keep = body(skeleton).bones
     world, places = jointed(skeleton, motion.positions, motion.rotations)
-    path = gaussian(motion.positions[:, 0], STEADY)
+    path = gaussian(motion.positions[:, 0], CAMERA_SMOOTHING)
     path[:, 1] = LOOK_AT
     return [
         studio.draw(places[f, keep], world[f, keep], Camera(path[f], distance=DISTANCE, size=size))
@@ -114,7 +112,7 @@ def pictures(studio: Studio, skeleton: Skeleton, motion: Motion, size: int) -> l
 
 
 def encoded(frames: Sequence[NDArray[np.uint8]]) -> bytes:
-    """An animated WebP that is played once."""
+    """An animated WebP that plays once."""
     images = [Image.fromarray(frame) for frame in frames]
     out = io.BytesIO()
     options: dict[str, Any] = {"quality": QUALITY, "method": 3, "duration": round(1000 * STRIDE / FPS)}

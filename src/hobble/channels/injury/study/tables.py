@@ -1,7 +1,7 @@
-"""The tables of the study from people's answers: III to XV for the thirteen films, XVI for all of them.
+"""Makes the tables of the study from people's answers: III to XV for the thirteen films, XVI for all.
 
-Of Quentin Ferre's tables it is known how many there are, and that 82 % of hurt parts were named; a table for
-each film and one for all is our reading of that.
+We know only how many tables Quentin Ferre had, and that 82 % of hurt parts were named. That there is one for
+each film and one for all films is our assumption.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Rows = list[dict[str, Any]]
 
 
 def tables(study: Study, people: Sequence[Sequence[Answer]]) -> dict[str, Rows]:
-    """Numeral -> rows. people: the answers of each. The last of the tables is of all films together."""
+    """Numeral -> rows. people: each person's answers. The last table is of all films together."""
     of = {film.number: [a for some in people for a in some if a.film == film.number] for film in study.films}
     named = [*NUMERALS, *(f"XVI+{i}" for i in range(1, len(study.films)))]
     out = {named[i]: film_rows(study, film, of[film.number]) for i, film in enumerate(study.films)}
@@ -32,7 +32,9 @@ def tables(study: Study, people: Sequence[Sequence[Answer]]) -> dict[str, Rows]:
 
 
 def film_rows(study: Study, film: Shown, answers: Sequence[Answer]) -> Rows:
-    """How many ticked each part of one film: `people`, and their `share`. hurts: whether the part did."""
+    """For each part how many people ticked it in one film: `people` and their `share`. hurts: whether it
+    hurt.
+    """
     return [
         {
             "part": part,
@@ -45,7 +47,7 @@ def film_rows(study: Study, film: Shown, answers: Sequence[Answer]) -> Rows:
 
 
 def summary_rows(study: Study, of: Mapping[int, Sequence[Answer]]) -> Rows:
-    """A row for each film, for each kind of film, and for all; see `scores`."""
+    """A row of `scores` for each film, for each kind of film, and for all."""
     rows = [
         {"film": str(film.number), "kind": film.kind, "parts": ", ".join(film.parts)}
         | scores([(film, a) for a in of[film.number]])
@@ -58,11 +60,11 @@ def summary_rows(study: Study, of: Mapping[int, Sequence[Answer]]) -> Rows:
 
 
 def scores(answers: Sequence[tuple[Shown, Answer]]) -> dict[str, Any]:
-    """What people saw, of pairs of a film and an answer.
+    """How well people answered. answers: pairs of a film and an answer.
 
-    seen: share of the parts that hurt that were ticked; seen_without_side: with left and right taken for the
-    same. wrong: parts ticked in an answer that do not hurt, on average. exact: share of the answers that tick
-    just the parts that hurt. fluid: mean of the marks from 1 to 5; fluid_sd: their standard deviation.
+    seen: share of the hurt parts that were ticked. seen_without_side: the same if left and right are not
+    distinguished. wrong: mean number of ticked parts that do not hurt. exact: share of the answers that tick
+    exactly the hurt parts. fluid: mean of the marks from 1 to 5. fluid_sd: their standard deviation.
     """
     seen = sum(part in a.parts for film, a in answers for part in film.parts)
     sides = [({without_side(p) for p in f.parts}, {without_side(p) for p in a.parts}) for f, a in answers]
@@ -80,7 +82,7 @@ def scores(answers: Sequence[tuple[Shown, Answer]]) -> dict[str, Any]:
 
 
 def write_tables(folder: str | Path, study: Study, made: Mapping[str, Rows], published: float) -> None:
-    """Write table-III.csv and so on, and tables.md, in which they can all be read."""
+    """Write table-III.csv and so on, and tables.md with all tables."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     text = [f"# What people saw in the films of {study.configuration}\n"]
@@ -88,12 +90,12 @@ def write_tables(folder: str | Path, study: Study, made: Mapping[str, Rows], pub
         write_csv(folder / f"table-{numeral}.csv", rows)
         hurt = f"film {film.number}, {film.kind}: {', '.join(film.parts)}" if film else "all films"
         text += [f"## Table {numeral}: {hurt}\n", _markdown(rows), ""]
-    text.append(f"`seen` beside Quentin Ferre (2019): {100 * published:.0f} % named what hurts.\n")
+    text.append(f"Compare `seen` with Quentin Ferre (2019): {100 * published:.0f} % named what hurts.\n")
     write_text(folder / "tables.md", "\n".join(text))
 
 
 def _markdown(rows: Rows) -> str:
-    """Rows of equal keys as a table."""
+    """A Markdown table. All rows have the same keys."""
     lines = [list(rows[0]), ["---"] * len(rows[0]), *([_cell(v) for v in row.values()] for row in rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 

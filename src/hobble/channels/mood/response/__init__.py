@@ -1,4 +1,4 @@
-"""Whether a mood can be seen: a recogniser of captured clips names it, and how much it changes the walk."""
+"""Measures whether a recogniser of captured clips sees moods, and how much they change the walk."""
 
 from hobble.measures.measure import Cost, Measure
 from hobble.runtime.options import Runtime

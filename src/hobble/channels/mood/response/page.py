@@ -1,4 +1,4 @@
-"""Whether moods can be seen: a section of the report."""
+"""Shows whether moods can be seen."""
 
 from __future__ import annotations
 
@@ -12,15 +12,19 @@ UNITS = {"speed": "m/s", "stride": "cm", "trunk": "° forward", "arms": "° of s
 
 
 def section(found: Json, material: Material) -> Section:
-    """How often each mood is named, and how much it changes the walk; empty for a network without moods."""
+    """How often each mood is recognised and how much it changes the walk.
+
+    Empty for a network without moods.
+    """
     if not found.get("applies"):
         return Section("mood", [])
     shares = found["right_at_1"], found["captured"]["right"]
     right, left_out = (f"{100 * (share or 0):.0f} %" for share in shares)
     words = (
-        f"A recogniser taught by captured clips names the mood in {right} of the windows of generated "
-        f"walks at 1, and in {left_out} of the windows of captured clips that it did not learn from. All "
-        f"generated walks were asked for the same three speeds around {found['speed_asked']:.2f} m/s."
+        f"A classifier trained on captured clips finds the right mood in {right} of the windows of generated "
+        f"walks with a mood at 1, and in {left_out} of the windows of captured clips that it was not trained "
+        f"on. All generated walks had the same three target speeds around "
+        f"{found['speed_asked']:.2f} m/s."
     )
     charts = [effect_chart(found, effect) for effect in EFFECTS]
     parts = [Part(0, Words(words)), *(Part(10 + i, chart) for i, chart in enumerate(charts))]
@@ -28,7 +32,7 @@ def section(found: Json, material: Material) -> Section:
 
 
 def effect_chart(found: Json, effect: str) -> Chart:
-    """One size of all moods, captured and generated."""
+    """One effect of all moods, captured and generated."""
     rows = [row for row in found["effects"] if row["effect"] == effect]
     of = (("captured", "captured", "@muted"), ("generated", "generated at 1", "@accent"))
     traces = [
@@ -41,7 +45,7 @@ def effect_chart(found: Json, effect: str) -> Chart:
         }
         for key, label, colour in (*of, ("generated_at_half", "generated at .5", "@predicted"))
     ]
-    caption = f"What each mood adds to {effect} ({UNITS[effect]}), beside the walk in no mood."
+    caption = f"How much each mood changes {effect} ({UNITS[effect]}), relative to the neutral walk."
     return Chart(
         f"mood-{effect}", effect.capitalize(), caption, traces, {"yaxis": {"title": UNITS[effect]}}, 260
     )

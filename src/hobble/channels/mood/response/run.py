@@ -1,4 +1,7 @@
-"""Each mood of a generated walk named by what knows captured ones, and its size beside the captured one."""
+"""Measures whether a recogniser of captured moods recognises generated ones.
+
+Also compares sizes of effects.
+"""
 
 from __future__ import annotations
 
@@ -26,27 +29,27 @@ from hobble.runtime.options import Runtime
 MOOD = "mood"  # the channel
 WALK = GAITS.index("walk")
 NONE = "none"
-WINDOW, STEP = 60, 15  # frames: about a cycle
+WINDOW, STEP = 60, 15  # frames; a window is about a cycle
 AHEAD, LEAST = (
     0.9,
     0.5,
 )  # share of the speed that goes forward in a window; its least, cm a frame
-WALKED_IN, SHOWN = 4 * FPS, 6 * FPS  # frames of a generated walk that are left out, and that are looked at
-PACES = (0.85, 1.0, 1.15)  # of the middle speed of captured walks in no mood, asked of every mood alike
-ASKED = 120.0  # cm a second, where nobody was captured walking in no mood
+WARM_UP, USED = 4 * FPS, 6 * FPS  # frames of a generated walk that are skipped, and that are used
+PACES = (0.85, 1.0, 1.15)  # of the median speed of captured neutral walks; the same for every mood
+ASKED = 120.0  # cm a second, if there are no captured neutral walks
 VALUES = (0.5, 1.0)
 MIRROR = "_mirror"
-# Towards the diagonal of the covariance. With .6, 69 % of the captured windows that were left out are named
-# right, with the .02 of the injury recogniser 54 %: there are only one or two clips for each mood.
+# Of the covariance towards its diagonal. With .6, 69 % of the left-out captured windows are recognised. With
+# the .02 of the other recogniser it is 54 %, because each mood has only one or two clips.
 SHRINKAGE = 0.6
-REASON = "this network is told no moods"
-TOO_FEW = "the clips walk in fewer than two moods"
+REASON = "this network has no moods among its inputs"
+TOO_FEW = "there are walking clips of fewer than two moods"
 EFFECTS = ("speed", "stride", "trunk", "arms", "head")
 
 
 @dataclass(frozen=True)
 class Window:
-    """A stretch of going straight on: whose, in which mood (or NONE), its features, and whether it walks."""
+    """A stretch of straight motion: its clip, its mood (or NONE), its features, and whether it walks."""
 
     clip: str
     mood: str
@@ -58,13 +61,14 @@ class Window:
 def response(
     network: Network, motion: Iterable[Captured], splits: Mapping[str, str], runtime: Runtime
 ) -> dict[str, Any]:
-    """mood.json; `applies` is false, with a `reason`, where it cannot be tried.
+    """The content of mood.json. If it cannot be measured, `applies` is false and `reason` says why.
 
-    captured: how many windows of clips that were left out whole, each with its mirror in turn, are named
-    right by what was learnt from the others. generated: for each mood and value the share of `windows` named
-    so by what was learnt from all; of two moods together the share named one of them, and how far the walk is
-    `between` that of each alone. effects: of each mood, captured and generated, less no mood's:
-    speed (m/s), stride (cm), trunk and head (degrees forward), arms (degrees of swing, standard deviation).
+    captured: results for windows of captured clips. Each clip (with its mirror) is left out in turn and
+    recognised with what was learnt from the others. generated: for each mood and value the share of `windows`
+    recognised with what was learnt from all clips. For two moods together: the share recognised as either,
+    and how far the walk is `between` the two single moods. effects: of each mood, captured and generated,
+    minus the neutral walk's: speed (m/s), stride (cm), trunk and head (degrees forward), arms (degrees of
+    swing, standard deviation).
     """
     if MOOD not in network.channels or network.skeleton is None:
         return {"applies": False, "reason": REASON}
@@ -108,7 +112,7 @@ def response(
 
 
 def captured_windows(clip: Captured, network: Network) -> list[Window]:
-    """The windows of a captured stretch that go straight on in one mood, told at its highest, or in none."""
+    """The windows of a captured stretch with straight motion and one mood at its highest value, or none."""
     assert network.skeleton is not None
     columns = network.channels[MOOD]
     out = []
@@ -137,15 +141,15 @@ def captured_windows(clip: Captured, network: Network) -> list[Window]:
 def generated(
     network: Network, figures: Sequence[Mapping[str, float]], speed: float, runtime: Runtime
 ) -> list[list[Window]]:
-    """The windows of each figure's walks straight ahead at all PACES; figures: mood -> value."""
+    """The windows of each figure's straight walks at all PACES. figures: mood -> value."""
     assert network.skeleton is not None
     asked = [(i, figure, pace) for i, figure in enumerate(figures) for pace in PACES]
     values = channel_values(network, MOOD, [figure for _, figure, _ in asked])
-    script = Stretch(WALKED_IN + SHOWN, ["walk"] * len(asked), values, [speed * pace for *_, pace in asked])
+    script = Stretch(WARM_UP + USED, ["walk"] * len(asked), values, [speed * pace for *_, pace in asked])
     walks = run_walks(network, [script], runtime)
     out: list[list[Window]] = [[] for _ in figures]
     for c, (i, figure, _) in enumerate(asked):
-        for start in range(WALKED_IN, WALKED_IN + SHOWN - WINDOW + 1, STEP):
+        for start in range(WARM_UP, WARM_UP + USED - WINDOW + 1, STEP):
             span = slice(start, start + WINDOW)
             parts = walks.local[span, c], walks.contacts[span, c], walks.root[span, c]
             out[i].append(_window(network.skeleton, "", " and ".join(figure) or NONE, *parts))
@@ -153,7 +157,7 @@ def generated(
 
 
 def left_out(windows: Sequence[Window]) -> dict[str, Any]:
-    """Windows of each clip, and its mirror, named by what was learnt from the other clips."""
+    """Windows of each clip and its mirror, recognised with what was learnt from the other clips."""
     right: dict[str, list[bool]] = {}
     for clip in sorted({_original(w.clip) for w in windows}):
         rest = [w for w in windows if _original(w.clip) != clip]
@@ -225,7 +229,7 @@ def _sizes(
 
 
 def _between(both: Array, first: Array, second: Array) -> float:
-    """Where the mean features of both lie on the way from the first's, 0, to the second's, 1."""
+    """Position of the mean features of `both` between those of the first (0) and the second mood (1)."""
     way = second - first
     return round(float((both - first) @ way / max(float(way @ way), 1e-9)), 4)
 
