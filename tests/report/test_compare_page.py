@@ -169,7 +169,7 @@ def test_frame_times_are_medians_and_measures_have_names(
     assert [column.label for column in named.columns] == ["measure", "a, walk"]
     assert named.rows == [
         ["share of the healthy speed at severity 10", 0.8],
-        ["remaining distance after healing, cm a joint", 0.1],
+        ["remaining distance after healing, cm per joint", 0.1],
     ]
 
 

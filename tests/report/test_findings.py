@@ -95,16 +95,16 @@ def test_links_never_hurt_in_training_only_show_the_drift_of_the_walk(material: 
     drift = swept("never", False, 10.0, 7.0)
     like_it = {"responses": [drift, swept("hurt", True, 11.0, 6.5, 0.3)]}
     found = heads(material, injury=like_it)
-    assert found["A walk in which nothing hurts drifts as well, by 10.0 cm a joint."] == "warn"
+    assert found["A healthy walk also drifts, by 10.0 cm per joint."] == "warn"
     assert "1 of 1 link hardly changes the walk at severity 10" in found
-    assert not [head for head in found if "does not quite come back" in head]
+    assert not [head for head in found if "stays changed" in head]
     caught = {"responses": [swept("never", False, 0.1, 0.1), swept("hurt", True, 11.0, 6.5)]}
     found = heads(material, injury=caught)
-    assert "After healing, the walk does not quite come back for hurt." in found
+    assert "After healing, the walk stays changed for hurt." in found
     head = "The 1 link hurt in training, of 2, changes the walk at severity 10"
     assert found[head] == "good"
     texts = {hint.head: hint.text for hint in hints(changed(material, injury=caught))}
-    assert "11.0 to 11.0 cm a joint" in texts[head]
+    assert "11.0 to 11.0 cm per joint" in texts[head]
 
 
 def test_the_time_of_a_frame_is_a_median(material: Material) -> None:

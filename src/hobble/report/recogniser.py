@@ -30,7 +30,7 @@ WARM_UP, MEASURED = 3 * FPS, 8 * FPS  # frames to get up to speed, and frames th
 ROLES = ("hip", "knee", "heel", "toe", "shoulder")  # roles that both sides must have
 
 
-def playable_and_judged(network: Network, runtime: Runtime) -> dict[str, Any]:
+def playable_with_recogniser(network: Network, runtime: Runtime) -> dict[str, Any]:
     """The data of `playable`, and under `recogniser` what the page needs to recognise a limp.
 
     There is no `recogniser` if the network has no channel with parts of the body, if its rig lacks a role, or

@@ -91,7 +91,8 @@ def size_chart(found: Json) -> Chart:
         "limp-sizes",
         "Size of the limp",
         "The character walks at a target speed of 1.2 m/s with one link at severity 3, 5, 7 or 10, and is "
-        "compared with its healthy walk. Grey: mean and standard deviation of ten people who imitated strong limps.",
+        "compared with its healthy walk. Grey: mean and standard deviation of ten people who imitated strong "
+        "limps.",
         layout={"xaxis": axis("severity", range=[2.5, 11]), "yaxis": axis("size")},
         height=360,
         choose="Effect",

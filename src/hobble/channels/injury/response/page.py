@@ -168,8 +168,8 @@ def curves(
     return Family(
         "sweeps",
         "One link at rising severity",
-        "Each point is a separate walk, healthy for the first quarter and measured over the last half. Dotted "
-        "lines: severity falls back to 0. A smooth curve means that the walk changes gradually. A gap "
+        "Each point is a separate walk, healthy for the first quarter and measured over the last half. "
+        "Dotted lines: severity falls back to 0. A smooth curve means that the walk changes gradually. A gap "
         "between left and right is a limp. A jump between neighbours means that the network switches between "
         "two gaits. Pose distances are means over joints at the same phase. Links that were never hurt in "
         "training show how much a healthy walk varies.",

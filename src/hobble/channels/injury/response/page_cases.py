@@ -81,7 +81,7 @@ def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         "divided",
         "Divided severities",
         "Distance of the pose from the healthy walk, if severities are divided before the network gets them.",
-        layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm a joint", rangemode="tozero")},
+        layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm per joint", rangemode="tozero")},
         choose="Link",
         options=options,
     )
@@ -115,7 +115,7 @@ def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()
         traces,
         {
             "xaxis": axis("severity", dtick=1),
-            "yaxis": axis("cm a joint", rangemode="tozero"),
+            "yaxis": axis("cm per joint", rangemode="tozero"),
             "showlegend": True,
         },
         height=420,
