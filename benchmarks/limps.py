@@ -14,7 +14,7 @@ import numpy as np
 
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
-from hobble.gait.compare import compare, healthy_profile
+from hobble.gait.comparison import compare, healthy_profile
 from hobble.gait.derive_healthy import REFERENCE, healthy_windows
 from hobble.gait.graded import HEALTHY, Grader, grade, healthy_covariance, learn_grader
 from hobble.gait.people import GAITS, NORMAL, people
