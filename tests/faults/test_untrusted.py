@@ -105,7 +105,7 @@ def test_as_many_joints_as_may_be_can_hang_from_each_other(tmp_path: Path) -> No
     assert len(bvh.read_bvh(path).names) == bvh.MOST_JOINTS
     make = lambda: make_clip(path, SKELETON, SKELETON.parent, "a", "holden31", OPTIONS)  # noqa: E731
     more = f"  ... ({bvh.MOST_JOINTS - MOST_SHOWN} more; python -m hobble.motion rig a.bvh writes all)\n"
-    refused(make, "a.bvh: what is what on this rig is in doubt: ", more, letters=6000)
+    refused(make, "a.bvh: the parts of this rig are in doubt: ", more, letters=6000)
 
 
 def test_joints_without_channels_cost_memory_too(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from hobble.core.clip import Clip
 from hobble.core.files import load_npz
-from hobble.gait.compare import compare, healthy_profile, measure_clip
+from hobble.gait.comparison import compare, healthy_profile, measure_clip
 from hobble.gait.cycles import SCALARS
 from hobble.gait.effects import EFFECTS, effects_of_people
 from hobble.gait.features import features

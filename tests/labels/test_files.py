@@ -152,7 +152,7 @@ def test_the_eight_columns_of_a_gait_file_become_six(write):
     [
         ("0.1\n1.1\n0.2\n0.3\n", 2, "outside 0..1"),
         ("0.1\nnan\n0.2\n0.3\n", 2, "not a number"),
-        ("0.1\n0.1 0.2\n0.2\n0.3\n", 2, "2 values where 1 belong"),
+        ("0.1\n0.1 0.2\n0.2\n0.3\n", 2, "2 values instead of 1"),
         ("0.1\n0.2\n", None, "has 2 rows, but the clip's file has 4 frames"),
         ("", None, "has 0 rows"),
     ],

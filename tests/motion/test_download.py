@@ -100,8 +100,8 @@ def test_a_wrong_checksum_is_refused_with_both_and_nothing_is_kept(server, fetch
     with pytest.raises(InputError) as refused:
         fetch()
     assert str(refused.value) == (
-        f"{server.url}: cannot be downloaded: what arrives is another file: its SHA-256 is {found}, in the "
-        f"manifest it is {SHA256}, 2 times. Run the same command again when it can be reached, or "
+        f"{server.url}: cannot be downloaded: the server has another file: its SHA-256 is {found}, in the "
+        f"manifest it is {SHA256}, 2 times. Run the same command again later, or "
         "put walk.bvh into data/mine yourself."
     )
     assert list(fetch.part.parent.iterdir()) == []

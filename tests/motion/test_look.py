@@ -32,7 +32,7 @@ def test_a_wrong_frame_rate_shows_in_the_cadence(root, folder, bvh, walker, hold
     bvh(walker(holden31, 600, 120.0), "slow", edit=lambda s: s.replace("0.00833333", "0.04166667"))
     slow = next(clip for clip in seen(root, folder).clips if clip.name == "slow")
     assert any(
-        "no person's; at 120 fps" in warning and "source_fps: 120" in warning for warning in slow.warnings
+        "impossible; at 120 fps" in warning and "source_fps: 120" in warning for warning in slow.warnings
     )
 
 

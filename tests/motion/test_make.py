@@ -59,7 +59,9 @@ def test_the_unit_can_be_overruled(walk, bvh, make):
 
 
 def test_a_rig_of_no_known_size_is_refused(walk, bvh, make, scaled):
-    with pytest.raises(InputError, match=r"walk.bvh: no unit makes this rig a person.*Set motion.unit"):
+    with pytest.raises(
+        InputError, match=r"walk.bvh: no unit gives this rig a person's size.*Set motion.unit"
+    ):
         make(bvh(scaled(walk, 500.0)))
 
 
@@ -125,7 +127,7 @@ def test_a_figure_that_crawls_is_not_stood_on_end(holden31, bvh, make, heading):
         assert report["up"] == up
         np.testing.assert_allclose(clip.positions, crawling.positions, atol=1e-4)
         (note,) = report["notes"]
-        assert f"its rest pose along {up}; since it goes that way, as in a crawl, {up} was taken" in note
+        assert f"its rest pose along {up}. {up} was taken for up, because the body crawls" in note
     assert make(bvh(crawling), up="Y")[1]["notes"] == []
 
 
@@ -145,9 +147,8 @@ def test_a_rest_pose_that_lies_in_its_world_does_not_lay_the_figure_down(walk, b
     climbing = replace(walk, root=walk.root + up)
     clip, report = make(bvh(turned_upright(climbing)))
     assert report["up"] == "+Z"
-    assert (
-        "The body lies along +Z and its rest pose along +Y; since it moves so, +Z was" in report["notes"][0]
-    )
+    note = report["notes"][0]
+    assert "its rest pose along +Y. +Z was taken for up, because the body moves that way up" in note
     np.testing.assert_allclose(clip.positions, climbing.positions[::2], atol=1e-4)
 
 
@@ -203,7 +204,7 @@ def test_a_floor_near_zero_stays_where_it_is(walk, bvh, make, height):
 def test_uneven_ground_stays_where_it_is(walk, bvh, make):
     stairs = raised(walk, np.interp(walk.root[:, 2], [80, 120], [20, 60]))
     clip, report = make(bvh(stairs))
-    assert "which no flat ground is: say `ground: rocky` of this clip" in report["notes"][0]
+    assert "too uneven for flat ground: set `ground: rocky` for this clip" in report["notes"][0]
     assert report["repairs"] == []
     np.testing.assert_allclose(clip.root, stairs.root[::2], atol=1e-6)
     beam = bvh(raised(walk, 40.0), name="beam")
@@ -410,7 +411,7 @@ def test_a_joint_above_the_hips_is_folded_into_them_and_said(walker, bvh, make, 
     made, report = make(bvh(carried(clip, turn, place), name="carried"))
     alone, without = make(bvh(clip))
     np.testing.assert_allclose(made.positions, alone.positions, atol=1e-4)
-    assert report["notes"][0] == "What stands above Hips (Reference) was folded into it."
+    assert report["notes"][0] == "The joints above Hips (Reference) were folded into it."
     assert report["rig"] == without["rig"] == rig
     assert without["repairs"] == []
     assert len(report["repairs"]) == 1
@@ -453,8 +454,8 @@ def test_one_frame_off_is_repaired_or_refused(walk, bvh, make, declared):
     path = bvh(walk, edit=lambda s: s.replace("Frames: 241", f"Frames: {declared}"))
     clip, report = make(path)
     assert len(clip) == 121
-    assert f"declares {declared} frames and holds 241" in report["repairs"][0]
-    with pytest.raises(InputError, match=f"declares {declared} frames and holds 241"):
+    assert f"declares {declared} frames and has 241" in report["repairs"][0]
+    with pytest.raises(InputError, match=f"declares {declared} frames and has 241"):
         make(path, defects="refuse")
 
 

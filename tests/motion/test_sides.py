@@ -48,7 +48,7 @@ def wrists(clip, side):
 
 @pytest.mark.shared
 def test_a_rig_without_sides_is_refused_with_one_question(original, tmp_path, make):
-    with pytest.raises(InputError, match=r"no name tells its left side.*Set motion.handedness"):
+    with pytest.raises(InputError, match=r"its joint names do not say left.*Set motion.handedness"):
         make(renamed(original, tmp_path, word))
 
 
@@ -58,7 +58,7 @@ def test_handedness_answers_it(original, tmp_path, make):
     path = renamed(original, tmp_path, word)
     right, report = make(path, handedness="right")
     left, _ = make(path, handedness="left")
-    assert any("motion.handedness: right did" in note for note in report["notes"])
+    assert any("motion.handedness: right was used" in note for note in report["notes"])
     for side, other in (("left", "right"), ("right", "left")):
         here = wrists(right, side)
         assert np.linalg.norm(here - wrists(known, side)[: len(here)], axis=-1).mean() < 2

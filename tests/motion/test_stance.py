@@ -48,7 +48,7 @@ def same_bends(path, clip: Clip, names: dict[str, str]) -> None:
 def test_a_rig_whose_zero_pose_is_a_line_comes_out_upright(shared, make, name):
     path = shared / f"mocap/styles/dataset-1_{name}.bvh"
     clip, report = make(path)
-    assert report["stance"].startswith("its motion, since in its zero pose")
+    assert report["stance"].startswith("its motion, because in its zero pose")
     same_bends(path, clip, report["roles"])
     left, right = (clip.positions[:, clip.skeleton.role(f"{side}_hip"), 1] for side in ("left", "right"))
     assert np.ptp(left - right) < 8

@@ -30,7 +30,7 @@ def test_a_clip_that_the_folder_lacks_is_downloaded_once(workflow, clips, server
     assert workflow.planned(TARGET) == {"download_clip": 1, "motion_clip": 1}
     assert server.asked == []
     text = workflow.run("-c1", TARGET, ok=False)
-    assert f"cannot be downloaded: what arrives is another file: its SHA-256 is {sha256}" in text
+    assert f"cannot be downloaded: the server has another file: its SHA-256 is {sha256}" in text
     assert "data/far yourself" in text
     assert "Traceback" not in text
     assert list(kept.parent.glob("*")) == []

@@ -405,9 +405,9 @@ def test_missing_clips_are_downloaded(base: Path) -> None:
     [
         ("https://host/", "ftp://host/", r"download: url: must be an address like"),
         ("{clip}", "{name}", r"download: url: 'name'"),
-        ("{clip}", "a", r"download: url: \{clip\} must stand in it"),
+        ("{clip}", "a", r"download: url: must contain \{clip\}"),
         ("{clip}", "{clip.x}", "download: url: "),
-        ("{clip}", "{clip:a>400000000}", "only a width of up to 99 may stand behind a name"),
+        ("{clip}", "{clip:a>400000000}", "only a width of up to 99 may follow a name"),
         ("{clip}", "{clip:{subject}}", "only a width of up to 99"),
         ("{clip}", "{clip!r}", "only a width of up to 99"),
         ("https://host/", "https://host/\u202e", "must be an address like"),

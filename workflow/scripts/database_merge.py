@@ -8,7 +8,7 @@ from hobble.database.merge import write_database
 from hobble.database.options import Merging
 from hobble.database.parts import join_parts
 from hobble.database.sides import refuse_both_sides
-from hobble.motion.same import likeness, load_likenesses, same_pairs
+from hobble.motion.duplicates import likeness, load_likenesses, same_pairs
 from hobble.workflow.job import job
 
 with job(snakemake) as log:

@@ -6,7 +6,7 @@ from hobble.core.clip import load_clip
 from hobble.core.files import read_json
 from hobble.database.options import Merging
 from hobble.database.parts import write_shard
-from hobble.motion.same import likeness, save_likenesses
+from hobble.motion.duplicates import likeness, save_likenesses
 from hobble.workflow.datasets import shard_of
 from hobble.workflow.job import job
 

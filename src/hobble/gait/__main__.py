@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hobble.core.errors import HobbleError, InputError
-from hobble.gait.compare import Comparison, compare, healthy_profile, measure_clip
+from hobble.gait.comparison import Comparison, compare, healthy_profile, measure_clip
 from hobble.gait.effects import EFFECTS, effects_of_people
 from hobble.gait.people import GAITS, SOURCE, people
 from hobble.gait.profile import NO_CYCLE, Profile

@@ -18,7 +18,7 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import save_npz
 from hobble.core.quat import Array
-from hobble.gait.compare import healthy_profile, measure_clip
+from hobble.gait.comparison import healthy_profile, measure_clip
 from hobble.gait.cycles import Walk
 from hobble.gait.features import features
 from hobble.gait.graded import HEALTHY

@@ -1,1 +1,1 @@
-"""Healthy clips as a hurt body would have walked them, after the impaired walks of real people."""
+"""Makes hurt versions of healthy clips, modelled on the impaired walks of real people."""

@@ -1,9 +1,8 @@
-"""How much a hurt part of the body changes, at severity 10: people's profiles mixed, and what they do not
-tell.
+"""How much a hurt part of the body changes the motion at severity 10.
 
-The three tables say which profiles of people a part mixes, and what is added where the recordings tell
-nothing: feet and toes are poor in them, arms, shoulders, neck and back were not hurt. Values of a side are
-those of a hurt right side; `_sound` is the other.
+The tables say which profiles of people a part mixes, and what is added where recordings have nothing. In the
+recordings, feet and toes are poor, and arms, shoulders, neck and back were not hurt. Values of one side are
+for a hurt right side; `_sound` is the other side.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.hurt.people import CURVES, HARMONICS, profiles
 
-# Profiles and their weights. A part that is not here changes only what OWN says.
+# Profiles and their weights. Parts that are not here have only the values of OWN.
 MIXES: dict[str, dict[str, float]] = {
     "pelvis": {"trendelenburg": 0.55, "lurch": 0.25, "antalgic": 0.2},
     "hip": {"trendelenburg": 0.75, "antalgic": 0.25},
@@ -24,14 +23,14 @@ MIXES: dict[str, dict[str, float]] = {
     "foot": {"antalgic": 0.65, "steppage": 0.35},
     "back": {"lurch": 1.0},
 }
-BOTH_SIDES = ("back",)  # parts whose profile is taken from both sides alike
-# Gains on people's curves of trunk, pelvis and shoulders.
+BOTH_SIDES = ("back",)  # parts whose profile is applied to both sides
+# Factors on people's curves of trunk, pelvis and shoulders.
 GAIN: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "shank": 1.0, "foot": 0.9}
-# speed, stride: ratios. lift, push, strike: ratios of the height of the swing, and of the foot's pitch with
-# its heel up (push-off) and its toe up (heel strike). out: leg lengths that the foot swings outward. toe_out:
-# degrees. crouch: degrees of knee flexion added in stance. arms: ratio of both arms' swing. back, head: ratio
-# of the movement of trunk and head in themselves. forward, side, list, nod: degrees, of the trunk forward and
-# to the hurt side, of the pelvis up on the hurt side while that leg swings, of the head forward.
+# Ratios: speed; stride (time); lift (height of the swing); push and strike (pitch of the foot with heel up
+# and with toe up); arms (swing of both arms); back and head (movement within trunk and head).
+# Lengths: out (leg lengths that the foot swings outward).
+# Degrees: toe_out; crouch (knee flexion added in stance); forward and side (lean of the trunk forward and to
+# the hurt side); list (pelvis up on the hurt side while that leg swings); nod (head forward).
 OWN: dict[str, dict[str, float]] = {
     "pelvis": {"speed": 0.74, "stride": 1.15, "push": 0.65, "back": 0.6, "lift": 0.8, "list": 2.0},
     "hip": {"speed": 0.66, "stride": 1.2, "push": 0.6, "lift": 0.75, "forward": 2.0, "out": 0.02},
@@ -83,18 +82,20 @@ RATIOS = (
     "back",
     "head",
 )
-# The recordings take a slow ankle for a stance, which an early landing changes by half only; and
-# the network smooths what it learns from.
+# The recordings count a slow ankle as stance, so an early landing shows only by half. The network smooths the
+# effect, too.
 TIMING = 1.85
-STEP = {"thigh": 0.44, "shank": 0.38, "foot": 0.44}  # of the hurt foot, where the mix would say less
+STEP = {"thigh": 0.44, "shank": 0.38, "foot": 0.44}  # ratio for the hurt foot, instead of the mix's
 
 
 @functools.cache
 def amounts(part: str) -> dict[str, float | Array]:
-    """What hurting a part on the right at severity 10 adds, by name; for RATIOS what is added to 1.
+    """The changes by name for a part that is hurt on the right at severity 10.
 
-    Also `off`, `off_sound`, `land_sound`: cycles by which a foot leaves and lands later. `step`: share of its
-    length by which the step onto the hurt foot is longer than that of a body that is only slower.
+    For RATIOS: what is added to 1.
+
+    Also: `off`, `off_sound`, `land_sound`: cycles by which a foot leaves and lands later. `step`: how much
+    longer the step onto the hurt foot is than that of a body that is only slower, as a share of its length.
     `curves`: (5, 5) factors of CURVES.
     """
     own = dict(OWN[part])
@@ -117,10 +118,10 @@ def _of_people(
     curves = sum(share * known[p].harmonics() for p, share in mix.items()) * GAIN.get(part, 1.0)
     ratios = {"stride": mean("stride"), "arm": mean("arm_hurt"), "arm_sound": min(mean("arm_sound"), 1.0)}
     if part in BOTH_SIDES:
-        # A back that hurts is no side's: people's lurch, its size halved on either side, without its lean.
+        # A hurt back has no side: people's lurch, half on each side, without its lean.
         return {"stride": mean("stride") ** 0.5, **own}, {"curves": np.zeros_like(curves)}
     speed = own["speed"]
-    slower = speed * own.get("stride", mean("stride"))  # of the length of a stride
+    slower = speed * own.get("stride", mean("stride"))  # ratio of the stride length
     step = STEP.get(part, mean("step_hurt"))
     return {**ratios, **own}, {
         "curves": curves,

@@ -1,4 +1,4 @@
-"""Trunk, pelvis, head and arms: what people's curves add to them, and how an arm that hurts is held."""
+"""Changes trunk, pelvis, head and arms: adds people's curves and holds a hurt arm."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from hobble.hurt.people import HARMONICS
 from hobble.hurt.source import Source
 
 X, Y, Z = np.eye(3)
-PELVIS = 0.35  # share of the trunk's lean that the pelvis tilts
-MEAN = 0.5  # seconds, of the Gaussian that leaves of a joint's turns its mean posture
-LOOK = {"neck": 0.5, "head": 0.85}  # share of the trunk's lean that neck and head take back
-MOST_GUARD = 0.93  # of an arm's own movement that holding it takes away
-# Upper arm and forearm of a guarded left arm, forward, left and up in the heading's frame. `fore` is the mean
-# of the hurt arm of Ferre et al.'s jog with a hurt forearm (Injured_Jog_LLA), across the belly; an upper arm
-# that hurts is held nearer to the body and its forearm ahead, a hand is carried.
+PELVIS = 0.35  # the pelvis tilts by this share of the trunk's lean
+MEAN = 0.5  # seconds: sigma of the Gaussian that gives a joint's mean posture
+LOOK = {"neck": 0.5, "head": 0.85}  # neck and head take back this share of the trunk's lean
+MOST_GUARD = 0.93  # a held arm loses up to this share of its movement
+# Directions of upper arm and forearm of a held left arm: forward, left and up in the heading's frame. `fore`
+# is the mean of Ferre et al.'s jog with a hurt forearm (Injured_Jog_LLA): across the belly. A hurt upper arm
+# is nearer to the body, with the forearm ahead. With a hurt hand the forearm is only carried.
 GUARDS = {
     "upper": ((0.10, 0.16, -0.98), (0.80, -0.58, 0.10)),
     "fore": ((0.28, 0.17, -0.85), (0.26, -0.86, -0.41)),
     "carry": ((0.10, 0.14, -0.98), (0.92, -0.25, 0.30)),
 }
-HAND = 0.75  # of a hand that hurts: it is only carried
+HAND = 0.75  # strength of `carry` for a hurt hand
 
 
 def change_body(source: Source, effects: Effects) -> Array:
-    """World rotations (F, J, 4) of the source's frames, changed; those of the legs are the source's still."""
+    """World rotations (F, J, 4) of the source's frames, changed. Those of the legs are still the source's."""
     skeleton = source.clip.skeleton
     local = _stiffened(source, effects)
     world = _world(skeleton, local)
@@ -57,14 +57,14 @@ def _world(skeleton: Skeleton, local: Array) -> Array:
 
 
 def _stiffened(source: Source, effects: Effects) -> Array:
-    """Local rotations with less movement of back, neck and arms about their mean posture."""
+    """Local rotations with less movement of back, neck and arms around their mean posture."""
     skeleton, local = source.clip.skeleton, source.clip.rotations.copy()
     back = _between(skeleton, "chest", "hips")
     neck = _between(skeleton, "head", "chest")
     ratios = [(back, effects.ratio("back")), (neck, effects.ratio("head"))]
     for side in (LEFT, RIGHT):
         arm = _between(skeleton, f"{SIDES[side]}_wrist", "chest")
-        ratios.append((arm[1:], effects.ratio("arm")[:, side]))  # not the hand's own
+        ratios.append((arm[1:], effects.ratio("arm")[:, side]))  # without the hand
     for joints, ratio in ratios:
         for j in joints:
             mean = quat.normalize(gaussian(quat.continuous(local[:, j]), MEAN * source.clip.fps))
@@ -73,13 +73,13 @@ def _stiffened(source: Source, effects: Effects) -> Array:
 
 
 def _between(skeleton: Skeleton, role: str, above: str) -> list[int]:
-    """The joints from that of `role` up to the one below that of `above`."""
+    """The joints from the one of `role` up to the one below that of `above`."""
     path = ancestors(skeleton, skeleton.role(role))
     return path[: path.index(skeleton.role(above))]
 
 
 def _shares(skeleton: Skeleton) -> list[tuple[str, float]]:
-    """For each joint how far it is on from pelvis to chest, or from chest to head."""
+    """For each joint its position between pelvis and chest, or between chest and head."""
     out: list[tuple[str, float]] = [("pelvis", 0.0)] * len(skeleton.joints)
     back = _between(skeleton, "chest", "hips")[::-1]
     neck = _between(skeleton, "head", "chest")[::-1]
@@ -94,7 +94,7 @@ def _shares(skeleton: Skeleton) -> list[tuple[str, float]]:
 
 
 def _turns(source: Source, effects: Effects) -> tuple[Array, Array, Array]:
-    """(F, 4) each: by how much pelvis, chest and head are turned in the world."""
+    """(F, 4) each: world rotations to add to pelvis, chest and head."""
     phase, going = source.phase, np.clip(source.walking, 0.0, 1.0)
     rows = [np.ones(len(source))]
     for h in range(1, HARMONICS + 1):
@@ -112,7 +112,7 @@ def _turns(source: Source, effects: Effects) -> tuple[Array, Array, Array]:
 
 
 def _lean(source: Source, turn: Array, roll: Array, forward: Array) -> Array:
-    """(F, 4) in the world: degrees to the left, left side up, and forward, in the heading's frame."""
+    """(F, 4) world rotation by degrees to the left, left side up, and forward, in the heading's frame."""
     yaw, roll_, pitch = (
         quat.from_axis_angle(axis, np.radians(angle)) for axis, angle in ((Y, turn), (Z, roll), (X, forward))
     )
@@ -121,7 +121,7 @@ def _lean(source: Source, turn: Array, roll: Array, forward: Array) -> Array:
 
 
 def _guard(source: Source, effects: Effects, world: Array, side: int) -> None:
-    """Hold an arm that hurts: elbow bent, against the body or before the chest; changes `world`."""
+    """Hold a hurt arm with a bent elbow, against the body or in front of the chest. Changes `world`."""
     skeleton = source.clip.skeleton
     weights = {name: np.clip(effects.sided[name][:, side], 0.0, 1.0) for name in GUARDS}
     weights["carry"] = HAND * weights["carry"]
@@ -129,7 +129,9 @@ def _guard(source: Source, effects: Effects, world: Array, side: int) -> None:
     if not held.any():
         return
     total = np.sum(list(weights.values()), axis=0)
-    weights["carry"] = np.where(total > 1e-9, weights["carry"], 1.0)  # a direction where nothing is held, too
+    weights["carry"] = np.where(
+        total > 1e-9, weights["carry"], 1.0
+    )  # frames without a held arm need a direction, too
     total = np.maximum(total, 1e-9) + (total <= 1e-9)
     sign = np.array([1.0 if side == LEFT else -1.0, 1.0, 1.0])
     shoulder, elbow, wrist = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("shoulder", "elbow", "wrist"))

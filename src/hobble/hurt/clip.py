@@ -1,4 +1,4 @@
-"""A healthy clip as a body that hurts would have walked it."""
+"""Makes the hurt version of a healthy clip."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hobble.core.skeleton import local_rotations
 from hobble.core.smooth import gaussian
 from hobble.hurt.body import change_body
 from hobble.hurt.effects import HIGHEST, Effects, effects
-from hobble.hurt.feet import Foot, move_foot, places, rolled_foot
+from hobble.hurt.foot_path import Foot, move_foot, places, rolled_foot
 from hobble.hurt.legs import Leg, hips_height, knee_flexion, place_leg, reach_of, read_leg
 from hobble.hurt.parts import LEFT, RIGHT, SIDES
 from hobble.hurt.path import Path, ground_below, shorten
@@ -27,10 +27,10 @@ from hobble.labels.model import Labels
 
 @dataclass(frozen=True)
 class HurtClip:
-    """A clip of N frames with its severities (N, L) and its labels. when: (N,) the source frame, fractions
-    included, that the body shows in each.
+    """A hurt clip of N frames with its severities (N, L) and its labels.
 
-    The severities are those that the motion shows: a change of what was asked sets in over about a second.
+    when: (N,) the source frame, with fractions, that the body shows in each frame. The severities are those
+    that the motion shows: a change of the requested severity sets in over about a second.
     """
 
     clip: Clip
@@ -48,12 +48,14 @@ def hurt_clip(
     zero: str = "right",
     margins: str = "extend",
 ) -> HurtClip:
-    """The clip as it would have been walked with these severities (F, L), 0 to 10, of the skeleton's links.
+    """The clip as a person with these severities would walk it.
 
-    It takes longer where the cadence falls; its path keeps its shape and is shortened where steps are. Where
-    nothing hurts at all the clip comes back as it is. labels: of the clip. flat: whether its ground is flat;
-    on other ground rises shrink with the steps. zero, margins: as in the section `labels`. Raises HobbleError
-    for severities of another shape or range, and for joints that are moved, not turned.
+    severity: (F, L), 0 to 10, of the skeleton's links. labels: of the clip. flat: whether its ground is flat;
+    on other ground, rises shrink with the steps. zero, margins: as in the section `labels`.
+
+    The clip gets longer if the cadence falls. The path keeps its shape, but is shortened with the steps.
+    Without any severity the clip is returned unchanged. Raises HobbleError for severities of another shape or
+    range, and for joints with positions of their own.
     """
     severity = np.asarray(severity, float)
     if severity.shape != (len(clip), len(clip.skeleton.links)):
@@ -68,7 +70,7 @@ def hurt_clip(
         same = Clip(name, clip.skeleton, clip.fps, clip.rotations, clip.root, clip.translations)
         return HurtClip(same, severity, labels, np.arange(len(clip), dtype=float))
     if clip.translations is not None:
-        raise HobbleError(f"clip {clip.name} moves its joints, not only turns them: it cannot be hurt")
+        raise HobbleError(f"clip {clip.name} has joints that move in their parents, so it cannot be hurt")
     source = read_source(clip, labels)
     changes = effects(clip.skeleton, severity, clip.fps)
     timing = retime(source, changes)
@@ -122,7 +124,7 @@ def _assembled(
 
 
 def _from_root(source: Source, world: Array, side: int) -> Array:
-    """(N, 3) of a hip joint from the root joint."""
+    """(N, 3) position of a hip joint relative to the root joint."""
     skeleton = source.clip.skeleton
     joint, out = skeleton.role(f"{SIDES[side]}_hip"), np.zeros((len(world), 3))
     while (parent := skeleton.parents[joint]) >= 0:
@@ -132,7 +134,7 @@ def _from_root(source: Source, world: Array, side: int) -> Array:
 
 
 def _reach(leg: Leg, changes: Effects, source: Source, timing: Timing, side: int) -> Array:
-    """(N,) cm from hip to ankle of a leg that stands, its knee bent more where it is spared."""
+    """(N,) cm from hip to ankle of a standing leg. The knee bends more if it is spared."""
     crouch = np.radians(changes.sided["crouch"][:, side]) * (1 - source.swing[:, side])
     bent = knee_flexion(leg.reach, leg.upper, leg.lower) + crouch
     return at_frames(

@@ -1,4 +1,4 @@
-"""How strongly each frame of a clip is changed, by severities of several links at once."""
+"""Combines the severities of several links into the changes of each frame of a clip."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from hobble.hurt.amounts import amounts
 from hobble.hurt.parts import LEFT, RIGHT, part_of_link
 
 HIGHEST = 10.0
-POWER = 0.75  # of the strength over severity: 3 is .41, 5 is .59, 7 is .77
-LEAST = 0.02  # a ratio
-SETTLING = 0.3  # seconds, of the Gaussian over which a change of severity sets in
-UNFELT = 0.05  # a severity
-TOGETHER = 3.0  # how two injuries add: 1 would be their sum, infinity the worse one
-WHOLE = ("speed", "stride", "back", "head", "forward", "nod")  # of the body, not of a side
+POWER = 0.75  # strength = (severity / 10) ** POWER: .41 at 3, .59 at 5, .77 at 7
+LEAST_RATIO = 0.02
+SETTLING = 0.3  # seconds: sigma of the Gaussian that smooths changes of severity
+UNFELT = 0.05  # smaller severities count as 0
+TOGETHER = 3.0  # exponent by which injuries add: 1 gives the sum, infinity the maximum
+WHOLE = ("speed", "stride", "back", "head", "forward", "nod")  # changes of the whole body
 SIDED = (
     *(
         "land",
@@ -38,18 +38,18 @@ SIDED = (
     *("upper", "fore", "carry"),
 )
 OTHER = "_sound"
-FLIPPED = np.array([1.0, -1.0, -1.0, -1.0, -1.0])  # of CURVES: all but the trunk forward change sign
-LATER = np.array([1.0, -1.0, -1.0, 1.0, 1.0])  # of a curve's factors: half a cycle on
+FLIPPED = np.array([1.0, -1.0, -1.0, -1.0, -1.0])  # signs of CURVES in a mirror
+LATER = np.array([1.0, -1.0, -1.0, 1.0, 1.0])  # signs of a curve's factors after half a cycle
 GUARD = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore", "hand": "carry"}
 
 
 @dataclass(frozen=True)
 class Effects:
-    """What changes in each of F frames of a clip, in the terms of `hobble.hurt.amounts`.
+    """The changes of each of F frames of a clip, named as in `hobble.hurt.amounts`.
 
-    whole: (F,) by name. sided: (F, 2), left and right, by name. curves: (F, 5, 5). strength: (F,) of the
-    worst link, 0 to 1. felt: (F, L) severities that the frames show: those given, but a change sets in over
-    about a second.
+    whole: name -> (F,). sided: name -> (F, 2), left and right. curves: (F, 5, 5). strength: (F,) of the worst
+    link, 0 to 1. felt: (F, L) severities that the frames show. They follow the requested ones over about a
+    second.
     """
 
     whole: dict[str, Array] = field(repr=False)
@@ -59,15 +59,14 @@ class Effects:
     felt: Array = field(repr=False)
 
     def ratio(self, name: str) -> Array:
-        """(F,) or (F, 2) factor that a ratio is."""
-        return np.maximum(1.0 + (self.whole[name] if name in self.whole else self.sided[name]), LEAST)
+        """(F,) or (F, 2) factor for a ratio."""
+        return np.maximum(1.0 + (self.whole[name] if name in self.whole else self.sided[name]), LEAST_RATIO)
 
 
 def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
     """The effects of severities (F, L), 0 to 10, of the skeleton's links.
 
-    Where links are hurt together the effect of each kind is at least that of the worst, and less than the
-    sum.
+    If several links hurt, an effect is at least that of the worst link and less than the sum.
     """
     frames = len(severity)
     strength = gaussian((np.clip(severity, 0, HIGHEST) / HIGHEST) ** POWER, SETTLING * fps)
@@ -77,7 +76,7 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
     parts: dict[tuple[str, int | None], Array] = {}
     for link, column in zip(skeleton.links, strength.T, strict=True):
         where = part_of_link(skeleton, link)
-        # Links of one part, fingers say, hurt it once, as much as the worst.
+        # Links of one part, such as fingers, count once, as much as the worst.
         key = (where.name, where.side)
         parts[key] = np.maximum(parts.get(key, 0.0), column)
     for (part, side), own in parts.items():
@@ -102,7 +101,7 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
 
 
 def _felt(strength: Array) -> Array:
-    """The severities (F, L) that go with strengths, none where next to nothing shows."""
+    """The severities (F, L) of strengths. Very small ones are 0."""
     severity = np.round(HIGHEST * np.clip(strength, 0.0, 1.0) ** (1 / POWER), 3)
     return np.where(severity < UNFELT, 0.0, severity)
 
@@ -123,7 +122,7 @@ def _of_side(curves: Array, side: int | None) -> Array:
 
 
 class _Sum:
-    """A sum in which the greatest term counts most, separately of what is added and what is taken away."""
+    """A sum in which the largest term counts most, separately for positive and negative terms."""
 
     def __init__(self, zero: Array) -> None:
         self.more, self.less = zero.copy(), zero.copy()

@@ -1,4 +1,4 @@
-"""The hips' height, so that the standing leg keeps its bend, and legs that put the feet in their places."""
+"""Sets the height of the hips so that the standing leg keeps its bend, and bends legs to reach the feet."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
-from hobble.hurt.feet import smooth_above
+from hobble.hurt.foot_path import smooth_above
 from hobble.hurt.parts import SIDES
 from hobble.hurt.sampling import at_frames, turns_at
 
 BENT = np.radians([6.0, 18.0])  # knee flexion from which on the bend itself shows where the knee points
-STRETCH = (0.985, 0.9985)  # of the leg's length: never held below, never above
+STRETCH = (0.985, 0.9985)  # leg lengths: limits of the distance hip-ankle
 
 
 @dataclass(frozen=True)
 class Leg:
-    """What the source's leg does, over F frames. reach: (F,) cm from hip to ankle. thigh, shank: (F, 4) and
-    hinge: (F, 3), the axis about which the knee bends, in the pelvis's frame. upper, lower: bone lengths.
+    """A leg of the source, over F frames.
+
+    reach: (F,) cm from hip to ankle. thigh, shank: (F, 4), and hinge: (F, 3), the axis of the knee, in the
+    pelvis's frame. upper, lower: bone lengths.
     """
 
     reach: Array = field(repr=False)
@@ -35,13 +37,13 @@ class Leg:
 
     @property
     def longest(self) -> float:
-        """The furthest that the ankle is taken from the hip."""
+        """The largest distance from hip to ankle that is used."""
         length = self.upper + self.lower
         return float(np.clip(self.reach.max(), STRETCH[0] * length, STRETCH[1] * length))
 
 
 def read_leg(clip: Clip, side: int) -> Leg:
-    """The source's leg; where it is nearly straight, its knee points where the thigh usually has it."""
+    """The source's leg. If it is nearly straight, its knee points where the thigh usually has it."""
     skeleton = clip.skeleton
     hip, knee, heel = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("hip", "knee", "heel"))
     at = clip.positions
@@ -71,13 +73,13 @@ def read_leg(clip: Clip, side: int) -> Leg:
 
 
 def _forward(clip: Clip, side: int, thigh: Array) -> Array:
-    """(3,) where the foot points, in the thigh's frame: of a knee that never bends."""
+    """(3,) direction of the foot in the thigh's frame, for a knee that never bends."""
     heel, toe = (clip.skeleton.role(f"{SIDES[side]}_{r}") for r in ("heel", "toe"))
     return np.mean(quat.rotate(quat.inv(thigh), clip.positions[:, toe] - clip.positions[:, heel]), axis=0)
 
 
 def knee_flexion(reach: Array, upper: float, lower: float) -> Array:
-    """(...) radians of knee flexion, 0 straight, by how far the ankle is from the hip."""
+    """(...) radians of knee flexion, 0 straight, from the distance of hip and ankle."""
     cosine = (reach**2 - upper**2 - lower**2) / (2 * upper * lower)
     return np.arccos(np.clip(cosine, -1.0, 1.0))
 
@@ -95,8 +97,10 @@ def hips_height(
     stands: list[Array],
     longest: list[float],
 ) -> Array:
-    """(N,) heights of the root. root: (N, 3) as it would be. hips: (N, 3) of each leg from the root. ankles:
-    (N, 3). reaches: (N,) cm that hip and ankle of a standing leg should be apart. stands: (N,) 0 to 1.
+    """(N,) heights of the root.
+
+    root: (N, 3) before the change. hips: (N, 3) of each leg relative to the root. ankles: (N, 3). reaches:
+    (N,) desired cm between hip and ankle of a standing leg. stands: (N,) 0 to 1.
     """
     needed = np.zeros(len(root))
     weight = np.full(len(root), 1e-9)
@@ -118,9 +122,9 @@ def hips_height(
 def place_leg(
     skeleton: Skeleton, side: int, leg: Leg, when: Array, pelvis: Array, hip: Array, ankle: Array
 ) -> tuple[Array, Array]:
-    """World rotations (N, 4) of thigh and shank that put the ankle where it should be.
+    """World rotations (N, 4) of thigh and shank that put the ankle in its place.
 
-    when: (N,) source frames whose leg is bent so. pelvis: (N, 4). hip, ankle: (N, 3) in the world.
+    when: (N,) source frames that give the knee's direction. pelvis: (N, 4). hip, ankle: (N, 3) in the world.
     """
     bones = [skeleton.offsets[skeleton.role(f"{SIDES[side]}_{r}")] for r in ("knee", "heel")]
     thigh, shank = (quat.mul(pelvis, turns_at(own, when)) for own in (leg.thigh, leg.shank))
@@ -130,13 +134,13 @@ def place_leg(
 
 
 def _turned(world: Array, hinge: Array, bone: Array, along: Array) -> Array:
-    """World rotations (N, 4) turned so that the local `bone` lies `along`, the knee's axis kept."""
+    """World rotations (N, 4), turned so that the local `bone` lies along `along`. The knee keeps its axis."""
     turn = _frame(along, hinge) @ np.swapaxes(_frame(quat.rotate(world, bone), hinge), -1, -2)
     return quat.mul(quat.from_matrix(turn), world)
 
 
 def _frame(along: Array, hinge: Array) -> Array:
-    """(N, 3, 3) columns: the hinge as far as it is across a bone, along the bone, and across both."""
+    """(N, 3, 3) columns: the hinge orthogonal to the bone, along the bone, and across both."""
     y = along / np.linalg.norm(along, axis=-1, keepdims=True)
     x = hinge - y * np.sum(hinge * y, axis=-1, keepdims=True)
     x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-9)

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from hobble.core.section import Section
 
-TELLS = "injury"  # the channel that hurt versions are told
+HURT_CHANNEL = "injury"  # the channel of the severities of hurt versions
 Severity = Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)]
 Link = Annotated[str, Field(min_length=3)]
 
@@ -16,20 +16,19 @@ Link = Annotated[str, Field(min_length=3)]
 class Hurt(Section):
     """Hurt versions of the healthy clips, as further clips of the data set."""
 
-    links: tuple[Link, ...] = Field((), description="links to hurt, as in status files; none: every link")
+    links: tuple[Link, ...] = Field((), description="links to hurt, named as in status files; empty: all")
     severities: Annotated[tuple[Severity, ...], Field(min_length=1)] = Field(
         (3.0, 5.0, 7.0, 10.0),
-        description="an injury has the highest for one half of its time and one of the others for the other",
+        description="an injury has the highest in one half of its time and another in the other half",
     )
     versions: Annotated[int, Field(ge=0, le=9)] = Field(1, description="hurt versions of each healthy clip")
     at_once: Annotated[int, Field(ge=1, le=30)] = Field(2, description="links hurt at once, at most")
-    seconds: Annotated[float, Field(ge=1, le=3600)] = Field(3.0, description="an injury lasts about so long")
+    seconds: Annotated[float, Field(ge=1, le=3600)] = Field(3.0, description="about how long an injury lasts")
     longest: Annotated[float, Field(gt=0, le=10)] = Field(
-        0.9, description="length of a version of a clip of 6 seconds or more, relative to the clip's"
+        0.9, description="greatest length of a version relative to its clip, for clips of 6 seconds or more"
     )
     in_between: bool = Field(
         True,
-        description="whether cycles are kept in which an injury sets in or goes, which show severities "
-        "between those above",
+        description="keep cycles in which an injury sets in or fades, with severities between those above",
     )
     seed: int = 1

@@ -1,4 +1,4 @@
-"""Which part of the body a link belongs to, by the roles of its joints, whatever the rig calls them."""
+"""Finds the part of the body that a link belongs to, by the roles of its joints."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ from hobble.core.skeleton import Skeleton
 
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
-LEG = (("hip", "hip"), ("knee", "thigh"), ("heel", "shank"))  # up to and with this joint it is that part
+LEG = (
+    ("hip", "hip"),
+    ("knee", "thigh"),
+    ("heel", "shank"),
+)  # (role, part): joints up to this one, included, belong to the part
 ARM = (("shoulder", "shoulder"), ("elbow", "upper arm"), ("wrist", "forearm"))
 
 
@@ -24,7 +28,7 @@ class Part:
 
 
 def part_of_link(skeleton: Skeleton, link: tuple[str, str]) -> Part:
-    """The part that a link (parent joint, child joint) of the skeleton belongs to."""
+    """The part of the body of a link (parent joint, child joint)."""
     child = skeleton.index(link[1])
     for side, word in enumerate(SIDES):
         for first, table, last in (("hip", LEG, "foot"), ("shoulder", ARM, "hand")):
@@ -53,6 +57,6 @@ def ancestors(skeleton: Skeleton, joint: int) -> list[int]:
 
 
 def _chain(skeleton: Skeleton, joint: int, above: int) -> list[int]:
-    """The joints from `joint` up to the one below `above`; none where `above` is no ancestor."""
+    """The joints from `joint` up to the one below `above`. Empty if `above` is no ancestor."""
     path = ancestors(skeleton, joint)
     return path[: path.index(above)] if above in path else []

@@ -1,4 +1,4 @@
-"""Where the body goes: the source's path, each bit of it shortened by as much as the steps are."""
+"""Shortens the source's path by as much as the steps."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ from hobble.core.smooth import gaussian
 from hobble.hurt.effects import Effects
 from hobble.hurt.source import Source
 
-SLOPE = 0.3  # seconds, of the Gaussian over the heights of the ground under the feet
+SLOPE = 0.3  # seconds: sigma of the Gaussian over the heights of the ground under the feet
 
 
 @dataclass(frozen=True)
 class Path:
-    """Old and new level path (F, 2) and height of the ground (F,) at each source frame. The ground of a clip
-    on flat ground is 0 and stays so; on other ground its rises shrink as the way does, so that slopes stay.
+    """Old and new horizontal path (F, 2) and height of the ground (F,) at each source frame.
+
+    Flat ground stays at 0. On other ground, rises shrink like the path, so that slopes stay.
     """
 
     old: Array = field(repr=False)
@@ -26,7 +27,7 @@ class Path:
     new_ground: Array = field(repr=False)
 
     def moved(self, point: Array, when: float) -> Array:
-        """(3,) a point of the old world that belongs to source frame `when`, in the new world."""
+        """(3,) a point of source frame `when`, moved to the new world."""
         frames = np.arange(len(self.old))
         shift = [np.interp(when, frames, self.new[:, i] - self.old[:, i]) for i in (0, 1)]
         return point + np.array(
@@ -35,9 +36,9 @@ class Path:
 
 
 def shorten(source: Source, effects: Effects, slower: Array, ground: Array | None) -> Path:
-    """The path at the speed of `effects`; slower: (F,) how much longer a stride takes.
+    """The path at the speed of `effects`.
 
-    ground: (F,) height of the ground below the body, None where it is flat.
+    slower: (F,) factor of the stride time. ground: (F,) height of the ground below the body, None if flat.
     """
     share = effects.ratio("speed") * slower
     flat = np.zeros(len(source))
@@ -50,10 +51,10 @@ def shorten(source: Source, effects: Effects, slower: Array, ground: Array | Non
 
 
 def ground_below(source: Source, heights: list[list[tuple[float, float]]]) -> Array:
-    """(F,) cm, the ground below the body by the feet that stand; heights: (middle, height) of each foot's
-    stances.
+    """(F,) cm: the ground below the body, from the standing feet.
 
-    Each foot's height is counted from its median, so that legs of two lengths make no waves.
+    heights: (middle, height) of each foot's stances. They are relative to each foot's median, so that legs of
+    different length make no waves.
     """
     points = sorted((when, y - float(np.median([h for _, h in own]))) for own in heights for when, y in own)
     line = np.interp(np.arange(len(source)), [p[0] for p in points], [p[1] for p in points])
@@ -61,6 +62,6 @@ def ground_below(source: Source, heights: list[list[tuple[float, float]]]) -> Ar
 
 
 def _shrunk(values: Array, share: Array) -> Array:
-    """The same curve from its first value on, every change times its share."""
+    """The curve with its first value and all changes multiplied by `share`."""
     steps = np.diff(values, axis=0) * (share[1:] + share[:-1]) / 2
     return values[:1] + np.concatenate([np.zeros_like(values[:1]), np.cumsum(steps, axis=0)])

@@ -1,8 +1,9 @@
-"""What real impaired walks differ in from the same people's normal walk: the profiles beside this module.
+"""Profiles of impairments: how real impaired walks differ from the same people's normal walks.
 
-`people.json` was derived, by `python -m hobble.hurt IMPAIRED_WALKS.npz`, from the recordings of Jun et al.
-2020 ("Pathological gait classification using Kinect v2 and gated recurrent neural networks", IEEE Access 8):
-ten people, each walking normally and with five impairments of the right leg. Only means over people are kept.
+`people.json` was derived with `python -m hobble.hurt IMPAIRED_WALKS.npz` from the recordings of Jun et al.
+2020 ("Pathological gait classification using Kinect v2 and gated recurrent neural networks", IEEE Access 8).
+Ten people each walked normally and imitated five impairments of the right leg. Only means over people are
+kept.
 """
 
 from __future__ import annotations
@@ -28,11 +29,11 @@ SOURCE = "Jun et al. 2020, IEEE Access 8: means over ten people who imitated imp
 class Profile:
     """An impairment of the right leg, relative to the same people's normal walk.
 
-    speed, stride, step_hurt, step_sound, knee, arm_hurt, arm_sound: ratios, of the speed, the stride's time,
-    the step onto either foot, the range of the hurt knee, the swing of the arms. strike: cycles by which the
-    sound foot lands later. stance_hurt, stance_sound: cycles by which a stance is longer. width: leg lengths
-    by which steps are wider. curves: for each of CURVES degrees as a mean and, per harmonic of the cycle from
-    the hurt foot's landing, the factors of cosine and sine; half a cycle on, the sound foot lands.
+    Ratios: speed, stride (time), step_hurt, step_sound (length of the step onto either foot), knee (range of
+    the hurt knee), arm_hurt, arm_sound (swing). strike: cycles by which the sound foot lands later.
+    stance_hurt, stance_sound: cycles by which a stance is longer. width: leg lengths by which steps are
+    wider. curves: for each of CURVES degrees as a mean and, for each harmonic, the factors of cosine and
+    sine. The cycle starts with the hurt foot's landing; the sound foot lands half a cycle later.
     """
 
     speed: float
@@ -63,7 +64,7 @@ def derive(walks: str | Path, path: str | Path = FILE) -> None:
     """Write the profiles of a file of impaired walks.
 
     walks: npz with `gaits`, `curves` and `scalars` (names), `curve` (gaits, people, curves, 50) over a cycle
-    from the right landing, and `scalar` (gaits, people, scalars). Raises InputError where one is missing.
+    from the right landing, and `scalar` (gaits, people, scalars). Raises InputError if one is missing.
     """
     data = load_npz(walks)
     gaits = [str(name) for name in data["gaits"]]
@@ -113,7 +114,10 @@ def _profile(data: Any, gait: int, normal: int) -> Profile:
 
 
 def _harmonics(curve: Array, strike: Array) -> Array:
-    """Mean over people of each one's factors (5,); the other foot's landing, at `strike`, is moved to .5."""
+    """(5,) mean over people of each one's factors.
+
+    Time is warped so that the other foot lands at .5, not at `strike`.
+    """
     steps = curve.shape[-1]
     phase = np.arange(steps) / steps
     rows = [np.ones(steps)]

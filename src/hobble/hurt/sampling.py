@@ -1,4 +1,4 @@
-"""Arrays over frames, seen at frames and fractions of frames."""
+"""Samples arrays over frames at fractional frames."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from hobble.core.quat import Array
 
 
 def at_frames(values: Array, when: Array) -> Array:
-    """(N, ...) values (F, ...) between the two frames about each of `when` (N,)."""
+    """(N, ...) values (F, ...), interpolated at the frames `when` (N,)."""
     before, share = _between(len(values), when)
     share = share.reshape(-1, *[1] * (values.ndim - 1))
     return values[before] * (1 - share) + values[np.minimum(before + 1, len(values) - 1)] * share
 
 
 def turns_at(rotations: Array, when: Array) -> Array:
-    """(N, ..., 4) rotations (F, ..., 4) between the two frames about each of `when` (N,)."""
+    """(N, ..., 4) rotations (F, ..., 4), interpolated at the frames `when` (N,)."""
     before, share = _between(len(rotations), when)
     share = share.reshape(-1, *[1] * (rotations.ndim - 2))
     return quat.slerp(rotations[before], rotations[np.minimum(before + 1, len(rotations) - 1)], share)
@@ -31,6 +31,6 @@ def _between(frames: int, when: Array) -> tuple[np.ndarray, Array]:
 
 
 def smoothstep(u: Array) -> Array:
-    """From 0 to 1 with no speed at either end."""
+    """From 0 to 1 with zero slope at both ends."""
     u = np.clip(u, 0.0, 1.0)
     return u * u * (3 - 2 * u)

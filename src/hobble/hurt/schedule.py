@@ -1,4 +1,4 @@
-"""What hurts when in the versions of a data set's clips: every link in its turn, legs more often."""
+"""Decides what hurts when in the hurt versions of a data set. Every link has its turn, legs more often."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from hobble.core.skeleton import Skeleton
 from hobble.hurt.options import Hurt
 from hobble.hurt.parts import part_of_link
 
-# Entries of a part's links in the deck; 1 for those that change little.
+# Entries of each link of a part in the deck. Parts that change the motion little have 1.
 OFTEN = {"hip": 3, "thigh": 3, "shank": 3, "foot": 3, "back": 2}
 GOLDEN = (math.sqrt(5) - 1) / 2
-TOGETHER = 0.25  # of the stretches hurt more than one link, where that is allowed
-SHORTEST = 0.4  # of `seconds`: what is left of a clip that is shorter belongs to the stretch before
+TOGETHER = 0.25  # share of the stretches with several hurt links, if that is allowed
+SHORTEST = 0.4  # of `seconds`: a shorter rest of a clip belongs to the stretch before
 
 
 def severities(skeleton: Skeleton, frames: int, fps: float, options: Hurt, clip: str, turn: int) -> Array:
-    """(frames, L) severities of the hurt version that has the `turn` (from 0) among all of the data set.
+    """(frames, L) severities of a hurt version.
 
-    In a stretch of about `seconds` one link hurts, at one severity and half way on at another. The version
-    goes on through one deck of links and severities from a place that its turn gives, so that
-    versions of any number and length share the deck evenly; `clip` and the seed choose what else hurts.
-    Raises HobbleError for a link that the skeleton has not.
+    turn: its number, from 0, among all versions of the data set. In a stretch of about `seconds` one link
+    hurts, at one severity in the first half and another in the second. All versions share one deck of links
+    and severities; the turn gives the start in it, so that the deck is used evenly for any number and length
+    of versions. `clip` and the seed choose what else hurts. Raises HobbleError for an unknown link.
     """
     rng = np.random.default_rng([options.seed, zlib.crc32(clip.encode())])
     deck = _deck(skeleton, options)
@@ -46,10 +46,11 @@ def severities(skeleton: Skeleton, frames: int, fps: float, options: Hurt, clip:
 
 
 def _deck(skeleton: Skeleton, options: Hurt) -> list[tuple[int, float, float]]:
-    """(column, severity, next severity) in an order that is the data set's: every link, those more often that
-    change much.
+    """(column, severity, next severity) in the order of the data set.
 
-    One of the two severities is the highest, from which a network learns most; the other takes turns through
+    Links with large effects occur more often.
+
+    One of the two severities is the highest, from which a network learns most. The other alternates between
     the rest.
     """
     names = list(skeleton.link_names)
@@ -65,13 +66,13 @@ def _deck(skeleton: Skeleton, options: Hurt) -> list[tuple[int, float, float]]:
         start = rng.random()
         for n in range(often):
             both = (values[0], others[n % len(others)])
-            # Entries of one link lie far apart, so that no clip is only about it.
+            # Entries of one link are far apart, so that no clip has only that link.
             entries.append((math.modf(start + n / often)[0], i, both if n % 2 == 0 else both[::-1]))
     return [(i, *both) for _, i, both in sorted(entries)]
 
 
 def _stretches(frames: int, length: float) -> list[int]:
-    """Lengths of about `length` that add up to `frames`."""
+    """Lengths of about `length` with the sum `frames`."""
     count = max(1, math.floor(frames / length + 1 - SHORTEST))
     edges = np.round(np.linspace(0, frames, count + 1)).astype(int)
     return [int(n) for n in np.diff(edges)]

@@ -1,4 +1,4 @@
-"""What is read of the healthy clip before it is changed: stances, heading, path, how long its cycles are."""
+"""Measures the healthy clip before it is changed: stances, heading, path, lengths of cycles."""
 
 from __future__ import annotations
 
@@ -18,35 +18,35 @@ from hobble.labels.options import Labels as LabelOptions
 from hobble.labels.phase import phase_of_footsteps
 
 UP = np.array([0.0, 1.0, 0.0])
-CYCLE = 1.1  # seconds, where a clip has no cycle of its own
+CYCLE = 1.1  # seconds: cycle of clips that have none
 LONGEST_CYCLE = 2.5
 LEAST_SWING = 6  # frames
-PATH = 0.25  # seconds, of the Gaussian that leaves of the root's way its path
+PATH = 0.25  # seconds: sigma of the Gaussian that makes a path of the root's positions
 FACING = 0.2
 
 
 @dataclass(frozen=True)
 class Stance:
-    """A foot on the ground from source frame `land` to `off`; `real` ends are not those of the clip."""
+    """A foot on the ground from source frame `land` to `off`."""
 
     land: float
     off: float
 
     @property
     def middle(self) -> float:
-        """The source frame half way."""
+        """The source frame in the middle."""
         return (self.land + self.off) / 2
 
 
 @dataclass(frozen=True)
 class Source:
-    """A healthy clip of F frames and what its change starts from; pairs are left and right.
+    """A healthy clip of F frames and its measurements. Pairs are left and right.
 
-    stances: of each foot in order, one at least. up: (F, 2) whether a foot swings. swing: (F, 2) 0 to 1 and
-    back to 0 over a swing. phase: (F,) cycles, unwrapped, 0 as the right foot lands. walking: (F,) 0 to 1,
-    whether the phase is known. jog: (F,) share. cycle: (F,) frames that a cycle takes about then. path: (F,
-    2) level path of the root, x and z. heading: (F, 4) turn about Y of the pelvis. leg: cm from hip to ankle
-    at full stretch.
+    stances: of each foot in order, at least one. up: (F, 2) whether a foot swings. swing: (F, 2) from 0 to 1
+    and back to 0 over a swing. phase: (F,) cycles, unwrapped, 0 as the right foot lands. walking: (F,) 0 to
+    1, whether the phase is known. jog: (F,) share. cycle: (F,) frames of a cycle around each frame. path: (F,
+    2) horizontal path of the root, x and z. heading: (F, 4) turn about Y of the pelvis. leg: cm from hip to
+    ankle of a straight leg.
     """
 
     clip: Clip
@@ -67,7 +67,7 @@ class Source:
 
 
 def read_source(clip: Clip, labels: Labels) -> Source:
-    """Everything about a healthy clip that its change needs; labels as `hobble.labels` makes them."""
+    """Measure a healthy clip. labels: as `hobble.labels` makes them."""
     frames, skeleton = len(clip), clip.skeleton
     options = LabelOptions()
     found = find_swings(clip, options)
@@ -75,7 +75,7 @@ def read_source(clip: Clip, labels: Labels) -> Source:
     for side in (LEFT, RIGHT):
         own = [
             (s.start, min(s.end, frames - 1)) for s in found if s.foot == 1 - side
-        ]  # there the right foot is 0
+        ]  # in swings the right foot is 0
         touches = np.asarray(labels.contacts[:, 2 * side : 2 * side + 2].any(axis=1))
         own = [_in_the_air(start, end, touches) for start, end in own]
         for start, end in own:
@@ -107,7 +107,7 @@ def read_source(clip: Clip, labels: Labels) -> Source:
 
 
 def _in_the_air(start: int, end: int, touches: np.ndarray) -> tuple[int, int]:
-    """A swing without the frames at its ends in which the foot touches the ground by its labels."""
+    """A swing without frames at its ends in which the labels have the foot on the ground."""
     while end - start > LEAST_SWING and touches[start]:
         start += 1
     while end - start > LEAST_SWING and touches[end - 1]:
@@ -121,7 +121,7 @@ def _length(clip: Clip, side: str) -> float:
 
 
 def _cycles(stances: tuple[list[Stance], list[Stance]], frames: int, fps: float) -> Array:
-    """(frames,) frames from a foot's landing to its next about then, from all landings of both feet."""
+    """(frames,) frames from a foot's landing to its next, around each frame. Landings of both feet count."""
     middles, lengths = [], []
     for own in stances:
         for a, b in itertools.pairwise(own[1:]):

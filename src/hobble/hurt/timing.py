@@ -1,6 +1,4 @@
-"""When everything happens: how the hurt clip's frames look back at the source's, for the body and for each
-leg.
-"""
+"""Times of the hurt clip: the source frame that the body and each leg show in each new frame."""
 
 from __future__ import annotations
 
@@ -14,18 +12,18 @@ from hobble.hurt.effects import Effects
 from hobble.hurt.parts import LEFT, RIGHT
 from hobble.hurt.source import Source
 
-SQUEEZE = 0.57  # of the time between two events of a leg that is left to it at least
-JOG_STRIDE = 0.15  # share of a longer stride's time that a jog takes on: its flight cannot last longer
-JOG_SHIFT = 0.6  # share of what its landings and leavings shift, whose stances are short
+SQUEEZE = 0.57  # the time between two events of a leg shrinks at most to this share
+JOG_STRIDE = 0.15  # a jog takes on only this share of a longer stride time, because flight cannot last longer
+JOG_SHIFT = 0.6  # a jog, whose stances are short, takes on only this share of the shifts of landings
 MOST_SHIFT = 0.3  # cycles
 
 
 @dataclass(frozen=True)
 class Timing:
-    """Source frames, fractions included, that show in each of N new frames.
+    """Source frames, with fractions, that show in each of N new frames.
 
-    body: (N,). legs: (N, 2) left and right. begins: (F,) new frame at which each source frame would show if
-    only the cadence changed. slower: (F,) how many times as long a stride takes.
+    body: (N,). legs: (N, 2) left and right. begins: (F,) new frame of each source frame if only the cadence
+    changed. slower: (F,) factor of the stride time.
     """
 
     body: Array = field(repr=False)
@@ -37,7 +35,7 @@ class Timing:
         return len(self.body)
 
     def new_frames(self, when: Array, leg: int | None = None) -> Array:
-        """The new frames (fractions included) in which source frames `when` show, for the body or a leg."""
+        """The new frames (with fractions) that show source frames `when`, for the body or a leg."""
         looked = self.body if leg is None else self.legs[:, leg]
         return np.interp(when, looked, np.arange(len(looked)))
 
@@ -68,7 +66,7 @@ def _limited(shift: Array) -> Array:
 
 
 def _looking_back(events: list[tuple[float, float]], begins: Array, new: Array) -> Array:
-    """(N,) source frames shown in the frames `new`; events: (source frame, new frames that it is later)."""
+    """(N,) source frames shown in the frames `new`. events: (source frame, delay in new frames)."""
     last = len(begins) - 1
     at, goal = [0.0], [0.0]
     for when, later in events:

@@ -1,4 +1,4 @@
-"""A hurt version of a clip of a data set: what hurts in it, by its turn, and how long it may be."""
+"""Makes a hurt version of a clip in a data set: decides what hurts in it, and limits its length."""
 
 from __future__ import annotations
 
@@ -16,14 +16,17 @@ from hobble.labels.files import whole_frame
 from hobble.labels.model import LabelReport, Labels
 from hobble.labels.phase import find_cycles
 
-NEAR = 0.5  # a severity within this of one that was asked for is that one
-WHOLE = 6.0  # seconds: a version of a shorter clip is not cut, which might leave no cycle of it
+NEAR = 0.5  # severities that differ less from a requested one count as it
+WHOLE = 6.0  # seconds: versions of shorter clips are not cut, because they might lose all cycles
 
 
 def hurt_version(
     clip: Clip, labels: Labels, report: LabelReport, options: Hurt, *, name: str, turn: int, ground: str
 ) -> tuple[HurtClip, LabelReport]:
-    """The version `name` of a healthy clip, and its labels' report. turn: among all versions, from 0."""
+    """The version `name` of a healthy clip, and its labels' report.
+
+    turn: its number among all versions, from 0.
+    """
     severity = severities(clip.skeleton, len(clip), clip.fps, options, name, turn)
     flat = ground == "flat"
     hurt = hurt_clip(clip, labels, severity, name, flat=flat, zero=report.phase_zero, margins=report.margins)
@@ -36,9 +39,9 @@ def hurt_version(
 
 
 def settled(hurt: HurtClip, severities: Sequence[float], report: LabelReport) -> HurtClip:
-    """The clip without cycles in which a link shows another severity than 0 or one of `severities`.
+    """The clip without the cycles in which a link has another severity than 0 or one of `severities`.
 
-    Their footsteps are marked as not to be used, so that the mirrored clip lacks them too.
+    Their footsteps are marked as unused, so that the mirrored clip lacks them, too.
     """
     known = np.array([0.0, *severities])
     odd = (np.abs(hurt.severity[..., None] - known).min(axis=-1) > NEAR).any(axis=1)
@@ -51,7 +54,7 @@ def settled(hurt: HurtClip, severities: Sequence[float], report: LabelReport) ->
 
 
 def cut(hurt: HurtClip, frames: int, report: LabelReport) -> HurtClip:
-    """The first `frames` of a hurt clip; all of it where it has no more."""
+    """The first `frames` of a hurt clip, or all of it if it has fewer."""
     if frames >= len(hurt.clip):
         return hurt
     clip, labels = hurt.clip, hurt.labels

@@ -1,1 +1,1 @@
-"""What a clip does: contacts, phase and gait, from hand-made files or from the motion alone."""
+"""Labels a clip with contacts, phase and gait, from hand-made files or from the motion alone."""

@@ -1,4 +1,4 @@
-"""Which heels and toes stand on the ground, from the motion of the feet alone."""
+"""Finds which heels and toes are on the ground, from the motion of the feet alone."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from hobble.labels.options import Labels
 
 FEET = ((0, 1), (2, 3))  # heel and toe of the left and of the right foot, in the order of CONTACT_ROLES
 
-# A joint comes into contact below the first limit and stays in contact up to the second. Heights are above
-# the joint's own stance, in leg lengths. Speeds are in leg lengths a frame, or a share of the fastest moment
-# of the swing beside it, whichever is more: the share keeps the stance of a leg that is dragged. Set on the
-# walks and runs of `cmu`: a foot is then down for 55 to 65 % of a walking cycle and for less than half of a
-# jogging one.
+# A joint comes into contact below the first limit and stays in contact below the second. Heights are above
+# the joint's own stance, in leg lengths. A speed limit is in leg lengths a frame, or a share of the adjacent
+# swing's top speed if that is more. The share finds the stance of a dragged leg. The limits were set on the
+# walks and runs of `cmu`, where a foot is then down for 55 to 65 % of a walking cycle and for less than half
+# of a jogging cycle.
 HEEL_HEIGHTS, TOE_HEIGHTS = (0.015, 0.02), (0.02, 0.035)
 SPEEDS, SHARES = (0.010, 0.020), (0.18, 0.30)
-ON_TIPTOE = 0.03  # a heel so much higher above its toe than in the clip's flat stances is in the air
+ON_TIPTOE = 0.03  # leg lengths: a heel is in the air if it is this much higher above its toe than when flat
 DRAWN_UP, STRETCHED = 0.55, 0.8  # heights of hips over heels, in leg lengths
 
 
 def contacts(clip: Clip, options: Labels) -> np.ndarray:
-    """(F, 4) bool in the order of CONTACT_ROLES, by the rule that the section `labels` names."""
+    """(F, 4) bool in the order of CONTACT_ROLES, by the rule that the section `labels` selects."""
     if options.contacts == "original":
         return still_joints(clip, options.contact_threshold)
     return stance(clip, options)
@@ -35,8 +35,8 @@ def contacts(clip: Clip, options: Labels) -> np.ndarray:
 def still_joints(clip: Clip, threshold: float) -> np.ndarray:
     """(F, 4) bool: whether a joint moves less than the root of `threshold` (cm2) to the next frame.
 
-    This is the rule of the original (`pfnn-facts`, Labels): it does not look at height, and it depends on the
-    size of the body and on the noise of the capture. The last frame repeats the one before it.
+    This is the rule of the original (`pfnn-facts`, Labels). It ignores height, and depends on the size of the
+    body and on capture noise. The last frame repeats the one before it.
     """
     feet = foot_positions(clip)
     still = np.sum(np.diff(feet, axis=0) ** 2, axis=-1) < threshold
@@ -46,11 +46,11 @@ def still_joints(clip: Clip, threshold: float) -> np.ndarray:
 
 
 def stance(clip: Clip, options: Labels) -> np.ndarray:
-    """(F, 4) bool: whether a joint is near the height of its stance and slow.
+    """(F, 4) bool: whether a joint is slow and near the height of its stance.
 
-    Between two swings a foot has one stance, and its height is the lowest of the joint's slow frames there.
-    So the rule needs no floor and holds on slopes and stairs. Two pairs of limits (hysteresis) keep a stance
-    in one piece from landing to toe-off. All limits are relative to the length of the leg.
+    Between two swings a foot has one stance. Its height is the lowest of the joint's slow frames there, so
+    the rule needs no floor and works on slopes and stairs. Two pairs of limits (hysteresis) keep a stance in
+    one piece from landing to toe-off. All limits are relative to leg length.
     """
     leg = clip.skeleton.leg_length
     height, speed = foot_positions(clip)[..., 1] / leg, _centred_speeds(clip) / leg
@@ -60,7 +60,7 @@ def stance(clip: Clip, options: Labels) -> np.ndarray:
         heel_level = _find_stances(height[:, heel], speed[:, heel], edges, HEEL_HEIGHTS, out[:, heel])
         toe_level = _find_stances(height[:, toe], speed[:, toe], edges, TOE_HEIGHTS, out[:, toe])
         lift = heel_level - toe_level
-        whole = lift[1:-1] if len(lift) > 3 else lift  # the first and the last stance may be cut off
+        whole = lift[1:-1] if len(lift) > 3 else lift  # the first and the last stance may be incomplete
         flat = np.percentile(whole, 10)
         for number in np.flatnonzero(lift > flat + ON_TIPTOE):
             out[edges[number] : edges[number + 1], heel] = False
@@ -68,7 +68,7 @@ def stance(clip: Clip, options: Labels) -> np.ndarray:
 
 
 def _lifted(clip: Clip) -> np.ndarray:
-    """(F, 4) bool: joints of a foot that is held up: its leg is drawn up, the other one is stretched."""
+    """(F, 4) bool: joints of a foot that is held up, while its leg is bent and the other one is straight."""
     sides = ("left", "right")
     hips, heels = (
         clip.positions[:, [clip.skeleton.role(f"{s}_{r}") for s in sides], 1] for r in ("hip", "heel")
@@ -80,10 +80,10 @@ def _lifted(clip: Clip) -> np.ndarray:
 def _find_stances(
     height: Array, speed: Array, edges: np.ndarray, heights: tuple[float, float], down: np.ndarray
 ) -> Array:
-    """Fill `down` (F,) from a joint's height and speed (F,) in leg lengths; returns each stance's height.
+    """Fill `down` (F,) from a joint's height and speed (F,) in leg lengths. Returns each stance's height.
 
-    edges: (S + 1,) the clip's ends and the fastest frames of the swings between them; one stance lies between
-    two of them. heights: the limits above a stance, for landing and for leaving.
+    edges: (S + 1,) the clip's ends and the fastest frame of each swing; there is one stance between two of
+    them. heights: limits above a stance, for landing and for leaving.
     """
     lands, stays = np.zeros(len(speed), bool), np.zeros(len(speed), bool)
     levels = []
@@ -105,7 +105,7 @@ def _stretches_with(stays: np.ndarray, lands: np.ndarray) -> np.ndarray:
 
 
 def _centred_speeds(clip: Clip) -> Array:
-    """(F, 4) speeds about each frame, cm a frame: a landing and a toe-off then look alike from both sides."""
+    """(F, 4) speeds centred on each frame, cm a frame, so that landing and toe-off are treated alike."""
     feet = foot_positions(clip)
     if len(feet) < 2:
         return np.zeros(feet.shape[:2])

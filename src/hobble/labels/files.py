@@ -1,7 +1,6 @@
-"""Hand-made label files, as they lie beside clips: `.phase`, `.gait`, `_footsteps.txt`, `_gait.txt`.
+"""Reads hand-made label files beside clips: `.phase`, `.gait`, `_footsteps.txt`, `_gait.txt`.
 
-Frame numbers in them count from 1 in the clip file's own rate. Whatever cannot be read is refused with file
-and line.
+Their frames count from 1 in the clip file's own rate. Errors name the file and the line.
 """
 
 from __future__ import annotations
@@ -24,9 +23,9 @@ TO_GAIT = {"run": "jog", "crawl": "crouch", "unknown": "bump"}
 
 @dataclass(frozen=True)
 class SourceTime:
-    """How frames of the clip's source file relate to the frames of the clip.
+    """How frames of the clip's source file relate to frames of the clip.
 
-    frames: frames of the source file. fps: its rate. first: its (0-based) frame that is frame 0 of the clip.
+    frames: number in the source file. fps: its rate. first: its frame, from 0, that is frame 0 of the clip.
     """
 
     frames: int
@@ -35,15 +34,15 @@ class SourceTime:
 
     @property
     def ratio(self) -> float:
-        """Source frames per 60 Hz frame, at the rate by which the clip was resampled."""
+        """Source frames per 60 Hz frame, at the rate of the resampling."""
         return self.fps / 60.0
 
     def to_clip(self, number: float) -> float:
-        """Frame of the clip, not rounded, of a source frame counted from 1."""
+        """Frame of the clip, not rounded, of a source frame that is counted from 1."""
         return (number - 1 - self.first) / self.ratio
 
     def at_clip_frames(self, frames: int) -> Array:
-        """(frames,) source rows, from 0 and not rounded, at which the clip's frames lie."""
+        """(frames,) source rows of the clip's frames, from 0 and not rounded."""
         return np.arange(frames) * self.ratio + self.first
 
 
@@ -53,10 +52,11 @@ def whole_frame(frame: float) -> int:
 
 
 def read_phase(path: Path, time: SourceTime, frames: int) -> Array:
-    """(frames,) phase at 60 Hz of a file with one value a source frame; between rows along the shorter way
-    round.
+    """(frames,) phase at 60 Hz of a file with one value per source frame.
 
-    Raises InputError for a value that is not a number in 0..1, or another number of rows than the clip has.
+    Interpolated along the shorter way round.
+
+    Raises InputError for a value that is not a number in 0..1, or for a wrong number of rows.
     """
     rows = _matrix(path, time, 1)[:, 0]
     before, after, share = _between(rows, time, frames)
@@ -65,18 +65,20 @@ def read_phase(path: Path, time: SourceTime, frames: int) -> Array:
 
 
 def read_gait(path: Path, time: SourceTime, frames: int) -> Array:
-    """(frames, 6) gait shares of a file with 8 columns: those of FILE_GAITS; raises like `read_phase`."""
+    """(frames, 6) gait shares of a file with the 8 columns FILE_GAITS. Raises like `read_phase`."""
     rows = _matrix(path, time, len(FILE_GAITS))
     before, after, share = _between(rows, time, frames)
     return _six(before + share[:, None] * (after - before))
 
 
 def read_footsteps(path: Path, time: SourceTime) -> Array:
-    """(N, 3) footsteps (see `Labels`) of a file with lines `right left [*]`; the last may hold `right` alone.
+    """(N, 3) footsteps (see `Labels`) of a file with lines `right left [*]`.
 
-    Such a last line counts as marked with `*`: the original makes no rows of the cycle that ends in it. Its
-    landing still gives the phase before it.
-    Raises InputError with the line where frames are not numbers, do not rise, or lie past the clip.
+    The last may hold only `right`.
+
+    Such a last line counts as marked with `*`, because the original makes no rows of the cycle that ends
+    there. Its landing still gives the phase before it. Raises InputError with the line if frames are not
+    numbers, do not rise, or are past the clip's end.
     """
     steps: list[tuple[float, float, float]] = []
     last, ended = 0.0, False
@@ -104,8 +106,8 @@ def read_footsteps(path: Path, time: SourceTime) -> Array:
 def read_gait_keys(path: Path, time: SourceTime, frames: int) -> Array:
     """(frames, 6) gait shares of a file with lines `frame gait`, with linear fades between different gaits.
 
-    A fade ends one frame before its second key, as the original's `.gait` files do. Raises InputError with
-    the line where a frame is not a number, does not rise, or a gait has another name than FILE_GAITS.
+    A fade ends one frame before its second key, as in the original's `.gait` files. Raises InputError with
+    the line if a frame is not a number or does not rise, or for a gait that is not in FILE_GAITS.
     """
     names = (*FILE_GAITS, "bump")
     keys: list[tuple[float, int]] = []
@@ -153,11 +155,11 @@ def _number(path: Path, line: int, word: str) -> float:
 
 
 def _matrix(path: Path, time: SourceTime, columns: int) -> Array:
-    """Rows of `columns` numbers in 0..1, one for each source frame; a row too few or too many is forgiven."""
+    """Rows of `columns` numbers in 0..1, one for each source frame. One row more or less is accepted."""
     rows = []
     for number, words in _lines(path):
         if len(words) != columns:
-            raise InputError(path, f"has {len(words)} values where {columns} belong", line=number)
+            raise InputError(path, f"has {len(words)} values instead of {columns}", line=number)
         values = [_number(path, number, w) for w in words]
         if not all(-1e-6 <= v <= 1 + 1e-6 for v in values):
             raise InputError(path, "has a value outside 0..1", line=number)
@@ -166,13 +168,13 @@ def _matrix(path: Path, time: SourceTime, columns: int) -> Array:
         raise InputError(
             path,
             f"has {len(rows)} rows, but the clip's file has {time.frames} frames",
-            fix="Make one row a frame, or remove the file to have it labelled without.",
+            fix="Write one row for each frame, or remove the file to label the clip automatically.",
         )
     return np.array(rows, float)
 
 
 def _between(rows: Array, time: SourceTime, frames: int) -> tuple[Array, Array, Array]:
-    """For each frame of the clip the rows before and after it, and how far it lies between them (0..1)."""
+    """For each frame of the clip the rows before and after it, and its position between them (0..1)."""
     at = np.clip(time.at_clip_frames(frames), 0, len(rows) - 1)
     nearest = np.round(at)
     at = np.where(np.abs(at - nearest) < 1e-6, nearest, at)
@@ -181,7 +183,7 @@ def _between(rows: Array, time: SourceTime, frames: int) -> tuple[Array, Array, 
 
 
 def _six(eight: Array) -> Array:
-    """Columns of FILE_GAITS added up to those of GAITS."""
+    """The columns of FILE_GAITS added up to those of GAITS."""
     out = np.zeros((len(eight), len(GAITS)))
     for column, name in enumerate(FILE_GAITS):
         out[:, GAITS.index(TO_GAIT.get(name, name))] += eight[:, column]

@@ -1,8 +1,8 @@
-"""Where each foot lands, found from the motion alone: a foot that swings and then stays.
+"""Finds where each foot lands, from the motion alone: a foot that swings and then rests.
 
-A foot is down while its heel or its toe rests: heels roll while the toe still stands and the other way round.
-What rest means is measured in units of the two speeds of the facts page and follows the foot's own swings, so
-that a slow shuffle, a jog whose feet never quite rest and a dragged leg all have theirs.
+A foot is down while its heel or its toe rests. The limit of rest is relative to the two unit speeds of the
+facts page and to the foot's own swings. So it fits a slow shuffle, a jog whose feet never quite rest, and a
+dragged leg.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from hobble.labels.options import Labels
 RIGHT, LEFT = 0, 1
 END_OF_BOUT = (np.nan, -1)
 
-# In shares of the unit speeds and of the swings to either side, in cm and in frames at 60 Hz; set once, on
-# the hand-made labels of the original release and on generated walks whose landings are exact.
+# Shares of the unit speeds and of the adjacent swings, cm, and frames at 60 Hz. They were set on the
+# hand-made labels of the original release and on generated walks with exact landings.
 SLOWEST_REST = 0.35
 REST_OF_SWING = 0.12
 DIP_OF_SWING = 0.35
@@ -36,9 +36,9 @@ LAST_FRAMES = 2
 
 @dataclass(frozen=True)
 class Swing:
-    """A foot in the air: it leaves at frame `start`, is down again from `end` on.
+    """A foot in the air from frame `start` until it is down at frame `end`.
 
-    path: how far its toe goes, cm. peak: the toe's highest speed, cm a frame.
+    path: distance of its toe, cm. peak: the toe's highest speed, cm a frame.
     """
 
     foot: int
@@ -63,10 +63,10 @@ def foot_speeds(clip: Clip) -> Array:
 
 
 def find_swings(clip: Clip, options: Labels) -> list[Swing]:
-    """The swings of both feet, in the order in which they end.
+    """The swings of both feet, in the order of their ends.
 
-    options: `heel_speed` and `toe_speed` are the unit speeds; a foot that never rests between two swings is
-    down while it is no faster than `valley_factor` times its slowest.
+    options: `heel_speed` and `toe_speed` are the unit speeds. A foot that never rests between two swings is
+    down while its speed is at most `valley_factor` times its lowest.
     """
     speed, relative = foot_speeds(clip), relative_speeds(clip, options)
     swings = []
@@ -87,7 +87,7 @@ def relative_speeds(clip: Clip, options: Labels) -> Array:
 
 
 def feet_up(swings: list[Swing], frames: int) -> np.ndarray:
-    """(frames, 2) bool: whether the right, the left foot is in a swing."""
+    """(frames, 2) bool: whether the right and the left foot are in a swing."""
     up = np.zeros((frames, 2), bool)
     for swing in swings:
         up[swing.start : swing.end, swing.foot] = True
@@ -95,11 +95,11 @@ def feet_up(swings: list[Swing], frames: int) -> np.ndarray:
 
 
 def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tuple[float, int]]:
-    """Landings (frame, foot) that take turns; END_OF_BOUT stands between bouts of walking.
+    """Alternating landings (frame, foot). END_OF_BOUT separates bouts of walking.
 
-    shortest_step: a landing so soon after one of the other foot, in frames at 120 Hz, is left out.
-    The frame is that of first contact, and later after slow swings, which a person marks when the weight
-    comes down: by the time in which the toe at its fastest goes SETTLING cm.
+    shortest_step: a landing at most so many frames (at 120 Hz) after one of the other foot is left out. The
+    frame is that of first contact. After slow swings it is later, because people mark the frame in which the
+    weight comes down: by the time in which the toe at top speed goes SETTLING cm.
     """
     out: list[tuple[float, int]] = []
     resting_since = -1
@@ -117,7 +117,7 @@ def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tup
 
 
 def _times_up(relative: Array, valley_factor: float) -> np.ndarray:
-    """(n, 2) first frame up, first frame down again, of a foot with the `relative` speed (F,)."""
+    """(n, 2) first frame up and first frame down again of a foot with the `relative` speed (F,)."""
     peaks = swing_peaks(relative)
     up = relative >= _rest_limit(relative, peaks, valley_factor)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], up, [False]]))).reshape(-1, 2)
@@ -126,7 +126,7 @@ def _times_up(relative: Array, valley_factor: float) -> np.ndarray:
 
 
 def swing_peaks(relative: Array) -> np.ndarray:
-    """Frames of the fastest moment of each swing: peaks that are parted by a real dip."""
+    """The fastest frame of each swing: peaks that are separated by a clear dip."""
     kept: list[int] = []
     for peak in _local_highs(relative, 2 * SLOWEST_REST):
         while kept:
@@ -143,7 +143,10 @@ def swing_peaks(relative: Array) -> np.ndarray:
 
 
 def _local_highs(values: Array, least: float) -> np.ndarray:
-    """Frames where `values` (F,) are `least` or more and higher than on both sides; mid-plateau."""
+    """Frames where `values` (F,) are at least `least` and higher than on both sides.
+
+    Of plateaus the middle.
+    """
     steps = np.diff(np.concatenate([[0.0], values, [0.0]]))
     moves = np.flatnonzero(steps)
     tops = np.flatnonzero((steps[moves[:-1]] > 0) & (steps[moves[1:]] < 0))
@@ -152,7 +155,7 @@ def _local_highs(values: Array, least: float) -> np.ndarray:
 
 
 def _rest_limit(relative: Array, peaks: np.ndarray, valley_factor: float) -> Array:
-    """(F,) the relative speed below which the foot is down: between two swings a share of the lesser one."""
+    """(F,) the relative speed below which the foot is down: a share of the slower adjacent swing."""
     frames = len(relative)
     limit = np.full(frames, SLOWEST_REST)
     for a, b in itertools.pairwise([0, *peaks, frames]):
@@ -167,7 +170,7 @@ def _rest_limit(relative: Array, peaks: np.ndarray, valley_factor: float) -> Arr
 
 
 def _one_swing_a_step(swings: list[Swing]) -> list[Swing]:
-    """Join what is one swing of a foot with a short touch in it; drop small moves between a foot's steps."""
+    """Join swings of a foot that are separated by a short touch, and drop small moves between steps."""
     out: list[Swing] = []
     for swing in swings:
         last = out[-1] if out else None

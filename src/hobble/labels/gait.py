@@ -1,4 +1,4 @@
-"""Gait shares: the overwritten crouch of flat clips, and the gaits of a clip that nobody labelled."""
+"""Gait shares: the crouch rule for flat clips, and automatic gaits of unlabelled clips."""
 
 from __future__ import annotations
 
@@ -14,44 +14,44 @@ from hobble.labels.model import GAITS
 STAND, WALK, JOG, CROUCH = range(4)
 GRAVITY = 981.0 / 3600.0  # cm a frame, each frame
 
-# Where a figure stands, in leg lengths a frame, and where it crouches, in the lengths of the bones below.
+# A slower figure stands (leg lengths a frame), a lower one crouches (lengths of the bones below).
 STANDING_SPEED = 0.0019
 CROUCHED_HEAD = 0.8
 CROUCHED_HIPS = 0.85
 
-# Log odds of jog against walk, a fit to the hand-made labels of the original release and of Ferre et al. and
-# to the descriptions of `cmu`. All measures are free of units, so that they hold for any size of body.
-JOG_SPRING = 3.7  # hips that are lowest over the standing foot (a spring), not between two steps (a pendulum)
-JOG_FLIGHT = 9.0  # share of the time in which no foot is down
-JOG_DOUBLE_SUPPORT = -9.0  # share of the time in which both are
-JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g, up to MOST_BOUNCE: a happy walk bounces too
+# Log odds of jog against walk. They were fitted to the hand-made labels of the original release and of Ferre
+# et al., and to the descriptions of `cmu`. All measures have no unit, so they hold for any size of body.
+JOG_SPRING = 3.7  # hips lowest over the standing foot (spring), not between two steps (pendulum)
+JOG_FLIGHT = 9.0  # share of the time without a foot down
+JOG_DOUBLE_SUPPORT = -9.0  # share of the time with both feet down
+JOG_BOUNCE = 12.5  # vertical acceleration of the hips, g, at most MOST_BOUNCE, because happy walks bounce
 MOST_BOUNCE = 0.5
-JOG_FROUDE = 6.0  # above FASTEST_WALK, in Froude numbers: people walk no faster than that for long
+JOG_FROUDE = 6.0  # per Froude number above FASTEST_WALK, the limit of walking for long
 FASTEST_WALK = 0.5
 JOG_CONSTANT = -3.2
-# A figure that has both feet down for this share of the time, always has one down, and does not clearly
-# spring, is walking, however much it bounces, as in a happy walk.
+# A figure walks if both feet are down for this share of the time, one is always down, and the hips do not
+# clearly spring. Bounce does not matter then, as in happy walks.
 LEAST_DOUBLE_SUPPORT = 0.1
 NO_FLIGHT = 0.01
 CLEAR_SPRING = 0.5
-# A slow figure whose feet hardly leave the ground and whose hips hardly spring skips along, and walks: on the
-# happy walks of `styles` flight is .06 at most, on its slowest run .16. With a spring of .25 slow jogs of the
-# original release would be walks.
+# A slow figure with little flight and little spring walks, too. In the happy walks of `styles` flight is at
+# most .06, in its slowest run .16. With a limit of .25 for the spring, slow jogs of the original release
+# would be walks.
 SLOW, SOME_FLIGHT, SOME_SPRING = 0.35, 0.1, 0.2
 MOST_ODDS_OF_A_WALK = -1.0
 CERTAIN_ODDS = 2.0  # log odds that count as full evidence
-DATA_SET_ODDS = 1.0  # what the data set says of the clip's main gait counts for so much
-SWITCH_COST = 18.0  # frames of full evidence that a change of gait takes
+DATA_SET_ODDS = 1.0  # log odds for the main gait of the clip in the data set
+SWITCH_COST = 18.0  # frames of full evidence that a change of gait costs
 FADE_FRAMES = 31
-LONGEST_START = 180  # a doubtful walk between a stand and a jog belongs to the jog, if no longer than this
+LONGEST_START = 180  # frames: a shorter doubtful walk between standing and jogging counts as jog
 CLEARLY_WALKING = -4.0  # log odds in the second half of such a walk
-LONGEST_PASSAGE = 75  # any other walk between the two is halved, if no longer than this
+LONGEST_PASSAGE = 75  # frames: any other shorter walk between the two is divided between them
 
 
 def overwrite_crouch(gait: Array, clip: Clip) -> Array:
-    """Gait (F, 6) of a clip on flat ground with crouch = 1 - clip((head height - 80) / 50, 0, 1).
+    """Gait (F, 6) of a clip on flat ground, with crouch = 1 - clip((head height - 80) / 50, 0, 1).
 
-    The other columns stay as they are (`pfnn-facts`, Labels), so that shares need not add up to 1.
+    The other columns do not change (`pfnn-facts`, Labels), so the sum may differ from 1.
     """
     head = clip.positions[:, clip.skeleton.role("head"), 1]
     out = gait.copy()
@@ -60,11 +60,11 @@ def overwrite_crouch(gait: Array, clip: Clip) -> Array:
 
 
 def automatic_gait(clip: Clip, down: np.ndarray, dominant: str | None) -> Array:
-    """Gait shares (F, 6), which add up to 1, of a clip whose feet stand as `down` says.
+    """Gait shares (F, 6) with the sum 1.
 
-    down: (F, 4) contacts by `contacts.stance`. dominant: the gait that the clip mostly shows; it tips the
-    balance where walk and jog are alike. A jump or a bump is not recognised: where `dominant` is one of them,
-    every frame but those that stand is that.
+    down: (F, 4) contacts by `contacts.stance`. dominant: the clip's main gait; it decides if walk and jog are
+    about equally likely. Jumps and bumps are not recognised: if `dominant` is one of them, all frames have it
+    except those that stand.
     """
     odds = jog_odds(clip, down) + {"jog": DATA_SET_ODDS, "walk": -DATA_SET_ODDS}.get(dominant or "", 0.0)
     gait = _likeliest_path(_evidence(clip, odds), SWITCH_COST)
@@ -76,11 +76,11 @@ def automatic_gait(clip: Clip, down: np.ndarray, dominant: str | None) -> Array:
 
 
 def jog_odds(clip: Clip, down: np.ndarray) -> Array:
-    """(F,) log odds that a moving figure jogs and does not walk; down: (F, 4) contacts."""
+    """(F,) log odds that a moving figure jogs rather than walks. down: (F, 4) contacts."""
     left, right = down[:, :2].any(axis=1), down[:, 2:].any(axis=1)
     flight = gaussian((~left & ~right).astype(float), 20.0)
     double_support = gaussian((left & right).astype(float), 20.0)
-    # Froude number: the square of the speed over gravity times the length of the leg.
+    # Froude number: speed squared / (gravity * leg length).
     froude = _speed(clip) ** 2 / (GRAVITY * clip.skeleton.leg_length)
     spring = _spring(clip)
     odds = (
@@ -97,7 +97,7 @@ def jog_odds(clip: Clip, down: np.ndarray) -> Array:
 
 
 def _evidence(clip: Clip, odds: Array) -> Array:
-    """(F, 4) how much more each of the first four gaits fits a frame than walking does, -1 to 1."""
+    """(F, 4) evidence for each of the first four gaits compared with walking, -1 to 1."""
     speed = _speed(clip) / clip.skeleton.leg_length
     stand = np.clip((STANDING_SPEED - speed) / STANDING_SPEED, -1.0, 1.0)
     head, hips = _relative_heights(clip)
@@ -116,7 +116,7 @@ def _speed(clip: Clip) -> Array:
 
 
 def _bounce(clip: Clip) -> Array:
-    """(F,) root mean square of the vertical acceleration of the hips over half a second, g."""
+    """(F,) root mean square of the hips' vertical acceleration over half a second, g."""
     if len(clip) < 3:
         return np.zeros(len(clip))
     height = gaussian(clip.positions[:, clip.skeleton.role("hips"), 1], 2.0)
@@ -127,8 +127,8 @@ def _bounce(clip: Clip) -> Array:
 def _spring(clip: Clip) -> Array:
     """(F,) correlation of the height of the hips with the distance between the ankles over about a cycle.
 
-    A walking leg is a pendulum turned upside down: the hips are highest over the standing foot, while the
-    other foot passes it. A jogging leg is a spring: there the hips are lowest (Cavagna et al. 1977).
+    A walking leg is an inverted pendulum: the hips are highest over the standing foot, as the other foot
+    passes it. A jogging leg is a spring: there the hips are lowest (Cavagna et al. 1977).
     """
     skeleton, positions = clip.skeleton, clip.positions
     height = gaussian(positions[:, skeleton.role("hips"), 1], 1.5)
@@ -140,7 +140,7 @@ def _spring(clip: Clip) -> Array:
 
 
 def _relative_heights(clip: Clip) -> tuple[Array, Array]:
-    """(F,) heights of head and hips over the feet's lowest about then, in lengths of the bones below them."""
+    """(F,) heights of head and hips above the lowest foot, in lengths of the bones below."""
     skeleton, y = clip.skeleton, clip.positions[..., 1]
     toes = y[:, [skeleton.role("left_toe"), skeleton.role("right_toe")]]
     floor = lowest(toes, 61).mean(axis=1)
@@ -155,7 +155,7 @@ def _relative_heights(clip: Clip) -> tuple[Array, Array]:
 
 
 def _likeliest_path(evidence: Array, switch: float) -> Array:
-    """(F,) the gaits with most evidence (F, G) in all, less `switch` for each change (Viterbi)."""
+    """(F,) the sequence of gaits with most evidence (F, G), minus `switch` for each change (Viterbi)."""
     frames, gaits = evidence.shape
     if not frames:
         return np.zeros(0, int)
@@ -174,9 +174,9 @@ def _likeliest_path(evidence: Array, switch: float) -> Array:
 
 
 def _without_passages(gait: Array, odds: Array) -> Array:
-    """Gaits (F,) without the short walks by which a figure gets from standing into a jog and back.
+    """Gaits (F,) without short walks between standing and jogging.
 
-    odds: (F,) of `jog_odds`. Setting off into a jog is part of the jog, unless it is clearly a walk.
+    odds: (F,) of `jog_odds`. The start of a jog is part of it, unless it is clearly a walk.
     """
     out = gait.copy()
     edges = np.concatenate([[0], np.flatnonzero(np.diff(gait)) + 1, [len(gait)]])

@@ -1,4 +1,4 @@
-"""The labels of one clip, put together: contacts, and phase and gait from files or from the motion."""
+"""Combines the labels of a clip: contacts, and phase and gait from files or from the motion."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from hobble.labels.contacts import contacts, stance
 from hobble.labels.files import SourceTime
 from hobble.labels.footfall import Swing, find_swings, landings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
+from hobble.labels.label_picture import label_picture
 from hobble.labels.model import GAITS, LabelReport, Labels
 from hobble.labels.options import Labels as Options
 from hobble.labels.phase import (
@@ -28,7 +29,6 @@ from hobble.labels.phase import (
     phase_of_footsteps,
     rows_of_landings,
 )
-from hobble.labels.strip import strip
 
 
 def label_clip(
@@ -41,10 +41,10 @@ def label_clip(
 ) -> tuple[Labels, LabelReport]:
     """Label a clip.
 
-    files: hand-made files beside its source; `.phase` goes before `_footsteps.txt`, `.gait` before
-    `_gait.txt`. motion: the report of the motion stage, for `source_fps` and `source_frames`. gait: the gait
-    it mostly shows, if that is known. ground: "flat", ... options: the section `labels` of the data set.
-    Raises InputError for a file that cannot be used.
+    files: hand-made files beside its source. `.phase` has priority over `_footsteps.txt`, `.gait` over
+    `_gait.txt`. motion: the report of the motion stage, for `source_fps` and `source_frames`. gait: the
+    clip's main gait, if known. ground: "flat", ... options: the section `labels` of the data set. Raises
+    InputError for an invalid file.
     """
     given = _by_kind(files) if options.files else {}
     warnings: list[str] = []
@@ -93,7 +93,7 @@ def _no_cycle(margins: str) -> str:
 
 
 def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labels, LabelReport]:
-    """Labels of the mirrored clip: contacts swapped, phase half a cycle on, cycles of the other foot."""
+    """Labels of the mirrored clip: contacts swapped, phase half a cycle later, cycles of the other foot."""
     footsteps = mirrored_footsteps(labels.footsteps)
     cycles, dropped = find_cycles(footsteps, len(labels), report.phase_zero, report.margins)
     mirrored = Labels(
@@ -109,7 +109,7 @@ def mirror_labels(labels: Labels, report: LabelReport, clip: Clip) -> tuple[Labe
 
 
 def write_report(path: str | Path, report: LabelReport, labels: Labels, clip: Clip) -> None:
-    """Write the JSON beside the labels, with seconds of each gait and the data of the label picture."""
+    """Write the JSON beside the labels: seconds of each gait and the data of the label picture."""
     main = np.argmax(labels.gait, axis=1)
     seconds = {name: float(np.sum(main == i) / clip.fps) for i, name in enumerate(GAITS)}
     write_json(
@@ -118,7 +118,7 @@ def write_report(path: str | Path, report: LabelReport, labels: Labels, clip: Cl
             **asdict(report),
             "seconds": seconds,
             "cycles": len(labels.cycles),
-            "strip": strip(labels, clip),
+            "strip": label_picture(labels, clip),
         },
     )
 
@@ -141,7 +141,7 @@ def _by_kind(files: Iterable[str | Path]) -> dict[str, Path]:
 def _phase(
     clip: Clip, given: Mapping[str, Path], time: SourceTime, swings: list[Swing], shortest_step: int
 ) -> tuple[Array, np.ndarray, Array]:
-    """Phase with the right foot at 0, where it is known, and footsteps."""
+    """Phase (0 as the right foot lands), where it is known, and footsteps."""
     frames = len(clip)
     if "footsteps" in given:
         footsteps = label_files.read_footsteps(given["footsteps"], time)

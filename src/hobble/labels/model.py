@@ -1,4 +1,4 @@
-"""The labels of one clip, and the file they are kept in."""
+"""The labels of one clip, and their file."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ CONTACT_ROLES = ("left_heel", "left_toe", "right_heel", "right_toe")
 class Labels:
     """Labels of F frames at 60 Hz.
 
-    contacts: (F, 4) bool, in the order of CONTACT_ROLES. phase: (F,) in 0..1. phase_known: (F,) bool, False
-    where no phase can be told. gait: (F, 6) shares in the order of GAITS.
-    footsteps: (N, 3): the frame where the right foot lands, the frame where the left one does next, and 1
-    where the step is not to be used, else 0; nan where that landing is not known; a row of nan ends a bout of
-    walking. cycles: (C, 2) int, first and last frame of each cycle kept, inclusive.
+    contacts: (F, 4) bool, in the order of CONTACT_ROLES. phase: (F,) in 0..1. phase_known: (F,) bool. gait:
+    (F, 6) shares in the order of GAITS. footsteps: (N, 3): the frame in which the right foot lands, the next
+    frame in which the left foot lands, and 1 if the step must not be used, else 0. A landing is nan if
+    unknown; a row of nan ends a bout of walking. cycles: (C, 2) int, first and last frame of each cycle kept,
+    inclusive.
     """
 
     contacts: np.ndarray = field(repr=False)
@@ -40,7 +40,7 @@ class Labels:
 
 @dataclass(frozen=True)
 class LabelReport:
-    """Where the labels of a clip came from and what is odd about them."""
+    """Where the labels of a clip come from, and warnings."""
 
     clip: str
     phase_source: str
@@ -52,7 +52,7 @@ class LabelReport:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> LabelReport:
-        """Read back what the JSON beside the labels says; keys that are computed anew are ignored."""
+        """Read the JSON beside the labels. Keys that are computed again are ignored."""
         values = {f.name: data[f.name] for f in fields(cls)}
         return cls(**{**values, "warnings": tuple(values["warnings"])})
 
@@ -63,6 +63,6 @@ def save_labels(path: str | Path, labels: Labels) -> None:
 
 
 def load_labels(path: str | Path) -> Labels:
-    """Read what `save_labels` wrote."""
+    """Read a file of `save_labels`."""
     data = load_npz(path)
     return Labels(**{f.name: data[f.name] for f in fields(Labels)})

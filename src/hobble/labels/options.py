@@ -10,13 +10,13 @@ from hobble.core.section import Positive, PositiveFloat, Section
 
 
 class Labels(Section):
-    """Contacts, phase and gait. Speeds are those of the facts page: centimetres a frame at 120 Hz."""
+    """Contacts, phase and gait. Speeds are in the unit of the facts page: centimetres a frame at 120 Hz."""
 
     files: bool = Field(True, description="use hand-made label files where they lie beside the clip")
     contacts: Literal["stance", "original"] = Field(
         "stance",
-        description="a heel or a toe is down near the height of its stance while it is slow; or, as in the "
-        "original, wherever it moves less than the root of `contact_threshold` in a frame",
+        description="stance: a heel or toe is down if it is slow and near the height of its stance. "
+        "original: it is down if it moves less than the root of `contact_threshold` in a frame",
     )
     contact_threshold: PositiveFloat = Field(
         0.02, description="for `contacts: original`: squared displacement, cm2 per 60 Hz frame"
@@ -27,7 +27,7 @@ class Labels(Section):
     valley_factor: PositiveFloat = 2.875
     margins: Literal["extend", "drop"] = Field(
         "extend",
-        description="what becomes of a cycle with less than a second of clip before or after it: the path "
-        "goes on straight past the clip's end, or, as in the original, the cycle is dropped",
+        description="cycles with less than a second of clip before or after them: extend continues the path "
+        "straight past the clip's end, drop leaves them out, as in the original",
     )
     shortest_step: Positive = Field(5, description="steps of this many 120 Hz frames or fewer are dropped")

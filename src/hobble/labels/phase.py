@@ -1,7 +1,7 @@
-"""From footsteps to phase and back, and the locomotion cycles between them.
+"""Converts footsteps to phase and back, and finds locomotion cycles.
 
-The right foot lands at phase 0 and the left one at .5 (`pfnn-facts`, Labels); `phase_zero="left"` shifts by
-half.
+The right foot lands at phase 0 and the left one at .5 (`pfnn-facts`, Labels). `phase_zero="left"` shifts this
+by half a cycle.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from hobble.labels.files import whole_frame
 BREAK = (np.nan, np.nan, 1.0)
 IDLE_RATE = 0.0017
 FASTEST = 0.25
-MARGINS = {"extend": 1, "drop": 60}  # frames that a clip has before a cycle; one more after it
+MARGINS = {"extend": 1, "drop": 60}  # least number of frames before a cycle; one more is needed after it
 
 
 def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray]:
-    """Phase (frames,) in 0..1, right foot = 0, linear from landing to landing, and where it is known.
+    """Phase (frames,) in 0..1, linear between landings, right foot = 0; and where it is known.
 
-    Where it is not, it creeps on by about a tenth of the mean of .017 cycles a frame, as the runtime does for
-    a character that stands, and by as much more as it takes to meet the next landing.
+    Elsewhere it advances by about a tenth of the mean of .017 cycles a frame, as the runtime does for a
+    standing character, and by the extra that is needed to meet the next landing.
     """
     when, value, joined = _landings(footsteps)
     frame = np.arange(frames)
@@ -42,7 +42,7 @@ def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray
 
 
 def dropped_frames(footsteps: Array, frames: int) -> np.ndarray:
-    """(frames,) bool: inside a line of footsteps that is marked as not to be used."""
+    """(frames,) bool: frames inside a marked line of footsteps."""
     out = np.zeros(frames, bool)
     for line, following in itertools.pairwise(footsteps):
         if line[2] and np.isfinite(line[0]) and np.isfinite(following[0]):
@@ -51,7 +51,7 @@ def dropped_frames(footsteps: Array, frames: int) -> np.ndarray:
 
 
 def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
-    """Footsteps (N, 3) where a hand-made phase (F,) passes 0 and .5, and (F,) where it moves at all."""
+    """Footsteps (N, 3) where a hand-made phase (F,) passes 0 and .5, and (F,) where it moves."""
     step = np.diff(phase) % 1.0
     moving = np.concatenate([[False], (step > 0) & (step < FASTEST), [False]])
     edges = np.flatnonzero(np.diff(moving))
@@ -68,9 +68,9 @@ def footsteps_of_phase(phase: Array) -> tuple[Array, np.ndarray]:
 
 
 def rows_of_landings(events: list[tuple[float, int]]) -> Array:
-    """Footsteps (N, 3) of (frame, foot) in order of time, foot 0 right, 1 left; foot -1 ends a bout.
+    """Footsteps (N, 3) of (frame, foot) in order of time. Foot 0 is right, 1 left, -1 ends a bout.
 
-    The same foot twice in a row ends a bout too.
+    The same foot twice in a row also ends a bout.
     """
     rows: list[list[float]] = []
     last = -1
@@ -92,12 +92,11 @@ def rows_of_landings(events: list[tuple[float, int]]) -> Array:
 
 
 def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple[np.ndarray, int]:
-    """Cycles (C, 2) from one landing of the foot `zero` to its next, both frames included, and how many are
-    left out.
+    """Cycles (C, 2) between landings of the foot `zero`, both frames included, and the number left out.
 
-    Left out are those with a line marked as dropped and those too near an end of the clip: with `margins`
-    "drop" as in the original (`pfnn-facts`, Labels) those that start before frame 60 or end within 61 frames
-    of the clip's end; with "extend" only what has no frame before it or not two after it.
+    Cycles with a marked line are left out, and cycles too near an end of the clip. With `margins` "drop", as
+    in the original (`pfnn-facts`, Labels), these start before frame 60 or end within 61 frames of the clip's
+    end. With "extend", they have no frame before them or less than two after.
     """
     margin = MARGINS[margins]
     own = 0 if zero == "right" else 1
@@ -115,10 +114,10 @@ def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple
 
 
 def mirrored_footsteps(footsteps: Array) -> Array:
-    """The footsteps (M, 3) of the mirrored clip: what was the left foot is the right one.
+    """The footsteps (M, 3) of the mirrored clip, with left and right exchanged.
 
-    A line runs from a landing of the left foot to the next of the right one, and is dropped where the line
-    that the left foot lands in is.
+    A line goes from a landing of the left foot to the next of the right foot. It is marked if the line with
+    the left foot's landing is.
     """
     landings: list[tuple[float, int]] = []
     marks: list[float] = []
@@ -137,7 +136,7 @@ def mirrored_footsteps(footsteps: Array) -> Array:
 
 
 def _landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
-    """Frames and phases (0 or .5) of all landings, and (n - 1,) whether the next is of the same bout."""
+    """Frames and phases (0 or .5) of all landings, and (n - 1,) whether the next is in the same bout."""
     when: list[float] = []
     value: list[float] = []
     joined: list[bool] = []
@@ -156,7 +155,7 @@ def _landings(footsteps: Array) -> tuple[Array, Array, np.ndarray]:
 
 
 def _climbing(when: Array, value: Array, joined: np.ndarray) -> Array:
-    """Phase of each landing without wrapping: half a cycle a step, and over a gap about the idle rate."""
+    """Phase of each landing without wrapping: half a cycle for a step, about the idle rate for a gap."""
     level = [value[0]]
     for i, together in enumerate(joined):
         if together:

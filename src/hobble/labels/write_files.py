@@ -1,6 +1,6 @@
-"""Automatic labels as the files that people correct: `_footsteps.txt`, `_gait.txt`, `.phase`.
+"""Writes automatic labels as files that people can correct: `_footsteps.txt`, `_gait.txt`, `.phase`.
 
-They count frames from 1 in the rate of the clip's own file, and `hobble.labels.files` reads them back.
+Frames count from 1 in the rate of the clip's own file. `hobble.labels.files` reads them.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from hobble.core.files import write_text
 from hobble.labels.files import SourceTime
 from hobble.labels.model import GAITS, Labels
 
-HALF_FADE = 15  # frames at 60 Hz to each side of a change of gait, over which the two labels fade
+HALF_FADE = 15  # frames at 60 Hz on each side of a change of gait in which the labels fade
 
 
 def write_label_files(footsteps: Path, gait: Path, phase: Path, labels: Labels, time: SourceTime) -> None:
-    """Write the three files of one clip; time: how its frames relate to those of its source file."""
+    """Write the three files of a clip. time: how its frames relate to those of its source file."""
     write_text(footsteps, footsteps_text(labels, time))
     write_text(gait, gait_text(labels, time))
     write_text(phase, phase_text(labels, time))
@@ -27,8 +27,8 @@ def write_label_files(footsteps: Path, gait: Path, phase: Path, labels: Labels, 
 def footsteps_text(labels: Labels, time: SourceTime) -> str:
     """Lines `right left`: the frames in which the feet land.
 
-    A `*` marks a line that no cycle is taken from: one marked so in the labels, and the last of a bout of
-    walking, since the format has no other way to end a bout.
+    A `*` marks a line that is not used for cycles: one marked in the labels, or the last of a bout of
+    walking, because the format has no other way to end a bout.
     """
     lines = []
     rows = labels.footsteps
@@ -43,7 +43,7 @@ def footsteps_text(labels: Labels, time: SourceTime) -> str:
 
 
 def gait_text(labels: Labels, time: SourceTime) -> str:
-    """Lines `frame gait`, two at each change: the fade runs from one to the other."""
+    """Lines `frame gait`, two at each change. The labels fade between them."""
     gaits = labels.gait.argmax(axis=1).tolist()
     changes = [i for i in range(1, len(gaits)) if gaits[i] != gaits[i - 1]]
     keys: list[tuple[int, int]] = [(0, gaits[0])]
@@ -57,7 +57,7 @@ def gait_text(labels: Labels, time: SourceTime) -> str:
 
 
 def phase_text(labels: Labels, time: SourceTime) -> str:
-    """One value a frame of the source file; 0 where no phase is known."""
+    """One value for each frame of the source file; 0 where the phase is unknown."""
     at = np.clip((np.arange(time.frames) - time.first) / time.ratio, 0, len(labels) - 1)
     before = np.floor(at).astype(int)
     after = np.minimum(before + 1, len(labels) - 1)
@@ -68,5 +68,5 @@ def phase_text(labels: Labels, time: SourceTime) -> str:
 
 
 def _source_frame(frame: float, time: SourceTime) -> int:
-    """The frame of the source file, from 1, that is nearest to a frame of the clip."""
+    """The source file's frame, from 1, nearest to a frame of the clip."""
     return min(max(round(frame * time.ratio + time.first) + 1, 1), time.frames)

@@ -1,4 +1,4 @@
-"""What can be asked of files before anything is configured: `python -m hobble.motion rig` and `look`."""
+"""Commands for files before there is a data set: `python -m hobble.motion rig` and `look`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SKELETONS = Path("config/skeletons")
 
 
 def rig(file: Path) -> str:
-    """A draft of a rig file for a BVH file: the roles that were found, and `?` for those that were not."""
+    """A draft of a rig file for a BVH file. It has the roles that were found, and `?` for the others."""
     bvh = read_bvh(file)
     skeleton = rig_of(bvh)
     try:
@@ -27,18 +27,18 @@ def rig(file: Path) -> str:
             skeleton.joints
         )
     except Doubt as doubt:
-        print(f"{file}: {doubt}; its roles are guessed by names", file=sys.stderr)
+        print(f"{file}: {doubt}. Its roles are guessed from names", file=sys.stderr)
         roles = guessed(skeleton)
     return draft(skeleton, roles)
 
 
 def main() -> int:
-    """Read the command line; the exit status is 1 where a file is refused."""
+    """Run the command line. Returns 1 if a file is refused, else 0."""
     parser = argparse.ArgumentParser(prog="python -m hobble.motion", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     one = commands.add_parser("rig", help="write a draft of a rig file for a BVH file")
     one.add_argument("file", type=Path)
-    one.add_argument("--to", type=Path, help="the file to write; else it is printed")
+    one.add_argument("--to", type=Path, help="the file to write (default: print it)")
     many = commands.add_parser("look", help="one line about each clip of a folder, or about one file")
     many.add_argument("folder", type=Path)
     many.add_argument("--skeleton", default="holden31")
@@ -47,7 +47,7 @@ def main() -> int:
         "--handedness",
         choices=["auto", "right", "left"],
         default="auto",
-        help="of the files' coordinates, as motion.handedness of a data set",
+        help="handedness of the files' coordinates, as motion.handedness of a data set",
     )
     given = parser.parse_args()
     try:

@@ -1,7 +1,6 @@
-"""Which way is up, which hand is which, where the rest pose faces: found from the rig and its motion, then
-put right.
+"""Finds which way is up, the handedness of the coordinates and where the rest pose faces, and corrects them.
 
-Hobble's clips are right-handed with Y up, and their rest poses face +Z with the left at +X.
+Hobble's clips are right-handed with Y up. Their rest poses face +Z, with the left at +X.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from hobble.core.skeleton import Skeleton, rest_positions
 
 FLIP = np.array([-1.0, 1.0, 1.0])
 MIRROR = np.array([1.0, 1.0, -1.0, -1.0])
-CLIMB = 20.0  # cm between the lower and the higher half of a clip's lowest points from which on it climbs
+CLIMB = 20.0  # cm: a clip climbs if its lowest points rise by more than this
 UPRIGHT = np.cos(np.radians(20.0))
 DIRECTIONS = {
     sign + axis: np.eye(3)["XYZ".index(axis)] * (1 if sign == "+" else -1) for sign in "+-" for axis in "XYZ"
@@ -26,7 +25,7 @@ DIRECTIONS = {
 
 @dataclass(frozen=True)
 class Axes:
-    """What was found or given: up ("+Y"), handedness ("right"), facing of the rest pose ("+Z", "oblique")."""
+    """Axes that were found or given. facing: of the rest pose ("+Z", "oblique")."""
 
     up: str
     handedness: str
@@ -41,7 +40,10 @@ def nearest_axis(direction: Array) -> tuple[str, float]:
 
 
 def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array]:
-    """Unit vectors (..., 3) to the left, up the trunk and, by feet or knees, forward, of (..., J, 3)."""
+    """Unit vectors (..., 3) to the left, up the trunk, and forward by feet or knees.
+
+    positions: (..., J, 3).
+    """
     at = {role: positions[..., skeleton.role(role), :] for role in skeleton.roles}
     left = at["left_hip"] - at["right_hip"] + at["left_shoulder"] - at["right_shoulder"]
     up = at["head"] - at["hips"]
@@ -50,7 +52,7 @@ def body_axes(skeleton: Skeleton, positions: Array) -> tuple[Array, Array, Array
 
 
 def _foot(at: dict[str, Array], side: str) -> Array:
-    """Where a foot points; on a rig without toes, where the knee does."""
+    """Where a foot points. On a rig without toes, where the knee points."""
     if f"{side}_toe" in at:
         return at[f"{side}_toe"] - at[f"{side}_heel"]
     hip, knee, heel = (at[f"{side}_{part}"] for part in ("hip", "knee", "heel"))
@@ -65,7 +67,7 @@ def _unit(v: Array) -> Array:
 def rest_frame(skeleton: Skeleton) -> Array:
     """(4,) rotation from left = X, up = Y, forward = Z to the body's own axes in the rest pose.
 
-    A rest pose that stands along the axes within 20 degrees is taken to stand along them exactly.
+    A rest pose within 20 degrees of the axes counts as exactly along them.
     """
     left, up, _ = body_axes(skeleton, rest_positions(skeleton))
     up = _unit(up - left * (up @ left))
@@ -77,13 +79,13 @@ def rest_frame(skeleton: Skeleton) -> Array:
 
 
 def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> tuple[Clip, Axes, list[str]]:
-    """The clip right-handed with Y up, its rest pose facing +Z where that is a matter of whole axes.
+    """The clip with right-handed coordinates, Y up, and a rest pose that faces +Z if whole axes allow it.
 
-    standing: whether anybody could stand in the rest pose, which else says nothing of what is up.
+    up: "auto", "Y" or "Z". handedness: "auto", "right" or "left". standing: whether a person can stand in the
+    rest pose; if not, it does not show what is up.
 
-    up: "auto", "Y" or "Z". handedness: "auto", "right" or "left". What is `auto` is read off the motion: up
-    goes from the hips to the head and from the feet to the hips, unless the figure crawls, and the feet point
-    forward. Returns notes, too: a sentence where motion and rest pose do not agree on what is up.
+    With `auto` the axes come from the motion. Up goes from hips to head and from feet to hips, unless the
+    figure crawls. The feet point forward. Also returns a note if motion and rest pose disagree on what is up.
     """
     name, notes = _up_of(clip, standing) if up == "auto" else (f"+{up}", [])
     if handedness == "auto":
@@ -100,22 +102,25 @@ def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> t
 
 
 def _up_of(clip: Clip, standing: bool) -> tuple[str, list[str]]:
-    """The axis that is up, and a sentence where the rest pose stands along another than the motion."""
+    """The axis that is up, and a note if motion and rest pose disagree."""
     body, rest = (
         nearest_axis(_along_body(clip.skeleton, positions).mean(axis=0))[0]
         for positions in (clip.positions, rest_positions(clip.skeleton)[None])
     )
     if body == rest or not standing:
         return body, []
-    up, why = (rest, "it goes that way, as in a crawl") if _crawls(clip, body) else (body, "it moves so")
+    up, why = (rest, "the body crawls") if _crawls(clip, body) else (body, "the body moves that way up")
     return up, [
-        f"The body lies along {body} and its rest pose along {rest}; since {why}, {up} was taken for up "
-        "(motion.up overrules it)."
+        f"The body lies along {body} and its rest pose along {rest}. {up} was taken for up, because {why} "
+        "(motion.up overrides this)."
     ]
 
 
 def _along_body(skeleton: Skeleton, positions: Array) -> Array:
-    """(F, 3) from the feet over the hips to the head, both parts of equal weight; positions (F, J, 3)."""
+    """(F, 3) directions from the feet over the hips to the head, both parts of equal weight.
+
+    positions: (F, J, 3).
+    """
     feet = [f"{side}_{part}" for side in ("left", "right") for part in ("toe", "heel")]
     feet = [next(role for role in feet[i : i + 2] if role in skeleton.roles) for i in (0, 2)]
     head, hips, left, right = (positions[:, skeleton.role(name)] for name in ("head", "hips", *feet))
@@ -123,9 +128,9 @@ def _along_body(skeleton: Skeleton, positions: Array) -> Array:
 
 
 def _crawls(clip: Clip, axis: str) -> bool:
-    """Whether the body travels the way it lies: no figure on its feet climbs further than it goes.
+    """Whether the body moves along its own axis. A standing figure never climbs further than it goes.
 
-    Its lowest point tells it from a jump, which comes down where it began.
+    A jump comes down to where it began, so its lowest point does not rise.
     """
     along = clip.positions @ DIRECTIONS[axis]
     early, late = np.percentile(along.min(axis=1), [25, 75])
@@ -139,7 +144,7 @@ def _hand_of(clip: Clip) -> str:
 
 
 def _other_hand(clip: Clip) -> Clip:
-    """Negate x throughout: from left- to right-handed coordinates."""
+    """Change from left- to right-handed coordinates: negate x."""
     ends = {name: (-x, y, z) for name, (x, y, z) in clip.skeleton.end_sites.items()}
     return replace(
         clip,
@@ -151,7 +156,7 @@ def _other_hand(clip: Clip) -> Clip:
 
 
 def _turned(clip: Clip, world: Array, rest: Array) -> Clip:
-    """Turn the world by `world` and the rest pose, without moving anything, by `rest`."""
+    """Turn the world by `world`, and the rest pose by `rest` without moving any joint."""
     if np.allclose(world, quat.IDENTITY) and np.allclose(rest, quat.IDENTITY):
         return clip
     rotations = quat.mul(quat.mul(rest, clip.rotations), quat.inv(rest))
@@ -172,7 +177,10 @@ def _turned(clip: Clip, world: Array, rest: Array) -> Clip:
 
 
 def turned(clip: Clip, angle: float) -> Clip:
-    """The clip turned about the vertical through where it begins, radians from +Z towards +X."""
+    """The clip turned about the vertical through its first root position.
+
+    angle: radians from +Z towards +X.
+    """
     turn = quat.yaw(angle)
     rotations = clip.rotations.copy()
     rotations[:, 0] = quat.mul(turn, rotations[:, 0])

@@ -1,4 +1,4 @@
-"""The parts of a body on a rig: which joints are its trunk, its limbs, its head."""
+"""The parts of a body on a rig: the joints of its trunk, limbs and head."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from hobble.motion.fingers import pointing_fingers
 from hobble.motion.tree import common, path
 
 SIDES = ("left", "right")
-REACH = 0.2  # share of the trunk by which a joint may lie above the one that follows it
+REACH = 0.2  # share of the trunk by which a source joint may lie above its target joint
 
 
 @dataclass(frozen=True)
 class Body:
     """Joints of a rig, by index, parents first.
 
-    hips: what carries both thighs. trunk: from the first joint above the hips to the chest, which carries
-    both arms; empty where the hips do. neck: between chest and head. arms: side -> clavicle or None,
+    hips: carries both thighs. trunk: from the first joint above the hips to the chest, which carries both
+    arms; empty if the hips carry the arms. neck: between chest and head. arms: side -> clavicle or None,
     shoulder, elbow, wrist. legs: side -> hip, knee, heel (the ankle), toe (the ball of the foot) or None.
+    fingers: side -> base of a finger.
     """
 
     hips: int
@@ -35,19 +36,19 @@ class Body:
 
     @property
     def chest(self) -> int:
-        """What carries the arms."""
+        """The joint that carries the arms."""
         return self.trunk[-1] if self.trunk else self.hips
 
     @property
     def joints(self) -> list[int]:
-        """All of them."""
+        """All joints."""
         out = [self.hips, *self.trunk, *self.neck, self.head]
         for side in SIDES:
             out += [j for j in (*self.arms[side], *self.legs[side]) if j is not None]
         return out
 
     def renumbered(self, new: Mapping[int, int]) -> Body:
-        """The same body of joints that have other indices; fingers that have none are left out."""
+        """The same body with other joint indices. Fingers without a new index are left out."""
 
         def one(joint: int | None) -> int | None:
             return None if joint is None else new[joint]
@@ -59,7 +60,7 @@ class Body:
         return Body(new[self.hips], trunk, neck, new[self.head], arms, legs, fingers)
 
     def roles(self, names: Sequence[str]) -> dict[str, str]:
-        """Role -> joint, as a skeleton file says it."""
+        """Role -> joint, as in a skeleton file."""
         out = {"hips": names[self.hips]}
         if self.trunk:
             out |= {"spine": names[self.trunk[max(0, len(self.trunk) - 2)]], "chest": names[self.chest]}
@@ -74,9 +75,10 @@ class Body:
 
 
 def body_of(parents: Sequence[int], roles: Mapping[str, int]) -> Body:
-    """The body whose roles are given; what lies between them, the hierarchy tells.
+    """The body with the given roles. The joints between them follow from the hierarchy.
 
-    roles: role -> joint; hips, head and of both sides shoulder, elbow, wrist, hip, knee and heel are needed.
+    roles: role -> joint. Needed are hips and head, and on both sides shoulder, elbow, wrist, hip, knee and
+    heel.
     """
     hips = roles["hips"]
     shoulders = [roles[f"{side}_shoulder"] for side in SIDES]
@@ -100,7 +102,7 @@ def with_fingers(body: Body, skeleton: Skeleton) -> Body:
 
 
 def body_by_roles(skeleton: Skeleton) -> Body:
-    """The body of a skeleton that says what its joints are for."""
+    """The body of a skeleton that has roles."""
     body = body_of(skeleton.parents, {role: skeleton.role(role) for role in skeleton.roles})
     return with_fingers(body, skeleton)
 
@@ -108,8 +110,8 @@ def body_by_roles(skeleton: Skeleton) -> Body:
 def pairs(source: Skeleton, own: Body, target: Skeleton, theirs: Body) -> dict[str, str]:
     """Target joint -> source joint that it follows, part by part.
 
-    The joints of a trunk are paired by their height: each follows the highest of the source's that is not
-    above it by more than a fifth of the trunk, and the chest the chest.
+    The joints of a trunk are paired by height. Each follows the highest source joint that is not above it by
+    more than a fifth of the trunk. The chest follows the chest.
     """
     out: dict[int, int] = {theirs.hips: own.hips, theirs.head: own.head}
     out |= _along(target, (theirs.hips, *theirs.trunk), source, (own.hips, *own.trunk))
@@ -137,6 +139,6 @@ def _along(target: Skeleton, mine: Sequence[int], source: Skeleton, theirs: Sequ
 
 
 def _shares(skeleton: Skeleton, joints: Sequence[int]) -> Array:
-    """How far along the way from the first to the last each joint lies, 0 to 1."""
+    """Position of each joint between the first (0) and the last (1), by length."""
     lengths = np.concatenate([[0.0], np.linalg.norm(skeleton.offsets[list(joints[1:])], axis=-1)])
     return np.cumsum(lengths) / max(float(lengths.sum()), 1e-9)

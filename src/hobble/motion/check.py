@@ -1,4 +1,4 @@
-"""Whether a retarget kept the motion: joint angles and limbs of the source against those of the result."""
+"""Checks that retargeting kept the motion: compares joint angles and limbs of source and result."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 
-MOST = 15.0  # degrees of mean difference from which on a result is refused
+MOST = 15.0  # degrees: a result with a larger mean difference is refused
 SIDES = ("left", "right")
-# What is measured at which joint: the angle between the bones from and to it.
+# At each joint the angle between the bones from it and to it is measured.
 ANGLES = {
     "knee": ("hip", "knee", "heel"),
     "elbow": ("shoulder", "elbow", "wrist"),
@@ -26,20 +26,20 @@ BONES = {
     "upper arm": ("shoulder", "elbow"),
     "forearm": ("elbow", "wrist"),
 }
-# Figures of other shapes have other angles there in the same pose, and a leg that is nearly straight bends by
-# 15 degrees for 1.5 cm: what is constant of the difference is taken off before it is judged.
+# Bodies of other shapes have other angles there in the same pose. A nearly straight leg bends by 15 degrees
+# for 1.5 cm. So the constant part of the difference is subtracted first.
 SHAPED = ("hip", "ankle", "knee")
-OFFSET = 25.0  # degrees of a knee that may be constant
-STANDS = 0.6  # cm a frame at 60 Hz: the ball of a foot that is slower stands
-BENT = 20.0  # degrees from which on a knee shows where it points
+OFFSET = 25.0  # degrees: largest constant difference of a knee
+STANDS = 0.6  # cm a frame at 60 Hz: the ball of a standing foot is slower
+BENT = 20.0  # degrees: a knee that bends more shows where it points
 
 
 def compare(source: Clip, made: Clip, scale: float) -> dict[str, Any]:
-    """How far a result is from its source, frame by frame on the same times, in degrees and centimetres.
+    """How different a result is from its source at the same times, in degrees and centimetres.
 
-    scale: legs of the result to legs of the source. Returns, for both sides: `angles`, of each joint its
-    middle and range in the source and the result, and the difference; `directions`, of each limb the
-    mean difference; `feet`, how much higher the balls are, and how far they slide a second while they stand.
+    scale: leg length of the result / leg length of the source. Returns for both sides: `angles`, for each
+    joint the median and range in source and result, and the difference. `directions`, the mean difference of
+    each limb. `feet`, how much higher the balls are, and how far they slide in a second while they stand.
     """
     frames = min(len(source), len(made))
     before, after = (_places(clip, frames) for clip in (source, made))
@@ -52,11 +52,11 @@ def compare(source: Clip, made: Clip, scale: float) -> dict[str, Any]:
 
 
 def check(path: Path, figures: dict[str, Any], rig: str) -> None:
-    """Refuse a result that does not move as its source. Raises InputError that names the joint."""
+    """Raise InputError with the joint if a result does not move like its source."""
     apart = {name: each["apart"] for name, each in figures["angles"].items()} | figures["directions"]
     name = max(apart, key=lambda part: apart[part])
     look = (
-        f"Look at it (`python -m hobble.motion look {path}`), and correct the roles of its rig: `python -m "
+        f"Look at it (`python -m hobble.motion look {path}`), and correct the roles of its rig. `python -m "
     )
     look += f"hobble.motion rig {path}` writes a draft for config/skeletons/."
     if apart[name] > MOST:
@@ -69,7 +69,7 @@ def check(path: Path, figures: dict[str, Any], rig: str) -> None:
 
 
 def worst(figures: dict[str, Any]) -> tuple[str, float]:
-    """The joint or limb that is furthest off, and by how many degrees."""
+    """The joint or limb with the largest difference, and the difference in degrees."""
     apart = {name: each["apart"] for name, each in figures["angles"].items()} | figures["directions"]
     name = max(apart, key=lambda part: apart[part])
     return name, apart[name]
@@ -119,7 +119,7 @@ def _foot(
 
 
 def _forward(at: dict[str, Array], side: str) -> float | None:
-    """Mean cosine between where a bent knee points and where the body faces; None where it never bends."""
+    """Mean cosine between the directions of a bent knee and of the body. None if the knee never bends."""
     left = at["left_hip"] - at["right_hip"]
     ahead = _unit(np.cross(left, [0.0, 1.0, 0.0]))
     hip, knee, heel = (at[f"{side}_{part}"] for part in ("hip", "knee", "heel"))

@@ -1,4 +1,4 @@
-"""From a BVH file's channels to rotations and positions, still in the file's own unit and axes."""
+"""Converts a BVH file's channels to rotations and positions, in the file's own unit and axes."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from hobble.motion.read import Bvh
 
 STANDARD_RATES = (120, 60, 30, 24, 25, 50, 100, 90, 48, 72, 144, 180, 200, 240, 250, 300, 15, 20, 12, 10)
 
-BLOCK = 4096  # frames at a time, so that intermediate results stay small
+BLOCK = 4096  # frames at a time, to keep intermediate arrays small
 
 
 @dataclass(frozen=True)
 class Decoded:
     """F frames of J joints, in the file's unit.
 
-    rotations: (F, J, 4) local. root: (F, 3). offsets: (J, 3). translations: (F, J, 3) local positions where
-    some joint but the root really moves in its parent, else None. repairs: sentences on channels dropped or
-    kept. notes: sentences on what needs no repair.
+    rotations: (F, J, 4) local. root: (F, 3). offsets: (J, 3). translations: (F, J, 3) local positions if any
+    joint but the root moves in its parent, else None. repairs: sentences on dropped or kept channels. notes:
+    sentences on what needs no repair.
     """
 
     rotations: Array = field(repr=False)
@@ -33,7 +33,7 @@ class Decoded:
 
 
 def frame_rate(frame_time: float, text: str) -> float:
-    """Frames a second of a Frame Time; a standard rate where its digits, rounded as written, say so.
+    """Frames a second of a Frame Time. It is a standard rate if the digits fit one, rounded as written.
 
     >>> frame_rate(0.008333, "0.008333"), frame_rate(0.0333, "0.0333")
     (120.0, 30.0)
@@ -44,7 +44,7 @@ def frame_rate(frame_time: float, text: str) -> float:
     if "e" not in text.lower() and "." in mantissa:
         step = 10.0 ** -len(mantissa.split(".")[1])
         for rate in STANDARD_RATES:
-            # Some writers cut the digits off instead of rounding.
+            # Some programs cut digits off instead of rounding.
             if abs(1 / rate - frame_time) < step * 1.01 and abs(rate * frame_time - 1) < 0.03:
                 return float(rate)
     nearest = round(1 / frame_time)
@@ -54,9 +54,9 @@ def frame_rate(frame_time: float, text: str) -> float:
 def decode(bvh: Bvh, still: float) -> Decoded:
     """Rotations and positions of a BVH file.
 
-    A position channel replaces that component of the joint's OFFSET, as every current program writes it;
-    where a joint below the root carries zeros against an offset that is not, they are added to it instead.
-    `still`: a joint whose position stays this close to its offset (file units) only repeats it.
+    A position channel replaces that component of the joint's OFFSET, as all current programs write it. If the
+    channels of a joint below the root are about zero and the OFFSET is not, they are added to it. still: a
+    joint whose position stays this close to its offset (file units) does not move in its parent.
     """
     frames, joints = len(bvh), len(bvh.names)
     rotations = np.broadcast_to(quat.IDENTITY, (frames, joints, 4)).copy()
@@ -77,7 +77,7 @@ def decode(bvh: Bvh, still: float) -> Decoded:
 
 
 def _wraps(bvh: Bvh, starts: Array) -> list[str]:
-    """A sentence on angles that leap by half a turn or more, as they do when they wrap at 360 degrees."""
+    """A sentence on angles that jump by half a turn or more, as they do when they wrap at 360 degrees."""
     channels = enumerate(bvh.channels)
     turning = [starts[j] + i for j, names in channels for i, name in enumerate(names) if "rot" in name]
     leaps = np.abs(np.diff(bvh.values[:, turning], axis=0)) > 180.0
@@ -88,12 +88,12 @@ def _wraps(bvh: Bvh, starts: Array) -> list[str]:
     times = int(leaps.any(axis=1).sum())
     return [
         f"Angles wrap by up to a whole turn between {times} pairs of frames (first {joint}, frames "
-        f"{after + 1} and {after + 2}); as rotations they go on smoothly."
+        f"{after + 1} and {after + 2}); as rotations they are smooth."
     ]
 
 
 def _positions(bvh: Bvh, starts: Array, still: float) -> tuple[Array, Array, Array | None, list[str]]:
-    """Root positions, offsets, and local positions where some joint moves in its parent; what was done."""
+    """Root positions, offsets, local positions (if any joint moves in its parent), and repairs."""
     root = np.broadcast_to(bvh.offsets[0], (len(bvh), 3)).copy()
     below = []
     for j, channels in enumerate(bvh.channels):
@@ -117,8 +117,7 @@ def _positions(bvh: Bvh, starts: Array, still: float) -> tuple[Array, Array, Arr
 def _judged(bvh: Bvh, local: Array, given: Array, still: float) -> tuple[Array, Array | None, list[str]]:
     """Which position channels carry motion, which only repeat an offset, and which contradict it.
 
-    local: (F, J, 3) the positions; those that are increments become sums here. given: (J, 3) bool, which of
-    them come from channels.
+    local: (F, J, 3) the positions. Increments become sums here. given: (J, 3) bool, which come from channels.
     """
     joints = np.flatnonzero(given.any(axis=1)).tolist()
     middle = np.median(local, axis=0)
@@ -131,7 +130,7 @@ def _judged(bvh: Bvh, local: Array, given: Array, still: float) -> tuple[Array, 
         for values in (local, middle):
             values[..., added, :] += bvh.offsets[added] * given[added]
         notes.append(
-            f"The position channels of {_some(bvh, added)} lie about zero, unlike their OFFSETs, and were "
+            f"The position channels of {_some(bvh, added)} are about zero, unlike their OFFSETs, and were "
             "added to them."
         )
     moving = [j for j in joints if np.abs(local[:, j] - middle[j]).max() > still]
@@ -157,9 +156,11 @@ def _judged(bvh: Bvh, local: Array, given: Array, still: float) -> tuple[Array, 
 
 
 def _increments(offsets: Array, middle: Array, given: Array, still: float) -> list[int]:
-    """Joints whose channels lie about zero where their offsets do not, so that they can only add to them.
+    """Joints whose channels are about zero although their offsets are not, so they must be added to the
+    offsets.
 
-    middle: (J, 3) the median position. A bone as short as a tenth of its offset is none.
+    middle: (J, 3) the median position. given: as in `_judged`. A bone cannot be as short as a tenth of its
+    offset.
     """
     apart = np.linalg.norm(middle * given, axis=1)
     length = np.linalg.norm(offsets * given, axis=1)

@@ -1,8 +1,8 @@
-"""Frames that are plainly broken: found, named, and cut off, bridged or smoothed over.
+"""Finds broken frames, and cuts them off, bridges them or smooths them.
 
-A joint of a living figure changes its velocity little from one frame to the next. What jumps further than any
-movement does is an error of the file: a rest pose or zeros as first or last frame, a teleport, a jump at the
-seam of a loop, a single frame gone wrong. Sentences count frames from 1, the code from 0.
+A joint of a living body changes its velocity little between frames. A larger jump is an error of the file: a
+rest pose or zeros as first or last frame, a teleport, a jump at the seam of a loop, a single wrong frame.
+Sentences count frames from 1, the code from 0.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 
-JUMP = 12.0  # cm further than the neighbouring frames lead to expect, were frames endlessly short
-JUMP_AT_30 = 30.0  # cm more at 30 Hz, where a fast limb's velocity changes more between frames
-GLITCH = 6.5  # cm that a single frame lies off the middle between its neighbours
+JUMP = 12.0  # cm more than neighbouring frames suggest, in the limit of a high frame rate
+JUMP_AT_30 = 30.0  # cm to add at 30 Hz, where velocities change more between frames
+GLITCH = 6.5  # cm: distance of a wrong frame from the mean of its neighbours
 GLITCH_AT_30 = 8.0
-TELEPORT = 30.0  # cm: a jump of the root that is no seam of a loop
-HEAD, TAIL = 0.5, 1.0  # seconds: pieces up to this long before the first and after the last jump are cut off
-BRIDGE = 0.25  # seconds: pieces up to this long between two jumps are bridged
-BLEND = 0.1  # seconds to each side over which a jump in the pose is smoothed
-FLIP = np.radians(60.0)  # a joint turning by more from one frame to the next has flipped
+TELEPORT = 30.0  # cm: a larger jump of the root is not the seam of a loop
+HEAD, TAIL = 0.5, 1.0  # seconds: shorter pieces before the first and after the last jump are cut off
+BRIDGE = 0.25  # seconds: shorter pieces between two jumps are bridged
+BLEND = 0.1  # seconds on each side over which a jump of the pose is smoothed
+FLIP = np.radians(60.0)  # a joint that turns more between two frames has flipped
 BLOCK = 4096  # frames at a time
-NO_POSE = 0.75  # share of joints without any rotation in a frame that holds no pose
+NO_POSE = 0.75  # in a frame without a pose, at least this share of the joints has no rotation
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Repaired:
 
 @dataclass(frozen=True)
 class Jump:
-    """A jump between frame `after` and the next: its size in cm, the joint furthest off, the root's share."""
+    """A jump between frame `after` and the next: its size in cm, its worst joint, and the root's share."""
 
     after: int
     size: float
@@ -53,7 +53,7 @@ class Jump:
 
 
 def repair(clip: Clip) -> Repaired:
-    """Find broken frames and mend what can be mended; a sound clip comes back as it is."""
+    """Find broken frames and repair them if possible. A sound clip is returned unchanged."""
     glitches = _find_glitches(clip)
     draft = _copy(clip) if glitches else clip
     sentences = []
@@ -92,7 +92,7 @@ def find_jumps(clip: Clip) -> list[Jump]:
     limit = JUMP + JUMP_AT_30 * (30.0 / clip.fps) ** 2
     jumps = []
     for first in range(0, len(clip) - 1, BLOCK):
-        # Three transitions more to either side, so that medians do not end at a block.
+        # Three more transitions on each side, so that medians at the edge of a block are right.
         start = max(0, first - 3)
         step = np.diff(clip.positions[start : first + BLOCK + 4], axis=0)
         off = np.linalg.norm(step - _running_median(step, 3), axis=-1)
@@ -113,7 +113,7 @@ def _running_median(values: Array, reach: int) -> Array:
 
 
 def _find_glitches(clip: Clip) -> list[tuple[int, float, str]]:
-    """Single frames far off the middle between their neighbours: frame, cm, the joint furthest off."""
+    """Single frames far from the mean of their neighbours: frame, cm, and the joint furthest off."""
     if len(clip) < 5:
         return []
     limit = GLITCH + GLITCH_AT_30 * (30.0 / clip.fps) ** 2
@@ -122,7 +122,7 @@ def _find_glitches(clip: Clip) -> list[tuple[int, float, str]]:
         p = clip.positions[first - 1 : first + BLOCK + 1]
         off = np.linalg.norm(p[1:-1] - 0.5 * (p[:-2] + p[2:]), axis=-1)
         size[first : first + len(off)], joint[first : first + len(off)] = off.max(axis=1), off.argmax(axis=1)
-    # A step in the motion raises two frames alike; a single wrong frame raises itself twice its neighbours.
+    # A step in the motion raises two frames equally. A wrong frame rises twice as much as its neighbours.
     alone = size[1:-1] > 1.5 * np.maximum(size[:-2], size[2:])
     alone[[0, -1]] = False
     found = np.flatnonzero((size[1:-1] > limit) & alone) + 1
@@ -130,10 +130,10 @@ def _find_glitches(clip: Clip) -> list[tuple[int, float, str]]:
 
 
 def flips(clip: Clip, first: int) -> list[str]:
-    """A sentence for each joint that spins faster than a living one can, while it stays where it is.
+    """A sentence for each joint that spins faster than a living one can without moving.
 
-    first: the source's frame at which the clip begins. Thumbs and other ends of captured rigs do, where their
-    markers did not tell how they were turned.
+    first: the source's frame at which the clip begins. Thumbs and end joints of captured rigs do this,
+    because markers do not show how they are turned.
     """
     limit = FLIP * min(1.0, 120.0 / clip.fps)
     sentences = []
@@ -151,7 +151,7 @@ def flips(clip: Clip, first: int) -> list[str]:
 
 
 def _without_edges(frames: int, fps: float, jumps: list[Jump]) -> tuple[int, int]:
-    """First and last frame of what is left without short pieces before the first and after the last jump."""
+    """First and last frame without the short pieces before the first and after the last jump."""
     first, last = 0, frames - 1
     head = [j.after for j in jumps if j.after + 1 <= HEAD * fps and 2 * (j.after + 1) <= frames]
     if head:
@@ -172,9 +172,9 @@ def _cut_sentence(clip: Clip, start: int, end: int, jumps: list[Jump], after: in
 
 
 def _short_pieces(clip: Clip, jumps: list[Jump]) -> tuple[list[Jump], list[tuple[int, int, Jump]]]:
-    """Part jumps into those left and pairs that enclose a few broken frames: (first, last, jump).
+    """Split jumps into single ones and pairs around a few broken frames: (first, last, jump).
 
-    A pair does so where the motion after it goes on from the motion before it.
+    Two jumps are a pair if the motion after the second continues the motion before the first.
     """
     left: list[Jump] = []
     bridges = []
@@ -195,7 +195,7 @@ def _short_pieces(clip: Clip, jumps: list[Jump]) -> tuple[list[Jump], list[tuple
 
 
 def _copy(clip: Clip) -> Clip:
-    """A clip whose arrays may be changed; its positions must not have been asked for before that."""
+    """A clip whose arrays may be changed. Its positions must not have been computed before that."""
     moved = clip.translations
     return replace(
         clip,
@@ -206,7 +206,7 @@ def _copy(clip: Clip) -> Clip:
 
 
 def _interpolate(draft: Clip, start: int, end: int) -> None:
-    """Replace the frames start..end by what leads from the frame before to the frame after."""
+    """Replace the frames start..end by interpolation between the frames before and after."""
     a, b, here = start - 1, end + 1, slice(start, end + 1)
     share = (np.arange(start, end + 1) - a) / (b - a)
     draft.rotations[here] = quat.slerp(draft.rotations[a][None], draft.rotations[b][None], share[:, None])
@@ -217,9 +217,9 @@ def _interpolate(draft: Clip, start: int, end: int) -> None:
 
 
 def _smooth(draft: Clip, after: int) -> None:
-    """Blend a jump in the pose away: half of it, fading out, is added before it and taken off after it.
+    """Smooth a jump of the pose. Half of it is added before and subtracted after, fading out.
 
-    What the root jumps sideways is taken off all that follows, so that the path goes on where it was.
+    A sideways jump of the root is subtracted from all later frames, so that the path has no gap.
     """
     a, b = after, after + 1
     reach = max(2, round(BLEND * draft.fps))

@@ -1,4 +1,4 @@
-"""Downloading one clip: resumed where it broke off, tried again where a server fails, then checked."""
+"""Downloads a clip. A download resumes after an interruption, retries if a server fails, and is checked."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from hobble.motion.read import MOST_BYTES
 log = logging.getLogger("hobble.download")
 
 ATTEMPTS = 5
-PAUSE = 1.0  # seconds before the second attempt, twice as long before each further one
-TIMEOUT = 30.0  # seconds without a byte
-DEADLINE = 600.0  # seconds in all, however many attempts: what the rule asks of a cluster
+PAUSE = 1.0  # seconds before the second attempt; doubled before each further one
+TIMEOUT = 30.0  # seconds without data
+DEADLINE = 600.0  # seconds for all attempts; the rule asks a cluster for as much
 BLOCK = 1 << 16
 LENGTH = re.compile(r"\d{1,18}")
-AGAIN = {408, 425, 429, *range(500, 600)}  # answers after which another attempt may do
+RETRY_STATUS = {408, 425, 429, *range(500, 600)}  # HTTP statuses after which a retry may work
 
 
 class _Failed(Exception):
-    """An attempt that came to nothing; another may do better where `again`."""
+    """A failed attempt. again: whether another attempt may succeed."""
 
     def __init__(self, reason: str, again: bool = True) -> None:
         super().__init__(reason)
@@ -46,7 +46,7 @@ class _TooLate(Exception):
 
 
 class _OtherFile(_Failed):
-    """What arrived has not the checksum; where the same arrives again, that is what the server has."""
+    """The file has the wrong checksum. If it arrives twice, the server has another file."""
 
 
 def download_clip(
@@ -62,13 +62,14 @@ def download_clip(
     most: int = MOST_BYTES,
     sleep: Callable[[float], object] = time.sleep,
 ) -> int:
-    """Fetch `url` to `path`, which is there afterwards only if it has the checksum; returns its bytes.
+    """Download `url` to `path`. Returns its number of bytes. `path` exists only if the checksum is right.
 
-    sha256: of the file, or of the file with its line ends as a bare newline, since version control may change
-    those. folder: where the user can put the file instead, for the message. What has arrived is kept in a
-    hidden file beside `path`, from which this or a later call goes on. pause, timeout: seconds. deadline:
-    seconds in all. most: bytes; a larger file is not kept.
-    Raises InputError, naming what to do, where no attempt succeeds.
+    sha256: of the file, or of the file with newlines as line ends, since version control may change those.
+    folder: where users can put the file themselves, for the message. Data are kept in a hidden file beside
+    `path`, from which this or a later call resumes. pause, timeout: seconds. deadline: seconds in all. most:
+    bytes; a larger file is not kept.
+
+    Raises InputError with advice if no attempt succeeds.
     """
     path = Path(path)
     part = path.with_name(f".{path.name}.part")
@@ -98,7 +99,7 @@ def download_clip(
 
 @contextlib.contextmanager
 def _at_most(seconds: float) -> Iterator[None]:
-    """Raise _TooLate when it lasts longer, whatever the server does meanwhile. (Only in the main thread.)"""
+    """Raise _TooLate after so many seconds, whatever the server does. Works only in the main thread."""
 
     def late(*_: object) -> None:
         raise _TooLate
@@ -116,7 +117,7 @@ def _at_most(seconds: float) -> Iterator[None]:
 
 
 def _keep(part: Path, path: Path) -> int:
-    """Give the whole file its name, on disk; returns its bytes."""
+    """Rename the complete file. Returns its number of bytes."""
     with open(part, "rb") as file:
         os.fsync(file.fileno())
         size = os.fstat(file.fileno()).st_size
@@ -130,12 +131,12 @@ def _refusal(url: str, path: Path, folder: str, reason: str, attempts: int) -> H
     return InputError(
         url,
         f"cannot be downloaded: {reason}{times}",
-        fix=f"Run the same command again when it can be reached, or put {path.name} into {folder} yourself.",
+        fix=f"Run the same command again later, or put {path.name} into {folder} yourself.",
     )
 
 
 def _fetch(url: str, part: Path, timeout: float, most: int) -> None:
-    """Complete `part`, going on from what is there of it if the server can."""
+    """Complete `part`. If the server allows it, resume from the data that are there."""
     have = part.stat().st_size if part.is_file() else 0
     headers = {"User-Agent": "hobble", "Accept-Encoding": "identity"}
     if have:
@@ -145,15 +146,15 @@ def _fetch(url: str, part: Path, timeout: float, most: int) -> None:
             goes_on = answer.status == 206 and _starts_at(answer.headers.get("Content-Range"), have)
             if answer.status == 206 and not goes_on:
                 part.unlink()
-                raise _Failed("the server sent another part than was asked for")
+                raise _Failed("the server sent the wrong part of the file")
             with open(part, "ab" if goes_on else "wb") as file:
                 _copy(answer, file, have if goes_on else 0, timeout, most)
     except urllib.error.HTTPError as error:
         error.close()
-        if error.code == 416 and have:  # there is nothing after what is there: it is whole, or not this file
+        if error.code == 416 and have:  # no data after these: the file is complete, or another one
             return
         raise _Failed(
-            f"the server says {error.code} {printable(error.reason)}", error.code in AGAIN
+            f"the server says {error.code} {printable(error.reason)}", error.code in RETRY_STATUS
         ) from None
     except TimeoutError:
         raise _Failed(f"no answer for {timeout:g} seconds") from None
@@ -169,9 +170,9 @@ def _starts_at(content_range: str | None, byte: int) -> bool:
 
 
 def _copy(answer: http.client.HTTPResponse, file: BinaryIO, have: int, timeout: float, most: int) -> None:
-    """Write the answer's body; raises _Failed where it is shorter than announced, or too long.
+    """Write the answer's body.
 
-    Of what is larger than `most` nothing is kept.
+    Raises _Failed if it is shorter than announced or larger than `most`, which is not kept.
     """
     length = answer.headers.get("Content-Length") or ""
     announced = int(length) if LENGTH.fullmatch(length) else None
@@ -195,7 +196,7 @@ def _too_large(file: BinaryIO, most: int) -> NoReturn:
 
 def _block(answer: http.client.HTTPResponse, timeout: float) -> bytes:
     try:
-        return answer.read1(BLOCK)  # what has come, so that a slow server's bytes are not waited for
+        return answer.read1(BLOCK)  # returns what has arrived, without waiting for a full block
     except TimeoutError:
         raise _Failed(f"no answer for {timeout:g} seconds") from None
     except (OSError, http.client.HTTPException) as error:
@@ -203,10 +204,10 @@ def _block(answer: http.client.HTTPResponse, timeout: float) -> bytes:
 
 
 def _check(part: Path, sha256: str) -> None:
-    """Raise _OtherFile, and throw the file away, where it is not the one that the manifest means."""
+    """Delete the file and raise _OtherFile if its checksum is not the manifest's."""
     data = part.read_bytes()
     found = hashlib.sha256(data).hexdigest()
     if sha256.lower() in (found, hashlib.sha256(data.replace(b"\r\n", b"\n")).hexdigest()):
         return
     part.unlink()
-    raise _OtherFile(f"what arrives is another file: its SHA-256 is {found}, in the manifest it is {sha256}")
+    raise _OtherFile(f"the server has another file: its SHA-256 is {found}, in the manifest it is {sha256}")

@@ -1,4 +1,4 @@
-"""A draft of a rig file: what was found of a rig, to be corrected where it is wrong."""
+"""Writes a draft of a rig file with what was found, for the user to correct."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from hobble.motion.read import Bvh
 LIMBS = ("shoulder", "elbow", "wrist", "hip", "knee", "heel", "toe")
 ROLES = ("hips", "spine", "chest", "neck", "head", *(f"{side}_{part}" for side in SIDES for part in LIMBS))
 OPTIONAL = ("spine", "chest", "neck", "left_toe", "right_toe")
-MOST_SHOWN = 80  # joints in a message: the usual rigs with all their fingers are shown whole
+MOST_SHOWN = 80  # joints in a message; enough for usual rigs with all fingers
 
 
 def refusal(file: Bvh, rig: Skeleton, doubt: Doubt) -> InputError:
-    """The one message that asks what cannot be told, with a draft to correct, or how a long one begins."""
+    """The error for a rig in doubt. It contains a draft to correct, or the start of a long one."""
     roles = guessed(rig) | {role: rig.joints[j] for role, j in doubt.roles.items()}
     text, name, more = draft(rig, roles), file.path.name, len(rig.joints) - MOST_SHOWN
     if more > 0:
@@ -33,13 +33,13 @@ def refusal(file: Bvh, rig: Skeleton, doubt: Doubt) -> InputError:
             "Put the right joints into this draft, save it as config/skeletons/<name>.yaml, and run again "
             f"(`python -m hobble.motion rig {name}` writes it):"
         )
-    problem = f"what is what on this rig is in doubt: {doubt}"
+    problem = f"the parts of this rig are in doubt: {doubt}"
     return InputError(file.path, problem, fix=f"{fix}\n\n{text}")
 
 
 def draft(rig: Skeleton, roles: Mapping[str, str]) -> str:
-    """A rig file in YAML: the joints as the file has them, and their roles, `?` where there is none."""
-    lines = ["# What a joint is for; ? is for you to fill in, what the rig has not is left out.", "roles:"]
+    """A rig file in YAML: the file's joints and their roles, `?` if unknown."""
+    lines = ["# Role: joint. Fill in each ?. Leave out roles that the rig does not have.", "roles:"]
     for role in ROLES:
         if role in roles:
             lines.append(f"  {role}: {_quoted(roles[role])}")

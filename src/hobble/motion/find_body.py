@@ -1,8 +1,8 @@
-"""Which joints of an unknown rig are its legs, arms, trunk and head: from structure, motion and names.
+"""Finds the legs, arms, trunk and head of an unknown rig, from structure, motion and names.
 
-A limb is one of two chains of like bones that hang from one joint and bend in the middle. The legs lead away
-from where the arms hang, the arms do not, and the legs are the longer ones. Names say which side is left;
-where they say nothing, up and forward do, in right-handed coordinates.
+A limb is one of two chains with bones of equal lengths that start at one joint and bend in the middle. The
+legs point away from the joint that carries the arms, and they are the longer pair. Names say which side is
+left. If they do not, up and forward do, in right-handed coordinates.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from hobble.motion.names import is_end, limb_parts, part_of, side_of, side_of_pa
 from hobble.motion.tree import above, common, path
 
 SAMPLES = 150
-ALIKE = 0.15  # by how much of its length a bone may differ from the one across the body
-RIGID = 0.03  # by how much of its length a bone that is none in the file may change
+ALIKE = 0.15  # relative difference of length that a bone and its counterpart may have
+RIGID = 0.03  # relative change of the length between two joints that count as one bone
 RATIOS = {"leg": (0.6, 1.6), "arm": (0.48, 1.6)}  # shank to thigh, forearm to upper arm
 APART = {"leg": 0.2, "arm": 0.4}  # of hips to knees, of shoulders to elbows, which may be spread for balance
 FEWEST = 3  # joints of a limb
-LEAST = 0.15  # length of a limb to the size of the body
-AWAY = -0.2  # cosine between legs and trunk from which on they lead away from each other
+LEAST = 0.15  # least length of a limb, relative to the size of the body
+AWAY = -0.2  # legs and trunk point apart if the cosine between them is below this
 WORDS = {
     "leg": {"thigh", "shank", "foot", "ankle", "toe", "leg", "hip"},
     "arm": {"clavicle", "upperarm", "forearm", "hand", "wrist", "finger", "arm", "shoulder"},
@@ -34,7 +34,7 @@ LIMBS = {"leg": ("thigh", "shank", "foot"), "arm": ("upperarm", "forearm", "hand
 
 
 class Doubt(Exception):
-    """What cannot be told of a rig, in words, with the roles that can: role -> joint."""
+    """What is uncertain about a rig. why: in words. roles: those that are certain, role -> joint."""
 
     def __init__(self, why: str, roles: dict[str, int] | None = None) -> None:
         super().__init__(why)
@@ -43,7 +43,7 @@ class Doubt(Exception):
 
 @dataclass(frozen=True)
 class Found:
-    """The body of a rig; sided: whether names tell left from right."""
+    """The body of a rig. sided: whether names distinguish left and right."""
 
     body: Body
     sided: bool
@@ -51,7 +51,7 @@ class Found:
 
 @dataclass(frozen=True)
 class _Pair:
-    """Two like chains of joints below one joint, from the trunk outward, `sides` (a, b)."""
+    """Two equal chains of joints below one joint, from the trunk outward, `sides` (a, b)."""
 
     hub: int
     chains: tuple[tuple[int, ...], tuple[int, ...]]
@@ -61,13 +61,13 @@ class _Pair:
 def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) -> Found:
     """Find the parts of a body.
 
-    positions: (F, J, 3) in the world, any unit, any axes. Raises Doubt where the rig, or so little motion,
-    does not tell.
+    positions: (F, J, 3) in the world, any unit, any axes. Raises Doubt if the rig and the motion do not
+    determine the parts.
     """
     rig = _Rig(tuple(names), tuple(parents), positions)
     pairs = rig.pairs()
     if len(pairs) < 2:
-        raise Doubt("two legs and two arms, alike on both sides, cannot be told among its joints")
+        raise Doubt("its joints do not contain two equal legs and two equal arms")
     legs, arms = rig.limbs(pairs)
     leg = [rig.joints_of(legs, "leg", k) for k in (0, 1)]
     arm = [rig.joints_of(arms, "arm", k) for k in (0, 1)]
@@ -99,19 +99,19 @@ class _Rig:
 
     @cached_property
     def at(self) -> Array:
-        """(S, J, 3): enough frames to see what moves."""
+        """(S, J, 3): a sample of frames that is large enough to see what moves."""
         every = np.unique(np.linspace(0, len(self.positions) - 1, SAMPLES).round().astype(int))
         return self.positions[every]
 
     @cached_property
     def lengths(self) -> Array:
-        """(J,) from each joint to its parent."""
+        """(J,) length from each joint to its parent."""
         up = [max(p, 0) for p in self.parents]
         return np.median(np.linalg.norm(self.at - self.at[:, up], axis=-1), axis=0)
 
     @cached_property
     def size(self) -> float:
-        """How far a body reaches from end to end, in the file's unit."""
+        """The largest extent of the body, in the file's unit."""
         return float(np.median(np.linalg.norm(np.ptp(self.at, axis=1), axis=-1)))
 
     @cached_property
@@ -123,7 +123,7 @@ class _Rig:
         return out
 
     def alike(self, a: int, b: int) -> bool:
-        """Whether two bones could be each other's counterpart across the body."""
+        """Whether two bones can be each other's counterparts."""
         sides = {side_of(self.names[a]), side_of(self.names[b])}
         if None not in sides and len(sides) == 1:
             return False
@@ -132,7 +132,7 @@ class _Rig:
         return bool(abs(self.lengths[a] - self.lengths[b]) <= share * longer + 0.01 * self.size)
 
     def match(self, a: int, b: int) -> tuple[float, tuple[int, ...], tuple[int, ...]]:
-        """The longest chains of like bones from a and b on: their length, and their joints."""
+        """The longest equal chains of bones from a and b on: their length and joints."""
         best: tuple[float, tuple[int, ...], tuple[int, ...]] = (0.0, (), ())
         for c in self.children[a]:
             for d in self.children[b]:
@@ -144,7 +144,7 @@ class _Rig:
         return own + best[0], (a, *best[1]), (b, *best[2])
 
     def pairs(self) -> list[_Pair]:
-        """All that could be two legs or two arms."""
+        """All pairs of chains that can be legs or arms."""
         out = []
         for hub, below in enumerate(self.children):
             for i, a in enumerate(below):
@@ -158,7 +158,7 @@ class _Rig:
         return out
 
     def limbs(self, pairs: list[_Pair]) -> tuple[_Pair, _Pair]:
-        """The pair of legs and the pair of arms that make the likeliest body."""
+        """The pair of legs and the pair of arms of the likeliest body."""
         known = {}
         for i, pair in enumerate(pairs):
             for kind in ("leg", "arm"):
@@ -179,12 +179,12 @@ class _Rig:
                     (np.log(ratio) - away + self._named(legs, "leg") + self._named(arms, "arm"), i, k)
                 )
         if not found:
-            raise Doubt("which of its chains are legs and which arms cannot be told from how they move")
+            raise Doubt("the motion does not show which chains are legs and which are arms")
         _, i, k = max(found)
         return pairs[i], pairs[k]
 
     def _away(self, legs: _Pair, middle: tuple[int, int, int], arms: _Pair) -> float:
-        """Mean cosine between the ways to the feet and to where the arms hang; -1 for one who stands."""
+        """Mean cosine between the directions to the feet and to the arms' root; -1 for a standing body."""
         trunk = self.at[:, arms.hub] - self.at[:, legs.hub]
         feet = sum(self.at[:, chain[middle[2]]] for chain in legs.chains) / 2 - self.at[:, legs.hub]
         return float(np.mean(np.sum(_unit(trunk) * _unit(feet), axis=-1)))
@@ -197,24 +197,24 @@ class _Rig:
         )
 
     def _named(self, pair: _Pair, kind: str) -> float:
-        """How far names speak for a limb of a kind, -1 to 1."""
+        """How strongly names suggest a kind of limb, -1 to 1."""
         parts = [part_of(self.names[j]) for chain in pair.chains for j in chain]
         other = "arm" if kind == "leg" else "leg"
         return (sum(p in WORDS[kind] for p in parts) - sum(p in WORDS[other] for p in parts)) / len(parts)
 
     def _chord(self, a: int, b: int) -> tuple[float, float]:
-        """Median distance of two joints, and by how much of it that changes."""
+        """Median distance of two joints, and its relative change."""
         apart = np.linalg.norm(self.at[:, b] - self.at[:, a], axis=-1)
         middle = float(np.median(apart))
         low, high = np.percentile(apart, [3, 97])
         return middle, float(high - low) / max(middle, 1e-9)
 
     def segments(self, pair: _Pair, kind: str) -> tuple[int, int, int] | None:
-        """Places in the chains of hip, knee and ankle, or shoulder, elbow and wrist.
+        """Indices in the chains of hip, knee and ankle, or of shoulder, elbow and wrist.
 
-        Names that tell all three are taken where their bones have a body's proportions. Else the two bones
-        are the longest that keep their length one after the other and bend between; a chain of joints along a
-        bone (twist joints) keeps its length from end to end.
+        Names count if they give all three and the bones have the proportions of a body. Otherwise the two
+        bones are the longest consecutive ones that keep their length and bend between. A chain of twist
+        joints along a bone keeps its length from end to end.
         """
         chain = pair.chains[0]
         named = [limb_parts([self.names[j] for j in c]) for c in pair.chains]
@@ -245,11 +245,11 @@ class _Rig:
         return min(upper, lower) > 0.04 * self.size and low <= lower / max(upper, 1e-9) <= high
 
     def _moves(self, pair: _Pair, i: int, j: int) -> bool:
-        """Whether the way from one place to another changes its length, so that it is no bone."""
+        """Whether the distance between two joints of a chain changes, so that they are not one bone."""
         return any(self._chord(chain[i], chain[j])[1] > RIGID for chain in pair.chains)
 
     def _apart(self, pair: _Pair, i: int, j: int, kind: str) -> bool:
-        """Whether the limbs begin apart, as shoulders and hips do, and collarbones do not."""
+        """Whether the limbs begin apart, like shoulders and hips and unlike collarbones."""
         at = [
             np.median(np.linalg.norm(self.at[:, a] - self.at[:, b], axis=-1))
             for a, b in ((pair.chains[0][i], pair.chains[1][i]), (pair.chains[0][j], pair.chains[1][j]))
@@ -257,7 +257,7 @@ class _Rig:
         return bool(at[0] >= APART[kind] * at[1])
 
     def _bends(self, pair: _Pair, i: int, j: int, k: int) -> bool:
-        """Whether the limb bends there, by six degrees or more on either side."""
+        """Whether the limb bends there, by at least six degrees on either side."""
         for chain in pair.chains:
             upper = _unit(self.at[:, chain[j]] - self.at[:, chain[i]])
             lower = _unit(self.at[:, chain[k]] - self.at[:, chain[j]])
@@ -273,7 +273,7 @@ class _Rig:
         return pair.chains[k][a], pair.chains[k][b], pair.chains[k][c]
 
     def toe(self, pair: _Pair, k: int, heel: int) -> int | None:
-        """The ball of the foot: the first joint after the ankle that is a foot's length away, or None."""
+        """The ball of the foot: the first joint a foot's length away from the ankle, or None."""
         chain = pair.chains[k]
         leg = pair.length
         after = chain[chain.index(heel) + 1 :]
@@ -283,14 +283,14 @@ class _Rig:
         return next((j for j in after if self._chord(heel, j)[0] > 0.06 * leg), None)
 
     def clavicle(self, pair: _Pair, k: int, shoulder: int) -> int | None:
-        """The joint between chest and shoulder that moves the shoulder, if there is one."""
+        """The joint between chest and shoulder that moves the shoulder, or None."""
         chain = pair.chains[k]
         before = chain[: chain.index(shoulder)]
         moving = [j for j in before if self._chord(j, shoulder)[0] > 0.01 * self.size]
         return moving[-1] if moving else None
 
     def head(self, legs: _Pair, arms: _Pair) -> tuple[int, tuple[int, ...]]:
-        """The head, and what lies between it and the chest."""
+        """The head, and the joints between it and the chest."""
         limbs = set(sum(legs.chains, ())) | set(sum(arms.chains, ()))
         named = [
             j
@@ -309,7 +309,10 @@ class _Rig:
         return head, tuple(j for j in way if j not in spine)
 
     def _highest(self, legs: _Pair, arms: _Pair, limbs: set[int]) -> int:
-        """The end of the chain that leads furthest on from the trunk, without what only ends the head."""
+        """The end of the chain that goes furthest from the trunk.
+
+        Joints that only mark the head's end do not count.
+        """
         trunk = _unit(self.at[:, arms.hub] - self.at[:, legs.hub])
         base = sum(self.at[:, chain[0]] for chain in arms.chains) / 2
 
@@ -319,7 +322,7 @@ class _Rig:
         below = [j for j in range(len(self.names)) if arms.hub in above(self.parents, j)[1:]]
         below = [j for j in below if not limbs & set(above(self.parents, j))]
         if not below:
-            raise Doubt("no joint above the arms can be its head")
+            raise Doubt("there is no joint for the head above the arms")
         top = max(below, key=height)
         chain = [j for j in above(self.parents, top) if j in below][::-1]
         leg = self._chord(legs.chains[0][0], legs.chains[0][-1])[0]
@@ -341,11 +344,11 @@ class _Rig:
         across = self.at[:, leg[0][0]] - self.at[:, leg[1][0]]
         turn = float(np.mean(np.sum(np.cross(up, ahead) * _unit(across), axis=-1)))
         if abs(turn) < 0.3:
-            raise Doubt("neither names nor feet and knees tell its left side from its right")
+            raise Doubt("neither names nor feet and knees show which side is left")
         return (0 if turn > 0 else 1), False
 
     def named_sides(self, pair: _Pair) -> tuple[int, int]:
-        """Of both chains, by how many joints more their names say left than right."""
+        """For both chains how many more joints have left than right names."""
         votes = []
         for chain, across in (pair.chains, pair.chains[::-1]):
             sides = [side_of(self.names[j]) for j in chain]
@@ -357,7 +360,7 @@ class _Rig:
         return votes[0], votes[1]
 
     def _ahead(self, pair: _Pair, leg: list[tuple[int, int, int]]) -> Array:
-        """(S, 3) where feet and, less, knees point."""
+        """(S, 3) direction of the feet and, with less weight, of the knees."""
         out = np.zeros((len(self.at), 3))
         for k, (hip, knee, heel) in enumerate(leg):
             toe = self.toe(pair, k, heel)
@@ -372,14 +375,14 @@ class _Rig:
     def left_arm(
         self, leg: list[tuple[int, int, int]], left: int, arm: list[tuple[int, int, int]], pair: _Pair
     ) -> int:
-        """Which of the two arms is the left one: that on the side of the left leg."""
+        """Which of the two arms is the left one, on the side of the left leg."""
         across = self.at[:, leg[left][0]] - self.at[:, leg[1 - left][0]]
         arms = self.at[:, arm[0][0]] - self.at[:, arm[1][0]]
         side = float(np.mean(np.sum(_unit(across) * _unit(arms), axis=-1)))
         named = self.named_sides(pair)
         place = 0 if side > 0 else 1
         if abs(side) < 0.2 or (named[0] * named[1] < 0 and (named[0] > 0) != (place == 0)):
-            raise Doubt("its left arm and its left leg do not lie on one side")
+            raise Doubt("its left arm and its left leg are not on the same side")
         return place
 
 

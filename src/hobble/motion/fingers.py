@@ -1,4 +1,4 @@
-"""Which joint of a hand tells where it points: the base of a finger."""
+"""Finds the joint that shows where a hand points: the base of a finger."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from hobble.core.skeleton import Skeleton
 from hobble.motion.names import part_of
 from hobble.motion.tree import above
 
-AWAY = (0.1, 0.7)  # how far the base of a finger is from the wrist, to the length of the forearm
+AWAY = (0.1, 0.7)  # range of the distance from wrist to the base of a finger, in forearm lengths
 
 
 def pointing_fingers(skeleton: Skeleton, wrists: Mapping[str, int]) -> dict[str, int]:
-    """Side -> the joint that is away from the wrist on the hand's longest finger; sides without one left out.
+    """Side -> the base of the hand's longest finger. Sides without one are left out.
 
-    A thumb is none, nor what is longer than a forearm: that is a thing held in the hand. Fingers whose names
-    tell what they are go first.
+    A thumb does not count, nor anything longer than a forearm, which is a thing in the hand. Fingers with
+    meaningful names come first.
     """
     lengths = np.linalg.norm(skeleton.offsets, axis=-1)
     fingers = {}
@@ -42,7 +42,7 @@ def pointing_fingers(skeleton: Skeleton, wrists: Mapping[str, int]) -> dict[str,
 
 
 def _chains(parents: Sequence[int], wrist: int) -> list[list[int]]:
-    """The ways from below the wrist to each joint that hangs from it."""
+    """The chains from below the wrist to each joint under it."""
     out = []
     for end in range(len(parents)):
         chain = above(parents, end)
@@ -52,9 +52,9 @@ def _chains(parents: Sequence[int], wrist: int) -> list[list[int]]:
 
 
 def _points(names: Sequence[str], wrist: str) -> bool:
-    """Whether names say of a chain that it points where the hand does.
+    """Whether the names of a chain say that it points where the hand does.
 
-    It does as an index or middle finger, as a numbered finger that is no thumb, or as the hand below a wrist.
+    That is an index or middle finger, a numbered finger that is not the thumb, or a hand below a wrist.
     """
     text = "".join(names).lower()
     hand = part_of(wrist) == "wrist" and any(part_of(name) == "hand" for name in names)

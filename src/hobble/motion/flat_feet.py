@@ -1,8 +1,7 @@
-"""How feet are turned when they stand flat, from the motion alone.
+"""Finds how feet are turned when they stand flat, from the motion alone.
 
-A ball of the foot that stands is low and slow. While it does, the heel comes down and goes up again, so that
-the foot is flat where it is least steep but for the first moments. A runner's heel never comes all the way
-down.
+The ball of a standing foot is low and slow. Meanwhile the heel comes down and goes up again, so the foot is
+flat when it is least steep, apart from the first moments. A runner's heel never comes all the way down.
 """
 
 from __future__ import annotations
@@ -13,29 +12,29 @@ from numpy.typing import NDArray
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES
+from hobble.motion.body_sample import BodySample
 from hobble.motion.orient import mean, unit
-from hobble.motion.seen import Seen
 from hobble.motion.spine import SHORT
 
 UP, AHEAD, LEFT = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
-STANCE = 0.2  # share of frames, those in which the ball is lowest and slowest, in which it stands
-LEAST_STEEP = (10.0, 30.0)  # percentiles of the steepness of a standing foot between which it is flat
+STANCE = 0.2  # the foot stands in this share of the frames, those with the lowest and slowest ball
+LEAST_STEEP = (10.0, 30.0)  # percentiles: a standing foot is flat if its steepness is between them
 FEWEST = 3  # frames
-SLOW = 0.5  # legs a second: a ball that is slower stands
-RUNS = 0.3  # share of frames with a standing ball below which it is a run; walks of CMU have .41 or more
-# How much steeper than flat a runner's standing foot is: on 19 runs of CMU, against their rigs' zero poses,
-# the mean is 6.8 degrees and the ends 4.0 and 9.2; on 50 walks the mean is .7.
+SLOW = 0.5  # leg lengths a second: a slower ball stands
+RUNS = 0.3  # it is a run if the ball stands in a smaller share of frames; CMU's walks have at least .41
+# How much steeper than flat a runner's standing foot is. On 19 runs of CMU, relative to their zero poses, the
+# mean is 6.8 degrees and the range 4.0 to 9.2. On 50 walks the mean is .7.
 RAISED = np.radians(6.8)
 UNLIKE = np.radians(2.5)
-APART = 10.0  # degrees between the feet of both sides from which on neither is to be believed
-UPRIGHT = 0.6  # height of the hips above a foot that stands, to the length of the leg
+APART = 10.0  # degrees: if the two feet differ by more, neither is trusted
+UPRIGHT = 0.6  # least height of the hips above a standing foot, in leg lengths
 
 
-def flat_feet(seen: Seen) -> dict[int, Array]:
-    """Frames (4,) of ankles and balls: how they are turned where the feet are flat.
+def flat_feet(seen: BodySample) -> dict[int, Array]:
+    """Frames (4,) of ankles and balls that show how they are turned while the feet are flat.
 
-    Both feet of a rig are built about alike, so that one that limps is told by the other: how steep their
-    bones are is drawn half way to the mean of both, and no further from it than UNLIKE.
+    Both feet of a rig have about the same build, so a limping foot is corrected by the other. The steepness
+    of each is moved half-way to the mean of both, but by no more than UNLIKE.
     """
     tilts = {side: _steepness(seen, side) for side in SIDES}
     frames: dict[int, Array] = {}
@@ -54,12 +53,12 @@ def flat_feet(seen: Seen) -> dict[int, Array]:
     return frames
 
 
-def doubt(seen: Seen) -> str | None:
-    """What is uncertain of feet that only motion tells of, in a sentence; None where little is."""
+def doubt(seen: BodySample) -> str | None:
+    """A sentence on what is uncertain about feet that are known from motion alone, or None."""
     tilts = [np.degrees(tilt) for side in SIDES if (tilt := _steepness(seen, side)) is not None]
     if len(tilts) < len(SIDES):
         return (
-            "Neither a joint nor a zero pose tells how its feet are turned: toes and ankles may lie some "
+            "Neither a joint nor a zero pose shows how its feet are turned: toes and ankles may lie some "
             "centimetres off."
         )
     if abs(tilts[0] - tilts[1]) > APART:
@@ -70,16 +69,16 @@ def doubt(seen: Seen) -> str | None:
     return None
 
 
-def runs(seen: Seen) -> bool:
-    """Whether the figure runs: its feet hardly stand."""
+def runs(seen: BodySample) -> bool:
+    """Whether the figure runs, so that its feet hardly stand."""
     slow = [
         seen.speeds[:, _ball(seen, side)] < SLOW * seen.length(*seen.body.legs[side][:3]) for side in SIDES
     ]
     return bool(np.mean(slow) < RUNS)
 
 
-def flat_frames(seen: Seen, side: str) -> NDArray[np.integer]:
-    """The frames in which a foot is flat on the ground, as far as any of them shows it."""
+def flat_frames(seen: BodySample, side: str) -> NDArray[np.integer]:
+    """The frames in which a foot is flat on the ground, as far as there are any."""
     ball = _ball(seen, side)
     order = _rank(seen.speeds[:, ball]) + _rank(seen.at[:, ball, 1])
     stance = np.argsort(order)[: max(FEWEST + 2, round(STANCE * len(order)))]
@@ -89,16 +88,16 @@ def flat_frames(seen: Seen, side: str) -> NDArray[np.integer]:
     return flat if len(flat) >= FEWEST else stance[np.argsort(steep)[:FEWEST]]
 
 
-def stands(seen: Seen, side: str) -> bool:
-    """Whether the body stands up while that foot is flat."""
+def stands(seen: BodySample, side: str) -> bool:
+    """Whether the body is upright while that foot is flat."""
     hip, knee, heel, _ = seen.body.legs[side]
     flat = flat_frames(seen, side)
     height = np.median(seen.at[flat, hip, 1] - seen.at[flat, heel, 1])
     return bool(height > UPRIGHT * seen.length(hip, knee, heel))
 
 
-def _steepness(seen: Seen, side: str) -> float | None:
-    """Radians by which the foot's bone points down where it is flat; None where it has no bone."""
+def _steepness(seen: BodySample, side: str) -> float | None:
+    """Radians by which the foot's bone points down when it is flat, or None without a bone."""
     heel, toe = seen.body.legs[side][2:]
     if toe is None:
         return None
@@ -106,13 +105,13 @@ def _steepness(seen: Seen, side: str) -> float | None:
     return float(np.median(_steep(seen.at[flat, toe] - seen.at[flat, heel])))
 
 
-def _ball(seen: Seen, side: str) -> int:
+def _ball(seen: BodySample, side: str) -> int:
     heel, toe = seen.body.legs[side][2:]
     return heel if toe is None else toe
 
 
-def _ahead(seen: Seen, side: str) -> Array:
-    """(S, 3) where a foot points: along its bone, to its end site, or where the hips face."""
+def _ahead(seen: BodySample, side: str) -> Array:
+    """(S, 3) direction of a foot: along its bone, to its end site, or where the hips face."""
     heel, toe = seen.body.legs[side][2:]
     if toe is not None:
         return seen.at[:, toe] - seen.at[:, heel]

@@ -1,4 +1,4 @@
-"""How the joints of a body are turned in a pose that stands, from where its bones point while it moves."""
+"""Derives how joints are turned in a standing pose from the directions of the bones in motion."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
+from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import flat_feet
 from hobble.motion.orient import frame, mean, unit
-from hobble.motion.seen import LEFT, Seen
 
 UP, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-AGREE = np.radians(25.0)  # joints of a trunk that are turned no further from each other have one rest pose
+AGREE = np.radians(25.0)  # trunk joints that differ by less have the same rest pose
 
 
-def from_motion(seen: Seen) -> dict[int, Array]:
-    """Frames of all joints from where their bones point while the figure moves."""
+def from_motion(seen: BodySample) -> dict[int, Array]:
+    """Frames of all joints from the directions of the bones while the figure moves."""
     frames: dict[int, Array] = {}
     _trunk(seen, frames)
     for side, sign in (("left", 1.0), ("right", -1.0)):
@@ -27,7 +27,7 @@ def from_motion(seen: Seen) -> dict[int, Array]:
     return frames | flat_feet(seen)
 
 
-def _trunk(seen: Seen, frames: dict[int, Array]) -> None:
+def _trunk(seen: BodySample, frames: dict[int, Array]) -> None:
     body = seen.body
     chain = (body.hips, *body.trunk)
     ends = (*body.neck, body.head)
@@ -41,7 +41,7 @@ def _trunk(seen: Seen, frames: dict[int, Array]) -> None:
         following = (*chain[i + 1 :], *ends)
         bone = seen.first_long(joint, following)
         axis, own = seen.spine.at(way[i] / max(way[-1], 1e-9)), seen.local(joint, left)
-        # What carries limbs is level where they begin: spines of captured rigs are bent sideways by degrees.
+        # Hips and chest are level where limbs begin. Spines of captured rigs bend sideways by some degrees.
         carries = joint in (body.hips, body.chest)
         frames[joint] = frame(own, LEFT, bone, axis) if carries else frame(bone, axis, own, LEFT)
     for i, joint in enumerate(body.neck):
@@ -51,8 +51,11 @@ def _trunk(seen: Seen, frames: dict[int, Array]) -> None:
     frames[body.head] = _head(seen, frames, (*chain, *body.neck))
 
 
-def _head(seen: Seen, frames: dict[int, Array], chain: Sequence[int]) -> Array:
-    """As the chest's, where all of the trunk agrees on what is up; else so that it mostly looks ahead."""
+def _head(seen: BodySample, frames: dict[int, Array], chain: Sequence[int]) -> Array:
+    """The chest's frame if the whole trunk agrees on what is up.
+
+    Otherwise the head looks ahead on average.
+    """
     chest = frames[seen.body.chest]
     if len(chain) > 2 and max(float(quat.angle(frames[j], chest)) for j in chain) < AGREE:
         return chest
@@ -61,7 +64,7 @@ def _head(seen: Seen, frames: dict[int, Array], chain: Sequence[int]) -> Array:
     return frame(up, UP, seen.local(seen.body.head, ahead), AHEAD)
 
 
-def _arm(seen: Seen, frames: dict[int, Array], side: str, sign: float) -> None:
+def _arm(seen: BodySample, frames: dict[int, Array], side: str, sign: float) -> None:
     clavicle, shoulder, elbow, wrist = seen.body.arms[side]
     chest = quat.mul(seen.turned[:, seen.body.chest], frames[seen.body.chest])
     if clavicle is not None:
@@ -73,7 +76,7 @@ def _arm(seen: Seen, frames: dict[int, Array], side: str, sign: float) -> None:
     frames[wrist] = seen.hand(side, mean(quat.mul(quat.inv(seen.turned[:, wrist]), forearm)), sign)
 
 
-def _leg(seen: Seen, frames: dict[int, Array], side: str) -> None:
+def _leg(seen: BodySample, frames: dict[int, Array], side: str) -> None:
     hip, knee, heel, _ = seen.body.legs[side]
     hinge = seen.hinge(hip, knee, heel, seen.hips_left)
     for start, end in ((hip, knee), (knee, heel)):

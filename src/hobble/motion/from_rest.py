@@ -1,4 +1,6 @@
-"""How the joints of a body are turned in a zero pose that stands, and what it knows better than motion."""
+"""Derives how the joints of a body are turned in a standing zero pose, which knows some joints better than
+motion.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +9,22 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES
+from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import stands
 from hobble.motion.orient import apart, frame, off, pointed, snapped, unit
-from hobble.motion.seen import LEFT, Seen
 
 UP = np.array([0.0, 1.0, 0.0])
-# Degrees between what zero pose and motion say of a joint, from which on the motion is believed.
+# Degrees: if zero pose and motion differ by more for a joint, the motion counts.
 TRUSTED = 30.0
-SHRUG = 12.0  # degrees from the chest, on average, up to which clavicles are at rest as in the zero pose
-LIMP = 60.0  # and hands from their forearms
+SHRUG = 12.0  # degrees: mean angle to the chest up to which the zero pose counts for clavicles
+LIMP = 60.0  # degrees: the same for hands and their forearms
 
 
-def from_rest(seen: Seen, rest: Array) -> dict[int, Array]:
-    """Frames of all joints from a rest pose (J, 3) that stands; limbs by where they point in it."""
+def from_rest(seen: BodySample, rest: Array) -> dict[int, Array]:
+    """Frames of all joints from a standing rest pose (J, 3).
+
+    Limbs are turned by the direction that they have in it.
+    """
     body = seen.body
     across = [rest[side["left"][k]] - rest[side["right"][k]] for side, k in ((body.legs, 0), (body.arms, 1))]
     left = unit(unit(across[0]) + unit(across[1]))
@@ -47,8 +52,8 @@ def from_rest(seen: Seen, rest: Array) -> dict[int, Array]:
     return frames
 
 
-def add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: Seen) -> None:
-    """Put into `frames` what the zero pose knows better."""
+def add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: BodySample) -> None:
+    """Replace in `frames` the joints that the zero pose knows better."""
     body = seen.body
     if apart(zero[body.head], frames[body.head]) < TRUSTED:
         frames[body.head] = zero[body.head]
@@ -64,10 +69,10 @@ def add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: Seen) -> No
             frames[toe] = _foot(frames[toe], zero[toe], seen, side)
 
 
-def _foot(standing: Array, zero: Array, seen: Seen, side: str) -> Array:
-    """How a foot is turned: as it stands, but as steep as in the zero pose, where the two agree at all.
+def _foot(standing: Array, zero: Array, seen: BodySample, side: str) -> Array:
+    """How a foot is turned: as it stands, but as steep as in the zero pose, if the two roughly agree.
 
-    Feet of a rig whose legs are splayed in the zero pose are rolled and point outward there; a patient's foot
+    If the legs are splayed in the zero pose, the feet are rolled and point outward there. A patient's foot
     may never be flat.
     """
     if not stands(seen, side):

@@ -1,8 +1,8 @@
-"""What a folder of clips says about itself: one line a clip, and what is odd about all of them.
+"""Summarises a folder of clips before training: one line for each clip, and notes on all of them.
 
-Cadence and speed are those of the feet: how often a minute the ankles pass each other, and how far the hips
-go. Steps of a length come at a rate that hardly differs between people; where a file's frame rate makes
-another of it, the rate that would explain it is told.
+Cadence is how often the ankles pass each other in a minute, speed how fast the hips go. Steps of a given
+length have nearly the same rate for all people. If a file's frame rate contradicts this, the note names a
+rate that would not.
 """
 
 from __future__ import annotations
@@ -19,24 +19,25 @@ from hobble.core.clip_files import find_clips, only_file, unused_file_notes
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.motion.check import worst
+from hobble.motion.duplicates import Likeness, likeness, same_pairs
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 from hobble.motion.rig import leg_length
-from hobble.motion.same import Likeness, likeness, same_pairs
 
-SLOWEST, FASTEST = 40.0, 260.0  # steps a minute of somebody who walks or runs
-RATES = (24, 25, 30, 60, 120, 240)  # frames a second at which most files are, whatever they say
-STILL = 3.0  # cm a second at which the hips of somebody stand
-STANDING = 0.5  # seconds that it takes to tell a stand
-STRIDE = 0.25  # of the leg: how far ankles must part for a step
+SLOWEST, FASTEST = 40.0, 260.0  # steps a minute of people who walk or run
+RATES = (24, 25, 30, 60, 120, 240)  # usual frame rates of files
+STILL = 3.0  # cm a second: slower hips stand
+STANDING = 0.5  # seconds: a shorter rest does not count as standing
+STRIDE = 0.25  # leg lengths: least distance of the ankles in a step
 ENOUGH = {"mirrors of each other": "hold both out or neither"}
 
 
 @dataclass(frozen=True)
 class Look:
-    """One clip as it looks. `stands`: seconds in which nobody moves. `steps`: ankles passing each other.
+    """The summary of one clip.
 
-    like: what it is compared with others by.
+    stands: seconds in which nobody moves. steps: how often the ankles pass each other. like: for finding
+    duplicates.
     """
 
     name: str
@@ -56,14 +57,14 @@ class Look:
 
 @dataclass(frozen=True)
 class Folder:
-    """All clips of a folder, and sentences on what they have in common or lack."""
+    """The clips of a folder, and notes on what they have in common or lack."""
 
     clips: tuple[Look, ...]
     notes: tuple[str, ...]
 
 
 def look(folder: Path, skeleton: Path, maps: Path, options: ClipMotion | None = None) -> Folder:
-    """Look at each clip of a folder, or at one file. Raises HobbleError where there are none.
+    """Summarise each clip of a folder, or one file. Raises HobbleError if there are none.
 
     options: how the files are read, as in a data set.
     """
@@ -84,7 +85,7 @@ def _one(file: Path, skeleton: Path, maps: Path, options: ClipMotion) -> Look:
 
 
 def seen(clip: Clip, report: Mapping[str, Any]) -> Look:
-    """How a clip looks that was made. report: its `motion/<clip>.json`."""
+    """The summary of a clip. report: its `motion/<clip>.json`."""
     hips = clip.positions[:, clip.skeleton.role("hips")]
     path = np.linalg.norm(np.diff(hips[:, [0, 2]], axis=0), axis=-1)
     seconds = len(clip) / clip.fps
@@ -113,12 +114,12 @@ def seen(clip: Clip, report: Mapping[str, Any]) -> Look:
 
 
 def _first(report: Mapping[str, Any]) -> list[str]:
-    """The repairs, as the shortest of warnings."""
+    """The number of repairs, as a short warning."""
     return [f"{len(report['repairs'])} repaired"] if report["repairs"] else []
 
 
 def step_count(clip: Clip) -> int:
-    """How often the ankles pass each other, along where the figure faces, parting far enough between."""
+    """How often the ankles pass each other in the facing direction, with enough distance between."""
     p, role = clip.positions, clip.skeleton.role
     left = p[:, role("left_hip")] - p[:, role("right_hip")]
     ahead = np.cross(left, [0.0, 1.0, 0.0])
@@ -130,7 +131,7 @@ def step_count(clip: Clip) -> int:
 
 
 def stand_seconds(speed: Array, fps: float) -> float:
-    """Seconds in which the hips hardly move for a while. speed: (F-1,) cm a second."""
+    """Seconds in which the hips hardly move for some time. speed: (F-1,) cm a second."""
     still = np.concatenate([[False], speed < STILL, [False]])
     edges = np.flatnonzero(still[1:] != still[:-1])
     runs = [b - a for a, b in zip(edges[::2], edges[1::2], strict=True)]
@@ -138,16 +139,16 @@ def stand_seconds(speed: Array, fps: float) -> float:
 
 
 def rate_warnings(steps: int, moving: float, way: float, clip: Clip, report: Mapping[str, Any]) -> list[str]:
-    """A sentence where no person has this cadence, with the frame rate that would explain it.
+    """A sentence if no person has this cadence, with the frame rate that would explain it.
 
-    moving: seconds in which the figure goes. way: how far, cm.
+    moving: seconds in which the figure moves. way: its distance, cm.
     """
     if steps < 2:
         return []
     cadence = 60.0 * steps / moving
     stride = way / steps
     leg = leg_length(clip.skeleton)
-    # Grieve and Gear 1966: step and cadence grow together; a step of .8 legs comes 110 times a minute.
+    # Grieve and Gear 1966: cadence grows with step length. Steps of .8 leg lengths come 110 times a minute.
     usual = 110.0 * np.clip(stride / (0.8 * leg), 0.5, 2.2) ** 0.6
     if SLOWEST <= cadence <= FASTEST and 0.45 < cadence / usual < 2.2:
         return []
@@ -156,29 +157,29 @@ def rate_warnings(steps: int, moving: float, way: float, clip: Clip, report: Map
     rate = min(rates, key=lambda r: abs(np.log(r / wanted)))
     would = cadence * rate / report["source_fps"]
     return [
-        f"{cadence:.0f} steps a minute of {stride:.0f} cm are no person's; at {rate} fps they would be "
+        f"{cadence:.0f} steps a minute of {stride:.0f} cm are impossible; at {rate} fps they would be "
         f"{would:.0f} (source_fps: {rate})"
     ]
 
 
 def same_notes(clips: Sequence[Look]) -> list[str]:
-    """Sentences on clips that are there twice."""
+    """Sentences on duplicates."""
     pairs = same_pairs([clip.like for clip in clips if clip.like is not None])
     return [f"{a} and {b} are {what}: {ENOUGH.get(what, 'one of them is enough')}." for a, b, what in pairs]
 
 
 def standing_notes(clips: Sequence[Look]) -> list[str]:
-    """A sentence where nobody stands in any clip, and what follows from it."""
+    """A sentence if nobody stands in any clip, with the consequence."""
     if not clips or any(clip.stands > 0 or clip.refused for clip in clips):
         return []
     return [
-        "Nobody stands in these clips: the character will not have learned to stand, to start or to stop. "
-        "Add a clip of somebody who stands, starts and stops."
+        "Nobody stands in these clips, so the character will not learn to stand, to start or to stop. "
+        "Add a clip in which somebody stands, starts and stops."
     ]
 
 
 def table(folder: Folder) -> str:
-    """The folder as text: a line a clip, and the sentences below."""
+    """The folder as text: a line for each clip, then the notes."""
     wide = max(4, *(len(clip.name) for clip in folder.clips))
     names = f"{'rig':10} {'fps':>5} {'s':>6} {'hips':>5} {'cm/s':>5} {'steps':>5} {'/min':>4} {'stands':>6}"
     head = f"{'clip':{wide}} {names}  furthest off"

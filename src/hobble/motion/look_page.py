@@ -1,4 +1,4 @@
-"""The page of a data set before anything is trained on it: a line a clip, with a small walking figure."""
+"""Makes the page of a data set before training: a line for each clip, with a small walking figure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hobble.core.quat import Array
 from hobble.motion.look import Look, same_notes, seen, standing_notes
 from hobble.motion.root import facing
 
-FRAMES, SECONDS = 40, 4.0  # of the picture: the middle of the clip
+FRAMES, SECONDS = 40, 4.0  # of the picture, from the middle of the clip
 HEAD = (
     "clip",
     "",
@@ -33,7 +33,7 @@ table{border-collapse:collapse}th,td{padding:2px 9px;text-align:left;border-bott
 th{position:sticky;top:0;background:#fff}td.n{text-align:right;font-variant-numeric:tabular-nums}
 .bar{display:inline-block;width:75px;height:9px;background:#eee;margin-right:6px}
 .bar i{display:block;height:100%;background:#4a7ab5}small,.said{color:#a04000}canvas{display:block}"""
-# One timer draws all figures that are in view.
+# One timer draws all figures in view.
 SCRIPT = """const D=JSON.parse(document.getElementById('d').textContent);
 const C=[...document.querySelectorAll('canvas')];
 const calm=matchMedia('(prefers-reduced-motion: reduce)').matches;
@@ -46,10 +46,10 @@ if(calm)addEventListener('scroll',()=>draw(0));requestAnimationFrame(draw);"""
 
 
 def figure(clip: Clip) -> dict[str, Any]:
-    """A walk on the spot seen from its side, in pixels of an 80 x 80 picture.
+    """A walk in place seen from the side, in pixels of an 80 x 80 picture.
 
-    p: for each of its frames x and y of every joint. b: bones (joint, joint, 0 middle, 1 left or 2 right).
-    f: frames a second.
+    p: for each frame x and y of every joint. b: bones (joint, joint, 0 middle, 1 left or 2 right). f: frames
+    a second.
     """
     long = min(len(clip), round(SECONDS * clip.fps))
     first = (len(clip) - long) // 2
@@ -81,7 +81,7 @@ def look_page(
     labels: Sequence[Mapping[str, Any]],
     down: Sequence[float],
 ) -> str:
-    """The page of data set `name`, whole in one file.
+    """The page of data set `name` as one file.
 
     reports, labels: `motion/<clip>.json` and `labels/<clip>.json` of each clip. down: see `foot_down`.
     """

@@ -1,4 +1,4 @@
-"""A short cycle repeated, each time from where the last one ended, with the seams blended."""
+"""Repeats a short cycle. Each repetition starts where the last one ended, and the seams are blended."""
 
 from __future__ import annotations
 
@@ -13,18 +13,17 @@ from hobble.core.quat import Array
 from hobble.motion.axes import turned
 from hobble.motion.root import facing
 
-BLEND = 0.2  # seconds to each side of a seam, at first
-FASTEST = 1.3  # joint speed at a seam, at most, to the highest in the clip; else the blend gets longer
-TURNING = np.radians(20.0)  # a cycle that turns by less is taken to go straight
+BLEND = 0.2  # seconds on each side of a seam; doubled until the seam is smooth
+FASTEST = 1.3  # highest joint speed at a smooth seam, relative to the highest in the clip
+TURNING = np.radians(20.0)  # a cycle that turns less counts as straight
 UP = np.array([0.0, 1.0, 0.0])
 
 
 def loop_clip(clip: Clip, times: int, heading: float | None = None) -> Clip:
-    """The clip `times` times over: the displacement of one cycle, and its turn, added each time.
+    """The clip repeated `times` times. Each repetition adds the displacement and the turn of one cycle.
 
-    heading: where the first cycle leads, degrees from +Z towards +X; as in the clip by default. The last
-    frame of a cycle may be the first of the next or come just before it. Raises HobbleError for less than
-    four frames.
+    heading: direction of the first cycle, degrees from +Z towards +X; by default as in the clip. The last
+    frame may repeat the first or come just before it. Raises HobbleError for less than four frames.
     """
     if len(clip) < 4:
         raise HobbleError(f"{clip.name}: {len(clip)} frames are no cycle to repeat")
@@ -40,13 +39,13 @@ def loop_clip(clip: Clip, times: int, heading: float | None = None) -> Clip:
 
 
 def _open(clip: Clip) -> Clip:
-    """The cycle without a last frame that only says again what the first said."""
+    """The cycle without a last frame that repeats the first."""
     first, second, last = (_pose(clip, i) for i in (0, 1, -1))
     return _part(clip, slice(0, -1)) if _apart(first, last) < 0.5 * _apart(first, second) else clip
 
 
 def _pose(clip: Clip, frame: int) -> Array:
-    """(J, 3) joints seen from above the ground below the hips, facing +Z."""
+    """(J, 3) joints relative to the ground below the hips, facing +Z."""
     turn = quat.yaw(-_yaw(clip, frame))
     place = clip.positions[frame] - clip.positions[frame, 0] * [1, 0, 1]
     return quat.rotate(turn, place)
@@ -62,7 +61,7 @@ def _yaw(clip: Clip, frame: int) -> float:
 
 
 def _step(cycle: Clip) -> tuple[float, Array]:
-    """What leads from one cycle to the next: a turn about Y, then a shift over the ground."""
+    """From one cycle to the next: a turn about Y, then a shift over the ground."""
     turn = (_yaw(cycle, -1) - _yaw(cycle, 0) + np.pi) % (2 * np.pi) - np.pi
     turn = float(turn) if abs(turn) > TURNING else 0.0
     pace = np.median(np.diff(cycle.root[-4:], axis=0), axis=0)
@@ -72,7 +71,9 @@ def _step(cycle: Clip) -> tuple[float, Array]:
 
 
 def _blended(cycle: Clip, step: tuple[float, Array], reach: int) -> Clip:
-    """The cycle with half of what parts its ends taken off each of them, fading over `reach` frames."""
+    """The cycle with smooth ends: half of their difference is subtracted from each, fading over `reach`
+    frames.
+    """
     turn, frames = step[0], len(cycle)
     first = cycle.rotations[0].copy()
     first[0] = quat.mul(quat.yaw(turn), first[0])
@@ -117,7 +118,7 @@ def _repeat(cycle: Clip, step: tuple[float, Array], times: int) -> Clip:
 
 
 def _headed(clip: Clip, step: tuple[float, Array], heading: float) -> Clip:
-    """The whole turned about its beginning, so that a cycle leads to `heading`."""
+    """The clip turned about its start so that a cycle goes in the direction `heading`."""
     shift = step[1]
     if np.hypot(shift[0], shift[2]) < 1.0:
         return clip

@@ -1,4 +1,4 @@
-"""From a BVH file to a clip on the target skeleton, with a report of what was found and done."""
+"""Converts a BVH file to a clip on the target skeleton, with a report of what was found and done."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from hobble.motion.source import FOUND, Source, load_source
 from hobble.motion.spine import Spine
 from hobble.motion.stance import upright
 
-SAME = 1e-3  # cm: offsets this near to the skeleton's are the skeleton's
+SAME = 1e-3  # cm: offsets that differ less from the skeleton's are equal
 
-KEPT = "What joints move in their parents was kept."
-DROPPED = "What joints move in their parents was dropped, since the clip was put on other bone lengths."
+KEPT = "Movements of joints in their parents were kept."
+DROPPED = "Movements of joints in their parents were dropped, because the bone lengths changed."
 
 
 def make_clip(
@@ -40,13 +40,14 @@ def make_clip(
     skeleton_name: str,
     options: ClipMotion,
 ) -> tuple[Clip, dict[str, Any]]:
-    """Read a BVH file, check it, and put it on the skeleton at the frame rate of `options`.
+    """Read a BVH file, check it, and convert it to the skeleton at the frame rate of `options`.
 
-    skeleton: the target's file. maps: the folder of the skeleton files. clip: the name of the clip made.
-    options: the `motion` section of the data set, with what the clip's entry overrules.
-    Returns the clip and its report: `motion/<clip>.json` of docs/artefacts.md.
-    Raises InputError for a file that cannot be read, for another skeleton, and for what is broken beyond
-    repair or, with defects: refuse, broken at all.
+    skeleton: the target's file. maps: the folder of the skeleton files. clip: name of the new clip. options:
+    the `motion` section of the data set, with the values of the clip's entry.
+
+    Returns the clip and its report: `motion/<clip>.json` of docs/artefacts.md. Raises InputError for a file
+    that cannot be read, for an unsuitable skeleton, for defects that cannot be repaired and, with defects:
+    refuse, for all defects.
     """
     target = load_skeleton(skeleton, skeleton_name)
     file = read_bvh(bvh)
@@ -74,19 +75,19 @@ def make_clip(
 
 
 def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) -> None:
-    """Refuse a clip that at the frame rate asked for would take more memory than any real one."""
+    """Refuse a clip that would take more memory at the new frame rate than any real one."""
     frames = len(clip) / clip.fps * options.fps * options.loops
     if frames * max(len(clip.skeleton.joints), len(target.joints)) > MOST_POSES:
         raise InputError(
             file.path,
             f"{len(clip)} frames at {clip.fps:g} a second become {frames:.0f} at {options.fps:g}: more "
             f"than {MOST_POSES} poses of a joint",
-            fix="Cut it into shorter clips, or give its source_fps.",
+            fix="Cut it into shorter clips, or set its source_fps.",
         )
 
 
 def _check_finite(file: Bvh, clip: Clip) -> None:
-    """Refuse what no longer is a motion: values that no joint has, or a rig whose bones have no length."""
+    """Refuse values that are not finite, and rigs whose bones have no length."""
     lengths = np.linalg.norm(file.offsets, axis=1)
     for values in (clip.rotations, clip.root, clip.positions):
         bad = ~np.isfinite(values).reshape(len(clip), -1).all(axis=1)
@@ -97,20 +98,20 @@ def _check_finite(file: Bvh, clip: Clip) -> None:
             why = f" (joints without length: {short:.200})" if short else ""
             raise InputError(
                 file.path,
-                f"no motion of {clip.skeleton.name} comes of it{why}",
+                f"gives no motion of {clip.skeleton.name}{why}",
                 frame=int(np.argmax(bad)) + 1,
                 fix="Check the OFFSETs and the values, and export the clip again.",
             )
 
 
 def first_facing(clip: Clip) -> float:
-    """Where the figure faces in its first frame, radians from +Z towards +X."""
+    """Facing direction in the first frame, radians from +Z towards +X."""
     ahead = facing(clip.skeleton, clip.positions[:1], 0.0)[0]
     return float(np.arctan2(ahead[0], ahead[2]))
 
 
 def resample(clip: Clip, fps: float) -> Clip:
-    """The clip at another frame rate; every frame that falls on one of the old is that frame exactly."""
+    """The clip at another frame rate. A frame at the time of an old frame equals it exactly."""
     if clip.fps == fps:
         return clip
     times = sample_times(len(clip), clip.fps, fps)
@@ -125,10 +126,9 @@ def resample(clip: Clip, fps: float) -> Clip:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A clip on the joints of the target, how far its path was scaled for that, and what it cost.
+    """A clip on the joints of the target, the scale of its path, and notes.
 
-    figures: how far it is from its source (`hobble.motion.check.compare`); None for one that was not
-    retargeted.
+    figures: difference from its source (`hobble.motion.check.compare`), or None if it was not retargeted.
     """
 
     clip: Clip
@@ -140,7 +140,7 @@ class Fitted:
 def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str) -> Fitted:
     """The clip's motion on the target skeleton, or on its joints with the clip's own bone lengths.
 
-    clip: that of the source, at another frame rate.
+    clip: the source's, at another frame rate.
     """
     match = source.match
     if match.same:
@@ -159,7 +159,7 @@ def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str)
     repairs = [DROPPED] if source.moving else []
     if proportions == "clip":
         rig = "another" if match.rig == FOUND else match.rig
-        repairs.append(f"Its rig is {rig}, so that it was put on the bone lengths of {target.name}.")
+        repairs.append(f"Its rig is {rig}, so it got the bone lengths of {target.name}.")
     made = retarget_clip(clip, how)
     return Fitted(made, round(how.scale, 6), repairs, compare(clip, made, how.scale))
 

@@ -1,4 +1,4 @@
-"""The same motion seen in a mirror: x negated, left and right swapped."""
+"""Mirrors a motion: x negated, left and right swapped."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ FLIP = np.array([-1.0, 1.0, 1.0])
 
 
 def mirror_skeleton(skeleton: Skeleton) -> Skeleton:
-    """The skeleton with the offsets of each side on the other; itself where it is symmetric.
+    """The skeleton with left and right offsets swapped. A symmetric skeleton is returned unchanged.
 
-    Raises HobbleError where a joint's counterpart hangs from another joint's counterpart.
+    Raises HobbleError if the counterparts of a joint and its parent are not joint and parent.
     """
     swap = skeleton.mirror_joints
     for j, p in enumerate(skeleton.parents):
@@ -33,7 +33,7 @@ def mirror_skeleton(skeleton: Skeleton) -> Skeleton:
 
 
 def mirror_clip(clip: Clip, name: str) -> Clip:
-    """The clip mirrored in the plane x = 0; mirrored twice it is the same again."""
+    """The clip mirrored in the plane x = 0. Mirroring it twice gives the same clip."""
     swap = clip.skeleton.mirror_joints
     translations = None if clip.translations is None else clip.translations[:, swap] * FLIP
     return Clip(
@@ -47,5 +47,5 @@ def mirror_clip(clip: Clip, name: str) -> Clip:
 
 
 def mirror_report(report: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """The report of the clip mirrored: as that of its original, facing the other way."""
+    """The report of the mirrored clip: its original's, with the facing direction mirrored."""
     return {**report, "clip": name, "mirror_of": report["clip"], "facing": 0.0 - report["facing"]}

@@ -1,4 +1,4 @@
-"""What the name of a joint says: its side, and which part of the body it is."""
+"""What the name of a joint says about its side and its part of the body."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ LEFT = {
 LEFT |= {"izquierdo", "sinistra", "sinistro", "sx", "hidari", "esq", "esquerda", "izq"}
 RIGHT = {"right", "r", "rgt", "rt", "rght", "rechts", "rechte", "rechter", "rechtes", "droite", "droit"}
 RIGHT |= {"derecha", "derecho", "destra", "destro", "dx", "migi", "dir", "direita", "der"}
-# Longer words first, since "forearm" holds "arm". What `shoulder`, `arm`, `hip` and `leg` mean, the other
-# joints of the limb tell: see `limb_parts`.
+# Longer words first, because "forearm" contains "arm". The meaning of `shoulder`, `arm`, `hip` and `leg`
+# depends on the other joints of the limb: see `limb_parts`.
 WORDS = (
     ("twist", ("twist", "roll", "tweak", "helper", "corrective", "muscle")),
     (
@@ -72,11 +72,11 @@ WORDS = (
     ("leg", ("leg",)),
     ("hip", ("hip", "buttock", "femoral")),
 )
-ENDS = ("end", "nub", "site", "tip", "top")  # joints that only say where a bone ends
+ENDS = ("end", "nub", "site", "tip", "top")  # joints that only mark the end of a bone
 
 
 def words(name: str) -> list[str]:
-    """The words of a name in small letters: parted at capitals, digits and signs.
+    """The words of a name in lower case, split at capitals, digits and signs.
 
     >>> words("mixamorig:LeftUpLeg"), words("Bip01 L Thigh"), words("DEF-shin.R.001"), words("lShin")
     (['mixamorig', 'left', 'up', 'leg'], ['bip', 'l', 'thigh'], ['def', 'shin', 'r'], ['l', 'shin'])
@@ -101,9 +101,9 @@ def side_of(name: str) -> str | None:
 
 
 def side_of_pair(name: str, other: str) -> str | None:
-    """The side of a joint whose counterpart across the body has the other name; None where neither tells.
+    """The side of a joint, by its own name and its counterpart's. None if the names do not say.
 
-    Names that only differ in one letter tell what they would not on their own.
+    Two names that differ only in one letter say more than each alone.
 
     >>> side_of_pair("lfemur", "rfemur"), side_of_pair("toe_r2", "toe_l2"), side_of_pair("armA", "armB")
     ('left', 'right', None)
@@ -118,7 +118,7 @@ def side_of_pair(name: str, other: str) -> str | None:
 
 
 def part_of(name: str) -> str | None:
-    """Which part of the body a name means, one of the words of WORDS, or None.
+    """The part of the body that a name means: one of the words of WORDS, or None.
 
     >>> part_of("LeftForeArm"), part_of("RightShoulder"), part_of("Bip01 R Calf"), part_of("qwertz")
     ('forearm', 'shoulder', 'shank', None)
@@ -131,15 +131,15 @@ def part_of(name: str) -> str | None:
 
 
 def is_end(name: str) -> bool:
-    """Whether a name says that the joint only ends a bone, as HeadTop_End does."""
+    """Whether a name says that the joint only ends a bone, like HeadTop_End."""
     return any(w in ENDS for w in words(name))
 
 
 def limb_parts(names: Sequence[str]) -> dict[str, int]:
-    """Which of the joints along a limb, from the trunk outward, is which; by their names alone.
+    """Which of the joints along a limb, from the trunk outward, is which part, by names alone.
 
-    Returns thigh, shank, foot and toe, or clavicle, upperarm, forearm and hand, as far as the names tell,
-    each with its place in `names`.
+    Returns thigh, shank, foot and toe, or clavicle, upperarm, forearm and hand, as far as the names say, each
+    with its index in `names`.
     """
     parts = [part_of(name) for name in names]
     out: dict[str, int] = {}

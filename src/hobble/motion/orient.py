@@ -1,4 +1,4 @@
-"""How a part of a body is turned, from the directions of its bones."""
+"""Derives how a part of a body is turned from the directions of its bones."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hobble.core.quat import Array
 
 
 def unit(v: Array) -> Array:
-    """Vectors (..., 3) at length 1."""
+    """Vectors (..., 3) of length 1."""
     return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
 
 
@@ -19,7 +19,7 @@ def off(a: Array, b: Array) -> float:
 
 
 def frame(first: Array, axis: Array, second: Array, other: Array) -> Array:
-    """(4,) the rotation that takes `axis` to `first` and `other`, as near as it can, to `second`."""
+    """(4,) the rotation that takes `axis` to `first`, and `other` as near as possible to `second`."""
     return quat.from_matrix(_axes(first, second) @ _axes(axis, other).T)
 
 
@@ -32,7 +32,7 @@ def _axes(first: Array, second: Array) -> Array:
 
 
 def snapped(frame: Array) -> Array:
-    """Whole axes where the frame is within 20 degrees of them."""
+    """The frame, or the nearest whole axes if they are within 20 degrees."""
     axes = quat.to_matrix(frame)
     whole = np.round(axes)
     if np.all(np.abs(whole).sum(axis=0) == 1) and np.sum(axes * whole, axis=0).min() > np.cos(np.radians(20)):
@@ -41,18 +41,18 @@ def snapped(frame: Array) -> Array:
 
 
 def pointed(whole: Array, axis: Array, bone: Array) -> Array:
-    """A frame turned by the least amount so that its `axis` lies along the bone."""
+    """A frame turned as little as possible so that its `axis` lies along the bone."""
     return quat.mul(quat.between(quat.rotate(whole, axis), bone), whole)
 
 
 def robust(vectors: Array) -> Array:
-    """Mean (3,) of vectors (S, 3) without those far off their median."""
+    """Mean (3,) of vectors (S, 3), without those far from their median."""
     off = np.linalg.norm(vectors - np.median(vectors, axis=0), axis=-1)
     return vectors[off <= 3 * np.median(off) + 1e-9].mean(axis=0)
 
 
 def mean(turns: Array) -> Array:
-    """Mean rotation (4,) of (S, 4), without those far off it."""
+    """Mean rotation (4,) of (S, 4), without those far from it."""
     for _ in range(2):
         _, vectors = np.linalg.eigh(turns.T @ turns)
         mean = vectors[:, -1]

@@ -1,7 +1,7 @@
-"""Reading BVH files as the wild holds them, fast, with errors that name the line.
+"""Reads BVH files of all kinds, fast, with errors that name the line.
 
-Any order of rotations, any channels on any joint, tabs, CRLF, scientific notation, several end sites, joint
-names with spaces or prefixes, braces anywhere. What the numbers mean is the work of the other modules.
+It accepts any order of rotations, any channels on any joint, tabs, CRLF, scientific notation, several end
+sites, joint names with spaces or prefixes, and braces anywhere. Other modules interpret the numbers.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.untrusted import read_bytes
 
-# What a file may ask for. The largest figure known has 191 joints; an hour of it at 60 Hz is 41 million poses
-# of a joint, which as rotations take 1.3 GB.
+# Limits. The largest known rig has 191 joints. An hour of it at 60 Hz is 41 million joint poses, whose
+# rotations take 1.3 GB.
 MOST_JOINTS = 4096
 LONGEST_NAME = 200
 MOST_BYTES = 1 << 30
 MOST_HEADER = 1 << 24  # bytes before MOTION
-MOST_LINES = 50_000_000  # after it
-LONGEST_LINE = 1 << 22  # a frame of 4096 joints with six channels of 25 letters has 614,400
+MOST_LINES = 50_000_000  # of frames after MOTION
+LONGEST_LINE = 1 << 22  # bytes; a frame of 4096 joints, six channels and 25 letters has 614,400
 MOST_POSES = 50_000_000
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 _EXPORT = "Export the clip again."
@@ -35,7 +35,7 @@ _EXPORT = "Export the clip again."
 
 @dataclass(frozen=True)
 class Bvh:
-    """A BVH file as it stands: nothing converted yet.
+    """A BVH file, not converted yet.
 
     names, parents: J joints in the file's order, -1 for the root.
     offsets: (J, 3) in the file's unit.
@@ -43,7 +43,7 @@ class Bvh:
     values: (F, C), degrees and file units.
     frame_time: seconds, with its digits as written in frame_time_text.
     end_sites: joint -> offsets of its end sites.
-    declared: the number of frames that the file declares; F itself may be one off (see `read_bvh`).
+    declared: the number of frames that the file declares. F may differ by one (see `read_bvh`).
     sha256, bytes: of the file as it was read.
     """
 
@@ -76,10 +76,10 @@ class _Header:
 def read_bvh(path: str | Path) -> Bvh:
     """Read a BVH file.
 
-    A file that holds one frame more or less than it declares is read as it is (compare `len` with
-    `declared`). Raises InputError, with the line where there is one, for a file that is missing, empty,
-    binary, truncated, or malformed, holds NaN or infinity, a wrong number of values or frames, or declares
-    more than it can hold.
+    A file with one frame more or less than it declares is accepted (compare `len` with `declared`). Raises
+    InputError, with the line if there is one, for a file that is missing, empty, binary, truncated or
+    malformed, that has NaN or infinity or a wrong number of values or frames, or that declares more than it
+    can hold.
     """
     path = Path(path)
     raw = read_bytes(path, MOST_BYTES)
@@ -99,7 +99,7 @@ def _text(path: Path, data: bytes) -> bytes:
         raise InputError(path, "binary data, not a BVH text file", fix=_EXPORT)
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\n" not in data:
-        data = data.replace(b"\r", b"\n")  # an old Macintosh's lines
+        data = data.replace(b"\r", b"\n")  # line ends of old Macintosh files
     if not data[:4096].lstrip()[:9].upper() == b"HIERARCHY":
         raise InputError(path, "not a BVH file: it does not begin with HIERARCHY", line=1)
     return data
@@ -109,7 +109,7 @@ _MOTION = re.compile(rb"^[ \t\r}]*MOTION(?![^\s])", re.MULTILINE)
 
 
 def _motion_at(path: Path, data: bytes) -> int:
-    """Where the MOTION section begins: at the first line that says just that."""
+    """Where the MOTION section begins: the first line with only that word."""
     found = _MOTION.search(data)
     if not found:
         lines = data.count(b"\n") + 1
@@ -120,7 +120,7 @@ def _motion_at(path: Path, data: bytes) -> int:
 
 
 class _Hierarchy:
-    """One pass over the header's lines; keeps the open joints on a stack, so that depth costs nothing."""
+    """Reads the header's lines in one pass. Open joints are on a stack, so deep hierarchies cost nothing."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -147,7 +147,7 @@ class _Hierarchy:
             "CHANNELS": self._channels,
         }.get(word.upper())
         if handler is None:
-            self.fail(f"{word[:40]!r} where a joint, OFFSET, CHANNELS or a brace should stand")
+            self.fail(f"{word[:40]!r} instead of a joint, OFFSET, CHANNELS or a brace")
         if self.pending is not None and word != "{":
             self.fail("an opening brace is missing")
         handler(rest.strip())
@@ -163,9 +163,9 @@ class _Hierarchy:
         if len(name) > LONGEST_NAME:
             self.fail(f"a joint's name of {len(name)} letters")
         if name in self.seen:
-            self.fail(f"joint {name!r} stands twice (first in line {self.seen[name]})")
+            self.fail(f"joint {name!r} occurs twice (first in line {self.seen[name]})")
         if names and not self.open:
-            self.fail(f"a second root, {name!r}; only one figure a file can be read")
+            self.fail(f"a second root, {name!r}; a file may have only one figure")
         if len(names) >= MOST_JOINTS:
             self.fail(f"more than {MOST_JOINTS} joints")
         self.seen[name] = self.line
@@ -255,7 +255,7 @@ def _motion(path: Path, data: bytes, at: int, header: _Header) -> Bvh:
     body = at + 6 + max(at_frames, at_time)
     width = sum(len(c) for c in header.channels)
     try:
-        declared = int(frames_text.replace("_", "?"))  # Python would read 1_000
+        declared = int(frames_text.replace("_", "?"))  # Python would accept 1_000
     except ValueError:
         raise InputError(path, f"Frames: {frames_text[:40]!r} is not a number", line=line_frames) from None
     try:
@@ -300,7 +300,7 @@ def _motion(path: Path, data: bytes, at: int, header: _Header) -> Bvh:
 
 
 def _declaration(path: Path, head: list[bytes], key: bytes, line: int) -> tuple[str, int, int]:
-    """The text after `key`, its line in the file, and where that line ends, from the first of `head` on."""
+    """The text after the first `key` from `head` on, its line, and where the line ends."""
     end = 0
     for i, raw in enumerate(head[:8]):
         end += len(raw) + 1
@@ -312,11 +312,13 @@ def _declaration(path: Path, head: list[bytes], key: bytes, line: int) -> tuple[
 
 
 def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_line: int) -> Array:
-    """The table (F, width), one line a frame from `at` on; falls back on a slower, explaining reader."""
-    text = io.BytesIO(data)  # shares the bytes; a slice would copy a file of 100 MB
+    """The table (F, width): one line for each frame from `at` on. If that fails, a slower reader finds the
+    error.
+    """
+    text = io.BytesIO(data)  # shares the bytes; a slice would copy them
     text.seek(at)
     if not re.compile(rb"\S").search(data, at):
-        raise InputError(path, f"truncated: declares {declared} frames and holds none", line=first_line)
+        raise InputError(path, f"truncated: declares {declared} frames and has none", line=first_line)
     _check_lines(path, data, at, first_line)
     try:
         table = np.loadtxt(text, dtype=float, comments=None, ndmin=2)
@@ -331,12 +333,12 @@ def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_l
         raise InputError(path, "a value is NaN or infinite", line=line, frame=frame + 1, fix=_EXPORT)
     if abs(len(table) - declared) > 1:
         what = "truncated: declares" if len(table) < declared else "declares"
-        raise InputError(path, f"{what} {declared} frames and holds {len(table)}", fix=_EXPORT)
+        raise InputError(path, f"{what} {declared} frames and has {len(table)}", fix=_EXPORT)
     return table
 
 
 def _check_lines(path: Path, data: bytes, at: int, first_line: int) -> None:
-    """Raise InputError for lines too long or too many from `at` on: each becomes an object as it is read."""
+    """Raise InputError for lines that are too long or too many, before each becomes an object."""
     for start in range(at, len(data) - LONGEST_LINE, LONGEST_LINE):
         if data.find(b"\n", start, start + LONGEST_LINE) < 0:
             line = first_line + data.count(b"\n", at, start)
@@ -347,7 +349,7 @@ def _check_lines(path: Path, data: bytes, at: int, first_line: int) -> None:
 
 
 def _explained(path: Path, body: bytes, width: int, first_line: int) -> Array:
-    """Frames that run over several lines are read; anything else is refused with its line."""
+    """Reads frames that run over several lines. Anything else is refused with its line."""
     counts = np.fromiter((len(raw.split()) for raw in io.BytesIO(body)), np.int32)
     used, total = np.flatnonzero(counts), int(counts.sum(dtype=np.int64))
     if total % width or not total or not (counts[used] < width).all():
@@ -355,7 +357,7 @@ def _explained(path: Path, body: bytes, width: int, first_line: int) -> Array:
         if len(wrong):
             n, i = int(wrong[0]), int(used[wrong[0]])
             last = " (truncated?)" if i == used[-1] else ""
-            problem = f"{counts[i]} values where the joints have {width} channels{last}"
+            problem = f"{counts[i]} values, but the joints have {width} channels{last}"
             raise InputError(path, problem, line=first_line + i, frame=n + 1, fix=_EXPORT)
     for i, raw in enumerate(io.BytesIO(body)):
         for word in raw.split():

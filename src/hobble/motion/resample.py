@@ -1,4 +1,4 @@
-"""From one frame rate to another: positions linearly, rotations by spherical interpolation."""
+"""Changes the frame rate: positions linearly, rotations by spherical interpolation."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hobble.core.quat import Array
 
 
 def sample_times(frames: int, source_fps: float, fps: float) -> Array:
-    """Times of the new frames, in source frames: (N,) from 0 to the last that lies within the clip.
+    """(N,) times of the new frames, in source frames, from 0 to the last within the clip.
 
     >>> sample_times(5, 120, 60)
     array([0., 2., 4.])
@@ -26,7 +26,7 @@ def _between(times: Array) -> tuple[Array, Array, Array]:
 
 
 def sample_rotations(rotations: Array, times: Array) -> Array:
-    """Rotations (N, J, 4) at times in frames, of (F, J, 4); a time on a frame gives that frame exactly."""
+    """Rotations (N, J, 4) of (F, J, 4) at times in frames. At a whole frame they are exactly that frame's."""
     first, second, share = _between(times)
     if not share.any():
         return quat.continuous(rotations[first])
@@ -36,7 +36,7 @@ def sample_rotations(rotations: Array, times: Array) -> Array:
 
 
 def sample_positions(positions: Array, times: Array) -> Array:
-    """Positions (N, ..., 3) at times in frames, of (F, ..., 3)."""
+    """Positions (N, ..., 3) of (F, ..., 3) at times in frames."""
     first, second, share = _between(times)
     share = share.reshape(-1, *(1,) * (positions.ndim - 1))
     return positions[first] * (1 - share) + positions[second] * share

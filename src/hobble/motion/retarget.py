@@ -1,11 +1,11 @@
-"""One figure's motion on another: by joint maps, rest poses and leg lengths, feet kept where they stand.
+"""Transfers one figure's motion to another, by joint maps, rest poses and leg lengths.
 
-World rotations carry over relative to the rest poses. Limbs point where the source's limbs point; trunk, head
-and feet turn as far from their own rest as the source's do from theirs, so that a flat foot stays flat
-whatever the height of its ankle. The path is scaled by the length of the legs, and the balls of the feet
-follow the source's, scaled alike, by two-bone inverse kinematics: what does not slide in the source does not
-slide in the result. Joints that follow none of the source (fingers, face, roll joints) keep their rest pose
-on the joint above them.
+World rotations are transferred relative to the rest poses. Limbs point where the source's limbs point. Trunk,
+head and feet turn as far from their rest pose as in the source, so that a flat foot stays flat whatever the
+height of its ankle. The path is scaled by the leg length. Two-bone inverse kinematics puts the balls of the
+feet where the source's are, scaled, so that feet that do not slide in the source do not slide in the result.
+Joints that follow no joint of the source (fingers, face, roll joints) keep their rest pose relative to the
+joint above.
 """
 
 from __future__ import annotations
@@ -22,32 +22,31 @@ from hobble.core.ik import aim, two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations, rest_positions
 from hobble.motion.axes import rest_frame
-from hobble.motion.feet import level_heels
+from hobble.motion.heel_tilt import level_heels
 from hobble.motion.rig import leg_length, missing_bone
 
-# Joints that point along a limb: role -> the role at the other end of the bone.
+# Bones of limbs: role of the joint -> role of the bone's other end.
 LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "heel"}
 SIDES = ("left", "right")
 # Stretch of the source's leg from which on, and from which fully, the target's must not be straighter.
 BENT, NEARLY_STRAIGHT = 0.88, 0.95
-SMOOTH = 0.08  # seconds to either side over which the hips come down
+SMOOTH = 0.08  # seconds on each side over which the hips come down
 MOST_DROP = 6.0  # cm
-STRAIGHT = 0.5  # cm: a knee nearer than this to the line from hip to ankle is taken to point forward
+STRAIGHT = 0.5  # cm: a knee nearer to the line from hip to ankle counts as pointing forward
 
 
 @dataclass(frozen=True)
 class Retarget:
-    """What it takes to move `target` as `source` moves; made once by `plan`, applied to any pose.
+    """How `target` follows `source`. Made once by `plan` and applied to any pose.
 
-    joints: (M,) target joints that follow a joint of the source, parents first. follows: (M,) those joints.
-    turns: (M, 4) what comes between them: world rotation of the target = that of the source times this.
-    leaders: (J,) for each target joint the nearest of `joints` above it, or itself where it is one of them.
-    arms: (J, 3) where a joint is in its leader's frame; for one of `joints`, in that of its parent's leader.
-    levels: joints of `joints` below the hips, those together whose parents' leaders are placed before them.
-    forward: (3,) where the target's rest pose faces.
-    pelvis: (3,) from the target's hips to the middle between its legs.
-    scale: legs of the target to legs of the source. lift: cm that the
-    legs are higher above the ground than the source's, scaled, because the ankles are.
+    joints: (M,) target joints that follow a joint of the source, parents first. follows: (M,) the joints that
+    they follow. turns: (M, 4) world rotation of the target = world rotation of the source times this.
+    leaders: (J,) for each target joint the nearest of `joints` above it, or itself if it is one of them.
+    arms: (J, 3) position of a joint in its leader's frame; for one of `joints`, in the frame of its parent's
+    leader. levels: the `joints` below the hips in groups, such that the leaders of a group's parents are
+    placed before it. forward: (3,) where the target's rest pose faces. pelvis: (3,) from the target's hips to
+    the middle between its legs. scale: leg length of the target / leg length of the source. lift: cm that the
+    target's ankles are higher above the ground than the source's, scaled.
     """
 
     source: Skeleton = field(repr=False)
@@ -65,10 +64,10 @@ class Retarget:
 
 
 def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Retarget:
-    """Work out how `target` follows `source`; sources: the target's joint -> the joint it follows.
+    """Work out how `target` follows `source`. sources: the target's joint -> the joint that it follows.
 
-    Both need the roles hips, head and, of both sides, shoulder, hip, knee, heel and toe. Raises HobbleError
-    where the target's hips or legs follow nothing, or a bone of a leg has no length.
+    Both need the roles hips and head, and on both sides shoulder, hip, knee, heel and toe. Raises HobbleError
+    if the target's hips or legs follow nothing, or if a bone of a leg has no length.
     """
     pairs = sorted((target.index(mine), source.index(theirs)) for mine, theirs in sources.items())
     joints, follows = (np.array(side) for side in zip(*pairs, strict=True))
@@ -108,7 +107,7 @@ def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Reta
 def _limb_bones(
     source: Skeleton, target: Skeleton, from_source: Array, to_target: Array
 ) -> dict[tuple[int, int], Array]:
-    """(target joint, source joint) of each limb bone -> the turn that makes it point as the source's does."""
+    """(target joint, source joint) of each limb bone -> the turn that makes it parallel to the source's."""
     a, b = rest_positions(target), rest_positions(source)
     out = {}
     for side in SIDES:
@@ -130,7 +129,7 @@ def _ankle(skeleton: Skeleton, to_upright: Array) -> float:
 
 
 def _leaders(target: Skeleton, joints: Array) -> tuple[Array, Array]:
-    """`leaders` and `arms` of a Retarget; what hangs above the hips is carried by them."""
+    """`leaders` and `arms` of a Retarget. Joints above the hips follow the hips."""
     rest, hips = rest_positions(target), target.role("hips")
     leaders = np.full(len(target.joints), hips)
     arms = np.zeros((len(target.joints), 3))
@@ -164,24 +163,24 @@ def retarget_clip(clip: Clip, how: Retarget) -> Clip:
 
 
 def retarget_pose(how: Retarget, positions: Array, rotations: Array) -> tuple[Array, Array]:
-    """A pose, or any number of them, on the target: what a figure driven by a network needs every frame.
+    """Any number of poses on the target, such as the pose of a network in each frame of a game.
 
-    positions (..., J, 3) and rotations (..., J, 4) in the world; returns the same of the target's joints.
+    positions (..., J, 3) and rotations (..., J, 4) in the world. Returns the same of the target's joints.
     """
     return _posed(how, positions, _carried(how, rotations))
 
 
 def _carried(how: Retarget, rotations: Array) -> Array:
-    """World rotations (..., J, 4) of the target's joints that follow; of the others, nothing yet."""
+    """World rotations (..., J, 4) of the target's joints that follow a joint. The others are not set yet."""
     out = np.empty((*rotations.shape[:-2], len(how.target.joints), 4))
     out[..., how.joints, :] = quat.mul(rotations[..., how.follows, :], how.turns)
     return out
 
 
 def _posed(how: Retarget, source: Array, rotations: Array, fps: float | None = None) -> tuple[Array, Array]:
-    """World positions and rotations of the target's joints, the feet where the source's are, scaled.
+    """World positions and rotations of the target's joints, with the feet where the source's are, scaled.
 
-    fps: of successive frames, over which the hips come down smoothly; None for single poses.
+    fps: frame rate of successive frames, over which the hips come down smoothly. None for single poses.
     """
     hips = _hips(how, source, rotations)
     legs = [_Leg(how, source, rotations, hips, side) for side in SIDES]
@@ -206,9 +205,9 @@ def _posed(how: Retarget, source: Array, rotations: Array, fps: float | None = N
 
 
 def _hips(how: Retarget, source: Array, rotations: Array) -> Array:
-    """Where the hips go: so that the middle between the legs is where the source's is, scaled.
+    """Position of the hips that puts the middle between the legs where the source's is, scaled.
 
-    Rigs disagree on where in the pelvis their first joint lies; legs and feet must fit all the same.
+    Rigs place their first joint differently in the pelvis, but legs and feet must fit anyway.
     """
     middle = 0.5 * sum(source[..., how.source.role(f"{side}_hip"), :] for side in SIDES)
     arm = quat.rotate(rotations[..., how.target.role("hips"), :], how.pelvis)
@@ -216,7 +215,7 @@ def _hips(how: Retarget, source: Array, rotations: Array) -> Array:
 
 
 def _smoothed(drop: Array, fps: float) -> Array:
-    """A curve (F,) that runs smoothly above `drop`: its highest value near by, averaged over a while."""
+    """A smooth curve (F,) above `drop`: its running maximum, averaged."""
     reach = max(1, round(SMOOTH * fps))
     padded = np.pad(drop, 2 * reach, mode="edge")
     highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=-1)
@@ -225,9 +224,9 @@ def _smoothed(drop: Array, fps: float) -> Array:
 
 
 class _Leg:
-    """One leg of the target: from where it starts to where the foot has to be.
+    """A leg of the target, from its hip to the position that the foot must reach.
 
-    rotations: (..., J, 4) of the target's joints, in which `bend` turns thigh and shank.
+    rotations: (..., J, 4) of the target's joints. `bend` changes those of thigh and shank.
     """
 
     def __init__(self, how: Retarget, source: Array, rotations: Array, hips: Array, side: str) -> None:
@@ -247,7 +246,7 @@ class _Leg:
         self.stretch = np.linalg.norm(c - a, axis=-1) / length
 
     def drop(self) -> Array:
-        """(...) cm by which the hips must come down so that the leg is no straighter than the source's."""
+        """(...) cm that the hips must come down so that the leg is no straighter than the source's."""
         reach = self.stretch * (np.linalg.norm(self.thigh) + np.linalg.norm(self.shank))
         way = self.start - self.ankle
         level = np.minimum(way[..., 0] ** 2 + way[..., 2] ** 2, reach**2)
@@ -256,7 +255,7 @@ class _Leg:
         return np.minimum(need, MOST_DROP) * share * share * (3 - 2 * share)
 
     def bend(self, start: Array) -> None:
-        """Turn thigh and shank so that the ankle gets where it has to be; the foot stays turned as it is."""
+        """Turn thigh and shank so that the ankle reaches its position. The foot keeps its rotation."""
         upper, lower = self.rotations[..., self.hip, :], self.rotations[..., self.knee, :]
         pole = _knee_direction(upper, lower, self.thigh, self.shank, self.forward)
         lengths = float(np.linalg.norm(self.thigh)), float(np.linalg.norm(self.shank))
@@ -266,7 +265,7 @@ class _Leg:
 
 
 def _knee_direction(hip: Array, knee: Array, thigh: Array, shank: Array, ahead: Array) -> Array:
-    """Where the knee points: off the line from hip to ankle, and, the straighter the leg, forward."""
+    """Where the knee points: away from the line hip-ankle. The straighter the leg, the more it is forward."""
     along = quat.rotate(hip, thigh)
     line = along + quat.rotate(knee, shank)
     line = line / np.linalg.norm(line, axis=-1, keepdims=True)

@@ -1,5 +1,4 @@
-"""What a rig says about itself: its unit, its axes, where it faces, and which of the known skeletons it
-is."""
+"""Finds a rig's unit, its axes, its facing direction, and which known skeleton it is."""
 
 from __future__ import annotations
 
@@ -18,14 +17,14 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.core.untrusted import printable, read_text, read_yaml
 
-# Centimetres per unit of the file; the CMU files count in inches / 0.45.
+# Centimetres per unit of the file. The unit of CMU files is an inch / 0.45.
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
-LEG = 80.0  # thigh and shank of an adult of ordinary size, cm
-KNOWN = 0.75  # share of a clip's joints that a skeleton must know by name to be its rig
+LEG = 80.0  # cm: thigh and shank of an average adult
+KNOWN = 0.75  # a skeleton is a clip's rig if it has at least this share of the joint names
 NAME = re.compile(
     r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE
 )  # of a joint in a skeleton file
-# Degrees by which bones of two rest poses may differ that are taken for one, by the role at the bone's end.
+# Degrees that bones may differ in two rest poses that count as equal, by the role at the bone's end.
 LIKE = {"elbow": 20.0, "wrist": 25.0, "knee": 35.0, "heel": 35.0, "toe": 35.0}
 LEG_RANGE = (50.0, 125.0)
 FARTHEST = 1e5  # cm from a joint to its parent
@@ -35,7 +34,7 @@ MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") fo
 
 @dataclass(frozen=True)
 class Target:
-    """A skeleton as its file describes it, with its maps to other skeletons."""
+    """A skeleton as in its file, with its maps to other skeletons."""
 
     skeleton: Skeleton
     maps: Mapping[str, Mapping[str, str]]
@@ -43,10 +42,10 @@ class Target:
 
 @dataclass(frozen=True)
 class Match:
-    """Which skeleton a clip's joints are those of, and how they carry over to the target.
+    """Which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: the name of the skeleton file. roles: role -> the clip's joint. same: the clip is on the target
-    itself. sources: the target's joint -> the clip's joint that it follows.
+    rig: name of the skeleton file. roles: role -> the clip's joint. same: the clip is on the target itself.
+    sources: the target's joint -> the clip's joint that it follows.
     """
 
     rig: str
@@ -56,7 +55,7 @@ class Match:
 
 
 def load_skeleton(path: str | Path, name: str | None = None) -> Target:
-    """Read a skeleton file (`config/skeletons/<name>.yaml`, validated when the workflow starts)."""
+    """Read a skeleton file (`config/skeletons/<name>.yaml`). It is validated when the workflow starts."""
     if not Path(path).is_file():
         raise InputError(path, "no such skeleton file")
     state = Path(path).stat()
@@ -65,7 +64,10 @@ def load_skeleton(path: str | Path, name: str | None = None) -> Target:
 
 @lru_cache(maxsize=32)
 def _loaded(path: Path, name: str, changed: int, size: int) -> Target:
-    """A skeleton file in a certain state, read once."""
+    """Read a skeleton file.
+
+    The arguments `changed` and `size` make the cache read it again after a change.
+    """
     data: Any = read_yaml(path)
     try:
         maps = data.pop("maps", None) or {}
@@ -78,9 +80,10 @@ def _loaded(path: Path, name: str, changed: int, size: int) -> Target:
 
 
 def nearest(names: Collection[str], target: Target, folder: str | Path) -> Target:
-    """The skeleton file of `folder` with most of the names, the target where none has more.
+    """The skeleton file in `folder` that has most of the names, or the target if none has more.
 
-    Only files whose text could hold more of them are read in full: to read YAML takes longer than most clips.
+    Files whose text cannot contain more of the names are not parsed, because YAML takes longer than most
+    clips.
     """
     best, found = len(set(names) & set(target.skeleton.joints)), target
     for file in sorted(Path(folder).glob("*.yaml")):
@@ -94,15 +97,15 @@ def nearest(names: Collection[str], target: Target, folder: str | Path) -> Targe
 
 
 def clean_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Joint names without a prefix up to a colon ("mixamorig:Hips"), where they stay distinct."""
+    """Joint names without a prefix up to a colon ("mixamorig:Hips"), unless they become ambiguous."""
     short = tuple(name.rpartition(":")[2].strip() for name in names)
     return short if len(set(short)) == len(short) and all(short) else tuple(names)
 
 
 def find_hips(names: Sequence[str], target: Target, folder: str | Path) -> int:
-    """Which of a clip's joints is the hips by the known skeleton that has most of its names; else the root.
+    """Index of a clip's hips, by the known skeleton that has most of its names; else the root.
 
-    Some programs export a joint above the hips. folder: where the skeleton files lie.
+    Some programs export a joint above the hips. folder: the folder of the skeleton files.
     """
     if names[0] == target.skeleton.roles["hips"]:
         return 0
@@ -111,11 +114,11 @@ def find_hips(names: Sequence[str], target: Target, folder: str | Path) -> int:
 
 
 def match_rig(rig: Skeleton, target: Target, folder: str | Path) -> Match | None:
-    """Find out which known skeleton a clip's rig is, and how it gets onto the target.
+    """Find which known skeleton a clip's rig is, and how it maps to the target.
 
-    rig: the clip's joints. folder: where the skeleton files lie, for their maps. None where no skeleton file
-    has the rig's names. Where its rest pose is not that of its skeleton file, or no map leads to the target,
-    the match has roles and no sources.
+    rig: the clip's joints. folder: the folder of the skeleton files, for their maps. Returns None if no
+    skeleton file has the rig's names. If its rest pose differs from the file's, or no map leads to the
+    target, the match has roles but no sources.
     """
     if not _differences(rig, target.skeleton):
         roles = target.skeleton.roles
@@ -133,7 +136,7 @@ def match_rig(rig: Skeleton, target: Target, folder: str | Path) -> Match | None
 
 
 def rest_alike(rig: Skeleton, known: Skeleton) -> bool:
-    """Whether the bones of two rest poses point the same way, however the bodies are turned or mirrored."""
+    """Whether the bones of two rest poses have equal directions. Turned or mirrored bodies count as equal."""
     mine, theirs = (_bones(skeleton) for skeleton in (rig, known))
     for bone, wanted in theirs.items():
         if bone in mine and mine[bone] @ wanted < np.cos(np.radians(LIKE[bone[1].partition("_")[2]])):
@@ -142,7 +145,7 @@ def rest_alike(rig: Skeleton, known: Skeleton) -> bool:
 
 
 def _bones(skeleton: Skeleton) -> dict[tuple[str, str], Array]:
-    """Role and role -> direction of the bone between them, to the body's left, upward and forward."""
+    """(role, role) -> direction of the bone between, as components to the body's left, up and forward."""
     at = rest_positions(skeleton)
     place = {role: at[skeleton.role(role)] for role in skeleton.roles}
     left = place["left_hip"] - place["right_hip"] + place["left_shoulder"] - place["right_shoulder"]
@@ -164,12 +167,12 @@ def _bones(skeleton: Skeleton) -> dict[tuple[str, str], Array]:
 
 
 def _share(rig: Skeleton, known: Skeleton) -> float:
-    """How many of the clip's joints have names of a known skeleton, 0 to 1."""
+    """Share of the clip's joints, 0 to 1, that have names of a known skeleton."""
     return len(set(rig.joints) & set(known.joints)) / len(rig.joints)
 
 
 def _differences(rig: Skeleton, target: Skeleton) -> list[str]:
-    """What keeps the rig from being the target, in words; empty where names and hierarchy agree."""
+    """Why the rig is not the target, in words. Empty if names and hierarchy agree."""
     mine, wanted = _parent_names(rig), _parent_names(target)
     found = [f"joint {name} is missing" for name in wanted if name not in mine]
     found += [f"joint {name} is not in the skeleton" for name in mine if name not in wanted]
@@ -191,9 +194,9 @@ def _roles(rig: Skeleton, known: Skeleton) -> dict[str, str]:
 
 
 def _unfit(rig: Skeleton, known: Skeleton) -> list[str]:
-    """What keeps a rig from being used as a known one, in words.
+    """Why a rig cannot be used as a known one, in words.
 
-    It may lack fingers or eyes, but nothing that plays a mandatory role, and may have joints unknown to all.
+    It may lack fingers or eyes, but no mandatory role. It may have unknown joints.
     """
     roles = _roles(rig, known)
     found = [f"joint {known.roles[role]} ({role}) is missing" for role in MANDATORY if role not in roles]
@@ -204,7 +207,7 @@ def _unfit(rig: Skeleton, known: Skeleton) -> list[str]:
 
 
 def _nearest(skeleton: Skeleton, other: Skeleton) -> dict[str, str | None]:
-    """Of every joint that both skeletons have: the nearest joint above it that both have."""
+    """For each joint of both skeletons the nearest joint above it that is in both."""
     above: dict[str, str | None] = {}
     for name, p in zip(skeleton.joints, skeleton.parents, strict=True):
         up = None if p < 0 else skeleton.joints[p]
@@ -213,7 +216,7 @@ def _nearest(skeleton: Skeleton, other: Skeleton) -> dict[str, str | None]:
 
 
 def joint_pairs(source: Target, target: Target) -> dict[str, str]:
-    """Target joint -> source joint, by the map of either to the other or of both to a third skeleton."""
+    """Target joint -> source joint, by the map of either to the other, or of both to a third skeleton."""
     mine, theirs = source.skeleton.name, target.skeleton.name
     if mine == theirs:
         return {name: name for name in target.skeleton.joints}
@@ -229,7 +232,7 @@ def joint_pairs(source: Target, target: Target) -> dict[str, str]:
 
 
 def _reverse(pairs: Mapping[str, str]) -> dict[str, str]:
-    """Turn a map round; of several joints that go to one, the first in the file stands for it."""
+    """Invert a map. If several joints map to one, the first in the file counts."""
     out: dict[str, str] = {}
     for a, b in pairs.items():
         out.setdefault(b, a)
@@ -244,7 +247,7 @@ def leg_length(skeleton: Skeleton, roles: Mapping[str, str] | None = None) -> fl
 
 
 def missing_bone(skeleton: Skeleton) -> str | None:
-    """The bone of a leg that has no length, such as "LeftUpLeg to LeftLeg"; None where all have one."""
+    """The first leg bone without length, such as "LeftUpLeg to LeftLeg", or None."""
     for side in ("left", "right"):
         for start, end in (("hip", "knee"), ("knee", "heel")):
             a, b = (skeleton.roles[f"{side}_{part}"] for part in (start, end))
@@ -254,7 +257,10 @@ def missing_bone(skeleton: Skeleton) -> str | None:
 
 
 def unit_of(leg: float) -> tuple[float, str] | None:
-    """Centimetres per unit and its name that make a leg of length `leg` an adult's; None where none does."""
+    """Centimetres per unit, and the unit's name, that make a leg of length `leg` an adult's.
+
+    None if no unit does.
+    """
     if leg <= 0:
         return None
     name = min(UNITS, key=lambda unit: abs(np.log(leg * UNITS[unit] / LEG)))

@@ -1,7 +1,7 @@
-"""The root frame: where the character is and faces, frame by frame, and what it looks like from there.
+"""The root frame: position and facing direction of the character, and coordinates relative to it.
 
-The formulas are those of the original pipeline (Holden, Komura, Saito 2017). The root stands on the ground
-below the hips, its Z axis is the facing direction, its X axis the character's left. "World to root" takes a
+The formulas are those of the original pipeline (Holden, Komura, Saito 2017). The root is on the ground below
+the hips. Its Z axis is the facing direction, its X axis the character's left. "World to root" converts a
 world vector to root coordinates.
 """
 
@@ -17,7 +17,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian
 
-STEADY = 10  # frames at 60 Hz that tell how fast the root goes on past an end of its clip
+STEADY = 10  # frames at 60 Hz whose median velocity continues the root past the ends of its clip
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class RootFrames:
 
 
 def across_body(skeleton: Skeleton, positions: Array) -> Array:
-    """Unit vectors (..., 3) from right to left, over shoulders and hips, of joint positions (..., J, 3)."""
+    """Unit vectors (..., 3) from right to left, through shoulders and hips. positions: (..., J, 3)."""
     shoulders = (
         positions[..., skeleton.role("left_shoulder"), :] - positions[..., skeleton.role("right_shoulder"), :]
     )
@@ -62,7 +62,7 @@ def facing(skeleton: Skeleton, positions: Array, sigma: float) -> Array:
 
 
 def root_frames(clip: Clip, sigma: float) -> RootFrames:
-    """Root position, facing and rotation of every frame; `sigma` in frames of the clip (20 at 60 Hz)."""
+    """Root position, facing and rotation of every frame. sigma: in frames of the clip (20 at 60 Hz)."""
     direction = facing(clip.skeleton, clip.positions, sigma)
     rotation = quat.yaw(-np.arctan2(direction[:, 0], direction[:, 2]))
     change = quat.rotate(quat.mul(rotation[1:], quat.inv(rotation[:-1])), np.array([0.0, 0.0, 1.0]))
@@ -72,11 +72,11 @@ def root_frames(clip: Clip, sigma: float) -> RootFrames:
 
 
 def continued(root: RootFrames, frames: int) -> RootFrames:
-    """The root of a clip that goes on for `frames` frames before its first frame and after its last.
+    """The root, continued for `frames` frames before the first frame and after the last.
 
-    It goes straight on: at the facing that it has there, which is smoothed, and at the median velocity of the
-    STEADY frames before. Frame i of the clip is frame i + `frames` of what is returned. Over the half second
-    that the window looks ahead, that is 11 cm off on the walks of the CMU database.
+    It goes straight, with the smoothed facing direction of that end and the median velocity of the nearest
+    STEADY frames. Frame i of the clip is frame i + `frames` of the result. Half a second ahead this is 11 cm
+    off on the walks of the CMU database.
     """
     steps = np.diff(root.position, axis=0) if len(root) > 1 else np.zeros((1, 2))
     n = np.arange(1, frames + 1)[:, None]
@@ -95,31 +95,31 @@ def continued(root: RootFrames, frames: int) -> RootFrames:
 
 
 def points_to_root(root: RootFrames, points: Array, frames: Array | slice | None = None) -> Array:
-    """World points (N, ..., 3) seen from the roots of `frames` (N of them; all by default). cm.
+    """World points (N, ..., 3), cm, relative to the roots of `frames` (N of them; by default all).
 
-    Heights stay above the world's zero.
+    Heights stay relative to the world's zero.
     """
     at = slice(None) if frames is None else frames
-    position, _ = _beside(root, at, points)
+    position, _ = _for_broadcast(root, at, points)
     origin = np.zeros((*position.shape[:-1], 3))
     origin[..., [0, 2]] = position
     return vectors_to_root(root, points - origin, at)
 
 
 def vectors_to_root(root: RootFrames, vectors: Array, frames: Array | slice | None = None) -> Array:
-    """World vectors (N, ..., 3), such as velocities and directions, turned into the roots of `frames`."""
-    _, rotation = _beside(root, slice(None) if frames is None else frames, vectors)
+    """World vectors (N, ..., 3), such as velocities and directions, in the root frames of `frames`."""
+    _, rotation = _for_broadcast(root, slice(None) if frames is None else frames, vectors)
     return quat.rotate(rotation, vectors)
 
 
 def rotations_to_root(root: RootFrames, rotations: Array, frames: Array | slice | None = None) -> Array:
     """World rotations (N, ..., 4) as rotations (N, ..., 4) relative to the roots of `frames`."""
-    _, turn = _beside(root, slice(None) if frames is None else frames, rotations)
+    _, turn = _for_broadcast(root, slice(None) if frames is None else frames, rotations)
     return quat.mul(np.broadcast_to(turn, rotations.shape), rotations)
 
 
 def local_pose(clip: Clip, root: RootFrames) -> tuple[Array, Array, Array]:
-    """What the network sees and predicts of every joint, for the frames 0 .. F-2.
+    """The pose as the network sees it, for the frames 0 .. F-2.
 
     Returns positions (F-1, J, 3) in cm, velocities (F-1, J, 3) in cm a frame, both in the frame's root, and
     rotations (F-1, J, 3): axis times half the angle.
@@ -131,8 +131,8 @@ def local_pose(clip: Clip, root: RootFrames) -> tuple[Array, Array, Array]:
     return positions, velocities, rotations
 
 
-def _beside(root: RootFrames, frames: Array | slice, values: Array) -> tuple[Array, Array]:
-    """Position and rotation of the chosen roots, shaped to broadcast against `values` (N, ..., k)."""
+def _for_broadcast(root: RootFrames, frames: Array | slice, values: Array) -> tuple[Array, Array]:
+    """Position and rotation of the chosen roots, with axes added to broadcast with `values` (N, ..., k)."""
     position, rotation = root.position[frames], root.rotation[frames]
     between = (1,) * (values.ndim - 2)
     return (

@@ -1,4 +1,4 @@
-"""A file's motion in centimetres, right-handed, Y up, on a rig whose rest pose stands."""
+"""Loads a file's motion in centimetres, right-handed, with Y up, on a rig whose rest pose stands."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from hobble.motion.defects import Repaired, flips, repair
 from hobble.motion.draft import refusal
 from hobble.motion.find_body import Doubt, Found, find_body
 from hobble.motion.floor import on_floor
-from hobble.motion.fold import below_hips, decode_below
+from hobble.motion.hips_root import below_hips, decode_below
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import Bvh
 from hobble.motion.rig import (
@@ -37,17 +37,17 @@ from hobble.motion.spine import Spine
 from hobble.motion.stance import upright
 from hobble.motion.standing import stands
 
-STILL = 0.1  # cm: a position channel that stays this near to its offset only repeats it
+STILL = 0.1  # cm: a position channel that stays nearer to its offset only repeats it
 Limb = TypeVar("Limb")
-FOUND = "found"  # what a report calls a rig that no skeleton file describes
+FOUND = "found"  # name in reports of a rig without a skeleton file
 
 
 @dataclass(frozen=True)
 class Source:
     """A file's motion at its own frame rate, on its own rig, or on the parts of its body.
 
-    stance: where its rest pose is from, in words. moving: whether joints below the hips move in their
-    parents. unsure: sentences on what of the rest pose is uncertain.
+    stance: where its rest pose comes from, in words. moving: whether joints below the hips move in their
+    parents. unsure: sentences on what is uncertain about the rest pose.
     """
 
     clip: Clip
@@ -65,11 +65,11 @@ class Source:
 
 
 def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion) -> Source:
-    """A file's motion, checked and where allowed repaired.
+    """A file's motion, checked and, if allowed, repaired.
 
-    maps: the folder of the skeleton files. A rig that one of them describes, in a rest pose like its own, is
-    taken as that; of any other the parts of the body are found, and a rest pose that stands.
-    Raises InputError for a file in which no body can be told, and for what is broken beyond repair.
+    maps: the folder of the skeleton files. A rig with a skeleton file and an equal rest pose is taken as that
+    skeleton. On other rigs the parts of the body and a standing rest pose are found. Raises InputError if the
+    parts cannot be found, or for defects that cannot be repaired.
     """
     repairs = _frame_count(file, options.defects)
     hips = find_hips(clean_names(file.names), target, maps)
@@ -80,7 +80,7 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion
 
 
 def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: ClipMotion) -> Source:
-    """The source of a file on a rig that a skeleton file describes."""
+    """The source of a file whose rig has a skeleton file."""
     rig = replace(rig_of(below_hips(file, hips)), roles=match.roles)
     unit, unit_name = _unit(file.path, leg_length(rig), options.unit)
     decoded = decode_below(file, hips, STILL / unit)
@@ -108,7 +108,7 @@ def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: Clip
 def _unknown(
     file: Bvh, target: Target, known: Match | None, repairs: list[str], options: ClipMotion
 ) -> Source:
-    """The source of a file on any other rig: its parts are found, and a rest pose that stands."""
+    """The source of a file on any other rig. Its parts and a standing rest pose are found."""
     rig = rig_of(file)
     decoded = _decoded(file)
     raw = Clip(file.path.stem, rig, 1.0, decoded.rotations, decoded.root, decoded.translations)
@@ -159,7 +159,7 @@ def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: Cl
     if not found.sided and options.handedness == "auto":
         raise InputError(
             file.path,
-            "no name tells its left side from its right, and its mirror image would move as well",
+            "its joint names do not say left and right, and its mirror image would move as well",
             fix="Set motion.handedness in the data set: right, as BVH files are meant to be, or left, as "
             "from programs with left-handed coordinates.",
         )
@@ -174,10 +174,10 @@ def _swapped(limbs: Mapping[str, Limb]) -> dict[str, Limb]:
 
 
 def _said(found: Found, handedness: str) -> list[str]:
-    """Sentences on what was found, and on what names did not tell."""
+    """Sentences on what was found, and on what names did not say."""
     out = ["No skeleton file describes this rig: its parts were found from structure, motion and names."]
     if not found.sided:
-        out.append(f"No name tells its left side from its right; motion.handedness: {handedness} did.")
+        out.append(f"Its joint names do not say left and right, so motion.handedness: {handedness} was used.")
     return out
 
 
@@ -194,20 +194,20 @@ def _mended(
     told: bool,
     options: ClipMotion,
 ) -> Source:
-    """The source, without what is broken in it, its floor at height zero."""
+    """The source with broken frames repaired and its floor at height zero."""
     leave = options.defects == "leave"
     repaired = Repaired(clip, 0, []) if leave else repair(clip)
     flat = options.ground == "flat" and not leave
     clip, moved, uneven = on_floor(repaired.clip) if flat else (repaired.clip, [], [])
     mended = repaired.sentences + moved
     if mended and options.defects == "refuse":
-        raise InputError(file.path, mended[0], fix="Set motion.defects: repair to mend it so.")
+        raise InputError(file.path, mended[0], fix="Set motion.defects: repair to repair it this way.")
     notes = notes + uneven + flips(clip, repaired.first)
     return Source(clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving, told)
 
 
 def raw_clip(file: Bvh) -> Clip:
-    """A file's motion as it stands: its own unit and axes, at one frame a second."""
+    """A file's motion in its own unit and axes, at one frame a second."""
     decoded = _decoded(file)
     return Clip(file.path.stem, rig_of(file), 1.0, decoded.rotations, decoded.root, decoded.translations)
 
@@ -218,7 +218,7 @@ def _decoded(file: Bvh) -> Decoded:
 
 
 def rig_of(file: Bvh) -> Skeleton:
-    """The joints of a file as a skeleton, in its own unit, its names without prefixes."""
+    """The joints of a file as a skeleton, in its own unit. Names have no prefixes."""
     names = clean_names(file.names)
     short = dict(zip(file.names, names, strict=True))
     ends = {short[name]: sites[0] for name, sites in file.end_sites.items()}
@@ -236,7 +236,7 @@ def _boneless(file: Bvh, bone: str) -> InputError:
 def _frame_count(file: Bvh, defects: str) -> list[str]:
     if len(file) == file.declared:
         return []
-    problem = f"declares {file.declared} frames and holds {len(file)}"
+    problem = f"declares {file.declared} frames and has {len(file)}"
     if defects == "refuse":
         raise InputError(file.path, problem, fix="Export the clip again, or set motion.defects: repair.")
     return [f"The file {problem}; those it holds are used."]
@@ -250,7 +250,7 @@ def _leg(clip: Clip, body: Body) -> float:
 
 
 def _moving(decoded: Decoded, body: Body, unit: float) -> bool:
-    """Whether joints of the body other than its hips move in their parents."""
+    """Whether any joint of the body except its hips moves in its parent."""
     if decoded.translations is None:
         return False
     parts = [j for limbs in (body.arms, body.legs) for limb in limbs.values() for j in limb if j is not None]
@@ -265,7 +265,7 @@ def _unit(path: Path, leg: float, unit: str | float) -> tuple[float, str]:
     if found is None:
         raise InputError(
             path,
-            f"no unit makes this rig a person: thigh and shank together are {leg:g} units long",
+            f"no unit gives this rig a person's size: thigh and shank together are {leg:g} units long",
             fix="Set motion.unit in the data set to the centimetres per unit.",
         )
     return found

@@ -1,4 +1,4 @@
-"""Where the bones of a trunk and a neck point in a rest pose that stands."""
+"""Directions of the bones of trunk and neck in a standing rest pose."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ SHORT = 2.0  # cm: a bone shorter than this has no direction
 
 @dataclass(frozen=True)
 class Spine:
-    """Where the bones of a trunk and a neck point in a rest pose that stands, facing +Z.
+    """Directions of the bones of trunk and neck in a rest pose that stands facing +Z.
 
-    shares: (N,) how far up from hips (0) to chest (1) the bones begin. axes: (N, 3). neck: (3,) to the head.
+    shares: (N,) where the bones begin between hips (0) and chest (1). axes: (N, 3). neck: (3,) to the head.
     """
 
     shares: Array
@@ -30,7 +30,7 @@ class Spine:
 
     @classmethod
     def of(cls, skeleton: Skeleton, body: Body) -> Spine:
-        """The spine of a skeleton, whose rest pose stands; what comes to it should point as it does."""
+        """The spine of a skeleton with a standing rest pose. Converted motion gets the same directions."""
         rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
         chain = (body.hips, *body.trunk, *body.neck, body.head)
         long = [j for k, j in enumerate(chain[1:]) if np.linalg.norm(rest[j] - rest[chain[k]]) > SHORT]
@@ -47,5 +47,5 @@ class Spine:
         return cls(way[:-1][below] / chest, axes[below], axes[-1])
 
     def at(self, share: float) -> Array:
-        """(3,) where the bone points that begins nearest below a share of the way, or little above it."""
+        """(3,) direction of the bone that begins nearest below a share, or slightly above it."""
         return self.axes[max(0, int(np.searchsorted(self.shares, share + REACH, side="right")) - 1)]

@@ -1,10 +1,9 @@
-"""A rig's motion told anew on an upright one: the same joints in the same places, in a rest pose that stands.
+"""Puts a rig's motion on an upright rest pose: the same joints in the same places.
 
-What a joint's rotations mean depends on the pose in which all of them are zero. Where a person could stand in
-that pose, it is the rest pose. Where nobody could (all bones along one axis, a heap of twisted bones), the
-directions of the bones while the figure moves tell how each joint is turned when its bone points down a leg,
-out along an arm or up the trunk; knees and elbows tell where a limb's front is, and feet that stand, what is
-level.
+The meaning of a joint's rotations depends on the pose in which all of them are zero. If a person could stand
+in that pose, it is the rest pose. If not (all bones along one axis, a heap of twisted bones), the directions
+of the bones in motion show how each joint is turned when its bone points down a leg, out along an arm or up
+the trunk. Knees and elbows show a limb's front, and standing feet show what is level.
 """
 
 from __future__ import annotations
@@ -19,14 +18,14 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import rest_positions
 from hobble.motion.body import Body
+from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import doubt
 from hobble.motion.from_motion import from_motion
 from hobble.motion.from_rest import TRUSTED, add_rest, from_rest
 from hobble.motion.orient import apart, mean, pointed
-from hobble.motion.seen import LEFT, Seen
+from hobble.motion.rebase import rebased, with_balls
 from hobble.motion.spine import SHORT, Spine
 from hobble.motion.standing import stands
-from hobble.motion.tell_anew import told_anew, with_balls
 from hobble.motion.tree import above
 
 SAMPLES = 400
@@ -34,10 +33,10 @@ SAMPLES = 400
 
 @dataclass(frozen=True)
 class Upright:
-    """A clip whose rest pose stands, facing +Z with the arms out; its joints are those of the body.
+    """A clip with a standing rest pose that faces +Z with the arms out. Its joints are those of the body.
 
-    rest: where the stance is from, in words. body: the parts by their new indices. notes: sentences on what
-    is uncertain.
+    rest: where the stance comes from, in words. body: the parts by their new indices. notes: sentences on
+    what is uncertain.
     """
 
     clip: Clip = field(repr=False)
@@ -47,20 +46,21 @@ class Upright:
 
 
 def upright(clip: Clip, body: Body, spine: Spine, others: Collection[int] = ()) -> Upright:
-    """The motion of a body on a rig that stands in its rest pose. clip: centimetres, right-handed, Y up.
+    """The motion of a body on a rig that stands in its rest pose.
 
-    spine: where the bones of a trunk point in that pose.
+    clip: centimetres, right-handed, Y up. spine: directions of the trunk's bones in that pose. others:
+    further joints to keep, turned like the body part that they are on.
 
-    Where the bones point decides alone how trunk, limbs and feet are turned, so that the same motion comes
-    out of any rig alike; a zero pose that stands adds what no bone shows: how head, clavicles and hands are
-    turned. others: further joints that are to be kept, turned as the part of the body that they hang from.
+    The directions of the bones alone decide how trunk, limbs and feet are turned, so that the same motion
+    gives the same result on any rig. A standing zero pose adds what no bone shows: how head, clavicles and
+    hands are turned.
     """
     every = np.unique(np.linspace(0, len(clip) - 1, SAMPLES).round().astype(int))
     ends = {
         side: clip.skeleton.end_sites.get(clip.skeleton.joints[leg[2]]) for side, leg in body.legs.items()
     }
     speeds = _speeds(clip)[every]
-    seen = Seen(body, clip.positions[every], clip.global_rotations[every], speeds, ends, spine)
+    seen = BodySample(body, clip.positions[every], clip.global_rotations[every], speeds, ends, spine)
     rest = rest_positions(clip.skeleton)
     frames, problem = from_motion(seen), stands(body, rest)
     if problem is None:
@@ -69,11 +69,11 @@ def upright(clip: Clip, body: Body, spine: Spine, others: Collection[int] = ()) 
             problem = "the trunk is twisted"
         else:
             add_rest(frames, zero, seen)
-    said = "its zero pose" if problem is None else f"its motion, since in its zero pose {problem}"
+    said = "its zero pose" if problem is None else f"its motion, because in its zero pose {problem}"
     unsure = None if problem is None else doubt(seen)
     kept = _kept(clip, seen, others, frames)
     clip, body = with_balls(clip, body, frames)
-    return Upright(*told_anew(clip, body, [*body.joints, *kept], frames), said, [unsure] if unsure else [])
+    return Upright(*rebased(clip, body, [*body.joints, *kept], frames), said, [unsure] if unsure else [])
 
 
 def _speeds(clip: Clip) -> Array:
@@ -83,11 +83,10 @@ def _speeds(clip: Clip) -> Array:
     return np.linalg.norm(np.gradient(clip.positions, axis=0), axis=-1) * clip.fps
 
 
-def _kept(clip: Clip, seen: Seen, others: Collection[int], frames: dict[int, Array]) -> list[int]:
-    """Those of the other joints that can be kept, with their frames put into `frames`.
+def _kept(clip: Clip, seen: BodySample, others: Collection[int], frames: dict[int, Array]) -> list[int]:
+    """The other joints that can be kept. Their frames are added to `frames`.
 
-    Each is turned, on average, as the part of the body that it hangs from; the base of a finger points along
-    it.
+    On average each is turned like the body part that it is on. The base of a finger points along the finger.
     """
     body, parents = seen.body, clip.skeleton.parents
     out = []

@@ -11,18 +11,18 @@ from hobble.motion.body import SIDES, Body
 from hobble.motion.orient import off, unit
 from hobble.motion.spine import SHORT
 
-LEG, TRUNK, HEAD, FOOT = 40.0, 40.0, 50.0, 50.0  # degrees off the straight at which a person still stands
+LEG, TRUNK, HEAD, FOOT = 40.0, 40.0, 50.0, 50.0  # degrees: largest angles of a standing person
 
 
 def stands(body: Body, rest: Array) -> str | None:
-    """What keeps anybody from standing in a rest pose, in words; None where nothing does. rest: (J, 3)."""
+    """Why a person could not stand in a rest pose (J, 3), in words. None if they could."""
     hips = 0.5 * (rest[body.legs["left"][0]] + rest[body.legs["right"][0]])
     shoulders = 0.5 * (rest[body.arms["left"][1]] + rest[body.arms["right"][1]])
     up = unit(shoulders - hips)
     left = rest[body.legs["left"][0]] - rest[body.legs["right"][0]]
     across = rest[body.arms["left"][1]] - rest[body.arms["right"][1]]
     if off(left, across) > 30 or abs(off(left, up) - 90) > 25:
-        return "hips and shoulders lie crosswise"
+        return "hips and shoulders point in different directions"
     if off(rest[body.head] - shoulders, up) > HEAD:
         return "the head is not above the shoulders"
     ahead = np.cross(unit(left), up)

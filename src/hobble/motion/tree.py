@@ -1,4 +1,4 @@
-"""Ways between joints in the tree of a rig; parents: the parent of each joint, -1 for the root."""
+"""Paths between joints in the tree of a rig. parents: the parent of each joint, -1 for the root."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 
 def above(parents: Sequence[int], joint: int) -> list[int]:
-    """The joint and all above it, the root last."""
+    """The joint and all joints above it, the root last."""
     out = [joint]
     while parents[out[-1]] >= 0:
         out.append(parents[out[-1]])
@@ -14,13 +14,13 @@ def above(parents: Sequence[int], joint: int) -> list[int]:
 
 
 def common(parents: Sequence[int], joints: Iterable[int]) -> int:
-    """The nearest joint that lies above each of `joints`, or is one of them."""
+    """The nearest joint that is above each of `joints`, or is one of them."""
     first, *others = (above(parents, j) for j in joints)
     return next(j for j in first if all(j in other for other in others))
 
 
 def path(parents: Sequence[int], start: int, end: int) -> list[int]:
-    """The joints from `start` to `end`, both included: up to what they have in common, and down again."""
+    """The joints from `start` to `end`, both included: up to their common joint, then down."""
     meet = common(parents, (start, end))
     up = above(parents, start)
     down = above(parents, end)

@@ -15,14 +15,14 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
 from hobble.core.skeleton import Skeleton
 from hobble.synthetic import files
-from hobble.synthetic.feet import move_foot
+from hobble.synthetic.foot_motion import move_foot
 from hobble.synthetic.footsteps import landings, phase_curve, stances
-from hobble.synthetic.gait import LEFT, RIGHT, healthy_style
 from hobble.synthetic.ground import Ground, make_ground
 from hobble.synthetic.options import Synthetic
 from hobble.synthetic.path import gait_keys, walk_path
 from hobble.synthetic.pose import pose
 from hobble.synthetic.recipes import GROUND, Segment, generator, plan
+from hobble.synthetic.style import LEFT, RIGHT, healthy_style
 
 SHORTEST = 60  # frames at 60 Hz in which some foot lands; no clip is shorter
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.synthetic.gait import LEFT, RIGHT, SIGN, Style
 from hobble.synthetic.ground import Ground
 from hobble.synthetic.path import Path
+from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style
 
 ANKLE_HEIGHT = 7.0  # of the ankle joint over the sole; the toe joint is 4.5 cm lower on the skeleton
 FOOT = np.array([0.0, -4.5, 13.5])  # from ankle to toe joint in a foot that stands flat

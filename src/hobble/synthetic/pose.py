@@ -9,10 +9,10 @@ from hobble.core import quat
 from hobble.core.ik import two_bone_knee
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
-from hobble.synthetic.feet import Foot, smooth_above
-from hobble.synthetic.gait import LEFT, RIGHT, SIGN, Style
+from hobble.synthetic.foot_motion import Foot, smooth_above
 from hobble.synthetic.ground import Ground, flat
 from hobble.synthetic.path import Path
+from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style
 
 X, Y, Z = np.eye(3)
 TWIST = 12.0  # degrees of an upper arm inward

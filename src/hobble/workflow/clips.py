@@ -21,7 +21,7 @@ from hobble.core.clip_files import (
 )
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.untrusted import check_regular
-from hobble.hurt.options import TELLS, Hurt
+from hobble.hurt.options import HURT_CHANNEL, Hurt
 from hobble.synthetic.options import WRITES
 from hobble.workflow.channel_sources import ChannelSources
 from hobble.workflow.sources import joint_names, nearest_rig, read_checksums
@@ -70,7 +70,7 @@ class Clips:
             )
         return {name: entry or ClipEntry() for name, entry in listed.items()}
 
-    hurt_channel = TELLS  # the channel with the severities of hurt versions
+    hurt_channel = HURT_CHANNEL  # the channel with the severities of hurt versions
 
     @staticmethod
     def original(clip: str) -> str:
@@ -87,7 +87,11 @@ class Clips:
         """Name of each hurt version of the healthy clips -> its number among them, from 0."""
         options = self.catalogue.dataset(dataset).hurt
         healthy = (
-            [clip for clip in self.listed(dataset) if self.channel_sources.neutral(dataset, clip, TELLS)]
+            [
+                clip
+                for clip in self.listed(dataset)
+                if self.channel_sources.neutral(dataset, clip, HURT_CHANNEL)
+            ]
             if options
             else []
         )

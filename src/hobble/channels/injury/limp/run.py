@@ -20,7 +20,7 @@ from hobble.channels.injury.walks import links as links_of
 from hobble.core.errors import HobbleError
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.spearman import spearman
-from hobble.gait.compare import compare_walk
+from hobble.gait.comparison import compare_walk
 from hobble.gait.effects import EFFECTS, effects, effects_of_people
 from hobble.gait.features import features
 from hobble.gait.people import people

@@ -1,4 +1,4 @@
-"""Standing feet of another shape: tilted about their balls, so that their heels do not slide either."""
+"""Keeps the heels of standing feet from sliding: tilts feet of another shape about their balls."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.quat import Array
 
-STANDING = 0.8  # cm a frame at 60 Hz: a heel slower than this is treated as standing
+STANDING = 0.8  # cm a frame at 60 Hz: a slower heel counts as standing
 SHORTEST = 1 / 20  # seconds
-RAMP = 1 / 15  # seconds before and after standing over which the tilt sets in and goes
+RAMP = 1 / 15  # seconds before and after standing over which the tilt is blended
 MOST_TILT = np.radians(10.5)  # half of all frames need 0.3 degrees, nine of ten less than 3.5
-LOW = 1.5  # cm of height of the ankle above the ball from which on tilting helps
+LOW = 1.5  # cm: tilting helps if the ankle is at least this far above the ball
 
 
 def level_heels(foot: Array, heel: Array, toe: Array, fps: float) -> Array:
-    """Rotations (F, 4) about the ball of the foot that keep a standing heel as still as the source's.
+    """Rotations (F, 4) about the ball of the foot that keep a standing heel as still as in the source.
 
-    A foot of another shape carries its ankle at another height above the ball, so that the same rocking would
-    move it further over the ground. foot: (F, 3) from heel to ball in the world, of the figure to be kept
-    from sliding. heel, toe: (F, 3) where the source has them, scaled.
+    In a foot of another shape the ankle has another height above the ball. The same rotation then moves it
+    further over the ground. foot: (F, 3) from heel to ball in the world, of the result. heel, toe: (F, 3)
+    positions in the source, scaled.
     """
     apart = toe - foot - heel
     missing = np.zeros_like(foot)
@@ -31,7 +31,7 @@ def level_heels(foot: Array, heel: Array, toe: Array, fps: float) -> Array:
     across = np.linalg.norm(level, axis=1, keepdims=True)
     ahead = level / np.maximum(across, 1e-9)
     side = np.cross([0.0, 1.0, 0.0], ahead)
-    # Raising the heel by an angle moves it level by that times its height; where it has none, nothing helps.
+    # A rotation moves the heel sideways by the angle times its height. Without height it has no effect.
     height = foot[:, 1]
     pitch = np.sum(missing * ahead, axis=1) * height**3 / (height**4 + LOW**4)
     yaw = np.sum(missing * side, axis=1) / np.maximum(across[:, 0], LOW)
@@ -40,12 +40,14 @@ def level_heels(foot: Array, heel: Array, toe: Array, fps: float) -> Array:
 
 
 def _held(angle: Array) -> Array:
-    """The angle, held below MOST_TILT; what is well below it stays as it is."""
+    """The angle, limited smoothly to MOST_TILT. Small angles do not change."""
     return angle / (1 + (angle / MOST_TILT) ** 6) ** (1 / 6)
 
 
 def standing_runs(point: Array, slow: float, shortest: int) -> list[tuple[int, int]]:
-    """Runs [first, last) of `shortest` frames or more in which a point (F, 3) moves less than `slow` each."""
+    """Runs [first, last) of at least `shortest` frames in which a point (F, 3) moves less than `slow` a
+    frame.
+    """
     speed = np.linalg.norm(np.diff(point, axis=0), axis=1)
     still = np.concatenate([[False], speed < slow, [False]])
     starts = np.flatnonzero(~still[:-1] & still[1:])
@@ -54,10 +56,10 @@ def standing_runs(point: Array, slow: float, shortest: int) -> list[tuple[int, i
 
 
 def _bridged(values: Array, runs: list[tuple[int, int]], ramp: int) -> Array:
-    """Values (F, 3) that are those given within the runs, and between them go smoothly.
+    """Values (F, 3) that equal `values` within the runs and are smooth between them.
 
-    They fade over `ramp` frames after a run and set in over as many before the next; where two runs are
-    nearer to each other than that, they go straight from the one's last to the other's first.
+    They fade out over `ramp` frames after a run and fade in over as many before the next. If two runs are
+    nearer than that, they go straight from one to the other.
     """
     at: list[int] = [-ramp - 1]
     known: list[Array] = [np.zeros((1, 3))]

@@ -11,8 +11,8 @@ from scipy.ndimage import maximum_filter1d
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.synthetic.footsteps import FOOT, Stance
-from hobble.synthetic.gait import Style
 from hobble.synthetic.ground import Ground
+from hobble.synthetic.style import Style
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
 HEEL = np.array([0.0, -4.2, -3.0])  # the back of the sole from the ankle, nearly

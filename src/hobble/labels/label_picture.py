@@ -1,4 +1,4 @@
-"""The label picture of a clip, as small arrays that the report draws."""
+"""The label picture of a clip, as small arrays for the report."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from hobble.labels.model import CONTACT_ROLES, GAITS, Labels
 POINTS = 400
 
 
-def strip(labels: Labels, clip: Clip, points: int = POINTS) -> dict[str, Any]:
-    """Footfalls, phase, gait and speed along time, at most `points` values each.
+def label_picture(labels: Labels, clip: Clip, points: int = POINTS) -> dict[str, Any]:
+    """Footfalls, phase, gait and speed over time, with at most `points` values each.
 
-    `contacts`: for each joint a list of [from, to) in seconds. `seconds`: the times of `phase` (None where it
-    is not known), `gait` (a list for each) and `speed` (m/s). `landings`: seconds at which each foot lands.
+    `contacts`: for each joint a list of [from, to) in seconds. `seconds`: the times of `phase` (None if
+    unknown), `gait` (a list for each) and `speed` (m/s). `landings`: seconds of each foot's landings.
     """
     frames = len(labels)
     at = np.unique(np.linspace(0, max(frames - 1, 0), min(frames, points)).round().astype(int))

@@ -1,4 +1,4 @@
-"""What is seen of a body in some frames of its motion: its bones, its fronts, its feet that stand."""
+"""Measures a body in some frames of its motion: its bones, where its parts face, and its standing feet."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from hobble.motion.orient import pointed, robust, unit
 from hobble.motion.spine import SHORT, Spine
 
 LEFT = np.array([1.0, 0.0, 0.0])
-FLEXED = 0.05  # mean sine of the bend of a knee or an elbow from which on it tells where the front is
+FLEXED = 0.05  # a knee or elbow with a larger mean sine of its bend shows where the limb's front is
 
 
-class Seen:
-    """What is seen of a body in the frames that are looked at: bones, fronts, and how its joints are turned.
+class BodySample:
+    """A sample of frames of a body: bones, facing directions, and how joints are turned.
 
-    A joint's frame is the rotation (4,) from the axes of a figure that stands facing +Z, arms out, to the
-    joint's own: its world rotation times it is how far the part is turned from that stance.
+    A joint's frame is the rotation (4,) from the axes of a figure that stands facing +Z with its arms out to
+    the joint's own axes. The joint's world rotation times its frame is the turn of the body part from that
+    stance.
 
-    positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds: (S, J) cm a second. ends: where the
-    end site of an ankle is, if it has one. spine: where the bones of a trunk point in that stance.
+    positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds: (S, J) cm a second. ends: position of
+    an ankle's end site, if it has one. spine: direction of the trunk's bones in that stance.
     """
 
     def __init__(
@@ -46,26 +47,26 @@ class Seen:
         return unit(self.at[:, end] - self.at[:, start])
 
     def local(self, joint: int, vectors: Array) -> Array:
-        """The mean of world vectors (S, 3) as the joint has them, (3,)."""
+        """(3,) mean of world vectors (S, 3) in the joint's coordinates."""
         own = quat.rotate(quat.inv(self.turned[:, joint]), vectors)
         return robust(own)
 
     def bone(self, start: int, end: int) -> Array:
-        """(3,) the bone to `end` as `start` has it."""
+        """(3,) the bone from `start` to `end`, in the coordinates of `start`."""
         return self.local(start, self.at[:, end] - self.at[:, start])
 
     def length(self, *joints: int) -> float:
-        """Of the way from joint to joint."""
+        """Distance between two joints."""
         ways = (self.at[:, b] - self.at[:, a] for a, b in pairwise(joints))
         return sum(float(np.median(np.linalg.norm(way, axis=-1))) for way in ways)
 
     def first_long(self, joint: int, following: Sequence[int]) -> Array:
-        """(3,) the bone to the first of the following joints that is not in the same place."""
+        """(3,) the bone to the first of the following joints that is at another place."""
         bones = [self.bone(joint, end) for end in following]
         return next((bone for bone in bones if np.linalg.norm(bone) > SHORT), bones[-1])
 
     def hinge(self, start: int, middle: int, end: int, otherwise: Array) -> Array:
-        """(S, 3) about what a limb bends, a knee to the body's left; `otherwise` where it hardly bends."""
+        """(S, 3) axis of a limb's bend, for a knee to the body's left. `otherwise` if it hardly bends."""
         axis = np.cross(self.line(start, middle), self.line(middle, end))
         own = self.local(start, axis)
         if np.linalg.norm(own) < FLEXED:
@@ -73,7 +74,7 @@ class Seen:
         return quat.rotate(self.turned[:, start], np.broadcast_to(unit(own), axis.shape))
 
     def hand(self, side: str, straight: Array, sign: float) -> Array:
-        """The frame of a hand: as its forearm's, but pointing where its fingers are."""
+        """The frame of a hand: its forearm's, but pointing where its fingers are."""
         if side not in self.body.fingers:
             return straight
         return pointed(straight, sign * LEFT, self.bone(self.body.arms[side][3], self.body.fingers[side]))

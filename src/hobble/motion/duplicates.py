@@ -1,4 +1,4 @@
-"""Clips that are one motion: the same file, the same motion under another name or facing, or its mirror."""
+"""Finds duplicate clips: the same file, the same motion under another name or heading, or a mirror."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ from hobble.core.files import load_npz, save_npz
 from hobble.core.quat import Array
 from hobble.motion.root import facing
 
-NEAR = 1.0  # cm of mean difference up to which two clips are one motion
-LONGER = 0.02  # of its length: how much longer a clip may be than one of the same motion
+NEAR = 1.0  # cm: clips with a smaller mean difference are the same motion
+LONGER = 0.02  # relative difference of length that the same motion may have
 POSES = 12
 FLIP = np.array([-1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True)
 class Likeness:
-    """What two clips are compared by.
+    """The data by which clips are compared.
 
-    sha256: of the file. poses: (12, J, 3) cm, frames evenly over the clip, seen from the ground below the
-    hips and from where the first one faces. mirrored: the same in a mirror; None where the rig has none.
+    sha256: of the file. poses: (12, J, 3) cm, frames evenly over the clip, relative to the ground below the
+    hips and to the first facing direction. mirrored: the same, mirrored, or None if the rig cannot be
+    mirrored.
     """
 
     name: str
@@ -36,7 +37,7 @@ class Likeness:
 
 
 def likeness(clip: Clip, sha256: str) -> Likeness:
-    """A clip, as it is compared."""
+    """The data by which a clip is compared with others."""
     at = np.linspace(0, len(clip) - 1, POSES).round().astype(int)
     moved = None if clip.translations is None else clip.translations[at]
     few = replace(clip, rotations=clip.rotations[at], root=clip.root[at], translations=moved)
@@ -78,7 +79,7 @@ def load_likenesses(path: Path) -> list[Likeness]:
 
 
 def same_pairs(clips: Sequence[Likeness]) -> list[tuple[str, str, str]]:
-    """Pairs of clips that are one motion: name, name, and "the same file", "the same motion" or "mirrors"."""
+    """Pairs of duplicates: name, name, and "the same file", "the same motion" or "mirrors"."""
     out = []
     order = sorted(clips, key=lambda clip: clip.seconds)
     for i, a in enumerate(order):

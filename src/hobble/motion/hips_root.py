@@ -1,4 +1,4 @@
-"""Joints above the hips, such as the "Reference" of some programs: folded into what hangs from them."""
+"""Folds joints above the hips, such as the "Reference" of some programs, into the hips."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hobble.motion.read import Bvh
 
 
 def below_hips(file: Bvh, hips: int) -> Bvh:
-    """The file with the joint `hips` as its root; whatever does not hang from it is left out."""
+    """The file with the joint `hips` as its root. Joints that are not below it are left out."""
     if not hips:
         return file
     below = [hips]
@@ -23,7 +23,7 @@ def below_hips(file: Bvh, hips: int) -> Bvh:
 
 
 def decode_below(file: Bvh, hips: int, still: float) -> Decoded:
-    """Rotations and positions of `below_hips`: the joints above, which may stand or move, carry the hips.
+    """Rotations and positions of `below_hips`. The joints above, which may move, move the hips.
 
     still: as for `decode`.
     """
@@ -45,12 +45,12 @@ def decode_below(file: Bvh, hips: int, still: float) -> Decoded:
     rotations[:, 0] = quat.mul(turn, rotations[:, 0])
     root = place + quat.rotate(turn, decoded.root)
     names = ", ".join(file.names[j] for j in above)
-    notes = [f"What stands above {file.names[hips]} ({names:.100}) was folded into it.", *decoded.notes]
+    notes = [f"The joints above {file.names[hips]} ({names:.100}) were folded into it.", *decoded.notes]
     return replace(decoded, rotations=quat.continuous(rotations), root=root, notes=notes)
 
 
 def part(file: Bvh, joints: list[int]) -> Bvh:
-    """The same file with only some of its joints, parents first; the first becomes the root."""
+    """The same file with only some of its joints, parents first. The first becomes the root."""
     new = {old: i for i, old in enumerate(joints)}
     starts = np.cumsum([0, *(len(c) for c in file.channels)])
     columns = [column for j in joints for column in range(starts[j], starts[j + 1])]

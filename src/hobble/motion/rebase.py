@@ -1,4 +1,4 @@
-"""A clip told anew on the joints of its body alone, each turned from a rest pose that stands."""
+"""Converts a clip to the joints of its body alone, with rotations relative to a standing rest pose."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from hobble.core.clip import Clip
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, local_rotations
 from hobble.motion.body import SIDES, Body
-from hobble.motion.seen import LEFT
+from hobble.motion.body_sample import LEFT
 from hobble.motion.tree import above
 
 MOVES = 0.1  # cm
-BALL = np.array([0.0, -0.045, 0.14])  # from the ankle, to the length of the leg, of a foot without toes
+BALL = np.array([0.0, -0.045, 0.14])  # from the ankle, in leg lengths, for feet without toes
 
 
-def told_anew(clip: Clip, body: Body, joints: list[int], frames: dict[int, Array]) -> tuple[Clip, Body]:
-    """The clip on those joints alone, each turned from its new rest pose; and the body by its new indices."""
+def rebased(clip: Clip, body: Body, joints: list[int], frames: dict[int, Array]) -> tuple[Clip, Body]:
+    """The clip on these joints alone, relative to its new rest pose, and the body with new indices."""
     skeleton = clip.skeleton
     joints = [
         body.hips,
@@ -56,7 +56,7 @@ def _depth(skeleton: Skeleton, body: Body, joint: int) -> int:
 
 
 def _carrier(parents: Sequence[int], body: Body, joint: int, among: Collection[int]) -> int:
-    """What a part of the body hangs from; of any other joint, the nearest of `among` above it."""
+    """The joint that carries a part of the body. For other joints, the nearest of `among` above it."""
     chain = (body.hips, *body.trunk, *body.neck, body.head)
     if joint in chain:
         return chain[chain.index(joint) - 1]
@@ -69,7 +69,10 @@ def _carrier(parents: Sequence[int], body: Body, joint: int, among: Collection[i
 
 
 def with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, Body]:
-    """The clip with a ball on every foot, and their frames: where a rig has none, where a body has it."""
+    """The clip with a ball on every foot, and frames with the balls.
+
+    Missing balls are put where people have them.
+    """
     without = [side for side in SIDES if body.legs[side][3] is None]
     if not without:
         return clip, body

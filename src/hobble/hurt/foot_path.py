@@ -1,6 +1,4 @@
-"""Where each foot goes, on the source's frames: shorter steps, less roll over the toe, a lower or wider
-swing.
-"""
+"""Moves the feet, on the source's frames: shorter steps, less roll over the toe, a lower or wider swing."""
 
 from __future__ import annotations
 
@@ -23,17 +21,19 @@ SIGN = (1.0, -1.0)  # +X is the figure's left
 LEVEL = np.radians(
     8.0
 )  # of pitch over which what is left of it goes from the heel strike's share to the push's
-SHORT = 12.0  # cm: a swing that goes less far is shared out by its time, not by its way
-CLEARANCE = 1.3  # cm of a swinging toe joint over its height in stance, or as little as in the source
-EVEN = 4.0  # cm of height between two stances that leaves the swing as high as it was
-JOGGING = 0.65  # share of what steps differ that a jog does not take on
-ENDS = 0.22  # share of the swing over which its lower height sets in and goes
+SHORT = 12.0  # cm: progress of a shorter swing is measured by time, not by distance
+CLEARANCE = 1.3  # cm: height of a swinging toe joint above its stance, unless it is lower in the source
+EVEN = 4.0  # cm: with this height between two stances the swing is not lowered
+JOGGING = 0.65  # a jog's steps change less by this share
+ENDS = 0.22  # share of the swing over which its lower height is blended in and out
 
 
 @dataclass(frozen=True)
 class Foot:
-    """One foot over F source frames. ankle, ball: (F, 3) of heel and toe joint; turn: (F, 4) of the foot in
-    the world; toes: (F, 4) local, of the toe joint.
+    """One foot over F source frames.
+
+    ankle, ball: (F, 3) heel and toe joint. turn: (F, 4) of the foot in the world. toes: (F, 4) local, of the
+    toe joint.
     """
 
     ankle: Array = field(repr=False)
@@ -43,7 +43,7 @@ class Foot:
 
 
 def rolled_foot(source: Source, effects: Effects, side: int) -> Foot:
-    """The source's foot with less pitch: turned about its ball while its heel is up, else about its ankle."""
+    """The source's foot with less pitch: turned about its ball while the heel is up, else about its ankle."""
     clip, skeleton = source.clip, source.clip.skeleton
     heel, toe = (skeleton.role(f"{SIDES[side]}_{role}") for role in ("heel", "toe"))
     ankle, ball, turn = clip.positions[:, heel], clip.positions[:, toe], clip.global_rotations[:, heel]
@@ -56,7 +56,7 @@ def rolled_foot(source: Source, effects: Effects, side: int) -> Foot:
     raised = pitch - flat
     heel_up = smoothstep(-raised / LEVEL)
     push, strike = (effects.ratio(name)[:, side] for name in ("push", "strike"))
-    # Toes that point down without a push-off reach for the ground as they land: less of that too.
+    # Toes that point down without a push-off reach for the ground before landing. That is reduced, too.
     share = strike + (push - strike) * heel_up
     tilt = quat.from_axis_angle(axis, raised * (share - 1))
     new_along = quat.rotate(tilt, along)
@@ -67,7 +67,7 @@ def rolled_foot(source: Source, effects: Effects, side: int) -> Foot:
 
 
 def _hinge(turn: Array, along: Array, stands: np.ndarray) -> Array:
-    """(F, 3) the axis about which the foot is pitched, + toe up: level and across a standing foot."""
+    """(F, 3) axis of the foot's pitch, positive for toe up: horizontal and across a standing foot."""
     across = np.cross(along, UP)
     size = np.linalg.norm(across, axis=1)
     own = quat.rotate(quat.inv(turn), across)[stands & (size > 0.3 * np.linalg.norm(along, axis=1))]
@@ -87,7 +87,7 @@ def places(foot: Foot, stances: list[Stance]) -> list[Array]:
 
 
 def move_foot(source: Source, effects: Effects, path: Path, foot: Foot, side: int) -> Foot:
-    """The foot's way where the body takes the new path."""
+    """The foot's path for the body's new path."""
     stances = source.stances[side]
     old = places(foot, stances)
     new = [
@@ -129,7 +129,7 @@ def move_foot(source: Source, effects: Effects, path: Path, foot: Foot, side: in
 
 
 def _way(ankle: Array) -> Array:
-    """(n, 1) share of its level way from first to last that a swinging foot has gone."""
+    """(n, 1) share of its horizontal distance from first to last that a swinging foot has covered."""
     level = ankle * [1, 0, 1]
     way = level[-1] - level[0]
     time = smoothstep(np.linspace(0.0, 1.0, len(ankle)))
@@ -137,7 +137,7 @@ def _way(ankle: Array) -> Array:
 
 
 def _moved(place: Array, when: float, source: Source, effects: Effects, path: Path, side: int) -> Array:
-    """A footprint in the new world: carried along with the body, the hurt one less far ahead, both wider."""
+    """A footprint in the new world: it moves with the body, the hurt one less far ahead, both wider apart."""
     frames = np.arange(len(source))
     at = min(round(when), len(source) - 1)
     speed = np.gradient(source.path, axis=0)[at] if len(source) > 1 else np.zeros(2)
@@ -149,7 +149,7 @@ def _moved(place: Array, when: float, source: Source, effects: Effects, path: Pa
 
 
 def smooth_above(values: Array, frames: int) -> Array:
-    """A smooth curve nowhere below `values`: their running maximum, averaged over as wide a window."""
+    """A smooth curve that is nowhere below `values`: their running maximum, averaged over an equal window."""
     wide = maximum_filter1d(values, 4 * frames + 1, mode="nearest")
     kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
     return np.convolve(np.pad(wide, 2 * frames, mode="edge"), kernel / kernel.sum(), mode="valid")

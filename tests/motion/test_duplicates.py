@@ -10,8 +10,8 @@ import pytest
 from hobble.core.errors import HobbleError
 from hobble.database.sides import refuse_both_sides
 from hobble.motion.axes import turned
+from hobble.motion.duplicates import likeness, load_likenesses, same_pairs, save_likenesses
 from hobble.motion.mirror import mirror_clip
-from hobble.motion.same import likeness, load_likenesses, same_pairs, save_likenesses
 
 
 def test_a_turned_a_shortened_and_a_mirrored_copy_are_found(walker, holden31):
