@@ -48,6 +48,6 @@ def test_without_the_registry_the_message_says_so(tmp_path: Path, monkeypatch: p
     monkeypatch.setenv("npm_config_registry", "http://127.0.0.1:9/")
     monkeypatch.setenv("npm_config_cache", str(tmp_path / "cache"))
     monkeypatch.setenv("npm_config_fetch_retries", "0")
-    with pytest.raises(HobbleError, match="could not be fetched from the npm registry") as error:
+    with pytest.raises(HobbleError, match=r"could not download .* from the npm registry") as error:
         install(tmp_path / "page")
     assert "Traceback" not in str(error.value)

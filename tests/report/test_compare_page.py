@@ -153,7 +153,7 @@ def test_frame_times_are_medians_and_measures_have_names(
 ) -> None:
     median = material.measured["responsivity"]["milliseconds"]["spread"]["median"]
     table = tables.configuration_table(compared)
-    column = [c.label for c in table.columns].index("ms a frame, median")
+    column = [c.label for c in table.columns].index("ms per frame, median")
     assert [row[column] for row in table.rows] == [median, median]
     laps, fit = of_responsivity.lap_lines(compared), of_responsivity.fit_chart(compared)
     assert laps is not None
@@ -169,7 +169,7 @@ def test_frame_times_are_medians_and_measures_have_names(
     assert [column.label for column in named.columns] == ["measure", "a, walk"]
     assert named.rows == [
         ["share of the healthy speed at severity 10", 0.8],
-        ["remaining distance after healing, cm a joint", 0.1],
+        ["remaining distance after healing, cm per joint", 0.1],
     ]
 
 
@@ -179,10 +179,10 @@ def test_networks_that_are_too_large_together_are_left_out(
     from hobble.report import compare_page
 
     alone = len(render_compared(compared, {"holden": pair["holden"]}).encode())
-    monkeypatch.setattr(compare_page, "LARGEST", alone + compare_page.ELSE)
+    monkeypatch.setattr(compare_page, "LARGEST_PAGE", alone + compare_page.RESERVED)
     page = render_compared(compared, pair)
-    assert len(page.encode()) < alone + compare_page.ELSE
-    assert "not here: ava" in page
+    assert len(page.encode()) < alone + compare_page.RESERVED
+    assert "to keep the file small: ava" in page
     assert 'id="play-second"' not in page
 
 

@@ -40,7 +40,7 @@ def history(losses: list[float]) -> dict[str, list[float | None]]:
 
 @pytest.mark.parametrize(
     ("held_out", "kind", "words"),
-    [(0.1, "warn", "2.5 times worse"), (0.041, "good", "about as well"), (0.052, "fact", "1.30 times")],
+    [(0.1, "warn", "2.5 times the"), (0.041, "good", "does not overfit"), (0.052, "fact", "1.30 times")],
 )
 def test_generalisation(material: Material, held_out: float, kind: str, words: str) -> None:
     found = heads(material, accuracy=accuracy(material, held_out))
@@ -48,29 +48,29 @@ def test_generalisation(material: Material, held_out: float, kind: str, words: s
 
 
 def test_nothing_held_out(material: Material) -> None:
-    assert heads(material, accuracy=accuracy(material, None))["Nothing was held out."] == "warn"
+    assert heads(material, accuracy=accuracy(material, None))["No clips were held out."] == "warn"
 
 
 def test_curve_that_rises_falls_or_rests(material: Material) -> None:
     rising = history([1.0, 0.5, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8])
     assert "The held-out error was lowest in pass 2 and has risen since." in heads(material, history=rising)
     falling = history([1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3])
-    assert any("still falling, by 36 %" in head for head in heads(material, history=falling))
-    assert heads(material, history=history([0.3] * 8))["Training has settled."] == "good"
+    assert any("still fell by 36 %" in head for head in heads(material, history=falling))
+    assert heads(material, history=history([0.3] * 8))["The held-out error has stopped falling."] == "good"
     with_the_rate = {"configuration": {"training": {"schedule": "cosine"}}}
-    for losses in (falling, history([0.3] * 8)):  # a rate at its end leaves nothing to fall
+    for losses in (falling, history([0.3] * 8)):  # the learning rate has reached its end
         found = heads(material, history=losses, resolved=with_the_rate)
-        assert not any("still falling" in head or "settled" in head for head in found)
+        assert not any("still fell" in head or "stopped falling" in head for head in found)
     assert "The held-out error was lowest in pass 2 and has risen since." in heads(
         material, history=rising, resolved=with_the_rate
     )
     noisy = history([0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.28, 0.32])  # the last section is no trend
-    assert heads(material, history=noisy)["Training has settled."] == "good"
+    assert heads(material, history=noisy)["The held-out error has stopped falling."] == "good"
 
 
 @pytest.mark.parametrize("losses", [[0.3] * 8, [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3]])
-def test_what_more_passes_would_do_is_said_once(material: Material, losses: list[float]) -> None:
-    """By the curve, which shows it; a small gap to the held-out clips tells of the network's size only."""
+def test_only_one_hint_advises_on_more_passes(material: Material, losses: list[float]) -> None:
+    """It follows from the curve. A small gap to the held-out clips only concerns the size of the network."""
     found = hints(changed(material, accuracy=accuracy(material, 0.041), history=history(losses)))
     said = [hint.text for hint in found if "passes" in hint.text]
     assert len(said) == 1
@@ -91,94 +91,96 @@ def swept(link: str, trained: bool, pose: float, left: float, rho: float = 1.0) 
     return {"gait": "walk", "link": link, "trained": trained, **measures}
 
 
-def test_links_that_were_never_hurt_say_nothing_but_how_the_walk_drifts(material: Material) -> None:
+def test_links_never_hurt_in_training_only_show_the_drift_of_the_walk(material: Material) -> None:
     drift = swept("never", False, 10.0, 7.0)
     like_it = {"responses": [drift, swept("hurt", True, 11.0, 6.5, 0.3)]}
     found = heads(material, injury=like_it)
-    assert found["A walk in which nothing hurts drifts as well, by 10.0 cm a joint."] == "warn"
+    assert found["A healthy walk also drifts, by 10.0 cm per joint."] == "warn"
     assert "1 of 1 link hardly changes the walk at severity 10" in found
-    assert not [head for head in found if "does not quite come back" in head]
+    assert not [head for head in found if "stays changed" in head]
     caught = {"responses": [swept("never", False, 0.1, 0.1), swept("hurt", True, 11.0, 6.5)]}
     found = heads(material, injury=caught)
-    assert "After healing, the walk does not quite come back for hurt." in found
+    assert "After healing, the walk stays changed for hurt." in found
     head = "The 1 link hurt in training, of 2, changes the walk at severity 10"
     assert found[head] == "good"
     texts = {hint.head: hint.text for hint in hints(changed(material, injury=caught))}
-    assert "11.0 to 11.0 cm a joint" in texts[head]
+    assert "11.0 to 11.0 cm per joint" in texts[head]
 
 
-def test_one_slow_frame_does_not_decide_the_time_of_a_frame(material: Material) -> None:
+def test_the_time_of_a_frame_is_a_median(material: Material) -> None:
     times = {"predict": 0.17, "total": 0.17, "spread": {"median": 0.025, "p99": 0.163}}
     slow = changed(
         material, name="holden", responsivity={**material.measured["responsivity"], "milliseconds": times}
     )
-    figure = next(f for f in key_figures(slow) if f.label == "Time for a frame")
+    figure = next(f for f in key_figures(slow) if f.label == "Time per frame")
     assert (figure.value, figure.unit) == ("0.025", "ms")
     assert "667 characters" in figure.beside
     assert "mean 0.17 ms, published mean 0.376 ms" in figure.beside
-    assert next(kind for head, kind in heads(slow).items() if head.startswith("A frame uses 0.1 %")) == "good"
+    assert (
+        next(kind for head, kind in heads(slow).items() if head.startswith("A frame takes 0.1 %")) == "good"
+    )
 
 
-def test_what_to_do_stands_first_and_data_before_what_is_learnt_from_it(material: Material) -> None:
+def test_problems_come_first_and_data_comes_before_training(material: Material) -> None:
     falling = history([1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3])
     found = hints(changed(material, history=falling))
     kinds = [hint.kind for hint in found]
     assert kinds == sorted(kinds, key=["warn", "note", "good", "fact"].index)
     todo = [hint.head for hint in found if hint.kind == "note"]
-    look, train = (
-        next(i for i, head in enumerate(todo) if word in head) for word in ("Look", "still falling")
+    check, train = (
+        next(i for i, head in enumerate(todo) if word in head) for word in ("Check", "still fell")
     )
-    assert look < train
+    assert check < train
     assert found[-1].head.endswith("of the time.")
 
 
-def test_a_turn_that_was_held_back_is_told(material: Material) -> None:
+def test_a_limited_turn_is_reported(material: Material) -> None:
     lap = material.measured["responsivity"]
     asked = {**lap, "largest_turn_degrees": 25.0, "asked_turn_degrees": 170.0, "turns_held_back": 3}
     assert heads(material, responsivity=asked)[
-        "The network asked a joint to turn by 170 degrees in one frame."
+        "The network predicted a turn of a joint by 170 degrees in one frame."
     ]
-    figure = next(f for f in track_figures(asked) if "asked for" in f.label)
+    figure = next(f for f in track_figures(asked) if f.label == "Largest predicted turn")
     assert figure.value == "170"
-    assert "less than was asked in 3 of" in figure.beside
-    assert "drew 25.0° at most" in figure.beside
+    assert "which changed 3 of" in figure.beside
+    assert "largest turn drawn: 25.0°" in figure.beside
 
 
-def test_the_error_as_predicted_stands_beside_that_as_drawn(material: Material) -> None:
+def test_errors_of_the_prediction_and_of_the_drawn_pose_are_shown(material: Material) -> None:
     one = {"length": 1, "held_out": {"position_error_cm": 0.51}, "train": {"position_error_cm": 0.4}}
     found = changed(material, rollouts={"lengths": [one]})
     figure = next(f for f in key_figures(found) if f.label == "Error on held-out clips")
-    assert "cm a joint as predicted, 0.510 cm as drawn" in figure.beside
+    assert "cm per joint for the prediction, 0.510 cm for the drawn pose" in figure.beside
 
 
-def test_key_figures_stand_beside_the_published(material: Material) -> None:
+def test_key_figures_show_the_published_values(material: Material) -> None:
     figures = {f.label: f for f in key_figures(changed(material, name="holden"))}
-    assert "HOLDEN was published at 4.39 %" in figures["Error on held-out clips"].beside
-    assert "published mean 0.376 ms" in figures["Time for a frame"].beside
-    assert figures["Network"].beside.startswith("parameters a phase: 372–16–16–311")
+    assert "published for HOLDEN: 4.39 %" in figures["Error on held-out clips"].beside
+    assert "published mean 0.376 ms" in figures["Time per frame"].beside
+    assert figures["Network"].beside.startswith("parameters per phase; layers of 372–16–16–311")
 
 
-def test_figures_of_almost_nothing(material: Material) -> None:
+def test_key_figures_without_results(material: Material) -> None:
     bare = changed(
         material, accuracy={}, responsivity={}, injury={}, pipeline={}, history={}, motion=[], labels=[]
     )
     assert [f.label for f in key_figures(bare)] == ["Network"]
-    assert [hint.head for hint in hints(bare)] == ["Nothing was held out."]
+    assert [hint.head for hint in hints(bare)] == ["No clips were held out."]
 
 
-def test_what_the_data_lack_comes_before_longer_training(material: Material) -> None:
+def test_missing_data_comes_before_longer_training(material: Material) -> None:
     """Nobody stands, and the error still falls: the clips are named first."""
     labels = [{"clip": "a", "seconds": {"walk": 30.0}, "strip": {}}]
     falling = history([0.5 * 0.9**k for k in range(20)])
     found = list(heads(material, labels=labels, history=falling))
-    missing = next(k for k, head in enumerate(found) if head.startswith("Nobody stands in these clips"))
-    longer = next(k for k, head in enumerate(found) if "still falling" in head)
+    missing = next(k for k, head in enumerate(found) if head.startswith("Nobody stands"))
+    longer = next(k for k, head in enumerate(found) if "still fell" in head)
     assert missing < longer
     standing = [{"clip": "a", "seconds": {"walk": 30.0, "stand": 5.0}, "strip": {}}]
     assert not any("Nobody stands" in head for head in heads(material, labels=standing, history=falling))
 
 
-def test_clips_without_turns_are_told(material: Material) -> None:
+def test_clips_without_turns_are_reported(material: Material) -> None:
     """A hundred seconds straight on, and some that turn by 50 degrees a second."""
     middles = (TURNS[:-1] + TURNS[1:]) / 2
 

@@ -150,7 +150,9 @@ def test_keys_move_the_figure(tab: Any) -> None:
     tab.send("Input.dispatchKeyEvent", type="keyUp", key="w", code="KeyW")
     assert tab.until(f"Math.hypot(...{character}.velocity) < .01")
     panel = "document.getElementById('play-panel').textContent"
-    assert tab.until(f"/Speed\\d\\.\\d\\d m\\/sPhase.*A frame\\d+\\.\\d ms/.test({panel})"), tab.run(panel)
+    assert tab.until(f"/Speed\\d\\.\\d\\d m\\/sPhase.*Time per frame\\d+\\.\\d ms/.test({panel})"), tab.run(
+        panel
+    )
 
 
 def test_a_gamepad_and_a_thumb_steer_too(tab: Any) -> None:
@@ -269,7 +271,7 @@ def test_what_is_saved_as_bvh_is_what_was_played(
     assert len(read_bvh(tmp_path / "own.bvh")) > 20
 
 
-def test_the_view_of_the_inputs_shows_what_the_network_is_told(
+def test_the_view_of_the_inputs_shows_inputs_of_the_network(
     tab: Any, network: Network, examples: ModuleType
 ) -> None:
     """Heights where the samples are, 25 cm to either side of the path too; velocities as Python's."""
@@ -297,7 +299,7 @@ def test_the_view_of_the_inputs_shows_what_the_network_is_told(
     button = "document.getElementById('play-inputs')"
     tab.run(f"{button}.click()")
     assert tab.run(f"{button}.getAttribute('aria-pressed')") == "true"
-    assert "heights of the ground" in tab.run("document.getElementById('play-note').textContent")
+    assert "ground heights" in tab.run("document.getElementById('play-note').textContent")
     tab.run(f"{button}.click()")
     assert tab.console == []
 

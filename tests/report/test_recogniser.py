@@ -18,7 +18,7 @@ from hobble.gait.graded import grade, grader
 from hobble.gait.people import people
 from hobble.gait.profile import profile
 from hobble.models.network import Network
-from hobble.report.recogniser import healthy_walk, learnt, playable_and_judged, words
+from hobble.report.recogniser import healthy_walk, learnt, playable_with_recogniser, words
 
 
 @pytest.fixture(scope="module")
@@ -102,23 +102,21 @@ def test_every_kind_has_words_of_its_own() -> None:
     assert words("leaning_trunk", "forward") == "back, leaning forward"
 
 
-def test_a_walk_is_judged_beside_the_healthy_walk_of_the_same_figure(
+def test_a_walk_is_compared_with_the_healthy_walk_of_the_same_figure(
     network: Network, examples: ModuleType, holden31: Skeleton, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of a figure that goes nowhere, or has no knees, nothing is said."""
-    spec = playable_and_judged(network, examples.RUNTIME)
+    spec = playable_with_recogniser(network, examples.RUNTIME)
     assert spec["recogniser"]["healthy"] == healthy_walk(network, holden31, examples.RUNTIME)
     assert spec["recogniser"]["healthy"]["speed_per_leg"] > 0.5
     without = {role: joint for role, joint in holden31.roles.items() if role != "left_knee"}
     assert healthy_walk(network, replace(holden31, roles=without), examples.RUNTIME) is None
     monkeypatch.setattr("hobble.report.recogniser.SPEED", 0.0)
     assert healthy_walk(network, holden31, examples.RUNTIME) is None
-    assert "recogniser" not in playable_and_judged(network, examples.RUNTIME)
+    assert "recogniser" not in playable_with_recogniser(network, examples.RUNTIME)
 
 
-def test_the_panel_says_what_the_walk_looks_like(
-    tab: Any, walks: dict[str, Array], holden31: Skeleton
-) -> None:
+def test_the_panel_shows_the_recognised_limp(tab: Any, walks: dict[str, Array], holden31: Skeleton) -> None:
     """The watch sees three seconds, and asks for a walk where there is none."""
     healthy = profile(measure(holden31, walks["even"], 60))
     spec = {"names": list(holden31.joints), "roles": dict(holden31.roles)}
@@ -134,4 +132,4 @@ def test_the_panel_says_what_the_walk_looks_like(
     last = grade(profile(measure(holden31, walks["even"][-180:], 60)), healthy)
     assert said["even"]["text"] == "nothing hurts"
     assert said["even"]["share"] == pytest.approx(last.probabilities["normal"], abs=1e-4)
-    assert said["on the spot"] == {"text": "walk straight on to be judged"}
+    assert said["on the spot"] == {"text": "no answer: walk straight ahead"}

@@ -265,10 +265,10 @@ def test_the_runs_lie_over_the_track_and_are_red_where_they_left_it() -> None:
     assert by_name["waypoints"]["text"] == ["0, walk", "1, jog", "2, crouch"]
     left = by_name["more than 100 cm off"]
     assert (left["x"], left["y"], left["customdata"]) == ([5.0], [-2.0], [[200.0, 2]])
-    assert "the furthest was 200 cm" in chart.caption
+    assert "The largest distance from the track was 200 cm" in chart.caption
     kept = responsivity_page.track_chart({"track": track, "runs": [near]})
     assert kept is not None
-    assert "none was further from it than 100 cm; the furthest was 10 cm" in kept.caption
+    assert "The largest distance from the track was 10 cm" in kept.caption
     assert responsivity_page.track_chart({"track": {"waypoints": 6}}) is None
 
 

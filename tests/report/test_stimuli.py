@@ -128,9 +128,9 @@ def test_stimuli_in_which_nothing_hurts_are_told() -> None:
     same, part, never = stimuli.doubts(
         [*fine, row("left-arm", "B", "B", 0.0), row("weak", "A", "", 0.05), row("both", "A C", "C", 1.5)]
     )
-    assert same.startswith("left-arm, weak: no different from the plain walk")
-    assert part.startswith("both: not all")
-    assert never.startswith("Never told in training: B, C.")
+    assert same.startswith("left-arm, weak: they look like the neutral walk")
+    assert part.startswith("both: some of their values")
+    assert never.startswith("Never above 0 in training: B, C.")
 
 
 def test_files_of_a_loop(network: Network, examples: ModuleType, tmp_path: Path, monkeypatch) -> None:

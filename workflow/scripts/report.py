@@ -7,7 +7,7 @@ from hobble.models.load import load_network
 from hobble.report.compare import comparisons
 from hobble.report.gather import gather
 from hobble.report.page import render
-from hobble.report.recogniser import playable_and_judged
+from hobble.report.recogniser import playable_with_recogniser
 from hobble.report.scenes import scenes
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
@@ -33,7 +33,7 @@ with job(snakemake):
     network = material.network
     play = scenes(given.scenarios, network["skeleton"], network["channels"])
     trained = load_network(given.weights)
-    character = playable_and_judged(
+    character = playable_with_recogniser(
         trained, Runtime.model_validate(material.resolved["configuration"]["runtime"])
     )
     compared = comparisons(trained, given.rows, asked.splits)

@@ -7,7 +7,7 @@ import yaml
 from hobble.core.files import read_json, write_text
 from hobble.models.load import load_network
 from hobble.report.compare_page import render_compared
-from hobble.report.recogniser import playable_and_judged
+from hobble.report.recogniser import playable_with_recogniser
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
@@ -19,7 +19,7 @@ with job(snakemake):
     ):
         if weights not in seen:  # a network that two configurations read is one character
             runtime = yaml.safe_load(Path(resolved).read_text(encoding="utf-8"))["configuration"]["runtime"]
-            playables[name] = playable_and_judged(load_network(weights), Runtime.model_validate(runtime))
+            playables[name] = playable_with_recogniser(load_network(weights), Runtime.model_validate(runtime))
         seen.add(weights)
     bundle = Path(given.bundle).read_text(encoding="utf-8")
     page = render_compared(read_json(given.compared), playables, bundle)

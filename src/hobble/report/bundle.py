@@ -1,4 +1,4 @@
-"""The page's scripts and what they take from the npm registry, bundled into one script by Node."""
+"""Bundles the page's scripts and their npm packages into one script, with Node."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ PACKAGES = ("package.json", "package-lock.json")
 
 
 def install(folder: str | Path) -> None:
-    """Put the packages of the lock file, checked against its hashes, into folder/node_modules.
+    """Install the packages of the lock file into folder/node_modules and check their hashes.
 
-    Node and npm are those of the Python environment. npm keeps what it has fetched, so that this needs the
-    network once on a machine. Raises HobbleError where the registry cannot be reached.
+    Uses Node and npm of the Python environment. npm has a cache, so a machine needs the internet only once.
+    Raises HobbleError if the registry cannot be reached.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -36,16 +36,16 @@ def install(folder: str | Path) -> None:
     done = npm(arguments, return_completed_process=True, cwd=folder, capture_output=True, text=True)
     if done.returncode:
         raise HobbleError(
-            "the packages of the report's page could not be fetched from the npm registry. They are needed "
-            f"once: run again where it can be reached. npm says: {_said(done)[-600:]}"
+            "could not download the report page's packages from the npm registry. Run again with an internet "
+            f"connection; later runs do not need it. npm says: {_output(done)[-600:]}"
         )
 
 
 def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -> None:
-    """Bundle sources/index.js and all that it imports into one script without imports.
+    """Bundle sources/index.js and everything it imports into one script.
 
-    modules: the node_modules folder of `install`. Needs no internet; the same input gives the same bytes.
-    Raises HobbleError with the file and line where a script is wrong.
+    modules: the node_modules folder from `install`. Needs no internet. The same input gives the same bytes.
+    Raises HobbleError with file and line if a script has an error.
     """
     with tempfile.TemporaryDirectory() as folder:
         networks = Path(folder, "networks.js")
@@ -54,7 +54,7 @@ def bundle(modules: str | Path, target: str | Path, sources: str | Path = WEB) -
 
 
 def bundle_module(modules: str | Path, target: str | Path) -> None:
-    """Bundle the character alone as an ES module that imports nothing; as `bundle`."""
+    """Bundle only the character, as an ES module without imports; otherwise like `bundle`."""
     with tempfile.TemporaryDirectory() as folder:
         networks = Path(folder, "networks.js")
         networks.write_text(networks_module(), encoding="utf-8")
@@ -62,7 +62,7 @@ def bundle_module(modules: str | Path, target: str | Path) -> None:
 
 
 def networks_module() -> str:
-    """The page's module "networks": what predicts, by kind of network, from its folder's network.js."""
+    """Source of the page's module "networks": kind of network -> `createNetwork` of its network.js."""
     imports = [
         f"import {{ createNetwork as {kind} }} from {json.dumps(str(MODELS_FOLDER / kind / 'network.js'))};"
         for kind in MODELS
@@ -91,10 +91,10 @@ def _bundle(modules: Path, target: str | Path, entry: Path, networks: Path, form
         env={**os.environ, "NODE_PATH": str(modules)},
     )
     if done.returncode:
-        raise HobbleError(f"the page's scripts could not be bundled: {_said(done)[:300]}")
+        raise HobbleError(f"the page's scripts could not be bundled: {_output(done)[:300]}")
     write_text(target, str(done.stdout))
 
 
-def _said(done: CompletedProcess[Any]) -> str:
-    """What a program said, on one line."""
+def _output(done: CompletedProcess[Any]) -> str:
+    """The output of a program, on one line."""
     return " ".join(str(done.stderr or done.stdout).split())

@@ -1,4 +1,4 @@
-"""Charts as plain plotly figures; colours are names of the page's tokens ("@accent")."""
+"""Charts as plotly specifications. Colours are names of the page's CSS colours, such as "@accent"."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Trace = dict[str, Any]
 
 @dataclass(frozen=True)
 class Chart:
-    """A chart: what the page draws, and how to read it.
+    """A chart, with a caption that says how to read it.
 
-    traces: plotly traces. options: alternatives to `traces`, by name, among which a chooser called `choose`
-    picks; option_layouts: what changes in the layout with them.
+    traces: plotly traces. options: instead of `traces`, name -> traces; a menu with the label `choose`
+    selects one. option_layouts: name -> changes of the layout for that option.
     """
 
     name: str
@@ -29,7 +29,7 @@ class Chart:
     option_layouts: Mapping[str, Mapping[str, Any]] = field(repr=False, default_factory=dict)
 
     def spec(self) -> dict[str, Any]:
-        """What the page's script needs."""
+        """The data for the page's script."""
         traces = list(self.traces) or list(next(iter(self.options.values()), ()))
         return {
             "name": self.name,
@@ -44,7 +44,7 @@ class Chart:
 
 @dataclass(frozen=True)
 class Family:
-    """Small charts that share a title, a caption and, where it has a name, a chooser of their options."""
+    """Small charts that share a title and a caption, and a menu of their options if `choose` is not empty."""
 
     name: str
     title: str
@@ -54,9 +54,9 @@ class Family:
 
 
 def _escaped(value: Any) -> Any:
-    """The same with "<" and "&" of every text as entities: plotly reads texts as a kind of HTML.
+    """`value` with "<" and "&" of every text escaped, because plotly reads texts as HTML.
 
-    Hover templates are left alone: they are ours, and reach into the data only by reference.
+    Hover templates are left alone: they come from the code and only refer to data.
     """
     if isinstance(value, Mapping):
         return {k: v if k == "hovertemplate" else _escaped(v) for k, v in value.items()}
@@ -71,7 +71,7 @@ def axis(title: str, **more: Any) -> dict[str, Any]:
 
 
 def log_axis(title: str, values: Iterable[float | None]) -> dict[str, Any]:
-    """A logarithmic axis with its ticks at 1, 2 and 5 times the powers of ten, written out."""
+    """A logarithmic axis with ticks at 1, 2 and 5 times the powers of ten, as plain numbers."""
     found = [v for v in values if v is not None and v > 0]
     if not found:
         return axis(title, type="log")
@@ -81,14 +81,14 @@ def log_axis(title: str, values: Iterable[float | None]) -> dict[str, Any]:
 
 
 def line(name: str, x: Sequence, y: Sequence, colour: str, **more: Any) -> Trace:
-    """A line; `dash` and `width` go to its stroke."""
+    """A line. `dash` and `width` set its stroke; `more` goes to the trace."""
     stroke = {"color": colour, "width": more.pop("width", 2), "dash": more.pop("dash", "solid")}
     mode = more.pop("mode", "lines")
     return {"type": "scatter", "mode": mode, "name": name, "x": list(x), "y": list(y), "line": stroke, **more}
 
 
 def mark(value: float, text: str, vertical: bool = True, colour: str = "@soft") -> tuple[dict, dict]:
-    """A dashed line across the plot at `value`, with its text at the end: (shape, annotation)."""
+    """A dotted line across the plot at `value` with a text at its end, as (shape, annotation)."""
     across = {"type": "line", "line": {"color": colour, "width": 1, "dash": "dot"}}
     note = {"text": text, "showarrow": False, "font": {"size": 11, "color": colour}}
     if vertical:

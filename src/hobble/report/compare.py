@@ -1,4 +1,4 @@
-"""Captured motion beside what the network predicts for its next frame, packed to be played in the page."""
+"""Captured motion and the network's prediction of the next frame, packed for the page."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from hobble.models.network import Network
 from hobble.report.scenes import FPS, UNIT, packed_motion
 from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
 
-CLIPS = 6  # that are shown at least, if there are so many; every held-out clip is
-MOST = 40
-LONGEST = 12 * 60  # frames of a clip that are shown
+CLIPS = 6  # shown at least, if there are that many; all held-out clips are shown
+MOST = 40  # clips shown at most
+LONGEST = 12 * 60  # frames shown of a clip
 
 
 def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str, Any]:
-    """The longest unbroken stretch of each held-out clip, and of others up to CLIPS in all; {} without any.
+    """The longest unbroken stretch of each held-out clip, and of training clips up to CLIPS; {} without
+    clips.
 
-    paths: `database/clips/<clip>.npz`. Predictions are one frame ahead from the true input, on the first fit
-    of each row, as accuracy is measured; both are drawn at the captured root.
+    paths: `database/clips/<clip>.npz`. Each prediction is one frame ahead from the captured input, on the
+    first terrain fit of the row. Both motions are drawn at the captured root.
     """
     if network.skeleton is None:
         return {}
@@ -85,7 +86,7 @@ def _compared(network: Network, rows: ClipRows, split: str, keep: list[int]) -> 
 def in_world(points: Array, place: Array, yaw: Array, lift: Array) -> Array:
     """World positions (F, J, 3) of points in the root frame of place (F, 3) and yaw (F,).
 
-    lift: (F, 1), what was taken off heights.
+    lift: (F, 1), cm that were subtracted from heights.
     """
     out = points.copy()
     out[..., ::2] = rotate_by_yaw(points[..., ::2], yaw[:, None])

@@ -1,4 +1,4 @@
-"""The page of configurations side by side: one file that needs nothing else, like the reports themselves."""
+"""Renders the page that compares configurations into one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from hobble.report.playable import skeleton_of
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
-LARGEST = 19_850_000  # bytes of the page, which is to stay under 20 MB
-ELSE = 60_000  # of them for words, style and tables
+LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
+RESERVED = 60_000  # bytes of the page for text, style and tables
 NAME = "compare"
 
 
@@ -25,8 +25,8 @@ def render_compared(
 ) -> str:
     """The comparison as one HTML document.
 
-    compared: compare.json; playables: of `playable.playable` for each configuration that is to be played, of
-    which as many are kept as there is room for, in their order; bundle: the scripts, of `bundle.bundle`.
+    compared: compare.json. playables: configuration -> data from `playable.playable`; as many as fit into the
+    page are kept, in order. bundle: the scripts, from `bundle.bundle`.
     """
     sections: dict[str, dict[str, Any]] = {
         "overview": {
@@ -41,15 +41,15 @@ def render_compared(
     charts = specs([sections, shown])
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in (playables or {}).values()}
     used = len(bundle.encode()) + len(embedded(charts).encode()) + len(embedded(bodies).encode())
-    kept, left_out = fitting(playables or {}, LARGEST - ELSE - used)
+    kept, left_out = fitting(playables or {}, LARGEST_PAGE - RESERVED - used)
     bodies = {spec["body"]: bodies[spec["body"]] for spec in kept.values()}
     data = {"name": NAME, "charts": charts, "playable": kept, "bodies": bodies}
     return template("compare.html.j2").render(
         name=NAME,
         measured=shown,
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
-        eyebrow="Hobble report · configurations side by side",
-        lead="What the same measurements say of " + ", ".join(names) + ", beside the published figures.",
+        eyebrow="Hobble report · comparison of configurations",
+        lead="The same measurements of " + ", ".join(names) + ", compared with published results.",
         embedded=embedded(data),
         playable=list(kept),
         left_out=left_out,
@@ -64,9 +64,9 @@ def render_compared(
 def fitting(
     playables: Mapping[str, Mapping[str, Any]], largest: int
 ) -> tuple[dict[str, Mapping[str, Any]], list[str]]:
-    """Those that fit into so many characters together, in their order, and the names of the others.
+    """The characters that fit into `largest` bytes together, in order, and the names of the others.
 
-    One that does not fit leaves room to a smaller one after it.
+    If one does not fit, a smaller one after it still may.
 
     >>> fitting({"a": {"x": 1}, "b": {"x": "long" * 9}, "c": {"x": 2}}, 20)
     ({'a': {'x': 1}, 'c': {'x': 2}}, ['b'])

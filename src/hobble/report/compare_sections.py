@@ -1,4 +1,4 @@
-"""How configurations came about, side by side: training, and the costs of the stages."""
+"""Comparison of configurations: training, and time and size of the stages."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from hobble.report.cost_section import log_range
 from hobble.report.formats import duration, size
 from hobble.report.side_by_side import Compared, colours, dots
 
-OVER = {"pass": "passes", "seconds": "seconds of training", "samples": "samples seen"}
+X_AXES = {"pass": "passes", "seconds": "seconds of training", "samples": "samples seen"}
 
 
 def training_curves(compared: Compared) -> Chart | None:
     """Training and held-out error of all configurations, over passes, seconds and samples."""
     options: dict[str, list[Trace]] = {}
     values: list[float | None] = []
-    for key, label in OVER.items():
+    for key, label in X_AXES.items():
         traces = []
         for entry in compared["training"]:
             name = entry["configuration"]
@@ -36,12 +36,12 @@ def training_curves(compared: Compared) -> Chart | None:
         return None
     return Chart(
         "compare-training",
-        "Learning",
-        "Mean squared error of the standardised output. Whole lines: held-out clips; dotted: training clips, "
-        "under dropout. Over passes one sees what the data gives, over seconds what it costs.",
+        "Error during training",
+        "Mean squared error of the standardised output. Solid lines: held-out clips. Dotted lines: training "
+        "clips, with dropout.",
         layout={"yaxis": log_axis("mean squared error", values)},
         height=420,
-        choose="Over",
+        choose="Horizontal axis",
         options=options,
         option_layouts={label: {"xaxis": {**axis(label), "rangemode": "tozero"}} for label in options},
     )
@@ -52,7 +52,7 @@ def stage_dots(compared: Compared) -> list[Chart]:
     order = list(dict.fromkeys(stage["stage"] for stage in compared["stages"]))[::-1]
     charts = []
     for key, title, label, show in (
-        ("seconds", "Time of each stage", "seconds of computing, added up over its jobs", duration),
+        ("seconds", "Time of each stage", "seconds, sum over all jobs", duration),
         ("bytes", "Size of each stage", "bytes on disk", size),
     ):
         values = [stage.get(key) or 0 for stage in compared["stages"]]
@@ -65,13 +65,13 @@ def stage_dots(compared: Compared) -> list[Chart]:
             "xaxis": axis(label, type="log", tickformat="~s", dtick=1, range=log_range(values)),
             "yaxis": {"automargin": True, "categoryorder": "array", "categoryarray": order},
         }
-        caption = "Stages that two configurations share (the same data set) cost their time once."
+        caption = "Configurations with the same data set share its stages, which then run only once."
         charts.append(Chart(f"compare-{key}", title, caption, traces, layout, 110 + 32 * len(order)))
     return charts
 
 
 def _passes(entry: Mapping[str, Any]) -> list[float]:
-    """Where each section ends, in passes."""
+    """The end of each section, in passes."""
     sections = [s for s in entry.get("section", ()) if s is not None]
     most = max(sections, default=1)
     return [p - 1 + s / most for p, s in zip(entry.get("pass", ()), entry.get("section", ()), strict=True)]

@@ -1,4 +1,4 @@
-"""Tables of configurations side by side, from compare.json."""
+"""Tables of the comparison page, from compare.json."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from hobble.report.published import cited
 from hobble.report.side_by_side import Compared
 from hobble.report.tables import Column, Table
 
-# What the measures of the published figures are, where their names alone do not tell.
+# Longer names of published measures whose own names are unclear.
 MEASURES = {
-    "patches": "patches: pieces of ground cut from height maps (ours: all that the terrain stage writes)",
+    "patches": "patches: pieces of ground cut from height maps (ours: all files of the terrain stage)",
     "database": "database, on disk",
     "weights of 50 phases": "weights of 50 phases, as the original stores them",
 }
 
 
-# What is shown of a pair. A series of means: those of the clips of a split, or of the laps of a mode.
+# Columns of the table of pairs. "sd of means": over the clips of a split, or the laps of a phase mode.
 PAIR = (
     ("mean_a", "mean, one"),
     ("sd_a", "sd of frames, one"),
@@ -32,7 +32,7 @@ PAIR = (
 
 
 def configuration_table(compared: Compared) -> Table:
-    """What sets each configuration apart, with the main figures of the measurements."""
+    """A row per configuration: its settings, and the key results of the measurements."""
     entries = {entry["configuration"]: entry for entry in compared["configurations"]}
 
     def of(key: str) -> dict[str, Any]:
@@ -41,7 +41,7 @@ def configuration_table(compared: Compared) -> Table:
     told = {name: ", ".join(channels) or "none" for name, channels in of("channels").items()}
     columns = [
         *compared_columns(compared),
-        Overview(50, Column("told"), told),
+        Overview(50, Column("channels"), told),
         Overview(60, Column("data set"), of("dataset")),
         Overview(80, Column.count("layers"), of("hidden_layers")),
         Overview(90, Column.count("units"), of("units")),
@@ -54,7 +54,10 @@ def configuration_table(compared: Compared) -> Table:
 
 
 def difference_table(compared: Compared) -> Table | None:
-    """Every pair and what it is over, errors and frame times; eq. 3.2 with both kinds of deviation."""
+    """Errors and frame times of every pair, with eq.
+
+    3.2 of Segerstedt for both kinds of standard deviation.
+    """
     found = [("error", r) for r in compared["difference"]]
     found += [("mean ms a frame", r) for r in compared["milliseconds"].get("difference", ())]
     rows = [
@@ -63,13 +66,13 @@ def difference_table(compared: Compared) -> Table | None:
     ]
     if not rows:
         return None
-    columns = [Column("one"), Column("other"), Column("of")]
+    columns = [Column("one"), Column("other"), Column("measured")]
     columns += [Column.number(label) for _, label in PAIR]
-    return Table("compare-difference", columns, rows, "Every pair")
+    return Table("compare-difference", columns, rows, "Differences between all pairs")
 
 
 def beside_table(compared: Compared) -> Table:
-    """The published figures with ours."""
+    """The published results next to ours."""
     sources = compared["published"]["sources"]
     shows = {"bytes": size, "s": duration}
     rows = []
@@ -88,4 +91,4 @@ def beside_table(compared: Compared) -> Table:
         Column("ours"),
         Column("source"),
     ]
-    return Table("compare-published", columns, rows, "Beside the published figures")
+    return Table("compare-published", columns, rows, "Comparison with published results")

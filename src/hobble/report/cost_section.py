@@ -1,4 +1,4 @@
-"""What each stage of the pipeline cost."""
+"""The time and disk space of each stage of the pipeline."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ def stage_charts(material: Material) -> list[Chart]:
     names = [stage["stage"] for stage in stages]
     charts = []
     for key, title, label, show, caption in (
-        ("seconds", "Time of each stage", "seconds, summed over jobs", duration,
-         "With several cores the wait is shorter than the sum over the jobs of a stage. Each line is ten "
-         "times the one before."),
+        ("seconds", "Time of each stage", "seconds, sum over all jobs", duration,
+         "The sum over all jobs of a stage. Jobs run in parallel, so the run itself takes less time. The "
+         "scale is logarithmic."),
         ("bytes", "Size of each stage", "bytes", size,
-         "What each stage leaves on disk."),
+         "The files that each stage writes. The scale is logarithmic."),
     ):  # fmt: skip
         values = [stage.get(key) or 0 for stage in stages]
         trace = {
@@ -45,13 +45,13 @@ def stage_charts(material: Material) -> list[Chart]:
 
 
 def log_range(values: list[float]) -> list[float]:
-    """Whole decades around the values that are above zero, with room to the right for the last one's text."""
+    """Range of a logarithmic axis: whole decades around the positive values, with room for text."""
     some = [math.log10(value) for value in values if value > 0] or [0.0, 1.0]
     return [math.floor(min(some)), max(some) + 0.4 * (max(some) - math.floor(min(some)) + 1)]
 
 
 def stage_table(material: Material) -> Table:
-    """A row per stage, beside it what was published of this very configuration."""
+    """A row per stage, with the published values of this configuration if there are any."""
     rows_of = [row for row in material.published["stages"] if row["configuration"] == material.name]
     theirs = {row["stage"]: row for row in rows_of}
     columns = [

@@ -1,5 +1,6 @@
-"""What the network learns from, counted over the rows of the database: seconds of speed, turn, and
-what is told."""
+"""How much data there is at each speed, turn and channel value: seconds, counted over the rows of the
+database.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from hobble.rows.clip_rows import load_clip_rows
 
 FPS = 60.0
 SPEEDS = np.arange(0, 6.01, 0.2)  # metres a second
-TURNS = np.arange(-220, 221, 20.0)  # degrees a second, to the left positive
+TURNS = np.arange(-220, 221, 20.0)  # degrees a second, positive to the left
 LEVELS = np.arange(1, 11)  # tenths of the highest value of a channel
 SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
 
@@ -25,8 +26,8 @@ SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
 def counted(paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str, Any]:
     """Seconds over the rows in `database/clips/<clip>.npz`, each frame counted once.
 
-    `turns`: for each split, of each turn; `both`: of each turn and speed; `told`: channel -> column -> of
-    each tenth of its highest value.
+    `turns`: split -> seconds at each turn. `both`: (turns, speeds), seconds at each turn and speed. `told`:
+    channel -> column -> seconds at each tenth of the highest value.
     """
     turns = {split: np.zeros(len(TURNS) - 1) for split, *_ in SPLITS}
     both = np.zeros((len(TURNS) - 1, len(SPEEDS) - 1))
@@ -36,7 +37,9 @@ def counted(paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str,
         once = np.unique(rows.frame, return_index=True)[1]
         y, layout = np.asarray(rows.y[once], float), rows.layout
         speed = np.linalg.norm(y[:, layout.y_root_velocity], axis=1) * FPS / 100
-        turn = np.degrees(-y[:, layout.y_turn][:, 0]) * FPS  # the column is the world's, seen from the root
+        turn = (
+            np.degrees(-y[:, layout.y_turn][:, 0]) * FPS
+        )  # the column is the turn of the world relative to the root
         speed, turn = (np.clip(v, e[0], e[-1] - 1e-6) for v, e in ((speed, SPEEDS), (turn, TURNS)))
         turns[splits.get(rows.clip, "train")] += np.histogram(turn, TURNS)[0] / FPS
         both += np.histogram2d(turn, speed, (TURNS, SPEEDS))[0] / FPS
@@ -51,7 +54,7 @@ def counted(paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str,
 
 
 def turn_chart(found: Mapping[str, Any]) -> Chart | None:
-    """Seconds at each turn."""
+    """Seconds at each turning speed."""
     traces: list[Trace] = [
         {
             "type": "bar",
@@ -69,15 +72,15 @@ def turn_chart(found: Mapping[str, Any]) -> Chart | None:
     layout = {
         "barmode": "stack",
         "bargap": 0.08,
-        "xaxis": axis("degrees a second, to the left positive"),
+        "xaxis": axis("degrees per second (positive: to the left)"),
         "yaxis": axis("seconds", rangemode="tozero"),
     }
-    caption = "Seconds at each turn of the figure. Both sides should be alike; mirrors make them so."
-    return Chart("turns", "How sharply it turns", caption, traces, layout, 300)
+    caption = "Seconds of data at each turning speed. With mirrored clips, left and right are alike."
+    return Chart("turns", "Turning speed", caption, traces, layout, 300)
 
 
 def both_chart(found: Mapping[str, Any]) -> Chart | None:
-    """Seconds at each speed and turn together."""
+    """Seconds at each combination of speed and turn."""
     both = found["both"]
     if not both.any():
         return None
@@ -93,17 +96,17 @@ def both_chart(found: Mapping[str, Any]) -> Chart | None:
         "colorbar": {"title": {"text": "s"}, "thickness": 10, "outlinewidth": 0},
         "hovertemplate": "%{x:.1f} m/s, %{y}°/s: %{z:.1f} s<extra></extra>",
     }
-    layout = {"xaxis": axis("m/s"), "yaxis": axis("degrees a second", automargin=True)}
+    layout = {"xaxis": axis("m/s"), "yaxis": axis("degrees per second", automargin=True)}
     caption = (
-        "Seconds at each speed and turn together. Where nothing is coloured, the network has seen nothing."
+        "Seconds of data at each combination of speed and turn. The network was not trained on empty cells."
     )
-    return Chart("speed-turn", "Speed and turn together", caption, [trace], layout, 300)
+    return Chart("speed-turn", "Speed and turn combined", caption, [trace], layout, 300)
 
 
 def told_charts(found: Mapping[str, Any], say: Callable[[str], str] = str) -> list[Chart]:
-    """Seconds at each value of each column, a chart for each channel that tells any clip something.
+    """Seconds at each value of each column: a chart for each channel that has a value above 0 in any clip.
 
-    say: what a reader calls a column.
+    say: column -> its name on the page.
     """
     return [_told_chart(name, seconds, say) for name, seconds in found["told"].items() if seconds]
 
@@ -124,10 +127,10 @@ def _told_chart(name: str, seconds: Mapping[str, Array], say: Callable[[str], st
     }
     across = axis(one.value, dtick=tenth, range=[0.4 * tenth, 10.6 * tenth])
     caption = (
-        f"Seconds of rows at each {one.value} of each column, mirrors counted. Where there is no cell the "
-        "network has seen nothing and can only interpolate."
+        f"Seconds of data at each {one.value}, including mirrored clips. The network was not trained on "
+        "empty cells and has to interpolate there."
     )
-    title, height = f"{one.title}: what, and how much", 120 + 24 * len(columns)
+    title, height = f"{one.title}: amount of data", 120 + 24 * len(columns)
     layout = {"xaxis": across, "yaxis": {"automargin": True}}
     return Chart(f"{name}-coverage", title, caption, [trace], layout, height)
 

@@ -1,4 +1,4 @@
-"""The data: which clips, how much of each gait, what they are told, what was repaired, where it came from."""
+"""The section on the data: clips, gaits, speeds, labels, repairs and sources."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
 
 GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
-FEW = 30  # bars that can have their names under them
+MOST_NAMED = 30  # bars that are few enough for a name under each
 SPLIT_NAMES = {"train": "training", "held_out": "held out"}
 
 
@@ -41,10 +41,10 @@ def gait_chart(material: Material) -> Chart | None:
     if not traces:
         return None
     caption = (
-        "Seconds of each gait, mirrors counted. A gait with a low bar is one the network has hardly seen."
+        "Seconds of each gait, including mirrored clips. The network learns little of a gait with a low bar."
     )
     layout = {"barmode": "stack", "xaxis": {"type": "category"}, "yaxis": axis("seconds", rangemode="tozero")}
-    return Chart("gaits", "How much of each gait", caption, traces, layout, 300)
+    return Chart("gaits", "Seconds of each gait", caption, traces, layout, 300)
 
 
 def speed_chart(material: Material) -> Chart | None:
@@ -79,14 +79,12 @@ def speed_chart(material: Material) -> Chart | None:
         "xaxis": axis("m/s", range=[0, last + 0.3]),
         "yaxis": axis("seconds", rangemode="tozero"),
     }
-    caption = (
-        "Seconds at each speed. Between two humps the network makes up its own way from one to the other."
-    )
-    return Chart("speeds", "How fast", caption, traces, layout, 300)
+    caption = "Seconds at each speed. Where there is little or no data, the network has to interpolate."
+    return Chart("speeds", "Speed", caption, traces, layout, 300)
 
 
 def retarget_chart(material: Material) -> Chart | None:
-    """A bar for each clip: the joint or limb that is furthest off its file, in degrees."""
+    """A bar for each retargeted clip: the joint or limb that differs most from the file, in degrees."""
     known = {report["clip"] for report in material.motion}
     found = []
     for report in material.motion:
@@ -103,18 +101,21 @@ def retarget_chart(material: Material) -> Chart | None:
         "text": [joint for joint, _, _ in found],
         "textposition": "none",
         "marker": {"color": "@muted"},
-        "hovertemplate": "%{x}: %{text} %{y:.1f} degrees off<extra></extra>",
+        "hovertemplate": "%{x}: %{text} differs by %{y:.1f} degrees<extra></extra>",
     }
     layout = {
         "showlegend": False,
-        "xaxis": {"type": "category", "showticklabels": len(found) <= FEW},
-        "yaxis": axis("degrees off", rangemode="tozero"),
+        "xaxis": {"type": "category", "showticklabels": len(found) <= MOST_NAMED},
+        "yaxis": axis("difference, degrees", rangemode="tozero"),
     }
     caption = (
-        "Of each clip that was put on other bones, the joint or limb that differs most from its file, mean "
-        f"over the clip. From {MOST:.0f} degrees on a clip is refused."
+        "These clips were retargeted to the skeleton of the data set. Each bar is the joint or limb whose "
+        f"direction differs most from the file, averaged over the clip. Clips with {MOST:.0f} degrees or "
+        "more are refused."
     )
-    return Chart("retarget", "How near clips are to their files", caption, [trace], layout, 220)
+    return Chart(
+        "retarget", "Difference between retargeted clips and their files", caption, [trace], layout, 220
+    )
 
 
 def clip_table(material: Material) -> Table:
@@ -166,12 +167,12 @@ def remarks_table(material: Material) -> Table | None:
             ]
     if not rows:
         return None
-    columns = [Column("clip"), Column("stage"), Column("what", kind="long")]
+    columns = [Column("clip"), Column("stage"), Column("message", kind="long")]
     return Table(f"{material.name}-remarks", columns, rows, f"{len(rows)} repairs and warnings")
 
 
 def strips(material: Material) -> list[dict[str, Any]]:
-    """The label strip of each clip that has one, with what it was told; mirrors would say it twice."""
+    """The label strip and channel values of each clip that has them; mirrors are left out."""
     told: dict[str, dict[str, Any]] = {}
     for report in material.told:
         highest = {"highest": report.get("highest", 10.0)}

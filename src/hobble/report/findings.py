@@ -1,4 +1,4 @@
-"""The minute's summary: key figures, and what the numbers suggest to do next."""
+"""The summary at the top of the page: key figures, and advice that follows from the numbers."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from hobble.report.formats import duration, number, size
 from hobble.report.gather import Material
 from hobble.report.summary import Figure, Hint, placed
 
-SHARP = 40.0  # degrees a second: a turn, not the sway of a straight walk
-FEW_TURNS = 0.01  # share of the time
+TURNING = 40.0  # degrees a second; slower turning is the sway of a straight walk
+LITTLE_TURNING = 0.01  # share of the time
 ORDER = ("warn", "note", "good", "fact")
 
 
 def _recipe(material: Material) -> Mapping[str, Any]:
-    """The training section of the configuration; empty where that is not known."""
+    """The training section of the configuration; empty if it is not known."""
     return (material.resolved.get("configuration") or {}).get("training") or {}
 
 
 def lead(material: Material) -> str:
-    """What was trained on what, in a sentence or two."""
+    """A sentence or two on the network and its training data."""
     clips = [report["clip"] for report in material.motion]
     kept = sum(material.split(clip) == "held_out" for clip in clips)
     frames = sum(report.get("frames", 0) for report in material.motion)
@@ -34,43 +34,43 @@ def lead(material: Material) -> str:
     text = (
         f"A {network['described']}, with {network['inputs']} inputs and {network['outputs']} outputs, trained"
         if network["sizes"]
-        else f"A character by {network['described']}, built"
+        else f"A character driven by {network['described']}, built"
     )
     text += f" for {passes} passes" if passes and network["sizes"] else ""
     text += f" on {len(clips) - kept} clips of {material.dataset}"
-    text += f" and tried on {kept} that it never saw" if kept else ""
-    return f"{text}: {frames:,} frames at 60\u00a0Hz in all."
+    text += f" and tested on {kept} held-out clips" if kept else ""
+    return f"{text}. All clips together have {frames:,} frames at 60\u00a0Hz."
 
 
 def key_figures(material: Material) -> list[Figure]:
-    """The numbers on top of the page, most important first."""
+    """The numbers at the top of the page, most important first."""
     figures = measured.figures(material)
     seconds = sum(report.get("seconds", 0) for report in material.motion)
     if seconds:
         kept = sum(material.split(report["clip"]) == "held_out" for report in material.motion)
         beside = f"{len(material.motion)} clips, {kept} of them held out"
         value, _, unit = duration(seconds).partition(" ")
-        figures.append(Figure("Motion in all", value, unit, beside, 30))
+        figures.append(Figure("Motion data", value, unit, beside, 30))
     network = material.network
-    beside = f"parameters a phase: {'–'.join(map(str, network['sizes']))}"
+    beside = f"parameters per phase; layers of {'–'.join(map(str, network['sizes']))}"
     beside = f"{beside if network['sizes'] else 'numbers in its tables'}; {size(network['bytes'])} on disk"
     figures.append(Figure("Network", number(network["parameters"] / 1e6, 3), "M", beside, 40))
     total = material.pipeline.get("total_seconds")
     if total:
         value, _, unit = duration(total).partition(" ")
-        beside = f"of computing from clips to figures, {size(material.pipeline.get('total_bytes'))} written"
+        beside = f"from clips to measurements, all jobs; {size(material.pipeline.get('total_bytes'))} written"
         figures.append(Figure("Whole pipeline", value, unit, beside, 50))
     return sorted(figures, key=lambda figure: figure.at)
 
 
 def hints(material: Material, turns: Mapping[str, Array] | None = None) -> list[Hint]:
-    """What to do next in the order in which to do it, then what is well, then what asks for nothing.
+    """Advice in the order in which to follow it, then what is good, then plain facts.
 
-    turns: split -> seconds at each turn (`coverage.counted`), where they were counted.
+    turns: split -> seconds at each turn (`coverage.counted`), if they were counted.
     """
     found = [
         *measured.hints(material),
-        *placed(10, _coverage(material)),  # what the data lack no training makes good
+        *placed(10, _coverage(material)),  # first, because training cannot make up for missing data
         *placed(10, _turning(turns or {})),
         *placed(11, _repairs(material)),
         *placed(20, _curve(material)),
@@ -86,29 +86,29 @@ def _curve(material: Material) -> Iterator[Hint]:
     if len(known) < 8:
         return
     passes, losses = zip(*known, strict=True)
-    # One section's error is noisy; a pass's is what has a trend.
+    # The error of one section is noisy, so compare means over passes.
     means = {p: np.mean([v for q, v in known if q == p]) for p in passes}
     best = min(means, key=lambda p: means[p])
     if means[passes[-1]] > 1.05 * means[best]:
         yield Hint(
             "warn",
             f"The held-out error was lowest in pass {best:.0f} and has risen since.",
-            "Fewer passes, more dropout or more data would serve the held-out clips better.",
+            "The network overfits: train for fewer passes, with more dropout, or on more data.",
         )
         return
     quarter = max(1, len(losses) // 4)
     before, after = np.mean(losses[-2 * quarter : -quarter]), np.mean(losses[-quarter:])
     fall = 1 - after / before
     if _recipe(material).get("schedule", "constant") != "constant":
-        return  # it fell with the learning rate, which has come to its end
+        return  # the error falls with the learning rate, which has reached its end
     if fall > 0.03:
         yield Hint(
             "note",
-            f"The held-out error was still falling, by {100 * fall:.0f} % over the last quarter.",
-            "More passes will help; a configuration that continues this one starts from its last checkpoint.",
+            f"The held-out error still fell by {100 * fall:.0f} % in the last quarter of training.",
+            "More passes will help: a configuration can continue from the last checkpoint of this one.",
         )
     else:
-        yield Hint("good", "Training has settled.", "More passes alone will change little.")
+        yield Hint("good", "The held-out error has stopped falling.", "More passes will change little.")
 
 
 def _coverage(material: Material) -> Iterator[Hint]:
@@ -120,16 +120,17 @@ def _coverage(material: Material) -> Iterator[Hint]:
     if everything and not totals.get("stand"):
         yield Hint(
             "warn",
-            "Nobody stands in these clips, so nobody starts or stops either.",
-            "More training will not teach it: where the character is to stand, it steps on the spot. Add "
-            "clips in which somebody stands, sets off and stops.",
+            "Nobody stands, starts or stops in these clips.",
+            "So the character steps on the spot when it should stand, and more training will not change "
+            "that. Add clips in which somebody stands, starts and stops.",
         )
     thin = [g for g, s in totals.items() if 0 < s < 0.03 * everything and g not in ("jump", "bump")]
     if thin:
         yield Hint(
             "note",
             f"There is little data of {' and '.join(sorted(thin))}:",
-            "under three per cent of the seconds, and those gaits will be the least steady. Add clips.",
+            "less than three per cent of the time each. Add clips, or expect the character to be unsteady "
+            "there.",
         )
 
 
@@ -137,14 +138,14 @@ def _turning(turns: Mapping[str, Array]) -> Iterator[Hint]:
     seconds = np.sum(list(turns.values()), axis=0)
     if not np.any(seconds):
         return
-    share = float(np.sum(seconds[np.abs(TURNS[:-1] + TURNS[1:]) / 2 > SHARP]) / np.sum(seconds))
-    if share < FEW_TURNS:
+    share = float(np.sum(seconds[np.abs(TURNS[:-1] + TURNS[1:]) / 2 > TURNING]) / np.sum(seconds))
+    if share < LITTLE_TURNING:
         yield Hint(
             "warn",
-            f"Hardly anybody turns in these clips: {100 * share:.1f} % of the time by {SHARP:.0f} degrees a "
-            "second or more.",
-            "More training will not teach it: a character that is steered sideways will slide its feet. Add "
-            "clips in which somebody turns, to both sides.",
+            f"Hardly anybody turns in these clips: only {100 * share:.1f} % of the time has turns of "
+            f"{TURNING:.0f} degrees per second or more.",
+            "So the character's feet slide when it is steered around a turn, and more training will not "
+            "change that. Add clips in which somebody turns to both sides.",
         )
 
 
@@ -154,8 +155,9 @@ def _repairs(material: Material) -> Iterator[Hint]:
     if repaired or warned:
         yield Hint(
             "note",
-            f"Look at {len(repaired | warned)} clips: {len(repaired)} repaired, {len(warned)} with warnings.",
-            "They are listed under Data. What is wrong in a clip, the network learns.",
+            f"Check {len(repaired | warned)} clips: {len(repaired)} were repaired, {len(warned)} have "
+            "warnings.",
+            "They are listed under Data. The network also learns the errors in a clip.",
         )
 
 
@@ -166,4 +168,4 @@ def _costs(material: Material) -> Iterator[Hint]:
         slowest = max(stages, key=lambda stage: stage["seconds"])
         share = slowest["seconds"] / total
         if share > 0.5:
-            yield Hint("fact", f"{slowest['stage'].capitalize()} took {100 * share:.0f} % of the time.", "")
+            yield Hint("fact", f"The {slowest['stage']} stage took {100 * share:.0f} % of the time.", "")

@@ -1,4 +1,4 @@
-"""Numbers as people read them, and data as a page can carry it safely."""
+"""Numbers formatted for people, and data encoded safely for a page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 
 def duration(seconds: float | None) -> str:
-    """Seconds as a person says them.
+    """Seconds as text for people.
 
     >>> duration(0.42), duration(93), duration(5400), duration(154800), duration(None)
     ('0.42 s', '1 min 33 s', '1 h 30 min', '43 h', '–')
@@ -43,7 +43,8 @@ def size(count: float | None) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number to so many significant digits, thousands apart; an en dash where there is none.
+    """A number to `digits` significant digits, with thousands separators; an en dash for None, NaN and
+    infinity.
 
     >>> number(0.04391), number(20000, 5), number(1234.5), number(None), number(float("nan")), number(0)
     ('0.0439', '20,000', '1,234', '–', '–', '0')
@@ -57,7 +58,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def plain(value: Any) -> Any:
-    """The same made of dicts, lists, strings and finite numbers only; NaN and infinities become None."""
+    """`value` as dicts, lists, strings and finite numbers only; NaN and infinities become None."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -72,7 +73,7 @@ def plain(value: Any) -> Any:
 
 
 def embedded(value: Any) -> Markup:
-    """JSON that can stand inside a <script> element whatever its strings say.
+    """JSON that is safe inside a <script> element, whatever its strings contain.
 
     With every "<" written as an escape, no string can end the element or open a comment.
 

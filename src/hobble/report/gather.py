@@ -1,4 +1,4 @@
-"""Everything the page tells, read from the artefacts into plain data once."""
+"""Reads everything that the page shows from the artefacts."""
 
 from __future__ import annotations
 
@@ -18,18 +18,16 @@ from hobble.measures.given import Json
 from hobble.models.load import load_network
 
 PUBLISHED = Path(__file__).parents[1] / "evaluation" / "published.yaml"
-COUNTED = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
+GENERAL_COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 
 
 @dataclass(frozen=True)
 class Material:
-    """What one configuration left behind.
+    """The results of one configuration.
 
-    measured: measurement -> its JSON.
-    history: column -> values, one per section of training; None where a cell is empty. motion, labels: the
-    reports of the clips, in one order; told: those of their channels. terrain, rows: paths of their fits and
-    of their rows.
-    splits: clip -> "train" or "held_out".
+    measured: measurement -> its JSON. history: column -> values, one per section of training, None for an
+    empty cell. motion, labels: reports of the clips, in the same order; told: reports of their channels.
+    terrain, rows: paths of the clips' terrain fits and rows. splits: clip -> "train" or "held_out".
     """
 
     name: str
@@ -53,18 +51,18 @@ class Material:
         return self.splits.get(clip, "train")
 
     def found(self, measure: str) -> Json:
-        """What a measurement found; empty where it was not made."""
+        """The JSON of a measurement; empty if it was not run."""
         return self.measured.get(measure, {})
 
     def beside(self, what: str) -> Json | None:
-        """The published entry of kind `what` for this configuration's network, if there is one."""
+        """The published entry for this configuration under the key `what`, or None."""
         rows = self.published.get(what, ())
         return next((row for row in rows if row["configuration"] == self.name), None)
 
     @property
     def blocks(self) -> list[str]:
         """Columns of the history that hold the held-out error of one block of Y."""
-        return [name for name in self.history if name not in COUNTED]
+        return [name for name in self.history if name not in GENERAL_COLUMNS]
 
 
 def gather(
@@ -84,7 +82,7 @@ def gather(
     terrain: Iterable[str] = (),
     rows: Iterable[str] = (),
 ) -> Material:
-    """Read the files a report is made from. Raises InputError naming the one that cannot be read."""
+    """Read the files of a report. Raises InputError with the name of a file that cannot be read."""
     return Material(
         name=name,
         dataset=dataset,
@@ -119,12 +117,12 @@ def _cell(path: str | Path, key: str, text: str | None) -> float | None:
     try:
         value = float(text)
     except ValueError:
-        raise InputError(path, f"column {key} holds {text!r}, which is no number") from None
+        raise InputError(path, f"column {key} holds {text!r}, which is not a number") from None
     return value if np.isfinite(value) else None
 
 
 def describe_network(path: str | Path) -> dict[str, Any]:
-    """What the page says of a network: what it is, its sizes and parameters, its skeleton and channels."""
+    """What the page needs to know about a network: description, sizes, parameters, skeleton, channels."""
     network = load_network(path)
     return {
         "described": network.described,

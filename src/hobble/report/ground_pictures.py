@@ -1,4 +1,4 @@
-"""Small pictures of terrain fits: the ground of a cycle, the soles on it, the figure at three moments."""
+"""Small 3D views of terrain fits: the ground of a cycle, the soles on it, the figure at three moments."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from hobble.figure.mesh import body, key
 from hobble.figure.pack import packed_turns
 from hobble.models.packing import packed
 
-STEPS_PER_CM = 10  # everything is kept in 16-bit steps of a millimetre
+STEPS_PER_CM = 10  # lengths are stored as 16-bit integers, in millimetres
 MOST = 24
 PARTS = ("cycle", "x", "z", "ground", "soles", "contacts", "pose")
 
 
 def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) -> dict[str, Any]:
-    """What the page draws of the pictures in `terrain/clips/<clip>.npz`; flat clips carry none.
+    """Views of the fits in `terrain/clips/<clip>.npz`, packed for the page; flat clips have none.
 
-    skeleton: as the network's file carries it.
+    skeleton: as in the network's file.
     """
     pictures: list[dict[str, Any]] = []
     if not skeleton:
@@ -45,8 +45,8 @@ def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) ->
 
 
 def _packed(part: Mapping[str, Array]) -> dict[str, Any]:
-    """Relative to the figure in the middle, so that 16 bits reach wherever in the world the clip is."""
-    middle = part["pose"][1, 0] * np.array([1.0, 0.0, 1.0])  # any bone is near enough
+    """Places relative to the middle figure, so that 16 bits are enough wherever the clip is."""
+    middle = part["pose"][1, 0] * np.array([1.0, 0.0, 1.0])  # any bone will do
     return {
         "n": len(part["x"]),
         "x": [float(part["x"][0] - middle[0]), float(part["x"][-1] - middle[0])],

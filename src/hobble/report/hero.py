@@ -1,18 +1,20 @@
-"""With what the page opens: which part of the body is told something, and how much of it."""
+"""The state in which the page opens: which part of the body hurts, and how much."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-SHARE = 0.7  # of the highest: enough that a visitor sees it, and not yet the most that there is
+OPENING_SHARE = 0.7  # of the highest value: easy to see, but not the maximum
 
 
 def opening(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
-    """`part`: the label of the slider that opens, of the channel that lies in the body: the one that
-    changes the
-    walk most by what was `measured` of responses to it; the first one where that does not tell. `value`: how
-    much."""
+    """The slider that is set when the page opens, and its value.
+
+    `part`: the label of the slider whose column changes the walk most according to `measured`, the JSON of
+    the measurements; the first slider if they do not say; None if no channel has parts of the body. `value`:
+    what the slider is set to.
+    """
     one = placed(playable)
     if one is None:
         return {"part": None, "value": 0}
@@ -24,10 +26,9 @@ def opening(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) 
         if row.get("gait") == "walk" and row["link"] in parts
     }
     best = max(seen, key=lambda column: seen[column]) if seen else next(iter(parts), None)
-    return {"part": parts.get(best) if best else None, "value": round(SHARE * one["highest"], 6)}
+    return {"part": parts.get(best) if best else None, "value": round(OPENING_SHARE * one["highest"], 6)}
 
 
 def placed(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    """The first channel of a character that lies in parts of the body and has a slider; None where
-    none has."""
+    """The first channel with parts of the body and a slider; None if there is none."""
     return next((c for c in playable.get("channels", ()) if c["regions"] and c["sliders"]), None)

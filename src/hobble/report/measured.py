@@ -1,16 +1,16 @@
-"""What the measurements show of themselves on the pages: a walk through the list of them.
+"""Collects what each measurement shows on the pages.
 
 A measurement's `page.py` may have
 
 - `section(found, material) -> Section`: its part of the report,
-- `figures(found, material) -> Iterable[Figure]`: for the top of the report,
-- `hints(found, material) -> Iterable[Hint]`: sentences drawn from its numbers,
+- `figures(found, material) -> Iterable[Figure]`: key figures for the top of the report,
+- `hints(found, material) -> Iterable[Hint]`: advice that follows from its numbers,
 
-where `found` is its own JSON ({} where it was not made) and `material` everything else that is known of the
+where `found` is its own JSON ({} if it was not run) and `material` everything else that is known of the
 configuration. Its `comparison_page.py` may have
 
-- `section(compared) -> Section`: its part of the page of a comparison,
-- `columns(compared) -> Iterable[Overview]`: for the table of configurations on top of it,
+- `section(compared) -> Section`: its part of the comparison page,
+- `columns(compared) -> Iterable[Overview]`: for the table of configurations at the top of that page,
 - `verdicts(compared) -> Iterable[Verdict]`: which configuration is best at something, for the first screen,
 
 where `compared` is compare.json.
@@ -33,7 +33,10 @@ from hobble.report.verdicts import Verdict
 
 @dataclass(frozen=True)
 class Overview:
-    """A column of the table of configurations; values: of each of them; at: its place among the others."""
+    """A column of the table of configurations.
+
+    values: configuration -> value. at: columns are sorted by it.
+    """
 
     at: int
     column: Column
@@ -51,28 +54,28 @@ def figures(material: Material) -> list[Figure]:
 
 
 def hints(material: Material) -> list[Hint]:
-    """What the numbers suggest."""
+    """Advice that follows from the numbers."""
     return [h for name, show in _each("page", "hints") for h in show(material.found(name), material)]
 
 
 def compared_sections(compared: Json) -> list[Section]:
-    """The sections of the page of a comparison that show measurements."""
+    """The sections of the comparison page that show measurements."""
     return joined(show(compared) for _, show in _each("comparison_page", "section"))
 
 
 def compared_verdicts(compared: Json) -> list[Verdict]:
-    """Which configuration is best at what, in the order in which it is said."""
+    """Which configuration is best at what, in the order of the page."""
     found = [verdict for _, show in _each("comparison_page", "verdicts") for verdict in show(compared)]
     return sorted(found, key=lambda verdict: verdict.at)
 
 
 def compared_columns(compared: Json) -> list[Overview]:
-    """Columns of the table of configurations."""
+    """The columns of the table of configurations."""
     return [column for _, show in _each("comparison_page", "columns") for column in show(compared)]
 
 
 def _each(part: str, function: str) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """The name of each measurement that has this function in that part, and the function."""
+    """(measurement, function) for each measurement whose module `part` has that function."""
     for one in MEASURES:
         if (found := getattr(one.part(part), function, None)) is not None:
             yield one.name, found

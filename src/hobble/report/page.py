@@ -1,4 +1,4 @@
-"""The page: sections in the order of a reader's questions, rendered into one file that needs nothing else."""
+"""Renders the report of a configuration into one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ def render(
 ) -> str:
     """The report as one HTML document.
 
-    scenes: of `scenes.scenes`; playable: of `playable.playable`; compared: of `compare.comparisons`; without
-    them those parts are left out. bundle: the page's scripts as `bundle.bundle` makes them.
+    scenes: from `scenes.scenes`; playable: from `playable.playable`; compared: from `compare.comparisons`. A
+    part without data is left out. bundle: the page's scripts, from `bundle.bundle`.
 
-    Every value is escaped where it stands; data for the scripts is JSON in which no "<" is left.
+    The template escapes every value. Data for the scripts is JSON without any "<".
     """
     found = coverage.counted(material.rows, material.splits)
     sections, shown = _sections(material, found), measured.sections(material)
@@ -89,7 +89,7 @@ def render(
 
 
 def _sections(material: Material, found: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Charts and tables by section; None where there is nothing to show. found: of `coverage.counted`."""
+    """Charts and tables by section, None if there is nothing to show. found: from `coverage.counted`."""
     costs, data, training = cost_section, data_section, training_section
     return {
         "training": {

@@ -1,4 +1,4 @@
-"""What a section of a page is made of: charts, tables, words and figures, each at its place."""
+"""The parts of a section of a page: charts, tables, text and figures."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from hobble.report.tables import Table
 
 @dataclass(frozen=True)
 class Words:
-    """A paragraph. Only what is written in the code may be Markup; everything else is escaped."""
+    """A paragraph. Only text from the code may be Markup; everything else is escaped."""
 
     text: str | Markup
-    empty: bool = False  # it says that there is nothing to show
+    empty: bool = False  # the text says that there is nothing to show
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """A few figures in a row."""
+    """A row of figures."""
 
     figures: Sequence[Figure]
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Charts side by side, where there is room."""
+    """Charts side by side, if the window is wide enough."""
 
     charts: Sequence[Chart | None]
 
 
 @dataclass(frozen=True)
 class Fragment:
-    """A template of the report's folder, for what needs a script of the page."""
+    """A template in the report's folder, for parts that a script of the page draws."""
 
     template: str
 
@@ -55,10 +55,10 @@ KINDS: dict[type, str] = {
 
 @dataclass(frozen=True)
 class Part:
-    """One thing of a section, at a place among the others: 0 is the top, 100 the end.
+    """One part of a section. at: its place, from 0 (top) to 100 (end).
 
-    content: None where there is nothing to show. tall: of a chart with a row for each clip. open, short: of a
-    table that is not folded, of one without a bar to scroll.
+    content: None if there is nothing to show. tall: a chart with a row for each clip. open: a table that is
+    shown unfolded. short: a table that needs no scroll bar.
     """
 
     at: int
@@ -69,16 +69,16 @@ class Part:
 
     @property
     def kind(self) -> str:
-        """What it is, for the template."""
+        """Name of the kind of content, for the template."""
         return KINDS[type(self.content)]
 
 
 @dataclass(frozen=True)
 class Section:
-    """A section of a page. Several may have one `name`: then they are one, with the parts of all.
+    """A section of a page. Sections with the same `name` are joined into one (`joined`).
 
-    title: what stands over it, said by one of them. at: its place among the sections. nav: a shorter title
-    for the contents. long: whether a print may break it.
+    title: its heading; one of the joined sections gives it. at: sections are sorted by it. nav: a shorter
+    title for the list of contents. long: whether printing may break the section between pages.
     """
 
     name: str
@@ -90,9 +90,9 @@ class Section:
 
 
 def joined(sections: Iterable[Section]) -> list[Section]:
-    """Sections in their order, those of one name as one, with its parts in their order; empty ones left out.
+    """Sections in order. Sections of the same name become one with all their parts; empty ones are left out.
 
-    Title and place are those of the first that has a title.
+    Title and place come from the first section that has a title.
     """
     by_name: dict[str, list[Section]] = {}
     for section in sections:

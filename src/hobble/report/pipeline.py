@@ -1,4 +1,4 @@
-"""What each stage cost, from Snakemake's own benchmark files and the sizes of the artefacts."""
+"""Time and disk space of each stage, from Snakemake's benchmark files and the sizes of the artefacts."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from hobble.report.provenance import machine, versions
 
 
 def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]) -> dict[str, Any]:
-    """The account of costs that `pipeline.json` holds.
+    """The content of `pipeline.json`.
 
     stages: in the order of the pipeline, stage -> {"benchmarks": tsv files or folders of them, "files":
-    artefacts or folders of them}. What is not there is listed under `missing`, not refused: a stage may have
-    been copied from another machine without its benchmarks. A training that was interrupted, or goes on from
-    another, took what its history says: Snakemake saw the last call only. Returns `stages` (one entry each:
+    artefacts or folders of them}. A missing file is listed under `missing` and is no error: a stage may have
+    been copied from another machine without its benchmarks. The time of training comes from its history,
+    because Snakemake measures only the last of several calls. Returns `stages` (one entry each:
     jobs, seconds and longest in seconds, max_rss_mb, cpu_seconds, files, bytes, and the same for each rule),
-    `total_seconds`, `total_bytes`, `database` (see `hobble.database.sizes`; none where there is none),
-    `missing`, `machine`, `versions`. Raises InputError for a benchmark or a history that is none.
+    `total_seconds`, `total_bytes`, `database` (see `hobble.database.sizes`; None without a database),
+    `missing`, `machine`, `versions`. Raises InputError for a malformed benchmark or history.
     """
     missing: list[str] = []
     entries = []
@@ -60,9 +60,9 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
 
 
 def read_benchmark(path: str | Path) -> list[dict[str, float]]:
-    """The runs in one of Snakemake's benchmark files; what it could not measure ("-", "NA") is left out.
+    """The rows of a Snakemake benchmark file, without the values that it could not measure ("-", "NA").
 
-    Raises InputError where the file is not a benchmark.
+    Raises InputError if the file is not a benchmark.
     """
     with open(path, encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file, delimiter="\t"))
@@ -81,7 +81,7 @@ def _number(text: str | None) -> float | None:
 
 
 def _jobs(paths: Iterable[str], missing: list[str]) -> list[tuple[str, dict[str, float]]]:
-    """(rule, measurement) of every benchmark at or below `paths`: <rule>.tsv or <rule>/<clip>.tsv."""
+    """(rule, row) of every benchmark in `paths`: <rule>.tsv or <rule>/<clip>.tsv."""
     found = []
     for root in map(Path, paths):
         if root.is_dir():
@@ -98,7 +98,7 @@ def _jobs(paths: Iterable[str], missing: list[str]) -> list[tuple[str, dict[str,
 
 
 def _sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
-    """Bytes of every file at or below `paths`, hidden ones (half-written files) left out."""
+    """Bytes of every file in `paths`, without hidden files, which are half-written."""
     sizes = []
     for root in map(Path, paths):
         if root.is_dir():
@@ -112,7 +112,7 @@ def _sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
 
 
 def _trained(paths: Iterable[str]) -> float:
-    """Seconds of training up to the last section, all calls together, by the history among the artefacts."""
+    """Seconds of training over all calls, from the history among the artefacts."""
     for path in map(Path, paths):
         if (path / "history.csv").is_file():
             seconds = read_history(path / "history.csv").get("seconds", [])

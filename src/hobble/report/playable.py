@@ -1,4 +1,4 @@
-"""The trained network, packed to run in the page: weights as 16-bit integers, and all it needs to know."""
+"""Packs a trained network to run in the page: 16-bit weights and everything else that the runtime needs."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from hobble.rows.layout import RowLayout
 from hobble.runtime import animation, controller, feet, trajectory
 from hobble.runtime.bounds import Bounds
 from hobble.runtime.character import start
-from hobble.runtime.limits import HURRIED, LAME_BELOW
+from hobble.runtime.limits import HURRY_FACTOR, LAME_BELOW
 from hobble.runtime.options import Runtime
 
-UNSEEN = 1e-7  # an input that is scaled by less than this says nothing
+UNSEEN = 1e-7  # an input with a smaller scale has no effect
 
 
 def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
-    """What the page's second implementation of the runtime needs; {} where the network has no skeleton.
+    """The data of the page's JavaScript runtime; {} if the network has no skeleton.
 
-    Left out are inputs that weigh nothing (joints that a network is not shown), and the rotations of joints
-    that move no part of the body, such as fingers: these stay at rest on the joint above.
+    It leaves out inputs without effect (hidden joints) and the rotations of joints that move no part of the
+    drawn body, such as fingers. Those joints keep their rest pose relative to their parent.
     """
     skeleton = network.skeleton
     if skeleton is None:
@@ -72,9 +72,10 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
 
 
 def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
-    """What the page shows of each channel, columns by index; `first`: where its columns begin among all.
+    """The data of each channel, with columns as indices. `first`: index of its first column among all
+    channels.
 
-    `rate`: most that a value may change in a frame; `scale`: what values are divided by.
+    `rate`: largest change of a value in one frame. `scale`: the divisor of values.
     """
     skeleton, out, first = network.skeleton, [], 0
     assert skeleton is not None
@@ -112,7 +113,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
 
 
 def turning_joints(skeleton: Skeleton) -> list[int]:
-    """The joints whose rotations are seen: the bones of the body, legs, and all above them."""
+    """The joints whose rotations matter: the bones of the drawn body, the legs, and all their ancestors."""
     found: set[int] = set()
     for joint in (*body(skeleton).bones.tolist(), *feet.leg_joints(skeleton).ravel().tolist()):
         while joint >= 0 and joint not in found:
@@ -122,20 +123,20 @@ def turning_joints(skeleton: Skeleton) -> list[int]:
 
 
 def _rows(layout: RowLayout, turning: Sequence[int]) -> NDArray[np.int64]:
-    """Outputs that the page uses: all before the rotations, and those of the joints that turn."""
+    """Indices of the outputs that the page uses: all before the rotations, and those of `turning` joints."""
     start = layout.y_joint_rotation.start
     turns = start + 3 * np.asarray(turning)[:, None] + np.arange(3)
     return np.concatenate([np.arange(start), turns.ravel()])
 
 
 def skeleton_of(spec: Mapping[str, Any]) -> Skeleton:
-    """The skeleton of a character that `playable` packed, as far as its body needs it."""
+    """The skeleton of a character packed by `playable`, with what is needed to draw its body."""
     joints, parents = tuple(spec["names"]), tuple(spec["parents"])
     return Skeleton("", joints, parents, np.array(spec["offsets"]), spec["roles"])
 
 
 def _bounds(network: Network, rows: NDArray[np.int64]) -> dict[str, Any]:
-    """What keeps the character whole: `hobble.runtime.bounds`, of the outputs `rows`."""
+    """The bounds of inputs and of the outputs `rows`, from `hobble.runtime.bounds`."""
     found = Bounds.of(network)
     low, high = found.y_low[rows], found.y_high[rows]
     arrays = {"xLow": found.x_low, "xHigh": found.x_high, "yLow": low, "yHigh": high}
@@ -154,7 +155,7 @@ def _start(network: Network) -> dict[str, Any]:
 
 
 def _constants() -> dict[str, float]:
-    """The numbers of the Python runtime, so that they stand in one place."""
+    """The constants of the Python runtime, so that they are defined in one place only."""
     return {
         "targetMix": trajectory.TARGET_MIX,
         "gaitMix": trajectory.GAIT_MIX,
@@ -163,13 +164,13 @@ def _constants() -> dict[str, float]:
         "owedRate": trajectory.OWED_RATE,
         "owedWithin": trajectory.OWED_WITHIN,
         "mostOwed": trajectory.MOST_OWED,
-        "held": trajectory.HELD,
+        "held": trajectory.UNWISHED_LOSS,
         "furthestTurn": float(trajectory.FURTHEST_TURN),
         "strafeFrom": float(trajectory.STRAFE_FROM),
         "turnInPlace": float(animation.TURN_IN_PLACE),
         "jogFrom": animation.JOG_FROM,
         "lameBelow": LAME_BELOW,
-        "hurried": HURRIED,
+        "hurried": HURRY_FACTOR,
         "lockAt": feet.LOCK_AT,
         "release": feet.RELEASE,
         "tooFar": feet.TOO_FAR,
@@ -178,6 +179,6 @@ def _constants() -> dict[str, float]:
         "floating": feet.FLOATING,
         "bodyMix": feet.BODY_MIX,
         "bodyFree": feet.BODY_FREE,
-        "bodyFrom": feet.BODY_FROM,
+        "bodyFrom": feet.BODY_MIN_CONTACT,
         "mostAdded": feet.MOST_ADDED,
     }

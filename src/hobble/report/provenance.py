@@ -1,4 +1,4 @@
-"""Where a result comes from: versions, the commit, the machine."""
+"""The origin of a result: versions, commit, machine."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PACKAGES = ("hobble", "torch", "numpy", "scipy", "numba", "snakemake", "pydantic
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python, of the packages that do the work, and of what the page takes from npm."""
+    """Versions of Python, of the main Python packages, and of the page's npm packages."""
     found = {"python": platform.python_version()}
     for name in PACKAGES:
         try:
@@ -26,7 +26,7 @@ def versions() -> dict[str, str]:
 
 
 def machine() -> dict[str, Any]:
-    """What the run was measured on: system, processor, cores, memory. No host or user name."""
+    """System, processor, cores and memory of this machine. No host or user name."""
     return {
         "system": f"{platform.system()} {platform.machine()}",
         "processor": _processor(),
@@ -36,7 +36,7 @@ def machine() -> dict[str, Any]:
 
 
 def commit(folder: Path) -> dict[str, Any] | None:
-    """The commit of the checkout at `folder` and whether anything is changed in it; None without git."""
+    """The commit of the checkout at `folder`, and whether it has uncommitted changes; None without git."""
     try:
         head = _git(folder, "rev-parse", "HEAD")
         return {

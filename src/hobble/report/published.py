@@ -1,4 +1,4 @@
-"""Where a published figure was printed, in words."""
+"""Citations of published figures."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def cited(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
-    """Source and table of a figure, and what the same publication says of it elsewhere.
+    """Source and table of a figure, with a different value in the same publication if there is one.
 
     >>> cited({"source": "a", "table": "5.2", "elsewhere": "3 in Appendix A"}, {"a": "Author (2021)"})
     'Author (2021), Table 5.2 (but 3 in Appendix A)'

@@ -1,4 +1,4 @@
-// The questionnaire: films in an order drawn for each person, two questions for each, and a file of answers.
+// The questionnaire: films in a random order, two questions for each film, and a file with the answers.
 "use strict";
 (() => {
   const { study, parts, films } = JSON.parse(document.getElementById("study").textContent);
@@ -6,11 +6,11 @@
   const KEY = `hobble-study-${study}`;
   let state = null, plays = 0, url = null;
 
-  // A page that was closed goes on where it was, if the browser keeps such things.
+  // If the browser allows local storage, a reopened page continues with the next film.
   const kept = () => { try { return JSON.parse(localStorage.getItem(KEY)); } catch { return null; } };
-  const keep = () => { try { localStorage.setItem(KEY, JSON.stringify(state)); } catch { /* then it begins anew */ } };
+  const keep = () => { try { localStorage.setItem(KEY, JSON.stringify(state)); } catch { /* no local storage: a reopened page starts again */ } };
 
-  const drawn = () => { // Fisher and Yates, without the bias of a remainder
+  const randomOrder = () => { // Fisher-Yates shuffle; rejecting large values avoids modulo bias
     const order = films.map(({ film }) => film), one = new Uint32Array(1);
     for (let i = order.length - 1; i > 0; i--) {
       const most = Math.floor(2 ** 32 / (i + 1)) * (i + 1);
@@ -37,14 +37,14 @@
     const { webp } = films.find(({ film }) => film === state.order[state.answers.length]);
     const raw = atob(webp), data = Uint8Array.from(raw, (c) => c.charCodeAt(0));
     if (url) URL.revokeObjectURL(url);
-    url = URL.createObjectURL(new Blob([data], { type: "image/webp" })); // a new address begins the film anew
+    url = URL.createObjectURL(new Blob([data], { type: "image/webp" })); // a new address restarts the film
     find("film").src = url;
     plays++;
   };
   const check = () => {
     const answered = ticked().length > 0 || none.checked, marked = fluid() > 0;
     find("next").disabled = !(answered && marked);
-    find("missing").textContent = answered && marked ? "" : answered ? "How fluid is it?" : marked ? "Tick the parts that hurt, or that nothing does." : "";
+    find("missing").textContent = answered && marked ? "" : answered ? "Say how fluid the motion is." : marked ? "Tick the parts that hurt, or \"nothing hurts\"." : "";
   };
   const show = (name) => ["welcome", "asking", "done"].forEach((id) => { find(id).hidden = id !== name; });
   const ask = () => {
@@ -79,7 +79,7 @@
   });
   find("again").addEventListener("click", play);
   find("begin").addEventListener("click", () => {
-    state ??= { study, person: find("person").value.trim(), begun: new Date().toISOString(), order: drawn(), answers: [] };
+    state ??= { study, person: find("person").value.trim(), begun: new Date().toISOString(), order: randomOrder(), answers: [] };
     keep();
     ask();
   });
@@ -95,7 +95,7 @@
   if (before?.study === study && Array.isArray(before.answers) && before.order?.length === films.length) {
     state = before;
     find("person").value = state.person;
-    find("resumed").textContent = `You have answered ${state.answers.length} of ${films.length}; it goes on there.`;
+    find("resumed").textContent = `You have answered ${state.answers.length} of ${films.length} films. Begin continues with the next one.`;
   }
   globalThis.Study = { films, get state() { return state; } };
 })();

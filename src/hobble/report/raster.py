@@ -1,4 +1,4 @@
-"""Pictures of the figure without a browser: the body that the page draws, lit, on ground with its shadow."""
+"""Renders the page's body without a browser, with light, ground and shadow."""
 
 from __future__ import annotations
 
@@ -15,19 +15,22 @@ from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.figure.mesh import Mesh
 
-FINE = 2  # pixels of the body to a pixel of the picture, a side
+SUPERSAMPLING = 2  # rendered pixels per picture pixel, in each direction
 PAPER = np.array([0.953, 0.945, 0.925])
 GROUND = np.array([0.905, 0.888, 0.850])
 LINE = np.array([0.60, 0.61, 0.62])
 BODY = np.array([0.70, 0.735, 0.765])
 HURT_LOW, HURT_HIGH = np.array([0.914, 0.725, 0.286]), np.array([0.761, 0.220, 0.169])
-GRID = 50.0  # cm between lines
-REACH = 700.0  # cm at which the ground has faded into the paper
+GRID = 50.0  # cm between the lines on the ground
+REACH = 700.0  # cm from the target over which the ground fades into the background
 
 
 @dataclass(frozen=True)
 class Camera:
-    """Looks at `target` (cm) from `distance`, turned by `yaw` and raised by `pitch`; pixels wide and high."""
+    """A camera that looks at `target` from `distance` (cm).
+
+    yaw, pitch: radians. size: pixels of each side.
+    """
 
     target: Array
     yaw: float = 0.75
@@ -37,7 +40,7 @@ class Camera:
 
     @property
     def axes(self) -> Array:
-        """Rows: to the right, up, and into the picture."""
+        """(3, 3), rows: right, up, and into the picture."""
         c = np.cos(self.pitch)
         ahead = -np.array([c * np.sin(self.yaw), np.sin(self.pitch), c * np.cos(self.yaw)])
         right = np.cross(ahead, [0.0, 1.0, 0.0])
@@ -46,11 +49,11 @@ class Camera:
 
     @property
     def eye(self) -> Array:
-        """Where the camera is."""
+        """Position of the camera (3,), cm."""
         return self.target - self.distance * self.axes[2]
 
     def project(self, points: Array, scale: int = 1) -> Array:
-        """Pixels x, y and the depth in cm of world points (V, 3)."""
+        """(V, 3): pixels x, y and depth in cm of world points (V, 3)."""
         across, up, deep = ((points - self.eye) @ self.axes.T).T
         deep = np.maximum(deep, 1.0)
         half, zoom = scale * self.size / 2, scale * self.size * 1.75
@@ -58,7 +61,7 @@ class Camera:
 
 
 class Studio:
-    """Draws one body in any pose; `regions`: for each of its bones the columns that colour it."""
+    """Draws one body in any pose. regions: for each bone, the indices of the columns that colour it."""
 
     def __init__(self, body: Mesh, regions: Sequence[Sequence[int]] = ()) -> None:
         self._body, self._faces = body, body.faces
@@ -67,15 +70,15 @@ class Studio:
     def draw(
         self, places: Array, turns: Array, camera: Camera, told: Array | None = None
     ) -> NDArray[np.uint8]:
-        """An RGB picture (size, size, 3). places (B, 3), cm, and turns (B, 4) of the bones; told:
-        (columns,) from 0 to 1, as colours."""
+        """An RGB picture (size, size, 3). places (B, 3), cm, and turns (B, 4) of the bones. told: (columns,)
+        values from 0 to 1, drawn as colours."""
         corners = self._body.posed(places, turns)
         key = np.array([0.55 * np.sin(camera.yaw - 0.85), 0.78, 0.55 * np.cos(camera.yaw - 0.85)])
         key /= np.linalg.norm(key)
         rim = np.array([0.9 * np.sin(camera.yaw + 2.5), 0.35, 0.9 * np.cos(camera.yaw + 2.5)])
         ground = _ground(camera)
         shadow = corners - key * (corners[:, 1:2] / key[1])
-        fine = camera.size * FINE
+        fine = camera.size * SUPERSAMPLING
         cover = np.zeros((camera.size, camera.size))
         _fill(camera.project(shadow), self._faces, cover)
         ground *= 1 - 0.42 * gaussian_filter(cover, camera.size / 130)[..., None]
@@ -87,12 +90,12 @@ class Studio:
         )
         colours = self._colours(told) * tone[:, None]
         picture, depth = np.zeros((fine, fine, 3)), np.full((fine, fine), np.inf)
-        _shade(camera.project(corners, FINE), colours, self._faces, picture, depth)
+        _shade(camera.project(corners, SUPERSAMPLING), colours, self._faces, picture, depth)
         share = _coarse(np.isfinite(depth).astype(float))[..., None]
         return np.clip(np.round(255 * (_coarse(picture) + (1 - share) * ground)), 0, 255).astype(np.uint8)
 
     def _colours(self, told: Array | None) -> Array:
-        """RGB of every corner: grey where it is told nothing, over amber to red where it is told the most."""
+        """RGB of every corner: grey for value 0, then amber, then red for value 1."""
         bones = np.tile(BODY, (len(self._body.bones), 1))
         if told is not None:
             for i, columns in enumerate(self._regions):
@@ -105,8 +108,8 @@ class Studio:
 
 @functools.lru_cache(maxsize=4)
 def _sheet(yaw: float, pitch: float, distance: float, size: int, height: float) -> tuple[Array, Array, Array]:
-    """Of each pixel: where it sees the ground, from under the target; how much of the ground, rather than
-    the paper, is seen there; half the width (cm) that a line is drawn with."""
+    """For each pixel: the point of the ground that it shows, relative to the point under the target (cm); the
+    share of ground colour over background; half the width of a grid line (cm)."""
     camera = Camera(np.array([0.0, height, 0.0]), yaw, pitch, distance, size)
     pixel = np.arange(size) + 0.5 - size / 2
     x, y = np.meshgrid(pixel, -pixel)
@@ -118,7 +121,7 @@ def _sheet(yaw: float, pitch: float, distance: float, size: int, height: float) 
 
 
 def _ground(camera: Camera) -> Array:
-    """RGB (size, size, 3) of the ground at height 0 with its grid, fading into the paper far away."""
+    """RGB (size, size, 3) of the ground at height 0 with its grid, fading into the background far away."""
     x, height, z = (float(v) for v in camera.target)
     place, seen, wide = _sheet(camera.yaw, camera.pitch, camera.distance, camera.size, height)
     near = np.full(seen.shape, np.inf)
@@ -130,12 +133,12 @@ def _ground(camera: Camera) -> Array:
 
 
 def _coarse(fine: Array) -> Array:
-    """Means over squares of FINE by FINE pixels."""
-    out = np.zeros_like(fine[::FINE, ::FINE])
-    for i in range(FINE):
-        for j in range(FINE):
-            out += fine[i::FINE, j::FINE]
-    return out / FINE**2
+    """Means over squares of SUPERSAMPLING by SUPERSAMPLING pixels."""
+    out = np.zeros_like(fine[::SUPERSAMPLING, ::SUPERSAMPLING])
+    for i in range(SUPERSAMPLING):
+        for j in range(SUPERSAMPLING):
+            out += fine[i::SUPERSAMPLING, j::SUPERSAMPLING]
+    return out / SUPERSAMPLING**2
 
 
 def _normals(corners: Array, faces: NDArray[np.int64]) -> Array:
@@ -151,12 +154,12 @@ def _normals(corners: Array, faces: NDArray[np.int64]) -> Array:
 def _shade(
     points: Array, colours: Array, faces: Any, picture: Array, depth: Array
 ) -> None:  # pragma: no cover
-    """Fill triangles of corners (V, 3) in pixels with their colours, the nearest in front."""
+    """Draw triangles with corners (V, 3) in pixels and colours (V, 3), with a depth buffer."""
     height, width = depth.shape
     for f in range(len(faces)):
         a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]
         area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        if area >= 0:  # seen from behind: y points down, so fronts have a negative area
+        if area >= 0:  # back face: y points down, so front faces have a negative area
             continue
         x0, x1 = max(0, int(min(a[0], b[0], c[0]))), min(width - 1, int(max(a[0], b[0], c[0])) + 1)
         y0, y1 = max(0, int(min(a[1], b[1], c[1]))), min(height - 1, int(max(a[1], b[1], c[1])) + 1)
@@ -180,7 +183,7 @@ def _shade(
 
 @njit
 def _fill(points: Array, faces: Any, cover: Array) -> None:  # pragma: no cover
-    """Set to 1 what triangles of corners (V, 3) in pixels cover, from whichever side."""
+    """Set pixels to 1 that triangles with corners (V, 3) in pixels cover, seen from either side."""
     height, width = cover.shape
     for f in range(len(faces)):
         a, b, c = points[faces[f, 0]], points[faces[f, 1]], points[faces[f, 2]]

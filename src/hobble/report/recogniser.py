@@ -1,6 +1,7 @@
 """The recogniser of limps, packed for the page.
 
-It is what was learnt of people's walks, and the healthy walk of the character, beside which its limps stand.
+It has the statistics of people's limps, and the healthy walk of the character, with which its limps are
+compared.
 """
 
 from __future__ import annotations
@@ -24,16 +25,16 @@ from hobble.runtime.export import jointed
 from hobble.runtime.options import Runtime
 
 FPS = 60
-SPEED = 2.5  # cm a frame, as Play walks
-BEGIN, WATCHED = 3 * FPS, 8 * FPS  # frames that a character has to get up to speed, and that are measured
-ROLES = ("hip", "knee", "heel", "toe", "shoulder")  # of each side, without which nothing is measured
+SPEED = 2.5  # cm per frame, the walking speed of the page's Play section
+WARM_UP, MEASURED = 3 * FPS, 8 * FPS  # frames to get up to speed, and frames that are measured
+ROLES = ("hip", "knee", "heel", "toe", "shoulder")  # roles that both sides must have
 
 
-def playable_and_judged(network: Network, runtime: Runtime) -> dict[str, Any]:
-    """`playable`, and under `recogniser` what the page needs to say what a walk looks like.
+def playable_with_recogniser(network: Network, runtime: Runtime) -> dict[str, Any]:
+    """The data of `playable`, and under `recogniser` what the page needs to recognise a limp.
 
-    `recogniser` is missing where nothing can be said: the network is not told where it hurts, its rig lacks
-    a role, or its healthy character makes no cycle of a walk.
+    There is no `recogniser` if the network has no channel with parts of the body, if its rig lacks a role, or
+    if the healthy character makes no gait cycle.
     """
     spec = playable(network, runtime)
     if any(channel["regions"] for channel in spec.get("channels", ())):
@@ -45,23 +46,23 @@ def playable_and_judged(network: Network, runtime: Runtime) -> dict[str, Any]:
 
 
 def healthy_walk(network: Network, skeleton: Skeleton, runtime: Runtime) -> Profile | None:
-    """The profile of the character that walks on, told nothing, its joints where the page has them."""
+    """The profile of the character walking straight on, healthy, with joints placed as in the page."""
     if not all(f"{side}_{part}" in skeleton.roles for side in SIDES for part in ROLES):
         return None
     animation = ProceduralAnimation(network, **dict(runtime))
     ahead = np.array([0.0, SPEED])
-    poses = [animation.next_pose(ahead, None, "walk") for _ in range(BEGIN + WATCHED)][BEGIN:]
+    poses = [animation.next_pose(ahead, None, "walk") for _ in range(WARM_UP + MEASURED)][WARM_UP:]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
     walk = measure(skeleton, jointed(skeleton, positions, rotations)[1], FPS)
     return profile(walk) if len(walk) else None
 
 
 def learnt(known: Grader | None = None) -> dict[str, Any]:
-    """What `hobble.gait.graded` learnt, D numbers a walk.
+    """The statistics that `hobble.gait.graded` learnt, with D features per walk.
 
     `features`: their names. `strengths`. `healthySpread`: (D, D) covariance of healthy walks. `kinds`: for
-    each label and side the `words` that a visitor reads, `mean` (D,) at strength 1 and `spread` (D, D).
-    Arrays are base64 of float64.
+    each label and side its `words` for the page, `mean` (D,) at strength 1 and covariance `spread` (D, D).
+    Arrays are float64 in base64.
     """
     known = known or grader()
     normal = people().normal()
@@ -83,7 +84,7 @@ def learnt(known: Grader | None = None) -> dict[str, Any]:
 
 
 def words(label: str, side: str) -> str:
-    """What a visitor reads: "left thigh, shank or foot", "back, leaning forward"."""
+    """The words for the page: "left thigh, shank or foot", "back, leaning forward"."""
     parts = PARTS[label]
     named = parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} or {parts[-1]}"
     return f"{named}, leaning {side}" if label == LEANING else f"{side} {named}"

@@ -1,4 +1,4 @@
-"""Generated motion, packed small enough to lie in the page and play."""
+"""Generated motion, packed for the page to play."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from hobble.models.packing import packed
 from hobble.runtime.export import jointed
 
 FPS = 30
-UNIT = 0.01  # centimetres of one step of the 16-bit joint positions
+UNIT = 0.01  # cm, one step of the 16-bit joint positions
 FEET = ("left_heel", "left_toe", "right_heel", "right_toe")
-CONTACT = 0.5  # a predicted contact above this is drawn as one
+CONTACT = 0.5  # a predicted contact above this counts as contact
 
 WORDS = {
     "walk": "Walks straight on, then in a curve",
     "jog": "Jogs straight on, then in a curve",
     "crouch": "Crouches straight on",
-    "strafe": "Walks sideways, facing one way",
+    "strafe": "Walks sideways, facing ahead",
     "backward": "Walks backward",
     "stop_and_go": "Stops and goes",
-    "turn_in_place": "Turns on the spot by quarters",
+    "turn_in_place": "Turns on the spot in quarter turns",
 }
 
 
 def scenes(
     path: str | Path, skeleton: Mapping[str, Any], channels: Mapping[str, Sequence[str]] | None = None
 ) -> dict[str, Any]:
-    """What the page's figure plays, from `runtime/scenarios.npz`.
+    """The recorded walks of the page, from `runtime/scenarios.npz`.
 
-    skeleton: as the network's file carries it. channels: name -> columns of each channel. Places of bones are
-    kept at 30 Hz, relative to the root joint, in 16-bit steps of 0.1 mm, their rotations in 16 bits too.
+    skeleton: as in the network's file. channels: channel -> its columns. Positions of bones are kept at 30
+    Hz, relative to the root joint, as 16-bit integers in steps of 0.1 mm. Rotations have 16 bits too.
     """
     data = load_npz(path)
     if not skeleton:
@@ -107,16 +107,18 @@ def _scenario(
 def packed_motion(
     figure: Skeleton, positions: Array, rotations: Array, keep: Sequence[int]
 ) -> dict[str, str]:
-    """Motion (F, J, 3) and (F, J, 4) as it is drawn: bones keep their lengths, and rotations decide.
+    """Packs positions (F, J, 3) and rotations (F, J, 4). Bones keep their lengths and follow the rotations.
 
-    `root`, `pose`: of `pack_positions`; `turn`: rotations of the joints to keep, of `packed_turns`.
+    `root`, `pose`: from `pack_positions`. `turn`: rotations of the joints in `keep`, from `packed_turns`.
     """
     world, places = jointed(figure, positions, rotations)
     return {**pack_positions(places, keep), "turn": packed_turns(world[:, keep])}
 
 
 def pack_positions(positions: Array, keep: Sequence[int] | slice = slice(None)) -> dict[str, str]:
-    """Positions (F, J, 3): `root` as float32 cm, `pose` as int16 steps of UNIT from it, joints to keep."""
+    """Packs positions (F, J, 3): `root` as float32 cm, `pose` of the joints in `keep` as int16, relative to
+    it.
+    """
     root = positions[:, 0].astype(np.float32)
     steps = np.round((positions[:, keep] - root[:, None].astype(float)) / UNIT)
     return {"root": packed(root), "pose": packed(np.clip(steps, -32767, 32767).astype(np.int16))}

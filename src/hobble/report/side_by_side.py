@@ -1,4 +1,4 @@
-"""What charts of several configurations have in common: names, colours, dots."""
+"""Shared by the charts of the comparison page: names, colours, dots."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SPLITS = {"held_out": "held-out clips", "train": "training clips"}
 
 
 def names(compared: Compared) -> list[str]:
-    """The configurations in their order."""
+    """The names of the configurations, in order."""
     return [entry["configuration"] for entry in compared["configurations"]]
 
 
@@ -23,7 +23,7 @@ def colours(compared: Compared) -> dict[str, str]:
 
 
 def dots(name: str, x: Sequence, y: Sequence, colour: str, hover: str) -> Trace:
-    """Dots of one configuration; hover: what stands beside one that is pointed at."""
+    """Dots of one configuration. hover: plotly template of the text that the pointer shows."""
     return {
         "type": "scatter",
         "mode": "markers",

@@ -1,5 +1,4 @@
-"""Short loops of the character walking as it is told, for a questionnaire or a README: images and BVH
-files."""
+"""Short loops of the walking character, for a questionnaire or a README, as animated images and BVH files."""
 
 from __future__ import annotations
 
@@ -27,19 +26,22 @@ from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import export_bvh, fitted_skeleton, jointed
 from hobble.runtime.options import Runtime
 
-SPEED = 2.5  # cm a frame, asked for
-SETTLED = 6 * 60  # frames until the gait is what it was told
+SPEED = 2.5  # target speed, cm per frame
+SETTLED = 6 * 60  # frames until the gait has settled
 SHORTEST, LONGEST = 150, 300  # frames of a loop
-BLEND = 12  # frames over which the end of a loop passes into its beginning
-STRIDE = 2  # frames of the motion to one of the image
+BLEND = 12  # frames over which the end of a loop is blended into its start
+STRIDE = 2  # motion frames per image
 QUALITY = 80
-FELT = 0.1  # cm; a loop nearer to the plain one shows nothing of what it is told
+VISIBLE = 0.1  # cm; a loop that is nearer to the neutral one looks the same
 
 
 @dataclass(frozen=True)
 class Loop:
-    """A walk that goes round: positions (F, J, 3) and rotations (F, J, 4), the way (3,) of one round, and how
-    far (cm, mean over joints) its end was from its beginning before they were blended."""
+    """A walk that can be repeated.
+
+    positions (F, J, 3), cm; rotations (F, J, 4); way (3,): translation of one round, cm; gap: mean distance
+    of joints between end and start before blending, cm.
+    """
 
     positions: Array
     rotations: Array
@@ -52,14 +54,15 @@ def write_stimuli(
 ) -> list[dict[str, Any]]:
     """Write <name>.webp and <name>.bvh of each walk of each channel into a folder, and stimuli.json.
 
-    Those of a channel after the first are called <channel>-<name>. Columns that were told nothing in
-    training,
-    and how far each walk is from the plain one, are listed: see `doubts`. Raises HobbleError for a
-    network that
-    is told nothing.
+    The files of the second channel and later ones are called <channel>-<name>. stimuli.json also lists
+    columns without training data and the distance of each walk from the neutral one (see `doubts`). Raises
+    HobbleError for a network without channels.
     """
     if network.skeleton is None or not network.channels:
-        raise HobbleError("this network is told nothing; make the stimuli of one that has `channels`")
+        raise HobbleError(
+            "this network has no channels, so there are no stimuli to make; use a configuration with "
+            "`channels`"
+        )
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     skeleton = network.skeleton
@@ -95,7 +98,7 @@ def write_stimuli(
 
 
 def all_loops(network: Network) -> list[tuple[str, str, Wanted]]:
-    """The name, channel and walk of each loop; what tells nothing is there once."""
+    """(name, channel, walk) of each loop. The neutral walk is listed once."""
     assert network.skeleton is not None
     out: list[tuple[str, str, Wanted]] = []
     for one, columns in network.channels.items():
@@ -108,39 +111,40 @@ def all_loops(network: Network) -> list[tuple[str, str, Wanted]]:
 
 
 def told_in_training(network: Network, name: str) -> set[str]:
-    """Columns of a channel that were above 0 somewhere in training, as the mean of the input tells."""
+    """Columns of a channel that were above 0 somewhere in training: the mean of their input is above 0."""
     means = network.x_mean[network.layout.x_channel(name)]
     return {column for column, mean in zip(network.channels[name], means, strict=True) if mean > 0}
 
 
 def apart(loop: Loop, other: Loop) -> float:
-    """Mean distance (cm, over joints and poses) of the poses of a loop from the nearest ones of another.
+    """Mean distance (cm, over joints and poses) from each pose of `loop` to the nearest pose of `other`.
 
-    Both stand over the origin and go the same way. 0 where they are the same walk, wherever it was cut.
+    Both are moved to the origin and turned the same way. 0 for the same walk, even if it starts elsewhere.
     """
     ours, theirs = _ahead(loop), _ahead(other)
     return float(np.mean([np.linalg.norm(theirs - pose, axis=-1).mean(axis=1).min() for pose in ours]))
 
 
 def doubts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What whoever shows the loops has to know of them: those that nobody tells apart. rows: of the above."""
-    same = [row for row in rows if row["told"] and row["from_plain_cm"] < FELT]
+    """Warnings about loops that look like the neutral walk. rows: from `write_stimuli`."""
+    same = [row for row in rows if row["told"] and row["from_plain_cm"] < VISIBLE]
     part = [row for row in rows if row["never_told"] and row not in same]
     out = []
     if same:
         names = ", ".join(row["name"] for row in same)
         out.append(
-            f"{names}: no different from the plain walk (less than {FELT} cm); not for a questionnaire."
+            f"{names}: they look like the neutral walk (under {VISIBLE} cm). Leave them out of a "
+            "questionnaire."
         )
     if part:
-        out.append(f"{', '.join(row['name'] for row in part)}: not all that is told there shows.")
+        out.append(f"{', '.join(row['name'] for row in part)}: some of their values have no effect.")
     if never := sorted({column for row in [*same, *part] for column in row["never_told"]}):
-        out.append(f"Never told in training: {', '.join(never)}. Train on clips in which they are.")
+        out.append(f"Never above 0 in training: {', '.join(never)}. Train on clips with such values.")
     return out
 
 
 def walk(network: Network, told: Mapping[str, Mapping[str, float]], runtime: Runtime) -> Loop:
-    """The character walking straight on, cut where a later moment is most like an earlier one."""
+    """A loop of the character walking straight on, cut between the two most similar poses."""
     animation = ProceduralAnimation(network, **dict(runtime))
     ahead = np.array([0.0, SPEED])
     poses = [animation.next_pose(ahead, None, "walk", **told) for _ in range(SETTLED + 60 + LONGEST + BLEND)]
@@ -160,7 +164,7 @@ def walk(network: Network, told: Mapping[str, Mapping[str, float]], runtime: Run
 def cut(positions: Array) -> tuple[int, int, float]:
     """First frame of a loop, the frame after its last, and the mean distance (cm) of joints between the two.
 
-    Over all first frames of a second from SETTLED on, and all lengths allowed; velocities count too.
+    Searches first frames within a second after SETTLED and all allowed lengths. Velocities count too.
     """
     local = positions - positions[:, :1] * np.array([1.0, 0.0, 1.0])
     speed = np.gradient(local, axis=0)
@@ -178,7 +182,10 @@ def cut(positions: Array) -> tuple[int, int, float]:
 def frames(
     studio: Studio, skeleton: Skeleton, loop: Loop, told: Array | None, size: int
 ) -> list[NDArray[np.uint8]]:
-    """The pictures of a loop. The camera goes along evenly, and the grid under it by whole meshes a round."""
+    """The pictures of a loop.
+
+    The camera moves at constant speed, by whole cells of the grid in each round.
+    """
     count, keep = len(loop.positions), body(skeleton).bones
     world, places = jointed(skeleton, loop.positions, loop.rotations)
     start, yaw = loop.positions[0, 0], np.arctan2(loop.way[0], loop.way[2])
@@ -199,7 +206,7 @@ def frames(
 
 
 def save_loop(path: Path, pictures: list[NDArray[np.uint8]]) -> None:
-    """Write an animated WebP that goes round for ever."""
+    """Write an animated WebP that repeats forever."""
     images = [Image.fromarray(picture) for picture in pictures]
     times = [round(1000 * STRIDE * (k + 1) / 60) - round(1000 * STRIDE * k / 60) for k in range(len(images))]
     images[0].save(
@@ -208,14 +215,14 @@ def save_loop(path: Path, pictures: list[NDArray[np.uint8]]) -> None:
 
 
 def _ahead(loop: Loop) -> Array:
-    """Positions (F, J, 3) of a loop over the origin, turned so that its way is along z."""
+    """Positions (F, J, 3) of a loop, with the root over the origin and the direction of travel along z."""
     yaw = np.arctan2(loop.way[0], loop.way[2])
     turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
     return (loop.positions - loop.positions[:, :1] * [1, 0, 1]) @ turn.T
 
 
 def _mixed(a: Array, b: Array, share: float) -> Array:
-    """Rotations on the way from a to b (J, 4), normalised."""
+    """Rotations (J, 4) interpolated between a and b, normalised. share: 0 is a, 1 is b."""
     b = np.where((a * b).sum(-1, keepdims=True) < 0, -b, b)
     mixed = (1 - share) * a + share * b
     return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""What a page says first: figures, and sentences drawn from the numbers."""
+"""The top of a page: key figures, and advice that follows from the numbers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Figure:
-    """A number that a reader should take away, and what it stands beside; at: its place among the others."""
+    """A key figure. beside: the smaller text under it. at: figures are sorted by it."""
 
     label: str
     value: str
@@ -19,12 +19,11 @@ class Figure:
 
 @dataclass(frozen=True)
 class Hint:
-    """A plain sentence drawn from the numbers.
+    """A sentence of advice that follows from the numbers.
 
-    kind: "warn", something to mend; "note", something worth doing; "good", what is well; "fact", what asks
-    for nothing. at: its place among those of its kind, along the way from clips to the character, since what
-    comes first decides what comes later: data below 20, training 20, the network 30, how the character goes
-    40, what it is told 50, its speed 60.
+    kind: "warn", a problem; "note", something to improve; "good", something fine; "fact", information.
+    at: hints of a kind are sorted by it, in the order of the pipeline, because earlier problems cause later
+    ones: data below 20, training 20, network 30, motion of the character 40, channels 50, speed 60.
     """
 
     kind: str
@@ -34,5 +33,5 @@ class Hint:
 
 
 def placed(at: int, hints: Iterable[Hint]) -> Iterator[Hint]:
-    """The same hints at that place."""
+    """`hints` with their `at` set."""
     return (replace(hint, at=at) for hint in hints)

@@ -1,4 +1,4 @@
-"""Tables that the page can sort and hand out as CSV."""
+"""Tables that the page can sort and save as CSV."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hobble.report.formats import number
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its heading, and how a value is shown (numbers are aligned right and sorted as numbers)."""
+    """A column. label: its heading. show: formats a value. kind "n": right-aligned and sorted as numbers."""
 
     label: str
     show: Callable[[Any], str] = str
@@ -19,7 +19,7 @@ class Column:
 
     @classmethod
     def number(cls, label: str, digits: int = 3) -> Column:
-        """A column of numbers shown to so many significant digits; the CSV has them whole."""
+        """A column of numbers, shown to `digits` significant digits; the CSV has all digits."""
         return cls(label, lambda value: number(value, digits), "n")
 
     @classmethod
@@ -30,16 +30,16 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table by name: the CSV is called <name>.csv."""
+    """A table. Its CSV file is called <name>.csv."""
 
     name: str
     columns: Sequence[Column]
     rows: Sequence[Sequence[Any]] = field(repr=False)
-    title: str = "The numbers"
+    title: str = "Table of the values"
 
     @property
     def cells(self) -> list[list[tuple[str, str, str]]]:
-        """Rows of (kind, raw value, text shown)."""
+        """For each row, (kind, raw value, shown text) of each cell."""
         return [
             [
                 (c.kind, "" if v is None else str(v), "–" if v is None else c.show(v))

@@ -1,4 +1,4 @@
-"""What the pages have in common: templates that escape, our own style and scripts, their charts."""
+"""Shared by all pages: templates that escape, style, scripts, specifications of charts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FOLDER = Path(__file__).parent
 
 
 def template(name: str) -> Template:
-    """A template in which every value is escaped where it stands, and a missing one is an error."""
+    """A template that escapes every value. A missing value is an error."""
     environment = Environment(
         loader=FileSystemLoader(FOLDER),
         autoescape=select_autoescape(default=True, default_for_string=True),
@@ -30,7 +30,7 @@ def template(name: str) -> Template:
 
 
 def specs(shown: Any) -> dict[str, Any]:
-    """What the scripts need of every chart, wherever in a section, or in a collection of them, it stands."""
+    """Chart name -> specification for the scripts, for all charts in nested sections and collections."""
     if isinstance(shown, Chart):
         return {shown.name: shown.spec()}
     if isinstance(shown, Family | Pair):
@@ -50,12 +50,12 @@ def style() -> Markup:
 
 
 def questionnaire_script() -> Markup:
-    """The script of the questionnaire, which needs no other."""
+    """The script of the questionnaire. It imports nothing."""
     return trusted("questionnaire.js", (FOLDER / "questionnaire.js").read_text(encoding="utf-8"))
 
 
 def trusted(name: str, text: str) -> Markup:
-    """Our own CSS or script; raises ValueError where it would end its own element."""
+    """Our own CSS or script. Raises ValueError if it contains the end tag of its element."""
     if "</script" in text.lower() or "</style" in text.lower():
-        raise ValueError(f"{name} holds the end of the element it is put into")
+        raise ValueError(f"{name} contains </script or </style, which would end its element")
     return Markup(text)

@@ -1,4 +1,4 @@
-"""The ground fitted under the clips: how near it comes to the feet, and its shape along the path."""
+"""The ground fitted to the clips: its distance from the feet, and its shape along the path."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from hobble.core.quat import Array
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.tables import Column, Table
 
-MOST_PICTURES = 10
-LONGEST = 900  # frames of a clip that its picture shows
-STRIDE = 3
+MOST_CLIPS = 10  # clips whose ground profile is drawn
+LONGEST = 900  # frames of a clip that are drawn
+STRIDE = 3  # frames between two points of a profile
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,12 @@ class Fits:
 
     @property
     def flat(self) -> bool:
-        """Whether the clip has but one, flat fit."""
+        """Whether the clip has only one, flat fit."""
         return self.profile.shape[1] < 2
 
 
 def read_fits(path: str | Path) -> Fits:
-    """Read `terrain/clips/<clip>.npz`. Raises InputError where an array is missing or counts disagree."""
+    """Read `terrain/clips/<clip>.npz`. Raises InputError if an array is missing or lengths disagree."""
     try:
         data = load_npz(path, ("fits", "frame", "heights", "foot_error", "error"))
         fits, frame, heights = data["fits"], data["frame"], data["heights"]
@@ -54,7 +54,7 @@ def read_fits(path: str | Path) -> Fits:
         return Fits(Path(path).stem, data["foot_error"], data["error"], frame[:LONGEST:STRIDE], profile)
     except (ValueError, IndexError) as error:
         raise InputError(
-            path, f"not the terrain of a clip ({error})", fix="Delete it; it is made again."
+            path, f"not the terrain of a clip ({error})", fix="Delete the file; the workflow makes it again."
         ) from error
 
 
@@ -67,11 +67,11 @@ def section(paths: Iterable[str | Path]) -> dict[str, Any]:
 
 
 def profiles(found: list[Fits]) -> Chart:
-    """The ground under the root along each clip, for all its fits."""
+    """Height of the ground under the root along each clip, for all its fits."""
     options: dict[str, list[Trace]] = {}
-    for fit in found[:MOST_PICTURES]:
+    for fit in found[:MOST_CLIPS]:
         x = np.round(fit.frame / 60, 2)
-        # Between two cycles that do not follow one another there is no ground.
+        # No line between cycles that are not consecutive.
         gaps = np.flatnonzero(np.diff(fit.frame) > STRIDE) + 1
         count = fit.profile.shape[1]
         traces = []
@@ -91,9 +91,9 @@ def profiles(found: list[Fits]) -> Chart:
     return Chart(
         "terrain-profiles",
         "The ground under the path",
-        "Height of the ground under the root along a clip, for every fit: one motion on so many grounds. "
-        "The lines meet where the feet stand and part where nothing touches the ground. They are drawn anew "
-        "for each cycle, so they may jump between two.",
+        "Several grounds are fitted to each cycle, and the network is trained on all of them. The lines are "
+        "their heights under the root. They agree where a foot is on the ground and differ elsewhere. Each "
+        "cycle has its own fits, so the lines may jump from one cycle to the next.",
         layout={"xaxis": axis("seconds"), "yaxis": axis("height, cm")},
         choose="Clip",
         options=options,
@@ -101,7 +101,7 @@ def profiles(found: list[Fits]) -> Chart:
 
 
 def distances(found: list[Fits]) -> Chart:
-    """How far standing feet are from the fitted ground, clip by clip."""
+    """Distance of feet in contact from the fitted ground, for each clip."""
     traces: list[Trace] = [
         {
             "type": "box",
@@ -116,9 +116,9 @@ def distances(found: list[Fits]) -> Chart:
     ]
     return Chart(
         "terrain-feet",
-        "Standing feet and their ground",
-        "Mean distance of a standing foot from the fitted ground, over cycles and fits, after the residual "
-        "is taken out. Under a centimetre cannot be seen.",
+        "Distance of the feet from the ground",
+        "Mean distance of a foot in contact from the fitted ground, after the residual correction. Each box "
+        "covers the cycles and fits of a clip. Less than a centimetre is invisible.",
         traces,
         {
             "xaxis": axis("cm", rangemode="tozero"),
@@ -130,14 +130,14 @@ def distances(found: list[Fits]) -> Chart:
 
 
 def fit_table(found: list[Fits]) -> Table:
-    """A row per clip that does not stand on flat ground."""
+    """A row for each clip that is not on flat ground."""
     columns = [
         Column("clip"),
         Column.count("cycles"),
-        Column.number("energy of the best fits"),
-        Column.number("energy of the last fits"),
+        Column.number("mean error of the best fits"),
+        Column.number("mean error of the worst fits"),
         Column.number("mean distance of a foot, cm"),
-        Column.number("largest, cm"),
+        Column.number("largest distance, cm"),
     ]
     rows = [
         [

@@ -1,4 +1,4 @@
-"""How the network learnt: training and held-out error over the passes."""
+"""The section on training: training and held-out error over the passes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hobble.report.tables import Column, Table
 
 
 def passes_axis(material: Material) -> list[float]:
-    """Where each section ends, in passes: pass 1 section 10 of 10 ends at 1.0."""
+    """The end of each section, in passes: section 10 of 10 in pass 1 ends at 1.0."""
     passes, sections = material.history.get("pass", []), material.history.get("section", [])
     most = max((s for s in sections if s is not None), default=1) or 1
     first = min((p for p in passes if p is not None), default=1)
@@ -32,9 +32,10 @@ def learning_curve(material: Material) -> Chart:
     return Chart(
         "learning-curve",
         "Error over the passes",
-        "Mean squared error of the standardised output, on a logarithmic scale: 1 would be guessing the "
-        "mean. Training error is taken under dropout, so it can lie above the held-out error; what counts "
-        "is whether the held-out line still falls, is flat, or rises again.",
+        "Mean squared error of the standardised output, on a logarithmic scale. A network that always "
+        "predicts the mean has error 1. The training error is measured with dropout, so it can be above the "
+        "held-out error. If the held-out line still falls, train longer. If it rises again, the network "
+        "overfits.",
         traces,
         {
             "xaxis": axis("pass", rangemode="tozero"),
@@ -44,7 +45,7 @@ def learning_curve(material: Material) -> Chart:
 
 
 def block_curves(material: Material) -> Family | None:
-    """The held-out error of each block of Y, a small chart for each on one scale, hardest first."""
+    """The held-out error of each block of Y: small charts with the same scale, largest error first."""
     x, history = passes_axis(material), material.history
     whole = [v for v in history.get("held_out_mse", ()) if v is not None]
     blocks = {
@@ -58,7 +59,7 @@ def block_curves(material: Material) -> Family | None:
     every = [v for values in blocks.values() for v in values] + whole
     charts = []
     for i, name in enumerate(sorted(blocks, key=lambda name: last[name], reverse=True)):
-        traces = [line("all of it", x, history["held_out_mse"], "@muted", width=1.2)] if whole else []
+        traces = [line("whole output", x, history["held_out_mse"], "@muted", width=1.2)] if whole else []
         traces.append(line(name, x, blocks[name], "@accent"))
         layout = {
             "xaxis": axis("pass", rangemode="tozero"),
@@ -68,15 +69,15 @@ def block_curves(material: Material) -> Family | None:
         charts.append(Chart(f"block-{i}", f"{name}, {number(last[name])}", "", traces, layout, height=190))
     return Family(
         "block-curves",
-        "Held-out error by what is predicted",
-        "The same error for each part of the output, hardest first, with its last value; in grey that of the "
-        "whole output. All are drawn to one logarithmic scale.",
+        "Held-out error of each part of the output",
+        "The last value of the error is in each title, and the largest comes first. Grey is the error of the "
+        "whole output. All charts have the same logarithmic scale.",
         charts,
     )
 
 
 def _log_span(values: Sequence[float | None]) -> list[float]:
-    """The range of a logarithmic axis that holds the values, in powers of ten, with a little room."""
+    """Range of a logarithmic axis around the values, as exponents of ten, with a small margin."""
     powers = [math.log10(v) for v in values if v is not None and v > 0] or [0.0]
     room = 0.05 * (max(powers) - min(powers)) + 0.02
     return [min(powers) - room, max(powers) + room]

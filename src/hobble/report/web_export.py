@@ -1,4 +1,4 @@
-"""The character for other web pages: an ES module, its network, and an example to begin with."""
+"""Exports the character for other web pages: an ES module, its network, and an example page."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ from hobble.report.bundle import WEB, bundle_module
 from hobble.report.playable import playable
 from hobble.runtime.options import Runtime
 
-THREE = ("three.module.js", "three.core.js")  # of three.js, for the example
+THREE = ("three.module.js", "three.core.js")  # files of three.js, for the example page
 
 
 def export_web(folder: str | Path, network: Network, runtime: Runtime, modules: str | Path) -> None:
-    """Write into a folder hobble.js, hobble.d.ts, character.json and index.html, with three.js for the last.
+    """Write hobble.js, hobble.d.ts, character.json, and an example index.html with three.js into a folder.
 
-    modules: the node_modules folder of `bundle.install`. Raises HobbleError for a network without a skeleton.
+    modules: the node_modules folder from `bundle.install`. Raises HobbleError for a network without a
+    skeleton.
     """
     if network.skeleton is None:
-        raise HobbleError("this network carries no skeleton, so it has no body to show")
+        raise HobbleError("the file of this network has no skeleton, so there is no body to draw")
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     spec = playable(network, runtime)

@@ -1,4 +1,4 @@
-"""The errors of configurations side by side."""
+"""The errors of several configurations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ KINDS = {"difference_of_means": "sd of the means of clips", "difference": "sd of
 
 
 def section(compared: Compared) -> Section:
-    """Spread, differences and single clips."""
+    """The spread of the errors, differences between configurations, and errors of single clips."""
     return Section(
         "accuracy",
         [
@@ -35,7 +35,7 @@ def section(compared: Compared) -> Section:
 
 
 def columns(compared: Compared) -> Iterator[Overview]:
-    """The error of each split, and how many joints it is over."""
+    """The error of each split, and the number of joints that were measured."""
     found = {entry["configuration"]: entry for entry in compared["accuracy"]}
     for at, split, label in ((10, "held_out", "held-out error"), (20, "train", "training error")):
         values = {name: entry[split]["mean"] for name, entry in found.items()}
@@ -81,22 +81,22 @@ def error_boxes(compared: Compared) -> Chart | None:
                 {
                     "type": "scatter",
                     "mode": "markers",
-                    "name": "mean as published",
+                    "name": "published mean",
                     "x": [row["configuration"] for row in published],
                     "y": [100 * row["mean"] for row in published],
                     "marker": {"symbol": "diamond-open", "size": 10, "color": "@ink"},
-                    "hovertemplate": "%{x}: %{y:.2f} % as published<extra></extra>",
+                    "hovertemplate": "%{x}: %{y:.2f} % published<extra></extra>",
                 }
             )
     return Chart(
         "compare-boxes",
         "Spread of the error",
-        "Each box holds the middle half of the relative errors (eq. 3.1 of Segerstedt) over all frames, the "
-        "line in it is the median, the dashed one the mean; whiskers reach from the 5th to the 95th "
+        "Each box holds the middle half of the relative errors of all frames (eq. 3.1 of Segerstedt). The "
+        "solid line is the median, the dashed line the mean. Whiskers reach from the 5th to the 95th "
         "percentile. Diamonds are published means, measured on other data.",
         layout={"yaxis": axis("relative error, %", rangemode="tozero"), "showlegend": False},
         height=400,
-        choose="Over",
+        choose="Clips",
         options=options,
     )
 
@@ -125,12 +125,12 @@ def clip_dots(compared: Compared) -> Chart | None:
         "xaxis": axis("relative error, %", rangemode="tozero"),
         "yaxis": {"categoryorder": "array", "categoryarray": order, "automargin": True, "type": "category"},
     }
-    caption = "Held-out clips stand on top. Where the dots of a row lie together, the configurations agree."
+    caption = "Each row is a clip, with one dot for each configuration. Held-out clips are at the top."
     return Chart("compare-clips", "Error of each clip", caption, traces, layout, 130 + 19 * len(order))
 
 
 def difference_map(compared: Compared) -> Chart | None:
-    """Eq. 3.2 of every pair, with both kinds of deviation."""
+    """Eq. 3.2 of Segerstedt for every pair, with both kinds of standard deviation."""
     order, options = names(compared), {}
     for (over, split), (key, kind) in product(SPLITS.items(), KINDS.items()):
         found = {(r["a"], r["b"]): r[key] for r in compared["difference"] if r["over"] == over}
@@ -160,14 +160,14 @@ def difference_map(compared: Compared) -> Chart | None:
     }
     return Chart(
         "compare-difference",
-        "How far apart two configurations are",
-        "Eq. 3.2 of Segerstedt: twice the distance of the means over the sum of the standard deviations. He "
-        "divides by the deviations of the means of the clips; those of single frames are several times as "
-        "large. 1 means that the means lie a standard deviation apart. Our own rule of thumb: under 0.2 the "
-        "two can hardly be told apart.",
+        "Difference between two configurations",
+        "Eq. 3.2 of Segerstedt: twice the difference of the two means, divided by the sum of the two "
+        "standard deviations. He uses the standard deviation of the clips' means. That of single frames is "
+        "several times as large. At 1, the means are one standard deviation apart. Our rule of thumb: "
+        "differences under 0.2 are too small to matter.",
         layout=layout,
         height=max(240, 90 + 42 * len(order)),
-        choose="Error over",
+        choose="Clips and deviation",
         options=options,
     )
 

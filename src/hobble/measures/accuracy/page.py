@@ -16,7 +16,10 @@ from hobble.report.published import cited
 from hobble.report.summary import Figure, Hint, placed
 from hobble.report.tables import Column, Table
 
-INTRODUCTION = "One step ahead from the true input, on every frame that lies in a locomotion cycle."
+INTRODUCTION = (
+    "The network gets the captured input of a frame and predicts the next frame. The error is measured on "
+    "every frame of a gait cycle."
+)
 COLOURS = {"train": "@muted", "held_out": "@accent"}
 NAMES = {"train": "training", "held_out": "held out"}
 QUANTILES = ("p05", "p25", "p50", "p75", "p95")
@@ -32,7 +35,7 @@ def _height(count: int) -> int:
 
 
 def clip_bars(found: Json, material: Material) -> Chart | None:
-    """Mean relative error of each clip, whiskers of one standard deviation, published means as lines."""
+    """Mean relative error of each clip, with whiskers of one standard deviation and the published mean."""
     rows = _rows(found)[::-1]
     if not rows:
         return None
@@ -62,15 +65,15 @@ def clip_bars(found: Json, material: Material) -> Chart | None:
     shapes, notes = [], []
     theirs = material.beside("accuracy")
     if theirs:
-        shape, note = mark(100 * theirs["mean"], f"{theirs['label']} as published")
+        shape, note = mark(100 * theirs["mean"], f"{theirs['label']}, published")
         shapes, notes = [shape], [note]
     order = [row["clip"] for row in rows]
     return Chart(
         "accuracy-clips",
         "Error of each clip",
-        "Bars: mean over frames and joints of the distance between predicted and true joint position, as a "
-        "share of the joint's distance from the root (eq. 3.1 of Segerstedt). Whiskers reach one standard "
-        "deviation further. Held-out clips, which the network never saw, stand first.",
+        "The distance between the predicted and the captured position of a joint, divided by the joint's "
+        "distance from the root, averaged over frames and joints (eq. 3.1 of Segerstedt). Whiskers are one "
+        "standard deviation long. Held-out clips come first: the network was not trained on them.",
         traces,
         {
             "xaxis": axis("relative error, %", rangemode="tozero"),
@@ -85,7 +88,7 @@ def clip_bars(found: Json, material: Material) -> Chart | None:
 
 
 def clip_boxes(found: Json) -> Chart | None:
-    """Quantiles of the error within each clip, where the evaluation gives them."""
+    """Quantiles of the error within each clip; None if the evaluation has none."""
     rows = [row for row in _rows(found)[::-1] if quantiles(row)]
     if not rows:
         return None
@@ -116,9 +119,9 @@ def clip_boxes(found: Json) -> Chart | None:
     return Chart(
         "accuracy-boxes",
         "Spread within each clip",
-        "Boxes hold the middle half of the errors of a clip, the line in them is the median; whiskers reach "
-        "from the 5th to the 95th percentile. A long whisker with a low box means a few hard moments in an "
-        "easy clip.",
+        "Each box holds the middle half of the errors of a clip. The line in it is the median. Whiskers "
+        "reach from the 5th to the 95th percentile. A low box with a long whisker means that the clip is "
+        "easy except for a few moments.",
         traces,
         {
             "xaxis": axis("relative error, %", rangemode="tozero"),
@@ -157,7 +160,7 @@ def accuracy_table(found: Json, name: str) -> Table:
 
 
 def beside_published(found: Json, material: Material) -> Table:
-    """Our two splits with the published means under them."""
+    """The errors of our two splits, followed by the published means."""
     rows: list[list[Any]] = []
     for split in ("held_out", "train"):
         part = found.get(split) or {}
@@ -174,11 +177,11 @@ def beside_published(found: Json, material: Material) -> Table:
         Column.number("position error, cm"),
         Column("source", kind="long"),
     ]
-    return Table(f"{material.name}-published", columns, rows, "Beside the published figures")
+    return Table(f"{material.name}-published", columns, rows, "Comparison with published results")
 
 
 def section(found: Json, material: Material) -> Section:
-    """The charts and tables; the figure beside the captured one is drawn by the page."""
+    """The charts and tables, and the view of captured and predicted motion."""
     return Section(
         "accuracy",
         [
@@ -196,7 +199,7 @@ def section(found: Json, material: Material) -> Section:
 
 
 def sampled(found: Json) -> str:
-    """A sentence on which clips were measured, where not all of them were; else nothing."""
+    """A sentence on which clips were measured; empty if all of them were."""
     sample = found.get("sample")
     if not sample:
         return ""
@@ -206,8 +209,9 @@ def sampled(found: Json) -> str:
         if (found.get(split) or {}).get("interval")
     ]
     return (
-        f" Measured on {sample['clips']:,} of {sample['of']:,} clips, drawn by gait, speed, channel and "
-        f"split; each counts for the clips of its kind. The 95 % intervals: {', '.join(widths)}."
+        f" Measured on a sample of {sample['clips']:,} of {sample['of']:,} clips, stratified by gait, speed, "
+        "channel and split and weighted to represent all clips. 95 % confidence intervals: "
+        f"{', '.join(widths)}."
     )
 
 
@@ -223,21 +227,21 @@ def figures(found: Json, material: Material) -> Iterator[Figure]:
             beside = _centimetres(error, split, material) if error is not None else ""
             theirs = material.beside("accuracy") if split == "held_out" else None
             if theirs:
-                beside += f"; {theirs['label']} was published at {100 * theirs['mean']:.2f} %, on other clips"
+                beside += f"; published for {theirs['label']}: {100 * theirs['mean']:.2f} %, on other clips"
             yield Figure(label, f"{100 * part['mean']:.2f}", "%", beside, at)
 
 
 def _centimetres(error: float, split: str, material: Material) -> str:
-    """The position error of the prediction, and that of the pose which is made from it, where it is known."""
+    """The position error of the prediction, and of the drawn pose if the roll-outs measured it."""
     lengths = {entry["length"]: entry for entry in material.found("rollouts").get("lengths", ())}
     drawn = (lengths.get(1, {}).get(split) or {}).get("position_error_cm")
     if drawn is None:
-        return f"{number(error)} cm a joint on average"
-    return f"{number(error)} cm a joint as predicted, {number(drawn)} cm as drawn, halfway to its velocities"
+        return f"{number(error)} cm per joint on average"
+    return f"{number(error)} cm per joint for the prediction, {number(drawn)} cm for the drawn pose"
 
 
 def hints(found: Json, material: Material) -> Iterator[Hint]:
-    """How far it generalises, and which clip is hard."""
+    """How well the network generalises, and which clip has the largest error."""
     held_out = (found.get("held_out") or {}).get("mean")
     yield from placed(10 if held_out is None else 30, _generalisation(found))
     yield from placed(12, _worst_clips(found))
@@ -248,28 +252,31 @@ def _generalisation(found: Json) -> Iterator[Hint]:
     if held_out.get("mean") is None:
         yield Hint(
             "warn",
-            "Nothing was held out.",
-            "The accuracy below says how well the clips were memorised. Name a few under held_out in the "
-            "data set.",
+            "No clips were held out.",
+            "So the error below does not show how the network does on new clips. List a few clips under "
+            "held_out in the data set.",
         )
         return
     ratio = held_out["mean"] / train["mean"] if train.get("mean") else float("nan")
     if ratio > 1.5:
         yield Hint(
             "warn",
-            f"Held-out clips are predicted {ratio:.1f} times worse than training clips.",
-            "The network has learnt these clips more than motion as such: add clips that differ "
-            "(speeds, turns, performers) before adding units or passes.",
+            f"The error on held-out clips is {ratio:.1f} times the error on training clips.",
+            "The network overfits. Add more varied clips (speeds, turns, performers) before you add units or "
+            "passes.",
         )
     elif ratio < 1.2:
         yield Hint(
             "good",
-            f"Held-out clips are predicted about as well as training clips ({ratio:.2f} times the error).",
-            "There is room for a larger network.",
+            f"The error on held-out clips is {ratio:.2f} times the error on training clips, so the network "
+            "does not overfit.",
+            "A larger network may do better.",
         )
     else:
         yield Hint(
-            "fact", f"Held-out clips have {ratio:.2f} times the error of training clips.", "That is usual."
+            "fact",
+            f"The error on held-out clips is {ratio:.2f} times the error on training clips.",
+            "That is usual.",
         )
 
 
@@ -282,8 +289,7 @@ def _worst_clips(found: Json) -> Iterator[Hint]:
     if worst["mean"] > 1.8 * median:
         yield Hint(
             "note",
-            f"{worst['clip']} is the hardest clip,",
-            f"with {worst['mean'] / median:.1f} times the error of the middle one. "
-            "See in its label strip whether the labels are right, and among the repairs whether its frames "
-            "are whole.",
+            f"{worst['clip']} has the largest error,",
+            f"{worst['mean'] / median:.1f} times the median over all clips. "
+            "Check its labels under Labels, and its repairs under Data.",
         )

@@ -1,4 +1,4 @@
-"""What a frame costs in configurations side by side."""
+"""The time of a frame in several configurations."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from hobble.report.verdicts import Verdict, best
 
 
 def section(compared: Compared) -> Section:
-    """Laps, and time over size."""
+    """Times of the laps, and time over the size of the network."""
     parts = [Part(10, lap_lines(compared)), Part(20, fit_chart(compared))]
     return Section("speed", parts, title="Speed and response", at=30, nav="Speed")
 
 
 def columns(compared: Compared) -> Iterator[Overview]:
-    """The median of a frame, in the exact mode where it was run, and the size of the network."""
+    """Median time per frame (in the exact phase mode if it was run), and the size of the network."""
     exact = in_exact_mode(compared)
     frames = {name: entry["milliseconds"]["spread"]["median"] for name, entry in exact.items()}
-    yield Overview(30, Column.number("ms a frame, median"), frames)
+    yield Overview(30, Column.number("ms per frame, median"), frames)
     about = {entry["configuration"]: entry for entry in compared["configurations"]}
     counts = {name: (entry["computations"] or {}).get("true") for name, entry in about.items()}
     yield Overview(40, Column.count("parameters"), counts)
@@ -32,16 +32,16 @@ def columns(compared: Compared) -> Iterator[Overview]:
 
 
 def verdicts(compared: Compared) -> Iterator[Verdict]:
-    """Which keeps to the path, which moves smoothly, which is fast and which is small."""
+    """Which configuration stays closest to the path, is smoothest, fastest and smallest."""
     exact = in_exact_mode(compared)
     whole = {name: e for name, e in exact.items() if e["waypoints_reached"] == e["waypoints"]}
     astray = [name for name in exact if name not in whole]
     lost = f" Did not reach every waypoint: {', '.join(astray)}." if astray else ""
     yield from best(
         20,
-        "Best on the path",
+        "Closest to the path",
         {name: e["path_overshoot_cm"] for name, e in whole.items()},
-        lambda name, v: f"at worst {name} is {number(v, 3)} cm off it",
+        lambda name, v: f"{name} is never more than {number(v, 3)} cm off the path",
         lost,
     )
     yield from best(
@@ -57,15 +57,15 @@ def verdicts(compared: Compared) -> Iterator[Verdict]:
         40,
         "Fastest",
         {name: e["milliseconds"]["spread"]["median"] for name, e in exact.items()},
-        lambda name, v: f"a frame of {name} takes {number(v, 3)} ms, the median of its laps",
+        lambda name, v: f"the median frame of {name} takes {number(v, 3)} ms",
     )
     yield from best(
-        50, "Smallest", _bytes(compared), lambda name, v: f"to run, {name} keeps {size(v)} in memory"
+        50, "Smallest", _bytes(compared), lambda name, v: f"{name} needs {size(v)} of memory to run"
     )
 
 
 def in_exact_mode(compared: Compared) -> dict[str, Any]:
-    """Configuration -> its laps in the mode without loss, or in the one that was run."""
+    """Configuration -> its laps in the exact phase mode, or in the only mode that was run."""
     exact = {entry["configuration"]: entry["exact"] for entry in compared["configurations"]}
     ordered = sorted(compared["responsivity"], key=lambda e: e["mode"] == exact[e["configuration"]])
     found = {entry["configuration"]: entry for entry in ordered}
@@ -77,7 +77,7 @@ def _bytes(compared: Compared) -> dict[str, float]:
 
 
 def lap_lines(compared: Compared) -> Chart | None:
-    """Milliseconds a frame, lap by lap, for each phase mode."""
+    """Milliseconds per frame, lap by lap, for each phase mode."""
     options: dict[str, list[Trace]] = {}
     for entry in sorted(compared["responsivity"], key=lambda entry: entry["mode"] != "cubic"):
         laps = [lap for lap in entry["laps"] if isinstance(lap.get("milliseconds"), dict)]
@@ -92,23 +92,23 @@ def lap_lines(compared: Compared) -> Chart | None:
             if row["configuration"] in names(compared):
                 most = max((max(t["x"], default=1) for t in traces), default=1)
                 colour = colours(compared)[row["configuration"]]
-                label = f"{row['label']}: mean as published"
+                label = f"{row['label']}: published mean"
                 traces.append(
                     line(label, [1, most], [row["milliseconds"]] * 2, colour, dash="dot", width=1.2)
                 )
     return Chart(
         "compare-laps",
-        "Milliseconds a frame, lap by lap",
-        "All steps of a frame, medians over each lap of the six-waypoint track. Dotted: the published "
-        "means, measured on another machine.",
-        layout={"xaxis": axis("lap", dtick=1), "yaxis": axis("ms a frame", rangemode="tozero")},
-        choose="Looked up by",
+        "Milliseconds per frame, lap by lap",
+        "Median time of a whole frame in each lap of the track. Dotted lines are published means, measured "
+        "on another machine.",
+        layout={"xaxis": axis("lap", dtick=1), "yaxis": axis("ms per frame", rangemode="tozero")},
+        choose="Phase mode",
         options=options,
     )
 
 
 def fit_chart(compared: Compared) -> Chart | None:
-    """Frame time over the number of parameters, with the straight lines through ours and the published."""
+    """Frame time over the number of parameters, with a straight line fitted to ours and to the published."""
     shown = [
         f
         for f in compared["milliseconds"]["fit"]
@@ -119,17 +119,20 @@ def fit_chart(compared: Compared) -> Chart | None:
     ]
     traces: list[Trace] = []
     for fit, colour in zip(shown, ("@accent", "@g2"), strict=False):
-        label = "ours, cubic phase: medians" if fit["whose"] == "hobble" else "published: means"
+        label = "ours (medians, cubic phase)" if fit["whose"] == "hobble" else "published (means)"
         traces.append(dots(label, fit["x"], fit["y"], colour, "%{x:,} parameters: %{y:.3f} ms"))
         if fit["slope"] is not None:
             ends = [min(fit["x"]), max(fit["x"])]
             values = [fit["intercept"] + fit["slope"] * x for x in ends]
-            traces.append(line(f"{label}, line", ends, values, colour, width=1.4))
+            traces.append(line(f"{label}, straight fit", ends, values, colour, width=1.4))
     if not traces:
         return None
     layout = {
-        "xaxis": axis("parameters of a phase", tickformat="~s", rangemode="tozero"),
-        "yaxis": axis("ms a frame", rangemode="tozero"),
+        "xaxis": axis("parameters per phase", tickformat="~s", rangemode="tozero"),
+        "yaxis": axis("ms per frame", rangemode="tozero"),
     }
-    caption = "A straight line means that a frame costs what its multiplications cost, and something fixed."
-    return Chart("compare-fit", "Frame time over size", caption, traces, layout, 340)
+    caption = (
+        "Where the dots lie on a straight line, the time of a frame is a constant plus a time proportional "
+        "to the number of parameters."
+    )
+    return Chart("compare-fit", "Frame time over network size", caption, traces, layout, 340)

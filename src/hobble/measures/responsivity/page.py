@@ -1,4 +1,4 @@
-"""What a frame costs at run time, and how the track is followed."""
+"""The time of a frame at run time, and how closely the character follows the track."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hobble.report.summary import Figure, Hint, placed
 from hobble.report.tables import Column, Table
 from hobble.runtime.controller import FASTEST_TURN
 
-# The steps of a frame in their order, and their colours.
+# The steps of a frame in order, with their colours.
 STEPS = {
     "prepare": "@g0",
     "input": "@g3",
@@ -27,14 +27,14 @@ STEPS = {
     "update": "@muted",
 }
 
-FEWEST_STEPS = 10  # under so many, what the feet did says nothing
-OFF = 100.0  # cm from the line between two waypoints, beyond which a run has left it
+FEWEST_STEPS = 10  # with fewer steps, the mean foot slide is not shown
+OFF_TRACK = 100.0  # cm from the line between two waypoints; farther places are marked
 FRAME_BUDGET_MS = 1000 / 60
-TRACK = "The character is led around a track of six waypoints, walking, side-stepping, jogging and crouching."
+TRACK = "The character is steered around a track of six waypoints: it walks, side-steps, jogs and crouches."
 
 
 def section(found: Json, material: Material) -> Section:
-    """The laps, and their times beside the published ones."""
+    """The track, the times of the laps, and the published times."""
     followed = track_figures(found)
     return Section(
         "speed",
@@ -53,24 +53,24 @@ def section(found: Json, material: Material) -> Section:
 
 
 def figures(found: Json, material: Material) -> Iterator[Figure]:
-    """The time for a frame."""
+    """The time of a frame."""
     milliseconds = frame_milliseconds(found)
     if milliseconds is not None:
         theirs = material.beside("responsivity")
-        beside = f"median; {number(FRAME_BUDGET_MS / milliseconds, 3)} characters at 60 Hz on one core"
+        beside = f"median; one core can run {number(FRAME_BUDGET_MS / milliseconds, 3)} characters at 60 Hz"
         if theirs:
             beside += f"; mean {number(frame_mean(found), 2)} ms, published mean {theirs['milliseconds']} ms"
-        yield Figure("Time for a frame", number(milliseconds, 2), "ms", beside, 20)
+        yield Figure("Time per frame", number(milliseconds, 2), "ms", beside, 20)
 
 
 def hints(found: Json, material: Material) -> Iterator[Hint]:
-    """Whether a frame has time, and whether the track was followed."""
+    """Whether a frame fits into 1/60 s, and whether the character followed the track."""
     yield from placed(60, _speed(found))
     yield from placed(40, _track(found))
 
 
 def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
-    """Milliseconds a frame of each step of a lap, without their total."""
+    """Milliseconds per frame of each step in one lap, without the total."""
     value = lap.get("milliseconds")
     if isinstance(value, dict):
         return {k: v for k, v in value.items() if k not in ("total", "sd") and isinstance(v, (int, float))}
@@ -82,7 +82,7 @@ def _place(step: str) -> int:
 
 
 def lap_chart(found: Json, material: Material) -> Chart | None:
-    """Milliseconds a frame of each step, stacked, lap by lap, for each way of looking up the phase."""
+    """Milliseconds per frame of each step, stacked, lap by lap, for each phase mode."""
     options = {}
     for entry in found.get("modes") or [found]:
         traces = _lap_bars(entry)
@@ -95,35 +95,36 @@ def lap_chart(found: Json, material: Material) -> Chart | None:
     shapes, notes = [], []
     theirs = material.beside("responsivity")
     if theirs:
-        shape, note = mark(theirs["milliseconds"], f"{theirs['label']}: mean as published", vertical=False)
+        shape, note = mark(theirs["milliseconds"], f"{theirs['label']}: published mean", vertical=False)
         shapes, notes = [shape], [note]
     counts = [max(len(trace["x"]) for trace in traces) for traces in options.values()]
     laps = max(counts)
     fewer = (
-        f" Other modes than the runtime's own ran {min(counts)}: from the second on, laps repeat each other."
+        f" The other phase modes ran {min(counts)} laps, because the second lap and later ones are all the "
+        "same."
         if min(counts) < laps
         else ""
     )
     return Chart(
         "laps",
-        "Milliseconds a frame, lap by lap",
-        "Each bar is one lap of the six-waypoint track; its parts are the steps of a frame, means over the "
-        "lap. Diamonds are medians of the whole frame. A few frames that another program held up raise a "
-        "bar and leave the diamond where it is. A frame at 60 Hz has 16.7 ms." + fewer,
+        "Milliseconds per frame, lap by lap",
+        "Each bar is one lap of the track. Its segments are the steps of a frame, averaged over the lap. A "
+        "diamond is the median of whole frames: a few frames that another program delayed raise the bar but "
+        "not the diamond. At 60 Hz, a frame may take 16.7 ms." + fewer,
         layout={
             "barmode": "stack",
             "xaxis": axis("lap", dtick=1 if laps < 25 else None),
-            "yaxis": axis("ms a frame", rangemode="tozero"),
+            "yaxis": axis("ms per frame", rangemode="tozero"),
             "shapes": shapes,
             "annotations": notes,
         },
-        choose="Looked up by" if len(options) > 1 else None,
+        choose="Phase mode" if len(options) > 1 else None,
         options=options,
     )
 
 
 def track_chart(found: Json) -> Chart | None:
-    """The track from above with the runs drawn over it, and where they left it."""
+    """The track from above, the paths of the laps, and where they left the track."""
     track, runs = found.get("track") or {}, found.get("runs") or []
     if not runs or not track.get("x"):
         return None
@@ -131,11 +132,11 @@ def track_chart(found: Json) -> Chart | None:
     along = {"x": [*track["x"], track["x"][0]], "z": [*track["z"], track["z"][0]]}
     traces = [line("track", along["x"], along["z"], "@faint", dash="dash", width=1.2, hoverinfo="skip")]
     for run in runs:
-        name = "runs" if run is runs[0] else f"lap {run['lap']}"
+        name = "laps" if run is runs[0] else f"lap {run['lap']}"
         shown = {"legendgroup": "runs", "showlegend": run is runs[0]}
         traces.append(line(name, run["x"], run["z"], "@accent", width=1.5, hoverinfo="skip", **shown))
     off = [(x, z, cm, r["lap"]) for r in runs for x, z, cm in zip(r["x"], r["z"], r["off_cm"], strict=True)]
-    left = [row for row in off if row[2] > OFF]
+    left = [row for row in off if row[2] > OFF_TRACK]
     if left:
         traces.append(_left(left))
     traces.append(
@@ -153,13 +154,13 @@ def track_chart(found: Json) -> Chart | None:
         }
     )
     most = max(row[2] for row in off)
-    where = f"red where they were more than {OFF:.0f} cm from it" if left else "none was further from it than"
+    where = f"Red marks places more than {OFF_TRACK:.0f} cm from the track. " if left else ""
     return Chart(
         "track",
-        "The track and the runs around it",
-        "From above. Straight lines join the waypoints; each is named by its number and the gait on the way "
-        f"to it. The runs lie over them, {where}{'' if left else f' {OFF:.0f} cm'}; the furthest was "
-        f"{most:.0f} cm. Only the first laps are drawn. A waypoint counts as reached within a metre.",
+        "The track, and the path of the character",
+        "From above. Dashed lines join the waypoints. Each waypoint has a number and the gait on the way to "
+        "it; it counts as reached within a metre. Solid lines are the paths of the first laps. "
+        f"{where}The largest distance from the track was {most:.0f} cm.",
         traces,
         {
             "xaxis": axis("x, m", constrain="domain", zeroline=False),
@@ -170,11 +171,11 @@ def track_chart(found: Json) -> Chart | None:
 
 
 def _left(places: list[tuple[float, float, float, int]]) -> Trace:
-    """Where runs left the track: x, z, cm and lap of each place."""
+    """Markers where laps left the track. places: x, z, distance in cm and lap of each."""
     return {
         "type": "scatter",
         "mode": "markers",
-        "name": f"more than {OFF:.0f} cm off",
+        "name": f"more than {OFF_TRACK:.0f} cm off",
         "x": [x for x, *_ in places],
         "y": [z for _, z, *_ in places],
         "customdata": [[cm, lap] for *_, cm, lap in places],
@@ -216,13 +217,13 @@ def _lap_bars(entry: dict[str, Any]) -> list[Trace]:
 
 
 def lap_median(lap: dict[str, Any]) -> float | None:
-    """The median of the milliseconds a frame of a lap, all steps together."""
+    """The median milliseconds per frame of a lap, all steps together."""
     value = lap.get("milliseconds")
     return (value.get("spread") or {}).get("median") if isinstance(value, dict) else None
 
 
 def lap_table(found: Json, name: str) -> Table | None:
-    """The laps as numbers."""
+    """A row per lap."""
     laps = found.get("laps")
     if not isinstance(laps, list) or not laps:
         return None
@@ -246,38 +247,43 @@ def _few(steps: int | None) -> bool:
 
 
 def track_figures(found: Json) -> list[Figure]:
-    """How the track was followed, in a few numbers."""
+    """A few numbers on how the character followed the track."""
     if not isinstance(found.get("laps"), list):
         return []
     spread = (found.get("milliseconds") or {}).get("spread") or {}
     reached = f"{found.get('waypoints_reached')} of {found.get('waypoints')}"
     steps = sum(lap.get("steps") or 0 for lap in found["laps"])
     slide = None if _few(steps) else found.get("foot_slide_cm")
-    measured = f"of the toe in a stance, on average; {steps:,} steps were measured"
+    measured = f"mean slide of the toe during a stance, over {steps:,} steps"
     laps = f"{found.get('laps_finished')} of {len(found['laps'])} laps finished"
     return [
         Figure("Waypoints reached", reached, "", laps),
-        Figure("Furthest off the path", number(found.get("path_overshoot_cm")), "cm", "at the turns"),
+        Figure(
+            "Largest distance from the path",
+            number(found.get("path_overshoot_cm")),
+            "cm",
+            "usually at a turn",
+        ),
         Figure("Foot slide", number(slide), "cm" if slide is not None else "", measured),
         _turn(found),
-        Figure("Slow frames", number(spread.get("p99")), "ms", "one frame in a hundred is slower"),
+        Figure("Slow frames", number(spread.get("p99")), "ms", "1 % of the frames are slower"),
     ]
 
 
 def _turn(found: Json) -> Figure:
-    """What the network asked for, which the runtime holds back, and what was drawn."""
+    """The largest turn of a joint in one frame: as predicted, and as drawn after the runtime's limit."""
     drawn, asked = (number(found.get(key)) for key in ("largest_turn_degrees", "asked_turn_degrees"))
-    allowed = f"the runtime allows {np.degrees(FASTEST_TURN):.0f}°"
+    allowed = f"the runtime limits it to {np.degrees(FASTEST_TURN):.0f}°"
     if found.get("asked_turn_degrees") is None:
-        return Figure("Largest turn of a joint, as drawn", drawn, "°", f"from a frame to the next; {allowed}")
+        return Figure("Largest turn of a joint", drawn, "°", f"in one frame, as drawn; {allowed}")
     frames = sum(lap.get("frames") or 0 for lap in found["laps"])
     held = f"{found['turns_held_back']:,} of {frames:,} frames"
-    beside = f"from a frame to the next; {allowed}, less than was asked in {held}, and drew {drawn}° at most"
-    return Figure("Largest turn that the network asked for", asked, "°", beside)
+    beside = f"of a joint in one frame; {allowed}, which changed {held}; largest turn drawn: {drawn}°"
+    return Figure("Largest predicted turn", asked, "°", beside)
 
 
 def speed_published(found: Json, material: Material) -> Table | None:
-    """Our milliseconds with the published means under them."""
+    """Our milliseconds, followed by the published means."""
     ours = frame_milliseconds(found)
     if ours is None:
         return None
@@ -304,22 +310,22 @@ def speed_published(found: Json, material: Material) -> Table | None:
         )
     columns = [
         Column("network"),
-        Column.number("median, ms a frame"),
-        Column.number("mean, ms a frame"),
+        Column.number("median, ms per frame"),
+        Column.number("mean, ms per frame"),
         Column("source", kind="long"),
     ]
-    return Table(f"{material.name}-published-speed", columns, rows, "Beside the published figures")
+    return Table(f"{material.name}-published-speed", columns, rows, "Comparison with published results")
 
 
 def frame_milliseconds(found: Json) -> float | None:
-    """Milliseconds of one frame, all steps together: the median over all laps, which no outlier decides."""
+    """Median milliseconds per frame over all laps, all steps together; robust against outliers."""
     value = found.get("milliseconds")
     median = (value.get("spread") or {}).get("median") if isinstance(value, dict) else None
     return frame_mean(found) if median is None else float(median)
 
 
 def frame_mean(found: Json) -> float | None:
-    """Likewise the mean, which is what was published."""
+    """Mean milliseconds per frame, to compare with the published means."""
     value = found.get("milliseconds")
     if isinstance(value, dict):
         value = value.get("total", sum(v for v in value.values() if isinstance(v, (int, float))))
@@ -331,7 +337,7 @@ def _speed(found: Json) -> Iterator[Hint]:
     if milliseconds is None:
         return
     if milliseconds > FRAME_BUDGET_MS:
-        yield Hint("warn", f"A frame takes {milliseconds:.1f} ms, too long for 60 Hz.", "Try mode: linear.")
+        yield Hint("warn", f"A frame takes {milliseconds:.1f} ms, too slow for 60 Hz.", "Try mode: linear.")
         return
     share = milliseconds / FRAME_BUDGET_MS
     value = found.get("milliseconds")
@@ -339,18 +345,18 @@ def _speed(found: Json) -> Iterator[Hint]:
     if slow is not None and slow > FRAME_BUDGET_MS:
         yield Hint(
             "warn",
-            f"One frame in a hundred takes {slow:.1f} ms or more, too long for 60 Hz.",
-            f"Half of all take {milliseconds:.2f} ms or less: measure again while nothing else runs.",
+            f"1 % of the frames take {slow:.1f} ms or more, too slow for 60 Hz.",
+            f"The median is {milliseconds:.2f} ms. Measure again while nothing else runs on the machine.",
         )
     elif slow is not None:
         yield Hint(
             "good",
-            f"A frame uses {100 * share:.1f} % of its time at 60 Hz, one in a hundred "
+            f"A frame takes {100 * share:.1f} % of the 16.7 ms that 60 Hz allows; 1 % of the frames take "
             f"{100 * slow / FRAME_BUDGET_MS:.0f} % or more.",
-            "Fast enough for a game.",
+            "That is fast enough for a game.",
         )
     else:
-        yield Hint("good", f"A frame uses {100 * share:.1f} % of its time at 60 Hz.", "")
+        yield Hint("good", f"A frame takes {100 * share:.1f} % of the 16.7 ms that 60 Hz allows.", "")
 
 
 def _track(found: Json) -> Iterator[Hint]:
@@ -359,18 +365,19 @@ def _track(found: Json) -> Iterator[Hint]:
         yield Hint(
             "warn",
             f"The character reached {reached} of {asked} waypoints.",
-            "Where it does not arrive, it circles or stands: look at Speed and response, lap by lap.",
+            "It circles or stops before a waypoint that it does not reach. See the laps under Speed and "
+            "response.",
         )
     drawn, asked = (found.get(key) for key in ("largest_turn_degrees", "asked_turn_degrees"))
     if drawn is not None and drawn > 60:
         yield Hint(
             "warn",
             f"A joint turned by {drawn:.0f} degrees in one frame.",
-            "That is a flip, and will be seen on a skinned figure.",
+            "That is a flip, which is visible on a skinned character.",
         )
     elif asked is not None and asked > 60:
         yield Hint(
             "note",
-            f"The network asked a joint to turn by {asked:.0f} degrees in one frame.",
-            f"The runtime drew {drawn:.0f}. See whether rotations of the clips flip.",
+            f"The network predicted a turn of a joint by {asked:.0f} degrees in one frame.",
+            f"The runtime limited it to {drawn:.0f}. Check whether joint rotations flip in the clips.",
         )

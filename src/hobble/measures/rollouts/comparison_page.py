@@ -1,4 +1,4 @@
-"""Roll-outs of configurations side by side: in the section on accuracy."""
+"""Roll-outs of several configurations; part of the section on accuracy."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ SECOND = 60  # frames
 
 
 def section(compared: Compared) -> Section:
-    """The chart, a guest of the section on accuracy."""
+    """The chart, which is added to the section on accuracy."""
     return Section("accuracy", [Part(20, rollout_chart(compared))])
 
 
 def verdicts(compared: Compared) -> Iterator[Verdict]:
-    """Which stays closest to the captured motion over the roll-outs of about a second."""
+    """Which configuration stays closest to the captured motion in roll-outs of about a second."""
     length = min({row["length"] for row in compared["rollouts"]}, key=lambda n: abs(n - SECOND), default=None)
     rows = [row for row in compared["rollouts"] if row["length"] == length]
     for split, label in SPLITS.items():
         off = {row["configuration"]: (row[split] or {}).get("position_error_cm") for row in rows}
         if any(value is not None for value in off.values()):
-            where = f"cm from where they were in {label}, on the average of {length} frames of its own"
+            where = f"cm from the captured joints on average, in roll-outs of {length} frames on {label}"
             yield from best(
                 10,
                 "Closest to captured motion",
                 off,
-                partial(_off, where),
+                partial(_distance, where),
             )
             return
 
 
-def _off(where: str, name: str, value: float) -> str:
+def _distance(where: str, name: str, value: float) -> str:
     return f"the joints of {name} are {number(value, 3)} {where}"
 
 
 def rollout_chart(compared: Compared) -> Chart | None:
-    """How the error grows when the figure is fed its own pose."""
+    """How the error grows when the networks continue from their own poses."""
     options: dict[str, list[Trace]] = {}
     for split, label in SPLITS.items():
         traces = []
@@ -58,13 +58,13 @@ def rollout_chart(compared: Compared) -> Chart | None:
         return None
     return Chart(
         "compare-rollouts",
-        "Fed its own pose",
-        "Mean distance of a joint from the captured one, over roll-outs of so many frames in which the "
-        "network goes on from what it predicted itself. One frame is the error above.",
+        "Error over time, from their own poses",
+        "Mean distance between a joint and its captured position when a network continues from its own "
+        "poses, for this many frames (60 frames are one second).",
         layout={
             "xaxis": log_axis("frames", [x for t in options.values() for one in t for x in one["x"]]),
-            "yaxis": axis("cm a joint", rangemode="tozero"),
+            "yaxis": axis("cm per joint", rangemode="tozero"),
         },
-        choose="Over",
+        choose="Clips",
         options=options,
     )

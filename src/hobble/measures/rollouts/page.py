@@ -1,4 +1,4 @@
-"""How the error grows when the figure is fed its own pose: in the section on accuracy."""
+"""How the error grows when the network continues from its own poses; part of the section on accuracy."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from hobble.report.parts import Part, Section
 
 
 def section(found: Json, material: Material) -> Section:
-    """The chart, a guest of the section on accuracy."""
+    """The chart, which is added to the section on accuracy."""
     return Section("accuracy", [Part(50, rollout_chart(found))])
 
 
 def sampled(found: Json) -> str:
-    """A sentence on which clips were measured, where not all of them were; else nothing."""
+    """A sentence on which clips were measured; empty if all of them were."""
     sample = found.get("sample")
     if not sample:
         return ""
     return (
-        f" Measured on {sample['clips']:,} of {sample['of']:,} clips, drawn by gait, speed, channel and "
-        "split. Whiskers are 95 % confidence intervals."
+        f" Measured on a sample of {sample['clips']:,} of {sample['of']:,} clips, stratified by gait, speed, "
+        "channel and split. Whiskers are 95 % confidence intervals."
     )
 
 
 def _whiskers(found: Json, split: str) -> dict[str, Any]:
-    """Half widths of the intervals, for each length that has a mean."""
+    """Half the width of the confidence interval of each length that has a mean."""
     entries = [entry[split] for entry in found["lengths"]]
     known = [entry for entry in entries if entry.get("position_error_cm") is not None]
     widths = [(entry.get("interval") or {}).get("position_error_cm", 0.0) for entry in known]
@@ -36,7 +36,7 @@ def _whiskers(found: Json, split: str) -> dict[str, Any]:
 
 
 def rollout_chart(found: Json) -> Chart | None:
-    """How the error grows when the figure is fed its own pose."""
+    """How the error grows when the network continues from its own poses."""
     traces = []
     for split in ("held_out", "train"):
         rows = [
@@ -52,15 +52,15 @@ def rollout_chart(found: Json) -> Chart | None:
         return None
     return Chart(
         "rollouts",
-        "Fed its own pose",
-        "Mean distance of a joint from the captured one when the network goes on from what it predicted "
-        "itself, as at run time, over roll-outs of so many frames. A line that flattens is a figure that "
-        "keeps to its feet; 60 frames are a second. This is the pose as drawn, halfway between the "
-        "predicted position and where the predicted velocity carries the one before. The charts above take "
-        "the predicted position alone, so their error of one frame is another." + sampled(found),
+        "Error over time, from its own poses",
+        "Mean distance between a joint and its captured position when the network continues from its own "
+        "poses, as at run time, for this many frames (60 frames are one second). If the line flattens, the "
+        "character stays stable. This chart measures the pose as drawn: the mean of the predicted position "
+        "and of the previous position moved by the predicted velocity. The charts above measure the "
+        "predicted position alone, so their values differ from the first point here." + sampled(found),
         traces,
         {
             "xaxis": log_axis("frames", [x for trace in traces for x in trace["x"]]),
-            "yaxis": axis("cm a joint", rangemode="tozero"),
+            "yaxis": axis("cm per joint", rangemode="tozero"),
         },
     )

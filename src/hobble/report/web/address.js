@@ -1,4 +1,4 @@
-// The state that a link carries. What stands in a link was written by anybody: each part is taken if it is right.
+// The state in a link. Anybody can write a link, so every part is checked.
 
 // {text: what follows "#play?", or null}
 export const read = (hash) => {

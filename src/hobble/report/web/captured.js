@@ -1,10 +1,10 @@
-// Captured (seen through) and predicted (blue), with the distance between them along the time.
+// The view of captured (transparent) and predicted (blue) motion, with the distance between them over time.
 import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
 import { createMotion } from "./motion.js";
 import { createView } from "./view.js";
 
-// Opens a clip by its name at the frame where the two are furthest apart; false where it does not lie in the page.
+// Opens a clip by name at the frame with the largest distance. Returns false if the page does not have the clip.
 export let openClip = () => false;
 
 (() => {
@@ -36,8 +36,8 @@ export let openClip = () => false;
     predicted.pose(() => paint.predicted);
     view.land.under([...predicted.balls(), ...(apart ? captured.balls() : [])]);
     const f = Math.min(clip.frames - 1, Math.round(time));
-    const split = clip.split === "held_out" ? "held out: never seen in training" : "a training clip";
-    find("compare-reading").replaceChildren(split, document.createElement("br"), `${clip.error[f].toFixed(1)} cm a joint apart`);
+    const split = clip.split === "held_out" ? "held out: not used for training" : "a training clip";
+    find("compare-reading").replaceChildren(split, document.createElement("br"), `distance ${clip.error[f].toFixed(1)} cm per joint`);
     find("compare-clock").textContent = `${(time / shown.fps).toFixed(1)} of ${((clip.frames - 1) / shown.fps).toFixed(1)} s`;
     find("compare-mark").setAttribute("x1", time);
     find("compare-mark").setAttribute("x2", time);

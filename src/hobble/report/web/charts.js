@@ -1,9 +1,9 @@
-// Charts: drawn when they come near the window, in the colours of the page's tokens, again when the theme changes.
+// Charts: drawn when they scroll into view, in the page's colours, and again when the theme changes.
 import Plotly from "plotly.js-cartesian-dist-min";
 import { colour, material, onTheme } from "./base.js";
 import { openClip } from "./captured.js";
 
-// Draws every chart, also those that were never scrolled to: for printing.
+// Draws every chart, for printing.
 export let drawAll;
 
 (() => {
@@ -54,7 +54,7 @@ export let drawAll;
     const first = !drawn.has(element);
     if (first) drawn.set(element, 0);
     Plotly.react(element, traces, shape, config);
-    // A point about a clip opens it in the viewer.
+    // A click on a point of a clip opens the clip in the viewer.
     if (first) element.on("plotly_click", ({ points }) => [points[0].y, points[0].x, points[0].text].some(openClip));
   };
   drawAll = () => document.querySelectorAll("[data-chart]").forEach(draw);

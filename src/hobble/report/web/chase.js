@@ -1,4 +1,4 @@
-// A camera that follows and comes round behind, smoothed by the clock, so that it is the same at any rate of pictures.
+// A camera that follows the character and turns behind it, smoothed by time, so that it does not depend on the frame rate.
 import { wrap } from "./numbers.js";
 
 const FOLLOW = 8, COME_ROUND = .9; // share of the way that is gone in a second, as 1 - exp(-rate)

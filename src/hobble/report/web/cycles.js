@@ -1,23 +1,23 @@
-// The cycles of a walk and their numbers, as `hobble.gait.cycles` and `hobble.gait.profile` find them. A foot lands where
+// The gait cycles of a walk and their measures, as in `hobble.gait.cycles` and `hobble.gait.profile`. A foot lands when
 // its ankle is furthest ahead of the hips.
-import { LIMBS, MIDDLE, SIDES, TURNS_ROUND, median, mirroredSignals, signals } from "./signals.js";
+import { LIMBS, MIDDLE, SIDES, SIGNED, median, mirroredSignals, signals } from "./signals.js";
 
 const SAMPLES = 50;
 const SCALARS = ["stride_seconds", "speed_per_leg", "left_strike_phase", "stance_share_R", "stance_share_L", "step_R", "step_L", "step_width"];
 const CURVES = [...SIDES.flatMap((side) => LIMBS.map((limb) => `${limb}_${side}`)), ...MIDDLE];
-const SLOW = .35; // of the walking speed: a slower ankle stands
+const STANDING_SPEED = .35; // share of the walking speed; a slower ankle counts as standing
 const [SHORTEST, LONGEST] = [.4, 3.5]; // s, a cycle
 const LEAST_TRAVEL = .2; // leg lengths in a cycle; less is standing
-const LEAST_SWING = .12; // leg lengths that an ankle goes back and forth, or it makes no step
-const OF_RANGE = .4; // of the ankle's range within the longest cycle: lesser turns of it are no step
+const LEAST_SWING = .12; // leg lengths; an ankle that swings less makes no step
+const LEAST_SWING_SHARE = .4; // share of the ankle's range within the longest cycle; smaller swings are no steps
 const STRAIGHT = 25; // degrees that the path turns in a cycle at most
 const AHEAD = .7; // mean cosine between facing and travel; less is a walk backward or sideways
 
 const mean = (values) => values.reduce((a, b) => a + b, 0) / values.length;
 const range = (values) => Math.max(...values) - Math.min(...values);
 
-// Largest minus least value within `reach` frames to either side of one.
-const around = (values, i, reach) => {
+// Largest minus smallest value within `reach` frames of frame i.
+const rangeAround = (values, i, reach) => {
   let low = Infinity, high = -Infinity;
   for (let k = Math.max(0, i - reach), end = Math.min(values.length, i + reach + 1); k < end; k++) {
     if (values[k] < low) low = values[k];
@@ -31,7 +31,7 @@ export const landings = (forward, fps) => {
   const reach = Math.floor(LONGEST * fps / 2), found = [];
   let high = 0, low = 0, rising = true;
   forward.forEach((value, i) => {
-    const least = Math.max(LEAST_SWING, OF_RANGE * around(forward, i, reach));
+    const least = Math.max(LEAST_SWING, LEAST_SWING_SHARE * rangeAround(forward, i, reach));
     if (rising) {
       if (value > forward[high]) high = i;
       if (forward[high] - value >= least) { found.push(high); rising = false; low = i; }
@@ -47,7 +47,7 @@ const cycle = (seen, a, other, b) => {
   const { fps, curves, hips } = seen, seconds = (b - a) / fps, part = (values) => values.slice(a, b);
   const speed = Math.hypot(hips[b][0] - hips[a][0], hips[b][1] - hips[a][1]) / seconds;
   const apart = (f) => curves.ankle_forward_R[f] - curves.ankle_forward_L[f];
-  const standing = (side) => mean(part(seen.ankleSpeed[side]).map((v) => Number(v < SLOW * speed)));
+  const standing = (side) => mean(part(seen.ankleSpeed[side]).map((v) => Number(v < STANDING_SPEED * speed)));
   const width = mean([a, other].map((f) => seen.across.L[f] - seen.across.R[f]));
   const scalars = [seconds, speed, (other - a) / (b - a), standing("R"), standing("L"), apart(a), -apart(other), width];
   const sampled = (values) => Array.from({ length: SAMPLES }, (_, k) => {
@@ -90,12 +90,12 @@ const ofCycles = (some) => {
 
 const mirroredProfile = (values) => Object.fromEntries(Object.keys(values).map((name) => {
   if (name === "left_strike_phase") return [name, 1 - values[name]];
-  if (TURNS_ROUND.some((curve) => name === `mean ${curve}`)) return [name, -values[name]];
+  if (SIGNED.some((curve) => name === `mean ${curve}`)) return [name, -values[name]];
   const across = name.endsWith("_R") ? `${name.slice(0, -1)}L` : name.endsWith("_L") ? `${name.slice(0, -1)}R` : name;
   return [name, values[across]];
 }));
 
-// A walk in numbers: medians over its cycles, both legs in equal parts; null where one leg has no cycle.
+// Measures of a walk: medians over its cycles, with equal weight for both legs; null if a leg has no cycle.
 export const profile = ({ right, left }) => {
   if (!right.length || !left.length) return null;
   const [a, b] = [ofCycles(right), mirroredProfile(ofCycles(left))];

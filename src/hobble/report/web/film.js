@@ -1,11 +1,11 @@
-// A button that films a canvas until it is pressed again.
+// A button that records a canvas as a film until it is pressed again.
 import { save } from "./base.js";
 
 export const film = (button, canvas, name) => {
   if (!canvas.captureStream || !globalThis.MediaRecorder) { button.hidden = true; return; }
   let recorder = null;
   button.addEventListener("click", () => {
-    if (recorder) { recorder.stop(); recorder = null; button.textContent = "Film"; return; }
+    if (recorder) { recorder.stop(); recorder = null; button.textContent = "Record film"; return; }
     const type = ["video/webm;codecs=vp8", "video/webm", "video/mp4"].find((t) => MediaRecorder.isTypeSupported(t));
     const chunks = [], made = new MediaRecorder(canvas.captureStream(60), { mimeType: type, videoBitsPerSecond: 8e6 });
     made.addEventListener("dataavailable", ({ data }) => chunks.push(data));

@@ -1,4 +1,4 @@
-// Terrain fits: the ground under one cycle, the soles that it was fitted to, and the figure at three moments.
+// Terrain fits: the ground of one cycle, the soles that it was fitted to, and the figure at three moments.
 import { material } from "./base.js";
 import { createFigure } from "./figure.js";
 import { bytes, mix } from "./numbers.js";

@@ -1,15 +1,15 @@
-// The first thing on the page: the character, already walking, and beside it a healthy ghost with the same wish.
+// The top of the page: the walking character, and next to it a healthy, transparent one with the same controls.
 import { createActor } from "./actor.js";
 import { find, material } from "./base.js";
 import { createDial } from "./dial.js";
 import { keyed, placed } from "./told.js";
 import { createView } from "./view.js";
 
-const BESIDE = -84; // cm from the hurt figure to its ghost, to its left
-const AHEAD = 120; // cm that the ghost may get away before it comes back
-const FADE = 24; // frames in which it goes, and comes
-const WARM = 100; // frames that are walked before anybody looks
-const SPEED = 2.5; // cm a frame
+const GHOST_OFFSET = -84; // cm from the hurt figure to the healthy one, negative: to its left
+const MOST_AHEAD = 120; // cm that the healthy one may get ahead before it is moved back
+const FADE = 24; // frames in which it fades out, and in
+const WARM_UP = 100; // frames that are simulated before the first picture
+const SPEED = 2.5; // target speed, cm per frame
 
 const createHero = (spec, asked) => {
   const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), still = find("hero-walk");
@@ -18,7 +18,7 @@ const createHero = (spec, asked) => {
   let part = hurts ? (labels.includes(asked.part) ? asked.part : labels[0]) : null;
   let last = null, owed = 0, shown = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-  // Both are asked to go the same way, which bends gently.
+  // Both have the same target direction, which turns slowly from side to side.
   const heading = () => .5 * Math.sin(hero.frames / 700);
   const wish = () => ({ velocity: [SPEED * Math.sin(heading()), SPEED * Math.cos(heading())], ahead: null, gait: "walk" });
   const view = createView(canvas, { yaw: .62, pitch: .1, distance: 460, nearest: 240, furthest: 800 }, (now) => {
@@ -27,8 +27,8 @@ const createHero = (spec, asked) => {
     if (walks) view.ask();
   });
   view.onHidden = () => { last = null; };
-  const main = createActor(view, spec), ghost = hurts ? createActor(view, spec, { place: [BESIDE, 0], tint: "ghost", ghost: true }) : null;
-  const aside = () => [BESIDE * Math.cos(heading()), -BESIDE * Math.sin(heading())];
+  const main = createActor(view, spec), ghost = hurts ? createActor(view, spec, { place: [GHOST_OFFSET, 0], tint: "ghost", ghost: true }) : null;
+  const aside = () => [GHOST_OFFSET * Math.cos(heading()), -GHOST_OFFSET * Math.sin(heading())];
 
   const step = () => {
     hero.frames++;
@@ -36,8 +36,8 @@ const createHero = (spec, asked) => {
     if (!ghost) return;
     ghost.frame(wish(), healthy);
     const [sin, cos] = [Math.sin(heading()), Math.cos(heading())], [a, b] = [main.character.root, ghost.character.root];
-    const [dx, dz] = [b[0] - a[0], b[2] - a[2]], along = dx * sin + dz * cos, beside = dx * cos - dz * sin;
-    if (!leaving && (Math.abs(along) > AHEAD || Math.abs(beside - BESIDE) > 70)) leaving = true;
+    const [dx, dz] = [b[0] - a[0], b[2] - a[2]], along = dx * sin + dz * cos, across = dx * cos - dz * sin;
+    if (!leaving && (Math.abs(along) > MOST_AHEAD || Math.abs(across - GHOST_OFFSET) > 70)) leaving = true;
     fade = Math.min(1, Math.max(0, fade + (leaving ? -1 : 1) / FADE));
     if (leaving && fade === 0) {
       const [x, z] = aside();
@@ -53,7 +53,7 @@ const createHero = (spec, asked) => {
     for (; owed >= 1; owed--) step();
     glide(1 - Math.exp(-passed / 350));
   };
-  // The camera keeps to the path, and not to the hips, which rise and fall.
+  // The camera follows the path and not the hips, because they move up and down.
   const glide = (share) => {
     const { root } = main.character, [x, z] = ghost ? aside().map((v) => v / 2) : [0, 0], goal = [root[0] + x, root[2] + z, heading()];
     camera = camera ? camera.map((v, i) => v + share * (goal[i] - v)) : goal;
@@ -85,8 +85,8 @@ const createHero = (spec, asked) => {
     const say = () => {
       words.part.textContent = part;
       words.much.textContent = `${dial.value} of ${one.highest}`;
-      if (dial.value) line.replaceChildren("A neural network walks both figures, and both are asked to walk on. Only the solid one is told that its ", words.part, " hurts, ", words.much, ".");
-      else line.replaceChildren("A neural network walks both figures, and both are asked to walk on. Nothing hurts, so they walk alike.");
+      if (dial.value) line.replaceChildren("One neural network moves both figures, and both have the same target speed. For the solid one, the network also gets the input that its ", words.part, " hurts, ", words.much, ".");
+      else line.replaceChildren("One neural network moves both figures, and both have the same target speed. Nothing hurts, so they walk alike.");
       chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
     };
     const hurt = () => {
@@ -120,7 +120,7 @@ const createHero = (spec, asked) => {
 
   for (const actor of [main, ghost]) actor?.start(flat);
   const warm = new Map(told);
-  for (let f = 0; f < WARM; f++) { hero.frames++; main.frame(wish(), f > 40 ? warm : healthy); ghost?.frame(wish(), healthy); }
+  for (let f = 0; f < WARM_UP; f++) { hero.frames++; main.frame(wish(), f > 40 ? warm : healthy); ghost?.frame(wish(), healthy); }
   glide(1);
   tell();
   section.classList.add("ready");

@@ -1,4 +1,4 @@
-// What the network is told of the ground and of the body's motion, drawn where it is: Play's view of its inputs.
+// Draws inputs of the network in Play: ground heights and joint velocities.
 const AHEAD = 8; // frames that a joint would go on for at its velocity
 const LEAST = .15; // cm a frame; slower joints have no line
 

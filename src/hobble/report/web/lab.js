@@ -1,11 +1,11 @@
-// The gait of the character that is played, as it goes: stance of both feet, length of steps, bend of the knees.
+// The gait of the played character over the last seconds: contacts, step lengths, knee angles.
 import { dot, minus } from "./numbers.js";
 import { at3 } from "./turns.js";
 
 export const SHOWN = 240; // frames: four seconds
 const SIDES = ["left", "right"];
 
-// Bend of a knee in degrees: 0 where the leg is straight.
+// Angle of a knee in degrees; 0 for a straight leg.
 export const bend = (hip, knee, heel) => {
   const a = minus(knee, hip), b = minus(heel, knee), size = Math.hypot(...a) * Math.hypot(...b);
   return size ? Math.acos(Math.min(1, Math.max(-1, dot(a, b) / size))) * 180 / Math.PI : 0;
@@ -16,14 +16,14 @@ export const createLab = (legs) => {
   const lab = { stance: [[], []], knees: [[], []], steps: [null, null], stood: [false, false] };
   let landed = [null, null];
   const kept = (list, value) => { list.push(value); if (list.length > SHOWN) list.shift(); };
-  // places: of all joints; down: whether the left and the right foot stand.
+  // places: of all joints. down: whether the left and the right foot are on the ground.
   lab.add = (places, down) => {
     legs.forEach(([hip, knee, heel], f) => {
       kept(lab.stance[f], down[f]);
       kept(lab.knees[f], bend(at3(places, hip), at3(places, knee), at3(places, heel)));
       if (down[f] && !lab.stood[f]) {
         const other = landed[1 - f], here = at3(places, heel);
-        // A step goes from where the other foot stands to where this one lands.
+        // A step reaches from the place of the other foot to the place where this one lands.
         if (other) lab.steps[f] = Math.hypot(here[0] - other[0], here[2] - other[2]);
         landed[f] = here;
       }
@@ -34,7 +34,7 @@ export const createLab = (legs) => {
   return lab;
 };
 
-// Draws a lab onto a canvas: a bar where a foot stands, over it the bend of that knee.
+// Draws onto a canvas: a bar while a foot is on the ground, and the angle of its knee above.
 export const drawLab = (canvas, lab, { ink, line, accent, second }) => {
   const scale = Math.min(2, devicePixelRatio || 1), [w, h] = [canvas.clientWidth, canvas.clientHeight];
   if (!w) return;

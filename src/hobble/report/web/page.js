@@ -1,4 +1,4 @@
-// The page itself: theme, printing, and the mark in the contents of where the reader is.
+// Theme, printing, and the mark of the current section in the list of contents.
 import { onTheme } from "./base.js";
 import { drawAll } from "./charts.js";
 import { views } from "./view.js";
@@ -7,7 +7,7 @@ import { views } from "./view.js";
   const root = document.documentElement, button = document.getElementById("theme");
   const themes = ["auto", "light", "dark"];
   const remembered = () => { try { return localStorage.getItem("hobble-theme"); } catch { return null; } };
-  const remember = (name) => { try { localStorage.setItem("hobble-theme", name); } catch { /* not from disk */ } };
+  const remember = (name) => { try { localStorage.setItem("hobble-theme", name); } catch { /* no storage for pages from disk */ } };
   const recolour = () => onTheme.forEach((react) => react());
   const show = (name) => {
     if (name === "auto") delete root.dataset.theme; else root.dataset.theme = name;
@@ -24,7 +24,7 @@ import { views } from "./view.js";
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", recolour);
 
-  // Paper gets everything: charts not yet scrolled to are drawn, folded tables opened, colours light.
+  // Printing draws all charts, opens folded tables and uses light colours.
   document.getElementById("print").addEventListener("click", () => print());
   let opened = [];
   addEventListener("beforeprint", () => {

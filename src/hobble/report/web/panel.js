@@ -1,14 +1,14 @@
-// What is read off a character while it is played: phase, contacts, gait, speed, milliseconds.
+// The readings next to the played character: phase, contacts, gait, speed, milliseconds.
 import { drawLab } from "./lab.js";
 import { palette } from "./paint.js";
 import { createWatch, SECONDS } from "./recogniser.js";
 
 const FEET = ["left heel", "left toe", "right heel", "right toe"];
 const COLOURS = { stand: "g0", walk: "g1", jog: "g2", crouch: "g3", jump: "g4", bump: "g5" };
-const JUDGED = 600; // ms between two answers of the recogniser
+const RECOGNISE_EVERY = 600; // ms between two answers of the recogniser
 const NS = "http://www.w3.org/2000/svg";
 
-// Between two pictures, so that none comes late for it.
+// Runs when the browser is idle, so that no picture is late.
 const idle = (act) => (globalThis.requestIdleCallback ? requestIdleCallback(act, { timeout: 1000 }) : setTimeout(act));
 
 const make = (parent, tag, className = "", text = "") => {
@@ -27,10 +27,10 @@ export const createPanel = (host, actor, title = "") => {
     make(part, "dt", "", label);
     return make(part, "dd");
   };
-  const speed = row("Speed"), phase = row("Phase"), down = row("On the ground"), gait = row("Gait"), lab = row("Stance and knees, 4 s"), steps = row("Steps"), looks = spec.recogniser ? row(`Looks like, last ${SECONDS} s`) : null, cost = row("A frame");
+  const speed = row("Speed"), phase = row("Phase"), down = row("On the ground"), gait = row("Gait"), lab = row("Contacts and knee angles, last 4 s"), steps = row("Length of the last step"), looks = spec.recogniser ? row(`Looks like, last ${SECONDS} s`) : null, cost = row("Time per frame");
   const chart = make(lab, "canvas", "lab"), bends = make(lab, "span", "words"), lengths = make(steps, "span", "words");
   chart.setAttribute("role", "img");
-  chart.setAttribute("aria-label", "When each foot stood, left above right, and how its knee was bent");
+  chart.setAttribute("aria-label", "When each foot was on the ground, left above right, and the angle of its knee");
   const number = make(speed, "span", "value");
   const dial = document.createElementNS(NS, "svg"), hand = document.createElementNS(NS, "circle");
   dial.setAttribute("viewBox", "0 0 24 24");
@@ -51,7 +51,7 @@ export const createPanel = (host, actor, title = "") => {
   let judged = 0;
   if (looks) {
     actor.watch = createWatch(spec);
-    looks.title = "What people who limp looked like says of this walk, beside the healthy walk of the same figure. It is not told what hurts.";
+    looks.title = "A recogniser trained on recordings of people who limp compares this walk with the healthy walk of the same figure. It does not know what hurts.";
   }
 
   return {
@@ -71,7 +71,7 @@ export const createPanel = (host, actor, title = "") => {
       lengths.textContent = `left ${cm(made[0])}, right ${cm(made[1])}`;
       cost.textContent = `${actor.milliseconds.toFixed(1)} ms${drawing ? `, drawing ${drawing.toFixed(1)} ms` : ""}`;
       const now = performance.now();
-      if (looks && now - judged > JUDGED) {
+      if (looks && now - judged > RECOGNISE_EVERY) {
         judged = now;
         idle(() => {
           const { text, share } = actor.watch.say();
@@ -79,7 +79,7 @@ export const createPanel = (host, actor, title = "") => {
           sure.textContent = share === undefined ? text : `${Math.round(100 * share)} % sure`;
         });
       }
-      note.textContent = actor.falls ? `fell over ${actor.falls === 1 ? "once" : `${actor.falls} times`} and stood up again` : "";
+      note.textContent = actor.falls ? `fell ${actor.falls === 1 ? "once" : `${actor.falls} times`} and was put back on its feet` : "";
     },
   };
 };

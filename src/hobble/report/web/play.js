@@ -1,4 +1,4 @@
-// Play: the networks run here. One figure in a report of one configuration, two in the same world where two are compared.
+// Play: the networks run here. A report has one character; a comparison has two on the same ground.
 import { createActor } from "./actor.js";
 import { camera, pairs, read } from "./address.js";
 import { bvh } from "./bvh.js";
@@ -59,7 +59,7 @@ const createPlay = (stage, playables) => {
     view.ask();
   };
 
-  // State that a link carries: who is played, the ground, what it is told, how it goes, where the camera is.
+  // The state in a link: characters, ground, channel values, toggles, camera.
 
   const address = () => {
     const { yaw, pitch, distance } = view.orbit, state = { ground: ground.value };
@@ -83,7 +83,7 @@ const createPlay = (stage, playables) => {
     return true;
   };
 
-  // Hurting by a click on the body, healing with Shift held or while the button is down
+  // A click on the body hurts it. With Shift, or while Heal is on, it heals.
 
   let pressed = null, heals = false;
   find("play-heal")?.addEventListener("click", (event) => {
@@ -98,7 +98,7 @@ const createPlay = (stage, playables) => {
     const { actor, found } = hits.reduce((best, hit) => (hit.found.deep < best.found.deep ? hit : best));
     const one = placed(actor.spec);
     if (!one) return;
-    const felt = found.columns.filter((column) => one.trained.includes(column)); // another would change nothing
+    const felt = found.columns.filter((column) => one.trained.includes(column)); // others have no effect
     if (felt.length) told.more(one, felt.at(-1), event.shiftKey || heals ? -1 : 1);
     else told.say(`${found.columns.length ? told.word(one, found.columns.at(-1)) : "this part"}: ${one.never}`);
   });
@@ -108,7 +108,7 @@ const createPlay = (stage, playables) => {
   find("play-inputs").addEventListener("click", (event) => {
     view.inputs = !view.inputs;
     event.currentTarget.setAttribute("aria-pressed", String(view.inputs));
-    told.say(view.inputs ? "Squares are the heights of the ground that the network is told: red above the path, blue below. Needles are the velocities of the joints." : "");
+    told.say(view.inputs ? "These are inputs of the network. Squares: ground heights, red above the path, blue below it. Needles: joint velocities." : "");
   });
   find("play-reset").addEventListener("click", () => { start(); view.orbit.reset(); });
   ground.addEventListener("change", start);
@@ -116,7 +116,7 @@ const createPlay = (stage, playables) => {
   find("play-share").addEventListener("click", () => {
     history.replaceState(null, "", address());
     if (navigator.clipboard) navigator.clipboard.writeText(location.href).catch(() => {});
-    told.say("The address bar has a link to this figure, as it is hurt and on this ground.");
+    told.say("Link copied. It has the ground, the sliders and the camera. It is also in the address bar.");
   });
   const named = (i) => `${names.length > 1 ? chosen[i].value : material.name}-played`;
   player.motion = (i = 0) => bvh(player.actors[i].spec, player.actors[i].frames);
@@ -131,7 +131,7 @@ const createPlay = (stage, playables) => {
   ready = true;
   cast();
   if (asked) find("play").scrollIntoView();
-  addEventListener("hashchange", () => { // a link that is pasted into an open page
+  addEventListener("hashchange", () => { // somebody pasted a link into the open page
     if (!restore()) return;
     cast();
     find("play").scrollIntoView();

@@ -1,15 +1,15 @@
-// What a walk looks like beside the same figure's healthy one: what hurts, on which side, how likely. It is
-// `hobble.gait.features` and `hobble.gait.graded` once more; what was learnt of people's walks lies in the page.
+// Recognises a limp by comparing a walk with the healthy walk of the same figure: what hurts, on which side, how likely.
+// The same as `hobble.gait.features` and `hobble.gait.graded` in Python. The page has the statistics of people's limps.
 import { measureWalk, profile } from "./cycles.js";
 import { bytes } from "./numbers.js";
 
-const LEAST_RANGE = 3; // degrees; a joint that moves less keeps still, and a share of nothing would be anything
-const MOST = 5; // times: larger shares say no more
-export const SECONDS = 3; // that are looked at: within two, half of all limps have no whole cycle of both legs
+const LEAST_RANGE = 3; // degrees; smaller ranges count as this, so that a ratio of two of them stays meaningful
+const MOST = 5; // larger ratios count as this
+export const SECONDS = 3; // of motion that are used; within two seconds, half of all limps have no whole cycle of both legs
 
 const clip = (v, low, high) => Math.min(Math.max(v, low), high);
 
-// Some twenty numbers that tell impairments apart, by name, in the order in which Python has them.
+// About twenty numbers that distinguish limps, by name, in the same order as in Python.
 export const features = (walk, healthy) => {
   const change = (name) => walk[name] - healthy[name], sides = (name) => change(`${name}_R`) - change(`${name}_L`);
   const share = (name) => Math.min(Math.max(walk[`range ${name}`], LEAST_RANGE) / Math.max(healthy[`range ${name}`], LEAST_RANGE), MOST);
@@ -41,7 +41,7 @@ const cholesky = (matrix, D) => {
   return low;
 };
 
-// learnt: of `hobble.report.recogniser`. recognise(walk, healthy): {label, side, strength, distance, probabilities, sides}.
+// learnt: from `hobble.report.recogniser`. Returns a function (walk, healthy) => {label, side, strength, distance, probabilities, sides}.
 export const createGrader = (learnt) => {
   const D = learnt.features.length, healthy = new Float64Array(bytes(learnt.healthySpread)), densities = [];
   const numbers = (text) => new Float64Array(bytes(text));
@@ -67,8 +67,8 @@ export const createGrader = (learnt) => {
     }
     return sum;
   };
-  return (walk, beside) => {
-    const seen = features(walk, beside), x = learnt.features.map((name) => seen[name]);
+  return (walk, healthyWalk) => {
+    const seen = features(walk, healthyWalk), x = learnt.features.map((name) => seen[name]);
     const squares = densities.map((density) => square(density, x)), scores = densities.map(({ top }, i) => top - .5 * squares[i]);
     const best = Math.max(...scores), likely = scores.map((score) => Math.exp(score - best)), whole = likely.reduce((a, b) => a + b);
     const sides = learnt.kinds.map(() => 0), strengths = learnt.kinds.map(() => 0);
@@ -90,7 +90,8 @@ export const createGrader = (learnt) => {
   };
 };
 
-// Watches a character that is played. add(places): a frame; say(): what its last SECONDS look like, {text, share} or {text}.
+// Recognises the limp of the played character. add(places): adds a frame. say(): the answer for the last SECONDS, {text, share},
+// or {text} if there is none.
 export const createWatch = (spec) => {
   const { learnt, healthy } = spec.recogniser, grade = createGrader(learnt), most = 60 * SECONDS;
   let frames = [];
@@ -98,9 +99,9 @@ export const createWatch = (spec) => {
     add(places) { frames.push(Float32Array.from(places)); if (frames.length > most) frames.shift(); },
     clear() { frames = []; },
     say() {
-      if (frames.length < most) return { text: "watching" };
+      if (frames.length < most) return { text: "collecting motion" };
       const walk = profile(measureWalk(spec, frames));
-      if (!walk) return { text: "walk straight on to be judged" };
+      if (!walk) return { text: "no answer: walk straight ahead" };
       const { kind, probabilities, sides } = grade(walk, healthy);
       const share = kind ? sides[learnt.kinds.indexOf(kind)] : probabilities.normal;
       return { text: kind ? kind.words : "nothing hurts", share };

@@ -1,12 +1,12 @@
-// A walking body in curves over time, as `hobble.gait.signals` has them: those that the recogniser reads. Degrees and
-// leg lengths; angles against the vertical and the direction of travel.
+// Curves of a walking body over time, for the recogniser, as in `hobble.gait.signals`. In degrees and leg lengths; angles are
+// relative to the vertical and the direction of travel.
 import { cross, dot, minus } from "./numbers.js";
 
 export const SIDES = ["L", "R"];
 const NAMES = { L: "left", R: "right" };
 export const LIMBS = ["hip_flexion", "hip_abduction", "knee_flexion", "ankle_height", "ankle_forward", "arm_forward"];
 export const MIDDLE = ["trunk_forward", "trunk_left", "pelvis_left_up"];
-export const TURNS_ROUND = ["trunk_left", "pelvis_left_up"]; // negated in a mirror
+export const SIGNED = ["trunk_left", "pelvis_left_up"]; // negated in a mirror
 const TRAVEL = .5; // s, sigma of the smoothing after which the hips' velocity is the direction of travel
 
 const degrees = (a, b) => Math.atan2(a, b) * 180 / Math.PI;
@@ -105,7 +105,7 @@ const unwrapped = (angles) => {
 export const mirroredSignals = (seen) => {
   const curves = {}, other = { L: "R", R: "L" };
   for (const limb of LIMBS) for (const side of SIDES) curves[`${limb}_${side}`] = seen.curves[`${limb}_${other[side]}`];
-  for (const name of MIDDLE) curves[name] = TURNS_ROUND.includes(name) ? seen.curves[name].map((v) => -v) : seen.curves[name];
+  for (const name of MIDDLE) curves[name] = SIGNED.includes(name) ? seen.curves[name].map((v) => -v) : seen.curves[name];
   return {
     ...seen, curves,
     heading: seen.heading.map((v) => -v),

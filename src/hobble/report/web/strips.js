@@ -1,4 +1,4 @@
-// Label strips: footfalls, phase, gait, speed and what hurts, along the time of one clip.
+// Label strips: contacts, phase, gait, speed and channel values of one clip over time.
 import { colour, material, onTheme } from "./base.js";
 
 (() => {
@@ -63,7 +63,7 @@ import { colour, material, onTheme } from "./base.js";
     y += 36;
     const fastest = Math.max(.5, ...strip.speed.filter((v) => v !== null));
     curve("speed", strip.speed, 34, fastest, colour("soft"));
-    label(`to ${fastest.toPrecision(2)} m/s`, y - 5, 10);
+    label(`up to ${fastest.toPrecision(2)} m/s`, y - 5, 10);
     strip.status.forEach((row) => {
       y += 4;
       label(row.name.length > 15 ? `…${row.name.slice(-14)}` : row.name, y + 10, 10);

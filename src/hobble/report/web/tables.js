@@ -1,4 +1,4 @@
-// Tables: a click on a heading sorts, a button hands out what is shown as CSV with the raw values.
+// Tables: a click on a heading sorts, a button saves the table as CSV with all digits.
 import { save } from "./base.js";
 
 const raw = (cell) => cell.dataset.v ?? cell.textContent;
@@ -16,7 +16,7 @@ document.querySelectorAll("table[data-csv]").forEach((table) => {
       const [x, y] = [raw(a.cells[column]), raw(b.cells[column])];
       if (!numeric) return falling ? byText(y, x) : byText(x, y);
       const [p, q] = [parseFloat(x), parseFloat(y)];
-      if (isNaN(p) || isNaN(q)) return isNaN(p) - isNaN(q); // what was not measured stays at the end
+      if (isNaN(p) || isNaN(q)) return isNaN(p) - isNaN(q); // empty cells stay at the end
       return falling ? q - p : p - q;
     });
     table.tBodies[0].append(...rows);

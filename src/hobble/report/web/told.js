@@ -1,19 +1,19 @@
-// What the body is told: a value for each column of each channel, with sliders, presets and keys.
+// The channel values in Play: a value for each column of each channel, with sliders, presets and keys.
 import { find } from "./base.js";
 
 export const keyed = (one, column) => `${one.name}/${column}`;
-// The channel whose columns lie in parts of the body, if there is one.
+// The channel with parts of the body, if there is one.
 export const placed = (spec) => spec.channels.find((one) => one.regions.length);
 
-// specs: of the figures that are played, which may know different channels; changed(): called after every change.
+// specs: of the played characters, which may have different channels. changed(): called after every change.
 export const createTold = (specs, changed) => {
   const channels = [];
-  for (const one of specs.flatMap((spec) => spec.channels)) { // of several by one name, the one that was told most
+  for (const one of specs.flatMap((spec) => spec.channels)) { // of channels with the same name, the one with most trained columns
     const at = channels.findIndex(({ name }) => name === one.name);
     if (at < 0) channels.push(one);
     else if (one.trained.length > channels[at].trained.length) channels[at] = one;
   }
-  // What was never told in training changes nothing, and so can not be told here.
+  // Columns that were always 0 in training have no effect, so they are left out.
   const known = (name) => specs.flatMap((spec) => spec.channels.filter((one) => one.name === name).flatMap((one) => one.trained));
   const values = new Map(channels.flatMap((one) => known(one.name).map((column) => [keyed(one, column), 0])));
   const sliders = [], told = { values, channels }, columns = (one) => [...new Set(known(one.name))];
@@ -51,25 +51,25 @@ export const createTold = (specs, changed) => {
     });
     changed();
   };
-  // Triples of a channel, a column and its value, all else 0; `only`: all else of that channel.
+  // Sets triples of a channel, a column and its value, and all others to 0; with `only`, all others of that channel.
   told.set = (triples, only = null) => {
     channels.filter((one) => !only || one === only).forEach((one) => columns(one).forEach((column) => values.set(keyed(one, column), 0)));
     triples.forEach(([one, column, value]) => { if (values.has(keyed(one, column)) && value) put(one, column, value); });
     show();
   };
-  // A click or a key: a fifth of the highest more, or less.
+  // A click or a key adds or subtracts a fifth of the highest value.
   told.more = (one, column, by) => {
     if (!values.has(keyed(one, column))) return;
     put(one, column, Math.round(1e6 * (values.get(keyed(one, column)) + by * one.highest / 5)) / 1e6);
     show();
   };
-  // The keys 1 to 9; true where one did something.
+  // The keys 1 to 9. Returns true if the key has a slider.
   told.key = (event) => {
     const digit = event.code.match(/^Digit([1-9])$/), slider = digit && sliders[digit[1] - 1];
     if (slider) told.more(slider.one, slider.column, event.shiftKey ? -1 : 1);
     return Boolean(slider);
   };
-  // What a link carries: for each channel "column:value,column:value".
+  // The state in a link: "column:value,column:value" for each channel.
   told.state = () => Object.fromEntries(channels.flatMap((one) => {
     const some = columns(one).map((column) => [column, values.get(keyed(one, column))]).filter(([, value]) => value > 0);
     return some.length ? [[one.key, some.map(([column, value]) => `${column}:${value}`).join(",")]] : [];

@@ -1,4 +1,4 @@
-// The figure walking: motion that lies in the page, played with footprints, readings and a scrubber.
+// Recorded walks: plays the motion in the page, with footprints, readings and a time slider.
 import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
 import { createMotion } from "./motion.js";
@@ -89,7 +89,7 @@ import { createView } from "./view.js";
     tell(s, frame);
   };
 
-  // What is read off beside the figure
+  // Readings next to the figure
 
   const FEET = ["left heel", "left toe", "right heel", "right toe"];
   const tell = (s, frame) => {

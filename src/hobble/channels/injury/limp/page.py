@@ -89,9 +89,10 @@ def size_chart(found: Json) -> Chart:
         options[found["effects"][effect]] = traces
     return Chart(
         "limp-sizes",
-        "How large is the limp?",
-        "Each link at severities 3, 5, 7 and 10, walking, asked for 1.2 m/s, beside the healthy character. "
-        "Grey: the mean and the spread of ten people who imitated impairments strongly.",
+        "Size of the limp",
+        "The character walks at a target speed of 1.2 m/s with one link at severity 3, 5, 7 or 10, and is "
+        "compared with its healthy walk. Grey: mean and standard deviation of ten people who imitated strong "
+        "limps.",
         layout={"xaxis": axis("severity", range=[2.5, 11]), "yaxis": axis("size")},
         height=360,
         choose="Effect",
@@ -103,9 +104,9 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Column], list[list[A
     columns = [
         Column.number("severity"),
         Column.count("walks"),
-        Column.number("called impaired by a classifier of strong limps"),
-        Column.number("named by a recogniser of mild ones"),
-        Column.number("the wrong side"),
+        Column.number("share that a classifier of strong limps calls impaired"),
+        Column.number("share recognised by the recogniser of mild limps"),
+        Column.number("share with the wrong side"),
     ]
     return columns, [[r["severity"], r["walks"], r["impaired"], r["named"], r["wrong_side"]] for r in rows]
 
@@ -120,7 +121,7 @@ def exam_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
         Column("healthy walk of"),
         Column.number("distance of the healthy character"),
         Column.number("distance of the hurt character"),
-        Column("nearer", lambda v: "yes" if v else "no"),
+        Column("hurt character is nearer", lambda v: "yes" if v else "no"),
     ]
     table = [
         [

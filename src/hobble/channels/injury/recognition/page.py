@@ -9,7 +9,7 @@ from hobble.report.parts import Part, Section
 
 
 def section(found: Json, material: Material) -> Section:
-    """The chart, which another section shows."""
+    """The chart, which is added to the section on the response to injury."""
     return Section("injury", [Part(30, recognition_chart(found))])
 
 
@@ -58,18 +58,18 @@ def recognition_chart(found: Json) -> Chart | None:
     classes = len(found.get("classes") or ())
     people = found.get("people")
     told = f" People recognised the part {100 * people:.0f} % of the time" if people else ""
-    beside = f"{told} (Ferre 2019, with another network)." if told else ""
+    beside = f"{told} (Ferre 2019, on the motion of another network)." if told else ""
     return Chart(
         "recognition",
         "Is the hurt part recognised?",
-        "A classifier that learnt from the captured clips says which part hurts. Rows: what hurts. Columns: "
-        "what the classifier says. The diagonal is right. Guessing would be right "
+        "A classifier trained on captured clips says which part hurts. Rows: the part that hurts. Columns: "
+        "the answer of the classifier. The diagonal is right. A random guess is right "
         f"{100 * (found.get('chance') or 0):.0f} % of the time.{beside}",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
         },
         height=max(300, 190 + 20 * classes),
-        choose="Of",
+        choose="Walks",
         options=options,
     )

@@ -9,21 +9,21 @@ from hobble.report.side_by_side import Compared
 from hobble.report.tables import Column, Table
 
 INTRODUCTION = (
-    "One link at a time is hurt from severity 0 to 10 and back while the character walks or jogs; every "
-    "figure is the mean over the links that were hurt in training. ρ is Spearman's rank correlation: 1 or −1 "
-    "means that the measure always rises or always falls with severity, 0 that it does neither."
+    "The character walks or jogs while one link is hurt, from severity 0 to 10 and back. Each value is the "
+    "mean over the links that were hurt in training. ρ is Spearman's rank correlation: 1 means that the "
+    "measure always rises with severity, −1 that it always falls, 0 that it does neither."
 )
 # Keys of the injury summary -> words.
 INJURY = {
-    "from_healthy_cm": "pose from healthy at severity 10, cm a joint",
+    "from_healthy_cm": "distance from the healthy pose at severity 10, cm per joint",
     "speed_share": "share of the healthy speed at severity 10",
     "spearman_from_healthy": "ρ of pose and severity",
     "spearman_speed": "ρ of speed and severity",
     "spearman_back_from_healthy": "ρ of pose and severity, healing",
-    "settle_seconds": "settles in, s",
-    "heal_seconds": "heals in, s",
-    "after_healing_cm": "remaining distance after healing, cm a joint",
-    "way_back_cm": "falling from rising severity, cm a joint",
+    "settle_seconds": "time to settle, s",
+    "heal_seconds": "time to heal, s",
+    "after_healing_cm": "remaining distance after healing, cm per joint",
+    "way_back_cm": "difference between rising and falling severity, cm per joint",
     "acceleration_share": "largest acceleration, share of the healthy walk's",
     "clip_acceleration_share": "largest acceleration, share of the captured clips'",
 }

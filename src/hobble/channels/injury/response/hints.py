@@ -24,8 +24,8 @@ def injury_hints(found: Json) -> Iterator[Hint]:
     if drift > 2:
         yield Hint(
             "warn",
-            f"A healthy walk drifts by {number(drift)} cm a joint, too.",
-            "The effect of severity is hardly larger. Train for longer, or measure for longer.",
+            f"A healthy walk also drifts, by {number(drift)} cm per joint.",
+            "So the effect of severity is hard to measure. Train for longer, or measure for longer.",
         )
     deaf = [r["link"] for r in walks if (r.get("from_healthy_cm") or 0) < max(0.5, 2 * drift)]
     if deaf:
@@ -33,7 +33,7 @@ def injury_hints(found: Json) -> Iterator[Hint]:
             "note",
             f"{len(deaf)} of {_plural(len(walks), 'link')} hardly "
             f"{'changes' if len(deaf) == 1 else 'change'} the walk at severity 10",
-            "(under half a centimetre a joint, or no more than a healthy walk drifts): "
+            "(by less than half a centimetre per joint, or by no more than a healthy walk drifts): "
             f"{', '.join(deaf[:4])}{' …' if len(deaf) > 4 else ''}. Add clips in which they hurt.",
         )
     stuck = [
@@ -45,7 +45,7 @@ def injury_hints(found: Json) -> Iterator[Hint]:
         yield Hint(
             "note",
             f"After healing, the walk stays changed for {', '.join(stuck[:4])}.",
-            "The network keeps limping although nothing hurts.",
+            "The network keeps limping although nothing hurts any more.",
         )
     if not deaf:
         felt = [r["from_healthy_cm"] for r in walks]
@@ -53,7 +53,7 @@ def injury_hints(found: Json) -> Iterator[Hint]:
             "good",
             f"The {_plural(len(walks), 'link')} hurt in training, of {len(responses)}, "
             f"change{'s' if len(walks) == 1 else ''} the walk at severity 10",
-            f"by {number(min(felt))} to {number(max(felt))} cm a joint.",
+            f"by {number(min(felt))} to {number(max(felt))} cm per joint.",
         )
 
 

@@ -18,7 +18,8 @@ from hobble.report.summary import Hint, placed
 from hobble.report.tables import Column, Table
 
 NOTHING = Markup(
-    "This network has no severities among its inputs. The configuration <code>injured</code> has."
+    "This network has no severities among its inputs, so nothing can hurt it. The configuration "
+    "<code>injured</code> has them."
 )
 LINKS = ("link", "first", "second")  # keys of the JSON that hold a link
 UNTRAINED = "never hurt in training"
@@ -166,11 +167,12 @@ def curves(
         )
     return Family(
         "sweeps",
-        "One link, hurt more and more",
-        "One walk for each link. Solid: severity rises to 10. Dotted: it falls back to 0. A smooth curve is "
-        "a gradual change, a gap between left and right is a limp, and a jump means that the network "
-        "switches between two gaits. Pose distances are means over joints at the same phase. Links that "
-        "were never hurt in training show how much a healthy walk varies.",
+        "One link at rising severity",
+        "Each point is a separate walk, healthy for the first quarter and measured over the last half. "
+        "Dotted lines: severity falls back to 0. A smooth curve means that the walk changes gradually. A gap "
+        "between left and right is a limp. A jump between neighbours means that the network switches between "
+        "two gaits. Pose distances are means over joints at the same phase. Links that were never hurt in "
+        "training show how much a healthy walk varies.",
         charts,
         "Link and gait",
     )
@@ -179,7 +181,7 @@ def curves(
 def y_range(
     rows: Sequence[Mapping[str, Any]], gait: str, columns: Sequence[str], span: float, from_zero: bool
 ) -> list[float] | None:
-    """One range for all links of a gait, so that they can be compared.
+    """The range of the vertical axis, the same for all links of a gait, so that they can be compared.
 
     It spans at least `span`, so that noise looks small.
     """
@@ -199,7 +201,7 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
             "injury-pose",
             "from_healthy_cm",
             "Change of the pose",
-            "cm at severity 10",
+            "cm per joint at severity 10",
             2.0,
             "Distance from the healthy walk at the same phase, mean over joints. Hollow dots are links that "
             "were never hurt in training. They have no effect and show how far a healthy walk drifts. A link "
@@ -211,8 +213,8 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
             "Remaining speed",
             "share of the healthy speed",
             1.0,
-            "At severity 10; 1 means that the hurt character is as fast as the healthy one. Hollow: links "
-            "that were never hurt in training.",
+            "Speed at severity 10, divided by the healthy speed. Hollow dots are links that were never hurt "
+            "in training.",
         ),
     ):
         traces: list[Trace] = []
@@ -254,15 +256,15 @@ def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
         Column("gait"),
         Column("link"),
         Column("in training", lambda v: "hurt" if v else "never hurt"),
-        Column.number("pose at 10, cm"),
-        Column.number("speed share"),
-        Column.number("settles in, s"),
-        Column.number("heals in, s"),
-        Column.number("left after healing, cm"),
+        Column.number("change of the pose, cm"),
+        Column.number("share of the healthy speed"),
+        Column.number("time to settle, s"),
+        Column.number("time to heal, s"),
+        Column.number("change left after healing, cm"),
         Column.number("way back, cm"),
-        Column.number("acceleration share"),
-        Column.number("ρ pose"),
-        Column.number("ρ speed"),
+        Column.number("largest acceleration, times healthy"),
+        Column.number("ρ of pose"),
+        Column.number("ρ of speed"),
     ]
     rows = [
         [

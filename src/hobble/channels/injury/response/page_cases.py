@@ -17,7 +17,7 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         return None
     firsts, seconds = (list(dict.fromkeys(row[key] for row in rows)) for key in ("first", "second"))
     by_pair = {(row["first"], row["second"]): row for row in rows}
-    shown = {"centimetres a joint": ("from_first_cm", ".1f"), "share of its effect alone": ("share", ".0%")}
+    shown = {"centimetres per joint": ("from_first_cm", ".1f"), "share of its effect alone": ("share", ".0%")}
     options: dict[str, list[Trace]] = {}
     for label, (key, form) in shown.items():
         options[label] = [
@@ -46,7 +46,7 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
         },
         height=max(300, 190 + 24 * len(firsts)),
-        choose="In",
+        choose="Unit",
         options=options,
     )
 
@@ -81,7 +81,7 @@ def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         "divided",
         "Divided severities",
         "Distance of the pose from the healthy walk, if severities are divided before the network gets them.",
-        layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm a joint", rangemode="tozero")},
+        layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm per joint", rangemode="tozero")},
         choose="Link",
         options=options,
     )
@@ -115,7 +115,7 @@ def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()
         traces,
         {
             "xaxis": axis("severity", dtick=1),
-            "yaxis": axis("cm a joint", rangemode="tozero"),
+            "yaxis": axis("cm per joint", rangemode="tozero"),
             "showlegend": True,
         },
         height=420,

@@ -23,7 +23,7 @@ from hobble.figure.mesh import body
 from hobble.models.network import Network
 from hobble.report.formats import embedded
 from hobble.report.raster import Camera, Studio
-from hobble.report.stimuli import FELT
+from hobble.report.stimuli import VISIBLE
 from hobble.report.templates import questionnaire_script, style, template
 from hobble.runtime.export import jointed
 from hobble.runtime.options import Runtime
@@ -93,9 +93,9 @@ def _row(network: Network, film: Film, motion: Motion) -> dict[str, Any]:
 
 def doubts(told: dict[str, Any]) -> list[str]:
     """Warnings about films in which nobody can see the injury."""
-    same = [str(row["film"]) for row in told["films"] if row["from_healthy_cm"] < FELT]
+    same = [str(row["film"]) for row in told["films"] if row["from_healthy_cm"] < VISIBLE]
     never = sorted({link for row in told["films"] for link in row["never_told"]})
-    out = [f"film {', '.join(same)}: nobody can see the injury (less than {FELT} cm)."] if same else []
+    out = [f"film {', '.join(same)}: nobody can see the injury (less than {VISIBLE} cm)."] if same else []
     return out + ([f"Never hurt in training: {', '.join(never)}."] if never else [])
 
 

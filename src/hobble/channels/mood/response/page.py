@@ -21,9 +21,9 @@ def section(found: Json, material: Material) -> Section:
     shares = found["right_at_1"], found["captured"]["right"]
     right, left_out = (f"{100 * (share or 0):.0f} %" for share in shares)
     words = (
-        f"A recogniser that learnt from captured clips finds the right mood in {right} of the windows of "
-        f"generated walks with a mood at 1, and in {left_out} of the windows of captured clips that it did "
-        f"not learn from. All generated walks were asked for the same three speeds around "
+        f"A classifier trained on captured clips finds the right mood in {right} of the windows of generated "
+        f"walks with a mood at 1, and in {left_out} of the windows of captured clips that it was not trained "
+        f"on. All generated walks had the same three target speeds around "
         f"{found['speed_asked']:.2f} m/s."
     )
     charts = [effect_chart(found, effect) for effect in EFFECTS]
