@@ -1,11 +1,13 @@
-"""How well a limp is named: people who were left out, half-way limps, healthy walks, captured clips.
+"""How well limps are recognised: of left-out people, at several strengths, and in captured clips.
 
-python benchmarks/limps.py CMU_FOLDER [CLIP.bvh ...]
+    python benchmarks/limps.py CMU_FOLDER [CLIP.bvh ...]
+
+Also prints how often healthy walks are called impaired.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -27,6 +29,7 @@ EXAM = ("105_16", "105_25", "105_26", "105_15")
 
 
 def left_out() -> Iterator[tuple[int, list[int]]]:
+    """Each person, and all other people."""
     everyone = range(people().count)
     return ((person, [other for other in everyone if other != person]) for person in everyone)
 
@@ -114,16 +117,22 @@ def captured(folder: Path, clips: list[str]) -> None:
         print(f"    graded {g.label} {g.side or ''} {g.strength:.1f}; windows: {rounded(seen.graded())}")
 
 
-def main(folder: str, *clips: str) -> None:
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path, metavar="CMU_FOLDER", help="folder of the CMU clips, as .bvh")
+    parser.add_argument("clips", nargs="*", metavar="CLIP.bvh", help="more captured impaired walks")
+    options = parser.parse_args()
     linear = {p: learn(*examples(people(), rest), shrinkage=SHRINKAGE) for p, rest in left_out()}
     people_left_out("linear", {p: lambda w, h, j=j: recognise(w, h, j) for p, j in linear.items()})
     healthy = healthy_covariance()
     graders: dict[int, Grader] = {p: learn_grader(people(), rest, healthy) for p, rest in left_out()}
     people_left_out("graded", {p: g.grade for p, g in graders.items()})
     strangers()
-    healthy_walks(Path(folder))
-    captured(Path(folder), list(clips))
+    healthy_walks(options.folder)
+    captured(options.folder, options.clips)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

@@ -12,7 +12,7 @@ from hobble.runtime import controller, trajectory
 
 
 def test_the_rule_in_numbers() -> None:
-    assert rule.met(2.0, 5.0) == 3.5
+    assert rule.joint_place(2.0, 5.0) == 3.5
     assert [rule.moving(s) for s in (0.0, 0.9375, 1.0, 1.5)] == [1.0, 0.5, 0.0, 0.0]
     assert rule.phase_change(0.0, 2.0) == pytest.approx(0.2)
     assert rule.phase_change(1.0, 2.0) == pytest.approx(2.0)
@@ -23,9 +23,9 @@ def test_compiled_and_plain_callers_get_the_same() -> None:
 
     @njit
     def compiled(a: float, b: float) -> tuple[float, float, float]:
-        return controller.met(a, b), trajectory.moving_share(a), trajectory.phase_change(a, b)
+        return controller.joint_place(a, b), trajectory.moving_share(a), trajectory.phase_change(a, b)
 
     for a, b in rng.random((100, 2)):
-        assert compiled(a, b) == (rule.met(a, b), rule.moving(a), rule.phase_change(a, b))
+        assert compiled(a, b) == (rule.joint_place(a, b), rule.moving(a), rule.phase_change(a, b))
     a, b = torch.rand(2, 50, generator=torch.Generator().manual_seed(0))
-    np.testing.assert_array_equal(rule.met(a, b).numpy(), rule.met(a.numpy(), b.numpy()))
+    np.testing.assert_array_equal(rule.joint_place(a, b).numpy(), rule.joint_place(a.numpy(), b.numpy()))

@@ -215,7 +215,7 @@ def test_what_cannot_be_merged_is_refused(rows_of, tmp_path):
     with pytest.raises(HobbleError, match="nothing to train on"):
         write_database(tmp_path / "db", {"b": empty}, {"b": "train"}, **OPTIONS)
     other = replace(a, layout=RowLayout(3, window=30, channels=(("injury", 2),)))
-    with pytest.raises(InputError, match=r"^z: its rows are not laid out as those of a"):
+    with pytest.raises(InputError, match=r"^z: the layout of its rows differs from that of a"):
         write_database(tmp_path / "db", {"a": a, "z": other}, {"a": "train", "z": "train"}, **OPTIONS)
     assert not any((tmp_path / "db").iterdir())
 

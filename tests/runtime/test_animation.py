@@ -222,14 +222,18 @@ def test_wishes_that_make_no_sense(network) -> None:
     character = ProceduralAnimation(network, characters=2)
     with pytest.raises(ValueError, match="target_velocity is not a finite vector"):
         character.next_pose((0, np.nan))
-    with pytest.raises(ValueError, match=r"facing is a vector of 2 or 3 .* each of 2, not of shape \(3, 2\)"):
+    with pytest.raises(
+        ValueError, match=r"facing has to be a vector of 2 or 3 .* each of 2, not of shape \(3, 2\)"
+    ):
         character.next_pose((0, 1), np.ones((3, 2)))
-    with pytest.raises(ValueError, match=r"target_velocity is a vector .* not of shape \(4,\)"):
+    with pytest.raises(ValueError, match=r"target_velocity has to be a vector .* not of shape \(4,\)"):
         character.next_pose((0, 1, 2, 3))
-    with pytest.raises(ValueError, match=r"terrain gave heights of shape \(2,\) for 72 places"):
+    with pytest.raises(ValueError, match=r"terrain returned heights of shape \(2,\) for 72 points"):
         character.next_pose((0, 1), terrain=lambda x, z: np.zeros(2))
     for shares in (np.ones(5), [-1, 0, 0, 0, 0, 0], np.ones((3, 6), int), [np.inf, 0, 0, 0, 0, 0]):
-        with pytest.raises(ValueError, match=r"shares of gaits are \(6,\) or \(2, 6\) .* order: stand, walk"):
+        with pytest.raises(
+            ValueError, match=r"gait shares have to be \(6,\) or \(2, 6\) .* order: stand, walk"
+        ):
             character.next_pose((0, 1), gait=shares)
     with pytest.raises(ValueError, match="heights that are not finite"):
         character.next_pose((0, 1), terrain=lambda x, z: x * np.nan)
@@ -273,7 +277,7 @@ def test_unknown_links_are_named(hurtable, network) -> None:
     ):
         ProceduralAnimation(hurtable).next_pose((0, 1), injury={"LeftUpLeg-LeftFoot": 1})
     with pytest.raises(
-        ValueError, match="not told injury; train a configuration with `channels: \\[injury\\]`"
+        ValueError, match="no input for injury; train a configuration with `channels: \\[injury\\]`"
     ):
         ProceduralAnimation(network).next_pose((0, 1), injury={KNEE: 1})
 
@@ -282,11 +286,13 @@ def test_severities_of_another_shape(hurtable, network) -> None:
     crowd = ProceduralAnimation(hurtable, characters=3)
     for injury in (np.ones((3, 30)), np.ones(30), {KNEE: [1, 2, 3]}, {KNEE: 4}, {}):
         crowd.next_pose((0, 1), injury=injury)
-    with pytest.raises(ValueError, match=r"injury is \(30,\) or \(3, 30\) numbers, not of shape \(29,\)"):
+    with pytest.raises(ValueError, match=r"injury has to have shape \(30,\) or \(3, 30\), not \(29,\)"):
         crowd.next_pose((0, 1), injury=np.ones(29))
-    with pytest.raises(ValueError, match=rf"{KNEE}: one severity, or 3, not of shape \(2,\)"):
+    with pytest.raises(ValueError, match=rf"{KNEE} has to be one severity or 3, not of shape \(2,\)"):
         crowd.next_pose((0, 1), injury={KNEE: [1, 2]})
-    with pytest.raises(ValueError, match="30 numbers given for injury, but this network is not told injury"):
+    with pytest.raises(
+        ValueError, match="30 numbers given for injury, but this network has no input for injury"
+    ):
         ProceduralAnimation(network).next_pose((0, 1), injury=np.ones(30))
 
 

@@ -13,7 +13,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.pfnn.network import Pfnn
 from hobble.models.seen import Seen
 from hobble.runtime.animation import ProceduralAnimation
-from hobble.runtime.bounds import BEYOND, FASTER, Bounds, keep_within
+from hobble.runtime.bounds import MARGIN_SHARE, SPEED_MARGIN, Bounds, clip_rows
 
 
 def walked(network: Pfnn, fastest: float = 4.0) -> Seen:
@@ -57,7 +57,7 @@ def test_a_network_that_answers_anything_leaves_the_figure_whole(make_network) -
     hips, moved = run(replace(wild, seen=walked(wild)))
     standing = wild.y_mean[wild.layout.y_joint_position][1]
     assert 0.5 * standing < hips.min() <= hips.max() < 1.2 * standing
-    assert moved.max() <= FASTER * 4.0 + 1e-3
+    assert moved.max() <= SPEED_MARGIN * 4.0 + 1e-3
     free_hips, free_moved = run(wild)
     assert free_moved.max() > 20, "without bounds it should fall apart"
     assert np.ptp(free_hips) > np.ptp(hips)
@@ -95,7 +95,7 @@ def test_it_starts_in_the_frame_of_the_clips(make_network) -> None:
 def test_what_is_kept_within() -> None:
     rows = np.array([[0, 5, -5], [np.nan, 1, np.inf]], np.float32)
     low, high, wild = np.full(3, -1, np.float32), np.full(3, 2, np.float32), np.zeros(2, bool)
-    assert keep_within(rows, low, high, wild)
+    assert clip_rows(rows, low, high, wild)
     np.testing.assert_array_equal(rows, [[0, 2, -1], [0.5, 1, 0.5]])
     np.testing.assert_array_equal(wild, [False, True])
 
@@ -104,8 +104,8 @@ def test_bounds_are_what_was_seen_and_a_little_more(hurtable) -> None:
     seen = walked(hurtable)
     bounds, layout = Bounds.of(replace(hurtable, seen=seen)), hurtable.layout
     place = layout.x_joint_position
-    np.testing.assert_allclose(bounds.x_high[place], seen.x_high[place] + BEYOND * 16, rtol=1e-5)
-    assert bounds.fastest == FASTER * 4.0
+    np.testing.assert_allclose(bounds.x_high[place], seen.x_high[place] + MARGIN_SHARE * 16, rtol=1e-5)
+    assert bounds.fastest == SPEED_MARGIN * 4.0
     assert (bounds.x_high[layout.x_channel("injury")] > 100).all(), "an injury has its own bounds"
 
 

@@ -225,7 +225,7 @@ def test_release_folder_round_trip(tmp_path: Path, network: Network, holden31) -
 
 
 def test_what_is_wrong_with_a_release_folder_is_said(tmp_path: Path, network: Network) -> None:
-    with pytest.raises(InputError, match=r"no weights.npz, and no Xmean.bin.* Train one"):
+    with pytest.raises(InputError, match=r"neither weights.npz nor Xmean.bin.* Train one"):
         load_network(tmp_path)
     with pytest.raises(InputError, match="no such file"):
         read_release(tmp_path)
@@ -236,7 +236,7 @@ def test_what_is_wrong_with_a_release_folder_is_said(tmp_path: Path, network: Ne
     with pytest.raises(InputError, match=r"W1_007.bin: .* bytes, expected"):
         read_release(tmp_path)
     path.write_bytes(bytes(np.frombuffer(whole, "<f4") + np.float32(1)))
-    with pytest.raises(InputError, match="W1 at 50 phases is no cyclic cubic"):
+    with pytest.raises(InputError, match="W1 at 50 phases is not a cyclic cubic"):
         read_release(tmp_path)
 
 

@@ -166,7 +166,7 @@ def test_the_process_that_knows_the_fault_tells_it(
 ) -> None:
     shutil.copytree(database, tmp_path / "db")
     spoil(tmp_path / "db")
-    with pytest.raises(HobbleError, match=r"rows of the database are not: .*(hop|walk) frame \d+"):
+    with pytest.raises(HobbleError, match=r"rows of the database are not finite: .*(hop|walk) frame \d+"):
         together(3, data=tmp_path / "db")
 
 

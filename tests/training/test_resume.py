@@ -224,8 +224,8 @@ def test_another_start_is_another_run(
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"passes": 4, "sections": 2}, "was trained in 3 sections a pass, and is to go on in 2"),
-        ({"passes": 1}, "stands after 2 passes, and is to go on to 1"),
+        ({"passes": 4, "sections": 2}, "was trained with 3 sections a pass, but training.sections is 2"),
+        ({"passes": 1}, "has 2 passes, but training.passes is 1"),
     ],
 )
 def test_a_start_that_cannot_be_gone_on_from_is_refused(

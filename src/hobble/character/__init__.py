@@ -1,1 +1,1 @@
-"""The rule by which a character goes on from one frame to the next."""
+"""How a character moves from one frame to the next, shared by runtime, training and measurements."""

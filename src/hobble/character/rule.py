@@ -1,8 +1,9 @@
-"""What becomes of a prediction from one frame to the next, as in the runtime of Holden et al. 2017.
+"""How a prediction changes the character's state, as in the runtime of Holden et al. 2017.
 
-Plain functions of numbers, numpy arrays or tensors: the runtime compiles them, roll-outs and training call
-them. The page's JavaScript is the only other implementation. Compiled callers are kept on disk and renewed
-when their own file changes: after a change here, delete the `__pycache__` beside them.
+The functions take numbers, numpy arrays or tensors. The runtime compiles them; roll-outs and training call
+them directly. The only other implementation is the page's JavaScript. numba caches compiled callers on disk
+and renews them only when the caller's own file changes. After a change here, delete the callers'
+`__pycache__`.
 """
 
 from __future__ import annotations
@@ -11,20 +12,20 @@ from typing import Any
 
 import numpy as np
 
-HALF = 0.5
-ALWAYS = 0.1  # share of the predicted change of phase that a standing figure keeps
+CARRIED_SHARE = 0.5  # share of the velocity's place, and of the predicted place, in a joint's new place
+STANDING_SHARE = 0.1  # share of the predicted change of phase that a standing figure keeps
 
 
-def met(carried: Any, predicted: Any) -> Any:
-    """Where joints come to lie: half way between where velocities carry them and where they are predicted."""
-    return HALF * (carried + predicted)
+def joint_place(carried: Any, predicted: Any) -> Any:
+    """New joint positions: the mean of `carried` (old position plus velocity) and `predicted`."""
+    return CARRIED_SHARE * (carried + predicted)
 
 
 def moving(stand: Any) -> Any:
-    """The share of its predicted movement that a figure makes; stand: the share of that gait, 0 to 1."""
+    """The share of the predicted movement that is applied. stand: share of the gait "stand", 0 to 1."""
     return np.maximum(0.0, 1.0 - stand) ** 0.25
 
 
 def phase_change(share: Any, predicted: Any) -> Any:
-    """Cycles that the phase goes on; share: of `moving`."""
-    return ((1.0 - ALWAYS) * share + ALWAYS) * predicted
+    """The change of phase in cycles. share: the result of `moving`; predicted: the network's change."""
+    return ((1.0 - STANDING_SHARE) * share + STANDING_SHARE) * predicted

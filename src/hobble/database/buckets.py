@@ -1,4 +1,4 @@
-"""Rows on their way through the external shuffle: scattered over files, each a stretch of the final order."""
+"""Buckets of the external shuffle: files of rows, each for a consecutive part of the final order."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ INDEX = np.dtype([("place", "<i8"), ("count", "<i4"), ("clip", "<i4"), ("frame",
 
 
 def gather_fits(fits: Array, count: np.ndarray, order: np.ndarray) -> Array:
-    """The fits (S, columns) of rows taken in another order; `count` (R,) is how many each row has."""
+    """The fits (S, columns) of rows, in a new order of the rows. count: (R,) fits of each row."""
     first = np.cumsum(count) - count
     taken = count[order]
     starts = np.cumsum(taken) - taken
@@ -23,9 +23,9 @@ def gather_fits(fits: Array, count: np.ndarray, order: np.ndarray) -> Array:
 
 
 class Buckets:
-    """Files of up to `rows_each` rows, each of consecutive places; rows arrive in any order.
+    """Files of up to `rows_each` rows for consecutive places in the final order. Rows arrive in any order.
 
-    there: whether the folder may be there, with what was added before.
+    there: whether the folder may exist already, with rows that were added before.
     """
 
     def __init__(
@@ -55,9 +55,9 @@ class Buckets:
         return self.folder / f"{bucket:05d}.{table}"
 
     def read(self, bucket: int) -> tuple[Array, Array, np.ndarray]:
-        """A bucket's frames, fits and index as they came; of a bucket that nothing was added to none.
+        """A bucket's frames, fits and index in the order in which they were added; empty if there are none.
 
-        Raises InputError where a file is not as long as the others say.
+        Raises InputError if the lengths of the files do not match.
         """
         if not self._file(bucket, "index").exists():
             return self._tables(np.empty(0, "<f4"), np.empty(0, "<f4"), np.empty(0, INDEX))
@@ -75,7 +75,7 @@ class Buckets:
         return frames.reshape(-1, self.columns), fits.reshape(-1, self.fit_columns), index
 
     def drain(self) -> Iterator[tuple[Array, Array, np.ndarray]]:
-        """Each bucket's frames, fits and index in the final order; its files are removed as they are read."""
+        """Each bucket's frames, fits and index in the final order. Removes the files after reading."""
         for b in range(self.count):
             frames, fits, index = self.read(b)
             for table in ("index", "frames", "fits"):

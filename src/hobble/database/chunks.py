@@ -1,7 +1,7 @@
-"""One chunk of a database: a safetensors file, so that other tools open it too, with its checksum kept apart.
+"""One chunk of a database: a safetensors file, which other tools can open. The manifest has its checksum.
 
-A safetensors file is the length of its header (8 bytes, little-endian), the header (JSON: each array's
-type, shape and place) and the arrays one after another.
+A safetensors file has the length of its header (8 bytes, little-endian), the header (JSON: type, shape and
+place of each array), then the arrays.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ import numpy as np
 
 from hobble.core.errors import InputError
 
-LENGTH = 8  # bytes that say how long the header is
-MOST_PARTS = 16  # of one vectored read: what POSIX has every system take
+LENGTH = 8  # bytes of the header's length
+MOST_PARTS = 16  # buffers in one vectored read: the least that POSIX guarantees
 TYPES = {"<f2": "F16", "<u2": "BF16", "<f4": "F32", "<i4": "I32"}
 HINT = "Delete the database's folder; the next run makes it again."
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """What the manifest says of a chunk: its file within the database, rows, fits, bytes and checksum."""
+    """A chunk's entry in the manifest: its file in the database, rows, fits, bytes and checksum."""
 
     file: str
     rows: int
@@ -40,7 +40,7 @@ class Chunk:
 
 
 def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Chunk:
-    """Write arrays of the types above, `x` and `fits` among them, to folder/file."""
+    """Write arrays (types as in TYPES; `x` and `fits` have to be among them) to folder/file."""
     header: dict[str, Any] = {}
     place = 0
     for name, array in arrays.items():
@@ -66,10 +66,10 @@ def write_chunk(folder: Path, file: str, arrays: Mapping[str, np.ndarray]) -> Ch
 
 
 def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], verify: bool = True) -> None:
-    """Read a chunk straight into `arrays`: those it was written from, by name and in that order.
+    """Read a chunk directly into `arrays`, which have the names, order, shapes and types that were written.
 
-    Each must be contiguous and of the shape and type that was written. Raises InputError, naming the file,
-    where it is missing, of another length or, with `verify`, of another checksum.
+    Each array has to be contiguous. Raises InputError with the file's name if it is missing, has another
+    length or, with `verify`, another checksum.
     """
     path = folder / chunk.file
     beside = chunk.bytes - sum(array.nbytes for array in arrays.values())
@@ -79,24 +79,24 @@ def read_chunk(folder: Path, chunk: Chunk, arrays: Mapping[str, np.ndarray], ver
         with open(path, "rb", buffering=0) as file:
             size = os.fstat(file.fileno()).st_size
             if size != chunk.bytes:
-                problem = f"{size} bytes where the manifest says {chunk.bytes}"
+                problem = f"{size} bytes, but the manifest says {chunk.bytes}"
                 raise InputError(path, f"truncated or overwritten: {problem}", fix=HINT)
             _fill(file.fileno(), parts)
     except OSError as error:
         raise InputError(path, f"cannot be read ({error.strerror})", fix=HINT) from error
     if verify and _checksum(parts) != chunk.crc32:
-        raise InputError(path, "damaged: its checksum is not the manifest's", fix=HINT)
+        raise InputError(path, "damaged: its checksum differs from the manifest", fix=HINT)
     if LENGTH + int.from_bytes(header[:LENGTH].tobytes(), "little") != beside:
-        raise InputError(path, "holds other arrays than the manifest says", fix=HINT)
+        raise InputError(path, "its arrays differ from the manifest", fix=HINT)
 
 
 def _bytes(array: np.ndarray) -> memoryview:
-    """The bytes of a contiguous array, not copied."""
+    """The bytes of a contiguous array, without a copy."""
     return array.reshape(-1).view(np.uint8).data
 
 
 def _fill(descriptor: int, parts: Sequence[memoryview]) -> None:
-    """One system call, or as many as it takes."""
+    """Fill the buffers from the file, with as few system calls as possible."""
     left, place = [part for part in parts if len(part)], 0
     while left:
         count = os.preadv(descriptor, left[:MOST_PARTS], place)

@@ -1,4 +1,4 @@
-"""What a database says of itself in manifest.json, which is written last: no manifest, no database."""
+"""manifest.json of a database. It is written last, so a folder without it is not a complete database."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ SPLITS = ("train", "held_out")
 
 @dataclass(frozen=True)
 class Manifest:
-    """folder: where chunks and statistics lie inside the database, named by their content.
+    """folder: subfolder of chunks and statistics, named by a hash of their content.
 
-    layout: of the rows composed. visits: how often a pass uses each row. clips: one entry a clip with
-    `clip`, `split`, `rows`, `pairs`. chunks: per split. original_bytes: what the same pairs take in the
-    original's layout. limits: channel -> how fast what it tells lets a body go (`hobble.channels.limits`).
+    layout: of the composed rows. visits: how often a pass uses each row. clips: one entry for each clip with
+    `clip`, `split`, `rows`, `pairs`. chunks: per split. original_bytes: size of the same pairs in the
+    original's layout. limits: channel -> speed limits (`hobble.channels.limits`).
     """
 
     folder: str
@@ -45,7 +45,7 @@ class Manifest:
         return sum(chunk.rows for chunk in self.chunks[split])
 
     def save(self, path: Path) -> None:
-        """Write manifest.json into the database's folder, whole or not at all."""
+        """Write manifest.json into the database's folder, atomically."""
         values = {**vars(self), "format": "hobble database", "version": VERSION}
         values["layout"] = self.layout.to_dict()
         values["skeleton"] = json.dumps(
@@ -56,11 +56,11 @@ class Manifest:
 
     @classmethod
     def load(cls, path: Path) -> Manifest:
-        """Read it; raises InputError where there is no whole database."""
+        """Read it. Raises InputError if there is no complete database."""
         file = path / FILE
         if not file.exists():
             raise InputError(
-                path, f"no database: there is no {FILE} in it, so its build did not finish", fix=HINT
+                path, f"not a complete database: it has no {FILE}, so its build did not finish", fix=HINT
             )
         values = read_json(file)
         try:

@@ -1,9 +1,9 @@
-"""The rows of all clips, shuffled once and written in chunks: a two-pass external shuffle in bounded memory.
+"""Shuffle the rows of all clips and write them in chunks: a two-pass external shuffle in bounded memory.
 
-Pass 1 reads each clip once, adds it to the statistics and scatters its rows over buckets, each of which
-holds a stretch of one permutation of all rows. Pass 2 puts each bucket into the permutation's order,
-standardises it and writes its chunks. The manifest, written last and by renaming, is what makes the folder
-a database: a build that is killed leaves the database that was there before, or none.
+Pass 1 reads each clip once, adds it to the statistics and scatters its rows over buckets. A bucket holds a
+consecutive part of one permutation of all rows. Pass 2 sorts each bucket into the permutation's order,
+standardises it and writes its chunks. The manifest is written last and atomically. So a killed build leaves
+the previous database, or none.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from hobble.database.precision import STORED
 from hobble.database.scatter import make_buckets, scatter
 from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
 
-CHUNK_BYTES = 4 << 20  # what a reader takes in one go: long enough for any disk, short enough for any memory
+CHUNK_BYTES = 4 << 20  # read at a time: large enough to be fast on any disk, small enough for any memory
 
 
 def write_database(
@@ -41,13 +41,12 @@ def write_database(
     seed: int = 1,
     chunk_bytes: int = CHUNK_BYTES,
 ) -> Manifest:
-    """Build the database folder `path` from rows by clip name, or from the files that hold them.
+    """Build the database folder `path` from the rows of clips, or from files of rows.
 
-    splits: clip name -> "train" or "held_out". channels: those that the network is told, in the order of
-    their columns. sources: hurt version -> the healthy clip that it was made from.
-    dtype: float32, float16 or bfloat16. The statistics are those of the clips in training. The
-    same rows and options give the same bytes. Raises HobbleError where no clip has rows to train on,
-    InputError where a clip does not fit the others.
+    clips: clip name -> rows or file. splits: clip name -> "train" or "held_out". channels: the network's
+    input channels, in the order of their columns. sources: hurt version -> its healthy clip. dtype: float32,
+    float16 or bfloat16. The statistics are those of the training clips. The same rows and options give the
+    same bytes. Raises HobbleError if no training clip has rows, InputError if a clip does not fit the others.
     """
     path = Path(path)
     path.mkdir(parents=True, exist_ok=True)
@@ -78,7 +77,7 @@ def write_database(
 
 
 def all_statistics(plan: Plan, moments: Sequence[tuple[Moments, Moments]], joint_weight: float) -> Statistics:
-    """The statistics of a database, from the moments of X and Y of each clip in training, in their order."""
+    """The statistics of a database, from the moments of X and Y of each training clip, in order."""
     x, y = moments[0]
     for of_x, of_y in moments[1:]:
         x, y = x + of_x, y + of_y
@@ -95,7 +94,7 @@ def publish(
     joint_weight: float,
     dtype: str,
 ) -> Manifest:
-    """Make the folder `work`, which holds all chunks, the database in the folder `path`."""
+    """Turn the folder `work`, which holds all chunks, into the database in the folder `path`."""
     save_npz(work / STATISTICS, **{f.name: getattr(statistics, f.name) for f in fields(statistics)})
     manifest = Manifest(
         folder=_name(work, chunks),
@@ -115,7 +114,7 @@ def publish(
 
 
 def _sweep(path: Path, keep: str | None) -> None:
-    """Remove what a killed build left and, with `keep`, every build but that one."""
+    """Remove leftovers of killed builds and, with `keep`, all builds but that one."""
     for entry in path.iterdir():
         if entry.is_dir() and (entry.name.startswith("part-") or (keep is not None and entry.name != keep)):
             shutil.rmtree(entry, ignore_errors=True)
@@ -124,19 +123,19 @@ def _sweep(path: Path, keep: str | None) -> None:
 
 
 def _name(work: Path, chunks: Mapping[str, list[Chunk]]) -> str:
-    """A name for the build that its content determines."""
+    """A name for the build from a hash of its content."""
     digest = hashlib.sha256((work / STATISTICS).read_bytes())
     digest.update(repr(chunks).encode())
     return f"rows-{digest.hexdigest()[:12]}"
 
 
 def _publish(path: Path, work: Path, manifest: Manifest) -> None:
-    """Give the finished build its name, let the manifest point to it, then remove the build before."""
+    """Rename the finished build, write the manifest, then remove the previous build."""
     final = path / manifest.folder
-    if final.exists():  # the same rows were built before: put each file in its place, whole or damaged
+    if final.exists():  # the same rows were built before: replace every file, since some may be damaged
         for file in sorted(p for p in work.rglob("*") if p.is_file()):
             place = final / file.relative_to(work)
-            place.parent.mkdir(parents=True, exist_ok=True)  # a kill may have left half a removed build
+            place.parent.mkdir(parents=True, exist_ok=True)  # a killed removal may have left a part
             os.replace(file, place)
         sync_folder(final)
     else:

@@ -10,10 +10,10 @@ from hobble.core.section import Positive, PositiveFloat, Section
 
 
 class Rows(Section):
-    """What a row holds: what the rule `database_clip` reads."""
+    """The content of a row; read by the rule `database_clip`."""
 
     window: Annotated[int, Field(gt=0, le=3600)] = Field(
-        60, description="frames to each side of the present one"
+        60, description="frames before and after the present one"
     )
     step: Positive = Field(10, description="frames between trajectory samples")
     facing_sigma: PositiveFloat = Field(20.0, description="smoothing of the facing direction, frames")
@@ -26,20 +26,20 @@ class Rows(Section):
 
 
 class Merging(Section):
-    """How rows lie on disk, and their statistics: what the rule `database_merge` reads."""
+    """How rows are stored, and their statistics; read by the rule `database_merge`."""
 
     joint_weight: PositiveFloat = 0.1
     dtype: Literal["float32", "float16", "bfloat16"] = Field(
-        "float32", description="of the rows on disk; the others take half the bytes, float16 more exactly"
+        "float32", description="type of the rows on disk; float16 and bfloat16 take half the bytes"
     )
     seed: int = 1
 
 
 class Database(Rows, Merging):
-    """What a row holds, how rows lie on disk, and by how many jobs they are merged."""
+    """The content of rows, their storage, and the number of jobs that merge them."""
 
     parts: Annotated[int, Field(gt=0, le=1000)] = Field(
-        1, description="jobs that read and shuffle the rows side by side; the result does not depend on it"
+        1, description="parallel jobs that read and shuffle the rows; the result does not depend on it"
     )
 
     terrain_side: PositiveFloat = Field(25.0, description="centimetres from the path to the side heights")

@@ -1,9 +1,10 @@
 """The order in which a pass visits rows and their fits, as pure functions of the seed.
 
-A pass is `visits` layers. A layer visits every row once; row r appears in layer l with its fit number
-picks[r, l % fits of r], a permutation drawn for each row and pass. So every (frame, fit) pair comes once in
-a pass, a flat row's one fit as often as there are layers, and no batch holds a frame twice. Sections cut
-the sequence of layers into near equal parts; with as many sections as visits, a section is a layer.
+A pass has `visits` layers. A layer visits every row once: in layer l, row r has fit number
+picks[r, l % fits of r], where picks is a permutation drawn for each row and pass. So a pass has every
+(frame, fit) pair once (the one fit of a flat row: once in each layer), and no batch has a frame twice.
+Sections cut the sequence of layers into nearly equal parts; with as many sections as visits, a section is a
+layer.
 """
 
 from __future__ import annotations
@@ -12,20 +13,20 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-CHUNKS, ROWS, FITS = 1, 2, 3  # what a generator draws, so that no two draw the same numbers
+CHUNKS, ROWS, FITS = 1, 2, 3  # purpose of a generator, so that no two draw the same numbers
 
 
 def generator(seed: int, *of: int) -> np.random.Generator:
-    """Seeded by a configuration's number and by what it is for, whatever was drawn before."""
+    """A generator seeded by the configuration's seed and by its purpose, independent of earlier draws."""
     return np.random.default_rng([seed, *of])
 
 
 def spans(
     rows: int, visits: int, section: int, sections: int, part: tuple[int, int] | None = None
 ) -> Iterator[tuple[int, int, int]]:
-    """The parts of layers that make up a section: (layer, first place, last place + 1).
+    """The parts of layers in a section: (layer, first place, last place + 1).
 
-    part: only the samples of the section from the first to before the second of two numbers.
+    part: (start, stop), only these samples of the section.
     """
     total = rows * visits
     start, stop = total * section // sections, total * (section + 1) // sections
@@ -41,10 +42,10 @@ def spans(
 def groups(
     chunk_rows: Sequence[int], window: int, seed: int, pass_index: int, layer: int
 ) -> list[np.ndarray]:
-    """The chunks that are read and mixed together, in a fresh order: one, two, four, ..., `window` at a time.
+    """Groups of chunks that are read and mixed together, in random order: 1, 2, 4, ..., `window` chunks each.
 
-    So the first rows of a layer are there after one chunk is read; since the rows were permuted when they
-    were written, few chunks are mixed as well as many.
+    So the first rows of a layer are ready after one chunk is read. Small groups mix as well as large ones,
+    because the rows were permuted when they were written.
     """
     order = generator(seed, CHUNKS, pass_index, layer).permutation(len(chunk_rows))
     out, start, size = [], 0, 1
@@ -55,14 +56,14 @@ def groups(
 
 
 def row_order(rows: int, seed: int, pass_index: int, layer: int, group: int) -> np.ndarray:
-    """(rows,) in which order the rows of a group come."""
+    """(rows,) a random order of the rows of a group."""
     return generator(seed, ROWS, pass_index, layer, group).permutation(rows)
 
 
 def picks(count: np.ndarray, visits: int, seed: int, pass_index: int, layer: int, chunk: int) -> np.ndarray:
-    """(R,) which of its fits each row of a chunk shows in this layer; `count` (R,) is how many it has.
+    """(R,) the number of the fit that each row of a chunk has in this layer.
 
-    No count may be above `visits`.
+    count: (R,) fits of each row, at most `visits`.
     """
     if np.all(count <= 1):
         return np.zeros(len(count), np.int64)
@@ -77,7 +78,7 @@ def picks(count: np.ndarray, visits: int, seed: int, pass_index: int, layer: int
 
 
 def starts(count: np.ndarray) -> np.ndarray:
-    """(R,) where each row's fits begin among those of all; `count` (R,) is how many each has."""
+    """(R,) the index of each row's first fit. count: (R,) fits of each row."""
     return np.cumsum(count, dtype=np.int64) - count
 
 
@@ -90,10 +91,10 @@ def shown(
     place: tuple[int, int, int, int],
     part: slice,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of a group of chunks in the order of a layer, and the fit of each: both (n,), n of `part`.
+    """Rows of a group of chunks in the order of a layer, and the fit of each: both (n,).
 
-    chunks: their numbers; rows: of each. count, first: (R,) of the group's rows, as in `starts`. place: seed,
-    pass, layer and group. part: of the order.
+    chunks: their numbers; rows: of each chunk. count, first: (R,) of the group's rows, see `starts`. place:
+    seed, pass, layer and group. part: which n places of the order to return.
     """
     seed, pass_index, layer, group = place
     picked = [

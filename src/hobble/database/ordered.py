@@ -1,4 +1,4 @@
-"""Pass 2 of the shuffle: buckets put in order, standardised and written as chunks."""
+"""Pass 2 of the shuffle: sort the buckets, standardise them and write chunks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hobble.rows.compose import x_columns
 def write_chunks(
     work: Path, split: str, buckets: Buckets, plan: Plan, statistics: Statistics, dtype: str, number: int = 0
 ) -> Iterator[Chunk]:
-    """Each bucket in order, standardised, as chunks of `chunk_rows` rows, of which the first is `number`."""
+    """Write each bucket, sorted and standardised, as chunks of `chunk_rows` rows, numbered from `number`."""
     columns = x_columns(plan.layout)
     for frames, fits, index in buckets.drain():
         ends = np.cumsum(index["count"])

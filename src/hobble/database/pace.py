@@ -1,4 +1,4 @@
-"""How fast bodies go that are told something, gathered while the rows of clips are merged."""
+"""Collect the speeds of clips with channel values while their rows are merged, to learn speed limits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hobble.rows.layout import GAITS, RowLayout
 
 
 def paces_of(layout: RowLayout, skeleton: Mapping[str, Any]) -> dict[str, Pace]:
-    """For each channel of the layout that slows a body, what will learn by how much."""
+    """A `Pace` for each channel of the layout that slows a body. It learns the speed limits."""
     slowing = [(one, columns) for name, columns in layout.channels if (one := channel(name)).slows]
     if not slowing:
         return {}
@@ -29,16 +29,16 @@ def paces_of(layout: RowLayout, skeleton: Mapping[str, Any]) -> dict[str, Pace]:
 
 
 def _other_side(one: Channel, columns: int, rig: Skeleton) -> np.ndarray:
-    """(columns,) the column of the other side for each; itself where the rig has no two sides to compare."""
+    """(columns,) for each column, that of the other side; itself if the rig does not pair left and right."""
     own = np.arange(columns, dtype=float)
     try:
         return one.mirror(own[None], rig)[0].astype(int)
-    except HobbleError:  # a rig whose names do not pair left and right: each side is learnt on its own
+    except HobbleError:  # the rig does not pair left and right: each side is learnt separately
         return own.astype(int)
 
 
 def gather(paces: Mapping[str, Pace], rows: ClipRows, source: str | None) -> None:
-    """Add the rows of a clip, a version of the clip `source` where it is one."""
+    """Add the rows of a clip. source: its healthy clip if it is a hurt version, else None."""
     if not paces or not len(rows):
         return
     layout = rows.layout

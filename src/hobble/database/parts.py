@@ -1,9 +1,9 @@
-"""A database made by many jobs: byte for byte what `hobble.database.merge.write_database` makes in one.
+"""Build a database in many jobs, with the same bytes as `hobble.database.merge.write_database` in one.
 
-A shard is some of the clips, a part is a stretch of the final order of the rows. The job of a shard reads its
-clips once, notes their moments and scatters their rows over the parts. The job of a part puts in order what
-all shards have for it, standardises it and writes its chunks. The last job gives the chunks their place in
-the database, without reading them.
+A shard is some of the clips; a part is a consecutive part of the final order of the rows. The job of a shard
+reads its clips once, saves their moments and scatters their rows over the parts. The job of a part sorts the
+rows that all shards have for it, standardises them and writes chunks. The last job moves the chunks into the
+database without reading them.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ def write_shard(
 ) -> None:
     """Scatter the rows of the clips `own` over `parts` parts.
 
-    clips: files of the rows of every clip of the database; of those that are not `own` only the outlines are
-    read. The other arguments, and what is raised, are as of `hobble.database.merge.write_database`.
+    clips: files of rows of all clips of the database; for clips not in `own` only the outlines are read.
+    Other arguments and errors: see `hobble.database.merge.write_database`.
     """
     plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes)
     paces = paces_of(plan.layout, plan.skeleton)
@@ -76,7 +76,7 @@ def write_shard(
 
 
 def part_rows(plan: Plan, parts: int) -> dict[str, int]:
-    """Split -> rows of each part, of whole buckets; the last parts may have fewer, or none."""
+    """Split -> rows of each part, a multiple of a bucket's rows. The last parts may have fewer or none."""
     buckets = {split: -(-plan.rows(split) // plan.bucket_rows) for split in SPLITS}
     return {split: max(1, -(-count // parts)) * plan.bucket_rows for split, count in buckets.items()}
 
@@ -90,7 +90,7 @@ def write_part(
     joint_weight: float,
     dtype: str = "float32",
 ) -> None:
-    """Write the chunks of part `part`, from 0, of `parts`, out of what all shards have for it."""
+    """Write the chunks of part `part`, from 0, of `parts`, from the rows that all shards have for it."""
     plan = Plan.load(shards[0] / PLAN)
     statistics = merged_statistics(plan, shards, joint_weight)
     rows = part_rows(plan, parts)
@@ -118,7 +118,7 @@ def write_part(
 def join_parts(
     path: Path, shards: Sequence[Path], parts: Sequence[Path], *, joint_weight: float, dtype: str = "float32"
 ) -> Manifest:
-    """Build the database folder `path` from its parts, in their order, and what the shards noted."""
+    """Build the database folder `path` from its parts, in order, and the moments and speeds of the shards."""
     plan = Plan.load(shards[0] / PLAN)
     statistics = merged_statistics(plan, shards, joint_weight)
     chunks: dict[str, list[Chunk]] = {split: [] for split in SPLITS}
@@ -138,7 +138,7 @@ def join_parts(
 
 
 def _put(source: Path, target: Path) -> None:
-    """A file under another name as well: by a link, or by a copy where the file system has none."""
+    """Link a file to another name, or copy it if the file system has no hard links."""
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
         os.link(source, target)
@@ -147,7 +147,7 @@ def _put(source: Path, target: Path) -> None:
 
 
 def merged_statistics(plan: Plan, shards: Sequence[Path], joint_weight: float) -> Statistics:
-    """Of all clips in training, added in the order in which one job would add them."""
+    """The statistics of all training clips, added in the same order as in one job."""
     found: dict[str, tuple[Moments, Moments]] = {}
     for shard in shards:
         data = load_npz(shard / MOMENTS)
@@ -158,14 +158,14 @@ def merged_statistics(plan: Plan, shards: Sequence[Path], joint_weight: float) -
 
 
 def _save_moments(path: Path, names: Sequence[str], moments: Sequence[tuple[Moments, Moments]]) -> None:
-    """weight: (n, 2); x: (n, 2, X), y: (n, 2, Y), mean and squares of each clip."""
+    """Save weight: (n, 2); x: (n, 2, X), y: (n, 2, Y): mean and squares of each clip."""
     weight = np.array([(x.weight, y.weight) for x, y in moments]).reshape(-1, 2)
     x, y = (np.array([(one[i].mean, one[i].squares) for one in moments]) for i in range(2))
     save_npz(path, clips=np.array(names, str), weight=weight, x=x, y=y)
 
 
 def _paces(plan: Plan, shards: Sequence[Path]) -> dict[str, Pace]:
-    """What was gathered of how fast bodies go, in the order in which one job would gather it."""
+    """The collected speeds of all shards, in the same order as in one job."""
     paces = paces_of(plan.layout, plan.skeleton)
     for channel, pace in paces.items():
         found: dict[str, dict[str, np.ndarray]] = {}

@@ -1,4 +1,4 @@
-"""What is known of a database before a row is written: its clips, and how their rows are cut up."""
+"""The plan of a database, made before any row is written: layout, clips, sizes of chunks and buckets."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from hobble.rows.clip_rows import ClipRows, Outline, outline
 from hobble.rows.compose import fit_columns, x_columns
 from hobble.rows.layout import RowLayout
 
-BUCKET_BYTES = 64 << 20  # the memory of pass 2, a few times over
+BUCKET_BYTES = 64 << 20  # of a bucket; pass 2 needs a few times as much memory
 
 Source = ClipRows | str | Path
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is known before a row is written: the layout of the rows, their clips and how they are cut up."""
+    """Layout of the rows, clips with their rows, and rows of a chunk and of a bucket."""
 
     layout: RowLayout
     skeleton: Mapping[str, Any]
@@ -36,13 +36,14 @@ class Plan:
 
     @property
     def original_bytes(self) -> int:
-        """What the same pairs take where every one is a row of X, Y and P in float32, as in the original."""
+        """Size of the same pairs in the original's layout: each a row of X, Y and P in float32."""
         values = self.layout.x_size + self.layout.y_size + 1
         return 4 * values * self.visits * sum(clip["rows"] for clip in self.clips)
 
     def save(self, path: Path) -> None:
         """Write it as JSON."""
-        skeleton = json.dumps(self.skeleton)  # a text: keys of a file get sorted, and its joints must not
+        # As text: write_json sorts keys, but the joints have to keep their order.
+        skeleton = json.dumps(self.skeleton)
         write_json(path, {**vars(self), "layout": self.layout.to_dict(), "skeleton": skeleton})
 
     @classmethod
@@ -62,8 +63,8 @@ def make_plan(
 ) -> Plan:
     """The plan of rows by clip name; see `hobble.database.merge.write_database`.
 
-    item: bytes of a number on disk. Raises HobbleError where no clip has rows to train on, InputError where
-    a clip does not fit the others.
+    item: bytes of a number on disk. Raises HobbleError if no training clip has rows, InputError if a clip
+    does not fit the others.
     """
     entries: list[dict[str, Any]] = []
     first: Outline | None = None
@@ -74,7 +75,7 @@ def make_plan(
         if one.layout != first.layout or list(one.skeleton["joints"]) != list(first.skeleton["joints"]):
             source = clips[name]
             where = name if isinstance(source, ClipRows) else source
-            raise InputError(where, f"its rows are not laid out as those of {min(clips)}")
+            raise InputError(where, f"the layout of its rows differs from that of {min(clips)}")
         fits = int(one.fits.sum())
         entries.append({"clip": name, "split": splits[name], "rows": len(one.fits), "pairs": fits})
         visits = max(visits, one.visits, int(one.fits.max(initial=1)))

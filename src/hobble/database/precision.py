@@ -1,7 +1,7 @@
-"""How numbers are kept in a database: float32, or half of the bytes as float16 or bfloat16.
+"""Types of numbers on disk: float32, or float16 or bfloat16 with half the bytes.
 
-float16 has 11 significant bits and ends at 65,504; bfloat16 has 8 and the range of float32. NumPy has no
-bfloat16, so it is held as the upper 16 bits of a float32, in uint16.
+float16 has 11 significant bits and a largest value of 65,504; bfloat16 has 8 bits and the range of float32.
+NumPy has no bfloat16, so it is stored as the upper 16 bits of a float32, in uint16.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ STORED: dict[str, np.dtype[Any]] = {
 
 
 def narrow(values: Array, precision: str) -> np.ndarray:
-    """Values in the type they are stored in, rounded to the nearest (of two equally near to the even one).
+    """Values in their storage type, rounded to nearest even.
 
-    Raises HobbleError where one is too large for float16.
+    Raises HobbleError if a value is too large for float16.
     """
     if precision != "bfloat16":
         with np.errstate(over="ignore"):
@@ -40,7 +40,7 @@ def narrow(values: Array, precision: str) -> np.ndarray:
 
 
 def widen(values: np.ndarray) -> Array:
-    """What was stored as bfloat16 as float32; other types as they are."""
+    """Stored bfloat16 as float32; other types unchanged."""
     if values.dtype != STORED["bfloat16"]:
         return values
     return (values.astype("<u4") << 16).view("<f4")

@@ -1,4 +1,4 @@
-"""Reading a database back: shuffled, standardised blocks of rows, ahead of their use, in a stated memory."""
+"""Read a database: shuffled, standardised blocks of rows, prefetched, within a memory limit."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from hobble.rows.layout import RowLayout
 Item = TypeVar("Item")
 Part = tuple[Window, np.ndarray, np.ndarray]
 BLOCK_ROWS = 4096
-BLOCKS = 3  # in memory at a time: being made, waiting, in use
+BLOCKS = 3  # in memory at a time: one being made, one waiting, one in use
 
 
 class Block(NamedTuple):
     """n composed rows: x (n, X) and y (n, Y), standardised float32; p (n,) phase 0 to 1, float32.
 
-    clip (n,): index into `Database.clips`, and frame (n,) of it at 60 Hz: where a row came from.
+    clip: (n,) index into `Database.clips`; frame: (n,) frame of the clip at 60 Hz.
     """
 
     x: Array
@@ -57,9 +57,9 @@ class Database:
     def open(cls, path: str | Path, memory_mb: int = 512) -> Database:
         """Open the database folder `path`.
 
-        memory_mb: most memory held at a time for its rows, by each reader of a section. A database that fits
-        is loaded once; a larger one is read again and again, chunk by chunk. Raises InputError where there is
-        no whole database.
+        memory_mb: memory limit for its rows, for each reader of a section. A database that fits is loaded
+        once; a larger one is read in every layer, chunk by chunk. Raises InputError if there is no complete
+        database.
         """
         path = Path(path)
         manifest = Manifest.load(path)
@@ -68,7 +68,7 @@ class Database:
 
     @property
     def layout(self) -> RowLayout:
-        """Columns of the composed rows, those of its channels among them."""
+        """Columns of the composed rows, including those of the channels."""
         return self.manifest.layout
 
     @property
@@ -86,7 +86,7 @@ class Database:
         return self.manifest.rows(split)
 
     def pairs(self, split: str) -> int:
-        """Samples of one pass: every (frame, fit) pair, a flat row's one fit as often as others have fits."""
+        """Samples of one pass: every (frame, fit) pair; the one fit of a flat row counts `visits` times."""
         return self.rows(split) * self.manifest.visits
 
     def section_pairs(self, split: str, section: int, sections: int) -> int:
@@ -105,13 +105,14 @@ class Database:
         stretch: Stretch | None = None,
         window: int | None = None,
     ) -> Iterator[Block]:
-        """One section of one pass, in shuffled order, as blocks of `block_rows` rows (the last: the rest).
+        """One section of one pass, in shuffled order, as blocks of `block_rows` rows; the last has the rest.
 
-        Over the `sections` sections of a pass every (frame, fit) pair comes once (a flat row's one fit as
-        often as others have fits). What comes depends on the arguments (and, where the split is larger than
-        memory, on memory_mb) and never on what was read before. The next block is made in a thread
-        meanwhile. stretch: the part of the section that is read, all of it where None. window: chunks held at
-        a time, those that `window` finds where None. Raises InputError naming the chunk where one is damaged.
+        Over the `sections` sections of a pass, every (frame, fit) pair comes once (the one fit of a flat row:
+        `visits` times). The blocks depend only on the arguments (and on memory_mb, if the split does not fit
+        in memory), not on what was read before. The next block is made in a thread.
+
+        stretch: the part of the section to read; None: all. window: chunks in memory at a time; None: see
+        `window`. Raises InputError with the chunk's file if it is damaged.
         """
         if not 0 <= section < sections:
             raise HobbleError(f"there is no section {section} in a pass of {sections}")
@@ -138,10 +139,10 @@ class Database:
         window: int,
         rooms: Iterator[Room],
     ) -> Iterator[Part]:
-        """Windows, the rows of them to show in order, and the fit of each: a layer from place to place.
+        """Places start to stop of a layer: windows, the rows to use in order, and the fit of each row.
 
-        of: seed, pass and layer. Windows are loaded into one of `rooms` while the one before is in use in the
-        other, so each has to be done with before the next is asked for.
+        of: seed, pass and layer. A window is loaded into one of `rooms` while the previous window is in use
+        in the other. So a window must not be used after the next one is requested.
         """
         every = range(len(self.manifest.chunks[split]))
         if window >= len(every):
@@ -157,7 +158,7 @@ class Database:
     def _wanted(
         self, split: str, of: tuple[int, int, int], start: int, stop: int, window: int
     ) -> Iterator[tuple[int, Sequence[int], int, int]]:
-        """The groups of chunks with places start to stop of a layer, and the part of each that is meant."""
+        """The groups of chunks with places start to stop of a layer, and the places of each group."""
         rows = [chunk.rows for chunk in self.manifest.chunks[split]]
         done = 0
         for group, some in enumerate(order.groups(rows, window, *of)):
@@ -168,16 +169,15 @@ class Database:
             done += n
 
     def block_rows(self, batch: int = 1) -> int:
-        """A good length for blocks: a multiple of `batch`, about 4,096 rows, a quarter of the memory."""
+        """A good length of blocks: a multiple of `batch`, about 4,096 rows, up to a quarter of the memory."""
         row = 4 * (self.layout.x_size + self.layout.y_size)
         most = min(BLOCK_ROWS, (self.memory_mb << 20) // (4 * BLOCKS * row))
         return batch * max(1, most // batch)
 
     def window(self, split: str, block_rows: int) -> int:
-        """Chunks held at a time: all, where both splits fit into memory; else as many as fit in twice.
+        """Chunks in memory at a time: all if both splits fit, else as many as fit twice, and at least one.
 
-        Twice, since while one window is in use the next is read. Off the memory go the blocks being made,
-        waiting and in use. Never less than one chunk.
+        Twice, because the next window is read while one is in use. Memory of the blocks is subtracted first.
         """
         memory = self.memory_mb << 20
         memory -= BLOCKS * block_rows * 4 * (self.layout.x_size + self.layout.y_size)
@@ -185,7 +185,7 @@ class Database:
         return len(sizes) if self.manifest.bytes <= memory else max(1, memory // (2 * max(sizes)))
 
     def _rooms(self, split: str, window: int) -> Iterator[Room]:
-        """Two rooms for windows, in turn; the memory is the same for all windows that a section reads."""
+        """Two sets of buffers for windows, in turn. All windows of a section reuse them."""
         if window >= len(self.manifest.chunks[split]):
             return iter(())
         return cycle([room(self.manifest, split, window) for _ in range(2)])
@@ -197,12 +197,12 @@ class Database:
         return self._kept[split]
 
     def load(self, split: str, some: Sequence[int], into: Room) -> Window:
-        """Chunks of a split, one after another, read into a `hobble.database.window.room`."""
+        """Read chunks of a split into the buffers `into` (`hobble.database.window.room`)."""
         folder = self.path / self.manifest.folder
         return load(folder, self.manifest.chunks[split], some, into, self._verified)
 
     def _composed(self, parts: Iterator[Part], total: int, block_rows: int) -> Iterator[Block]:
-        """Blocks of `block_rows` rows out of parts of any length."""
+        """Blocks of `block_rows` rows from parts of any length."""
         block, filled = self._empty(min(block_rows, total)), 0
         for window, rows, fit in parts:
             while len(rows):
@@ -218,10 +218,10 @@ class Database:
                     block, filled = self._empty(min(block_rows, total)), 0
 
     def _compose(self, window: Window, rows: np.ndarray, fit: np.ndarray, x: Array, y: Array) -> None:
-        """Fill x and y. Plain gathers: 2 million rows a second and core with 31 joints."""
+        """Fill x and y by indexing: 2 million rows a second on one core, with 31 joints."""
         frames, ground = widen(window.x[rows]), widen(window.fits[fit])
         if window.y.dtype == y.dtype:
-            np.take(window.y, rows, axis=0, out=y, mode="clip")  # any other mode copies once more
+            np.take(window.y, rows, axis=0, out=y, mode="clip")  # other modes make another copy
         else:
             y[...] = widen(window.y[rows])
         lift = ground[:, -1:].astype(np.float32)
@@ -235,7 +235,7 @@ class Database:
 
 
 def _kept(parts: Iterator[Part], stretch: Stretch) -> Iterator[Part]:
-    """The samples of a stretch that are read, out of all of it."""
+    """Only the samples of a stretch that this process reads."""
     at = 0
     for window, rows, fits in parts:
         some = stretch.kept(at, len(rows))
@@ -244,7 +244,7 @@ def _kept(parts: Iterator[Part], stretch: Stretch) -> Iterator[Part]:
 
 
 def ahead(items: Iterator[Item]) -> Iterator[Item]:
-    """The same items; while one is in use, the next is being made in a thread."""
+    """The same items, where a thread makes the next item while one is in use."""
     nothing = object()
     with ThreadPoolExecutor(1, "ahead") as pool:
         future = pool.submit(next, items, nothing)

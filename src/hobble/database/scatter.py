@@ -1,4 +1,4 @@
-"""Pass 1 of the shuffle: the rows of clips, scattered over buckets by their places in the final order."""
+"""Pass 1 of the shuffle: scatter the rows of clips over buckets, by their places in the final order."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.compose import fit_columns, frame_inputs, x_columns
 from hobble.rows.layout import RowLayout
 
-PART_ROWS = 8192  # of a clip that are scattered at a time
+PART_ROWS = 8192  # rows of a clip that are scattered at a time
 
 
 def make_buckets(folder: Path, plan: Plan, rows_each: Mapping[str, int]) -> dict[str, Buckets]:
-    """Buckets for each split, of `rows_each` rows of it."""
+    """Buckets for each split. rows_each: split -> rows of a bucket."""
     columns, of_fits = x_columns(plan.layout) + plan.layout.y_size, fit_columns(plan.layout)
     return {
         split: Buckets(folder / f"buckets-{split}", plan.rows(split), rows_each[split], columns, of_fits)
@@ -31,9 +31,10 @@ def make_buckets(folder: Path, plan: Plan, rows_each: Mapping[str, int]) -> dict
 def scatter(
     buckets: Mapping[str, Buckets], clips: Mapping[str, Source], plan: Plan, seed: int
 ) -> Iterator[tuple[dict[str, Any], ClipRows]]:
-    """Put each of `clips`, some of the plan's, into the buckets of its split; then its entry and its rows.
+    """Put each clip of `clips` into the buckets of its split, then yield its entry and its rows.
 
-    One permutation of all rows of a split says where each row comes to lie.
+    One permutation of all rows of a split determines the place of each row. `clips` may be a part of the
+    plan's.
     """
     places = {
         split: np.random.default_rng([seed, number]).permutation(plan.rows(split))

@@ -1,4 +1,4 @@
-"""One motion must not lie on both sides of the split: what is held out would have been learnt."""
+"""Refuse a split with the same motion in training and held out: the held-out error would mean nothing."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ MOST_NAMED = 10
 
 
 def refuse_both_sides(where: str, pairs: Iterable[tuple[str, str, str]], splits: Mapping[str, str]) -> None:
-    """Raise HobbleError that names every pair of which one clip is trained on and the other held out.
+    """Raise HobbleError with every pair of clips where one is in training and the other is held out.
 
-    where: how messages call the data set. pairs: (clip, clip, what they are: "the same file", ...).
-    splits: clip -> "train" or "held_out"; a clip that is in neither is not asked for.
+    where: the data set's name for messages. pairs: (clip, clip, what they are: "the same file", ...).
+    splits: clip -> "train" or "held_out"; other clips are ignored.
     """
     told, lacking = [], []
     for a, b, what in pairs:

@@ -1,4 +1,4 @@
-"""Raw rows standardised for a database, so that composing them is little more than copying."""
+"""Standardise raw rows for a database, so that composing them later is cheap."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from hobble.rows.layout import RowLayout
 def split_rows(
     layout: RowLayout, statistics: Statistics, x: Array, y: Array, fits: Array, count: np.ndarray
 ) -> tuple[Array, Array, Array]:
-    """Standardised x, y and fits out of raw ones.
+    """Standardised x, y and fits from raw ones.
 
-    x: (R, x columns) X without the terrain. y: (R, Y). fits: (S, fit columns) heights and the mean to take
-    off joint heights. count: (R,) fits of each row. In what comes back each row's joint heights have the mean
-    over its fits taken off, and a fit's last column (the lift, cm) is what its own mean is above that: small
-    numbers, which half precision holds well.
+    x: (R, x columns) X without the terrain. y: (R, Y). fits: (S, fit columns) heights, then their mean, which
+    is to be subtracted from joint heights. count: (R,) fits of each row. In the result, the mean over a row's
+    fits is subtracted from its joint heights, and a fit's last column (the lift, cm) is its own mean minus
+    that one: a small number, which half precision stores well.
     """
     s, terrain = statistics, layout.x_terrain
     of_row = np.repeat(np.arange(len(count)), count)

@@ -1,10 +1,9 @@
-"""How processes share a section of a pass: which of its samples each one reads, batch by batch.
+"""How processes share a section of a pass: which samples each one reads, batch by batch.
 
-A section's samples stand in one order, whatever reads them. It is cut into stretches, one after another. Each
-batch takes its share of every stretch, so that the samples of a batch come from as many places of the
-section as there are stretches. With one stretch, batches are consecutive samples. A process owns some
-places of each batch, the same ones in all batches, and reads only the stretches that fill them. So what a
-batch holds depends on the number of stretches and never on the number of processes.
+The samples of a section have a fixed order, which is cut into consecutive stretches. Each batch takes an
+equal share of every stretch. With one stretch, batches are consecutive samples. A process owns some places of
+each batch, the same ones in all batches, and reads only the stretches that fill them. So the content of a
+batch depends on the number of stretches, but not on the number of processes.
 """
 
 from __future__ import annotations
@@ -18,9 +17,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Stretch:
-    """Samples `start` to `stop` of a section, of which every `share` go into one batch.
+    """Samples `start` to `stop` of a section; each batch gets `share` of them.
 
-    low, high: which of those `share` are read; the others are for another process.
+    low, high: which of each `share` samples this process reads; the others are for other processes.
     """
 
     start: int
@@ -31,12 +30,12 @@ class Stretch:
 
     @property
     def rows(self) -> int:
-        """How many samples of it are read."""
+        """How many of its samples this process reads."""
         full, rest = divmod(self.stop - self.start, self.share)
         return full * (self.high - self.low) + max(0, min(rest, self.high) - self.low)
 
     def kept(self, at: int, count: int) -> np.ndarray | slice:
-        """Which of `count` samples are read, of which the first is number `at` of the stretch."""
+        """Which of `count` samples, from number `at` of the stretch on, this process reads."""
         if self.high - self.low == self.share:
             return slice(None)
         place = (at + np.arange(count)) % self.share
@@ -57,11 +56,11 @@ class Sharing:
 
     @classmethod
     def of(cls, total: int, batch: int, stretches: int = 1, rank: int = 0, processes: int = 1) -> Sharing:
-        """That of process `rank`, from 0, of `processes`, whose parts of a batch differ by one at most."""
+        """Of process `rank`, from 0, of `processes`. Their parts of a batch differ by 1 at most."""
         return cls(total, batch, stretches, own_places(batch, rank, processes))
 
     def sizes(self) -> Iterator[tuple[int, int]]:
-        """For each batch its samples, and those of them that this process reads; only the last is short."""
+        """For each batch, the number of its samples, and of those that this process reads."""
         for start in range(0, self.total, self.batch):
             whole = min(self.batch, self.total - start)
             yield whole, max(0, min(whole, self.own.stop) - self.own.start)

@@ -1,4 +1,4 @@
-"""Rows of some chunks in memory, and the one place that loads them."""
+"""Rows of some chunks in memory, and the function that loads them."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ Room = Mapping[str, np.ndarray]
 class Window:
     """The rows of some chunks, in memory one after another.
 
-    chunks: their numbers in the split. rows: of each chunk. first: (R,) where each row's fits begin in
-    `fits`. The rest is what chunks hold.
+    chunks: their numbers in the split. rows: of each chunk. first: (R,) index of each row's first fit in
+    `fits`. The other fields are the arrays of the chunks.
     """
 
     chunks: Sequence[int]
@@ -39,7 +39,7 @@ class Window:
 
 
 def room(manifest: Manifest, split: str, most: int) -> dict[str, np.ndarray]:
-    """Empty arrays for what any `most` chunks of a split hold, in the order of their tables."""
+    """Empty arrays that are large enough for any `most` chunks of a split, in the order of the tables."""
     chunks = manifest.chunks[split]
     rows = sum(sorted(chunk.rows for chunk in chunks)[-most:])
     fits = sum(sorted(chunk.fits for chunk in chunks)[-most:])
@@ -58,10 +58,10 @@ def room(manifest: Manifest, split: str, most: int) -> dict[str, np.ndarray]:
 def load(
     folder: Path, chunks: Sequence[Chunk], some: Sequence[int], into: Room, verified: set[str]
 ) -> Window:
-    """The chunks numbered `some`, one after another, read straight into a room.
+    """Read the chunks numbered `some`, one after another, directly into the arrays `into`.
 
-    verified: files whose checksum was found right before; it is not looked at again, and those that are right
-    are added. Raises InputError naming the file where one is damaged.
+    verified: files whose checksum was checked before and is not checked again; files that pass are added.
+    Raises InputError with the file's name if one is damaged.
     """
     wanted = [chunks[i] for i in some]
     all_rows, all_fits = sum(c.rows for c in wanted), sum(c.fits for c in wanted)

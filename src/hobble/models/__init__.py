@@ -1,7 +1,7 @@
-"""The kinds of network, each in a folder of its own: what is common to them is in this one.
+"""The kinds of network, one folder each; this folder holds what they share.
 
-A folder with an `__init__.py` is a kind, so that no list has to be edited to add one, and no rule's
-fingerprint changes for those that there are.
+Every subfolder with an `__init__.py` is a kind. So adding a kind edits no list, and the fingerprints of
+existing rules stay.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from hobble.models.model import Model
 if TYPE_CHECKING:
     from hobble.models.options import Options
 
-# A configuration names one of them as `network.kind`.
+# The values of `network.kind` in a configuration.
 MODELS = tuple(sorted(path.parent.name for path in Path(__file__).parent.glob("*/__init__.py")))
 DEFAULT = "pfnn"
 
 
 def model(kind: str) -> Model:
-    """The kind of network `kind`, one of MODELS."""
+    """The `Model` of the kind named `kind`, one of MODELS."""
     return importlib.import_module(f"hobble.models.{kind}").MODEL
 
 
 def network_options(section: Mapping[str, Any]) -> Options:
-    """A configuration's section `network`, of its kind's type.
+    """A configuration's section `network`, as the options type of its kind.
 
-    Not called `options`: that is a module of this package, which would take its place once it is imported.
+    The name `options` is taken: it is a module of this package.
     """
     return model(section.get("kind", DEFAULT)).options().model_validate(section)

@@ -1,7 +1,7 @@
-"""Arrays and facts of a network's file, taken one by one: right, or refused with the file's name.
+"""Checks of the arrays and the metadata of a network's file. Every error names the file.
 
-A file may come from anywhere, and compiled code indexes memory by what it says. So nothing of it gets further
-than here before its type, shape, count and range are known.
+A file may come from anywhere, and compiled code indexes memory with its numbers. So type, shape, count and
+range of everything are checked here before use.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 
 MOST_LAYERS = 16
-MOST_NUMBERS = 1 << 26  # of an array, 256 MB as float32; the largest of a known network has 3 million
-LARGEST_WEIGHT = 1e6  # trained ones are below 10
+MOST_NUMBERS = 1 << 26  # in an array, 256 MB as float32; the largest array of a known network has 3 million
+LARGEST_WEIGHT = 1e6  # trained weights are below 10
 LARGEST_MEAN = 1e9
-LARGEST_STD = 1e20  # a joint that is left out of the input has its own, times 1e11
+LARGEST_STD = 1e20  # the std of a joint that is left out of the input is multiplied by 1e11
 MOST_NAMES = 4096
 LONGEST_NAME = 200
 FARTHEST = 1e5  # centimetres from a joint to its parent
@@ -33,32 +33,34 @@ DIVERGED = "The training diverged, or the file is damaged."
 def numbers(
     path: str | Path, arrays: Mapping[str, Any], name: str, axes: int, largest: float = LARGEST_WEIGHT
 ) -> Array:
-    """The array `name` as float32: of so many axes, none of them empty, finite, none beyond `largest`."""
+    """The array `name` as float32: `axes` axes, not empty, finite, no absolute value above `largest`."""
     if name not in arrays:
         raise InputError(path, f"not a network: no {name}")
     array = np.asarray(arrays[name])
     if array.dtype.kind not in "fiu" or array.ndim != axes or not array.size:
         raise InputError(
-            path, f"{name} has shape {array.shape} and type {array.dtype}, not numbers along {axes} axes"
+            path, f"{name} has shape {array.shape} and type {array.dtype}, expected numbers with {axes} axes"
         )
     if array.size > MOST_NUMBERS:
-        raise InputError(path, f"{name} holds {array.size} numbers; {MOST_NUMBERS} at most are read")
-    # Without a copy, which for compressed bytes would be eight times as large as what was unpacked.
+        raise InputError(path, f"{name} holds {array.size} numbers; at most {MOST_NUMBERS} are allowed")
+    # No copy: for an array of bytes a float64 copy would be eight times as large.
     beyond = max(float(array.max()), -float(array.min()))
     if not np.isfinite(beyond):
         raise InputError(path, f"{name} holds weights that are not finite numbers", fix=DIVERGED)
     if beyond > largest:
-        raise InputError(path, f"{name} holds {beyond:.3g}, which is beyond {largest:g}", fix=DIVERGED)
+        raise InputError(
+            path, f"{name} holds {beyond:.3g}, which is above the limit of {largest:g}", fix=DIVERGED
+        )
     return np.ascontiguousarray(array, np.float32)
 
 
 def layers(path: str | Path, arrays: Mapping[str, Any], *prefixes: str) -> int:
-    """How many layers W0, W1, ... there are; with W, every prefix has to be there for each of them."""
+    """The number of layers, counted by the first prefix (W0, W1, ...). Every layer needs every prefix."""
     found = {name for name in arrays if re.fullmatch(rf"{prefixes[0]}\d{{1,4}}", name)}
     if not found:
         raise InputError(path, f"not a network: no {prefixes[0]}0")
     if len(found) > MOST_LAYERS:
-        raise InputError(path, f"{len(found)} layers; {MOST_LAYERS} at most are read")
+        raise InputError(path, f"{len(found)} layers; at most {MOST_LAYERS} are allowed")
     missing = [f"{k}{i}" for i in range(len(found)) for k in prefixes if f"{k}{i}" not in arrays]
     if missing:
         raise InputError(path, f"not a network: no {', '.join(missing)}")
@@ -68,10 +70,10 @@ def layers(path: str | Path, arrays: Mapping[str, Any], *prefixes: str) -> int:
 def stacked(
     path: str | Path, arrays: Mapping[str, Any], names: tuple[str, str], axes: int, inputs: int, outputs: int
 ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-    """Weights (..., out, in) and biases (..., out) of layers of which each takes what the last one gives.
+    """Weights (..., out, in) and biases (..., out) of consecutive layers, checked to fit one another.
 
-    names: of weights and biases, ("W", "b") for W0, b0, W1, ... axes: of the weights. The leading axes are
-    those of the first layer. inputs: of the first layer; outputs: of the last one.
+    names: prefixes of weights and biases, ("W", "b") for W0, b0, W1, ... axes: number of axes of the weights;
+    the leading ones have to be the same in all layers. inputs: of the first layer; outputs: of the last.
     """
     count = layers(path, arrays, *names)
     weights = tuple(numbers(path, arrays, f"{names[0]}{i}", axes) for i in range(count))
@@ -80,10 +82,10 @@ def stacked(
     for i, (w, b) in enumerate(zip(weights, biases, strict=True)):
         if w.shape[:-2] != sets or w.shape[-1] != size or b.shape != w.shape[:-1]:
             found = f"{names[0]}{i} {w.shape} and {names[1]}{i} {b.shape}"
-            raise InputError(path, f"{found} do not follow a layer of {size} units")
+            raise InputError(path, f"{found} do not fit the {size} units before them")
         size = w.shape[-2]
     if size != outputs:
-        raise InputError(path, f"its last layer {names[0]}{i} has {size} units for {outputs} outputs")
+        raise InputError(path, f"its last layer {names[0]}{i} has {size} units, but Y has {outputs} columns")
     return weights, biases
 
 
@@ -94,7 +96,9 @@ def statistics(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Array]:
         is_std = key.endswith("std")
         out[key] = numbers(path, arrays, name, 1, LARGEST_STD if is_std else LARGEST_MEAN)
         if is_std and out[key].min() < 0:
-            raise InputError(path, f"{name} holds {out[key].min():g}: no standard deviation is below 0")
+            raise InputError(
+                path, f"{name} holds {out[key].min():g}, but a standard deviation cannot be negative"
+            )
     for block in "xy":
         mean, std = out[f"{block}_mean"], out[f"{block}_std"]
         if mean.shape != std.shape:
@@ -105,12 +109,12 @@ def statistics(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Array]:
 
 
 def names(path: str | Path, what: str, value: Any) -> tuple[str, ...]:
-    """A list of different short names."""
+    """A list of short names without duplicates."""
     if not isinstance(value, Sequence) or isinstance(value, str | bytes) or len(value) > MOST_NAMES:
         raise InputError(path, f"{what} is {_short(value)}, not a list of names")
     for name in value:
         if not isinstance(name, str) or not 0 < len(name) <= LONGEST_NAME or not name.isprintable():
-            raise InputError(path, f"{what} holds {_short(name)}, which is no name")
+            raise InputError(path, f"{what} holds {_short(name)}, which is not a valid name")
     if len(set(value)) != len(value):
         raise InputError(path, f"{what} holds a name twice")
     return tuple(value)
@@ -139,7 +143,7 @@ def mapping(path: str | Path, what: str, value: Any) -> dict[str, Any]:
 
 
 def skeleton(path: str | Path, value: Any) -> Skeleton:
-    """The skeleton of a file, as `Skeleton.to_dict` writes it, with the joints that a character needs."""
+    """The skeleton of a file (the format of `Skeleton.to_dict`), with the roles that a character needs."""
     data = mapping(path, "its skeleton", value)
     joints = mapping(path, "its skeleton's joints", data.get("joints"))
     names(path, "its skeleton's joints", list(joints))
@@ -149,15 +153,15 @@ def skeleton(path: str | Path, value: Any) -> Skeleton:
     for joint, entry in joints.items():
         parent = mapping(path, f"joint {joint}", entry).get("parent")
         if (parent is None) != (not seen) or (parent is not None and not _one_of(parent, seen)):
-            raise InputError(path, f"joint {joint}: its parent {_short(parent)} does not stand above it")
-        _place(path, f"joint {joint}: its offset", entry.get("offset"))
+            raise InputError(path, f"joint {joint}: its parent {_short(parent)} is not listed before it")
+        _three_numbers(path, f"joint {joint}: its offset", entry.get("offset"))
         seen.add(joint)
     _named_joints(path, data, seen)
     return Skeleton.from_dict({**data, "name": names(path, "its skeleton's name", [data.get("name")])[0]})
 
 
 def _named_joints(path: str | Path, data: Mapping[str, Any], joints: set[str]) -> None:
-    """Roles, links, ends and unseen joints name joints that there are."""
+    """Check that roles, links, end sites and unseen joints name existing joints."""
     roles = mapping(path, "its skeleton's roles", data.get("roles"))
     if missing := [role for role in NEEDED_ROLES if role not in roles]:
         raise InputError(path, f"its skeleton has no joint for {', '.join(missing)}")
@@ -166,18 +170,18 @@ def _named_joints(path: str | Path, data: Mapping[str, Any], joints: set[str]) -
         raise InputError(path, f"its skeleton's links are {_short(links)}, not pairs of joints")
     ends = mapping(path, "its skeleton's end sites", data.get("end_sites", {}))
     for end in ends.values():
-        _place(path, "an end site", end)
+        _three_numbers(path, "an end site", end)
     unseen = names(path, "its skeleton's unseen joints", data.get("unseen", []))
     for name in (*roles.values(), *(joint for link in links for joint in link), *ends, *unseen):
         if not _one_of(name, joints):
-            raise InputError(path, f"its skeleton names {_short(name)}, which is no joint of it")
+            raise InputError(path, f"its skeleton names {_short(name)}, which is not one of its joints")
 
 
 def _one_of(name: Any, joints: set[str]) -> bool:
     return isinstance(name, str) and name in joints
 
 
-def _place(path: str | Path, what: str, value: Any) -> None:
+def _three_numbers(path: str | Path, what: str, value: Any) -> None:
     """Three finite numbers, centimetres."""
     if not isinstance(value, list | tuple) or len(value) != 3:
         raise InputError(path, f"{what} is {_short(value)}, not three numbers")
@@ -186,7 +190,7 @@ def _place(path: str | Path, what: str, value: Any) -> None:
 
 
 def _short(value: Any) -> str:
-    """A value for a message: one line, printable, not long."""
+    """A value for a message: one short printable line."""
     if isinstance(value, list | tuple | dict) and len(value) > 8:
         return f"a {type(value).__name__} of {len(value)}"
     text = ascii(value)

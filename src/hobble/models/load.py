@@ -1,4 +1,4 @@
-"""Reading a network from disk: whatever its kind, wherever it comes from, whole and sound or not at all."""
+"""Read and check a network of any kind from disk."""
 
 from __future__ import annotations
 
@@ -21,23 +21,22 @@ from hobble.models.seen import Seen
 from hobble.rows.layout import GAITS, RowLayout
 
 MOST_META = 1 << 22  # characters
-WIDEST = 1e4  # centimetres from the path to the heights at its sides
-LARGEST_Y = 1e9  # of a prediction for the mean input; a sound one is below 1000
+WIDEST = 1e4  # cm from the path to the side heights
+LARGEST_Y = 1e9  # in the prediction for the mean input; sound values are below 1000
 
 
 def read_skeleton(path: str | Path) -> Skeleton:
-    """The skeleton of a file of config/skeletons. Raises InputError where it is none."""
+    """The skeleton of a file of config/skeletons. Raises InputError if it is not a valid skeleton."""
     data = checks.mapping(path, "a skeleton", read_yaml(path))
     keys = {key: value for key, value in data.items() if key != "maps"}
     return checks.skeleton(path, {"name": Path(path).stem, **keys})
 
 
 def load_network(path: str | Path, skeleton: Skeleton | str | Path | None = None) -> Network:
-    """Read weights.npz, a folder that holds one, or a folder of the original release's .bin files.
+    """Read weights.npz, its folder, or a folder of the original release's .bin files.
 
-    skeleton: for files that carry none (the original release's); it, or a file of config/skeletons.
-    Raises InputError where something is missing, damaged, not finite, out of range or of shapes that do not
-    fit: what is returned can run.
+    skeleton: a Skeleton or a file of config/skeletons, for files without one (the original release's).
+    Raises InputError if something is missing, damaged, not finite, out of range or of the wrong shape.
     """
     path = Path(path)
     if isinstance(skeleton, str | Path):
@@ -50,8 +49,8 @@ def load_network(path: str | Path, skeleton: Skeleton | str | Path | None = None
                 return network_from_arrays(path, arrays, skeleton)
         raise InputError(
             path,
-            "holds no weights.npz, and no Xmean.bin, W0_000.bin, ...: not a network",
-            fix="Train one (snakemake results/<configuration>/network/weights.npz), or name its folder.",
+            "not a network: it holds neither weights.npz nor Xmean.bin, W0_000.bin, ...",
+            fix="Train one (snakemake results/<configuration>/network/weights.npz), or pass its folder.",
         )
     return network_from_arrays(path, load_npz(path), skeleton)
 
@@ -59,11 +58,11 @@ def load_network(path: str | Path, skeleton: Skeleton | str | Path | None = None
 def network_from_arrays(
     path: str | Path, arrays: Mapping[str, Any], skeleton: Skeleton | None = None
 ) -> Network:
-    """Check the arrays and the `meta` of a file named `path` and build the network that they are."""
+    """Check the arrays and the `meta` of the file `path`, and build the network."""
     meta = _meta(path, arrays)
     kind = meta.get("kind", DEFAULT)
     if kind not in MODELS:
-        raise InputError(path, f"is a network of kind {kind!a:.40}; there are: {', '.join(MODELS)}")
+        raise InputError(path, f"is a network of kind {kind!a:.40}; known kinds: {', '.join(MODELS)}")
     statistics = checks.statistics(path, arrays)
     layout = _layout(path, meta, len(statistics["x_mean"]), len(statistics["y_mean"]), skeleton)
     if meta.get("skeleton"):
@@ -84,7 +83,7 @@ def network_from_arrays(
     }
     common["limits"] = _limits(path, meta, common["channels"], len(common["gaits"]))
     network = model(kind).read(path, arrays, common)
-    _try(path, network)
+    _check_prediction(path, network)
     return network
 
 
@@ -93,7 +92,7 @@ def _meta(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Any]:
         return {}
     array = np.asarray(arrays["meta"])
     if array.shape != () or array.dtype.kind != "U":
-        raise InputError(path, f"meta is an array of shape {array.shape} of {array.dtype}, not a text")
+        raise InputError(path, f"meta is an array of shape {array.shape} of {array.dtype}, not one text")
     text = str(array)
     if len(text) > MOST_META:
         raise InputError(path, f"meta is longer than {MOST_META} characters")
@@ -106,7 +105,7 @@ def _meta(path: str | Path, arrays: Mapping[str, Any]) -> dict[str, Any]:
 def _layout(
     path: str | Path, meta: Mapping[str, Any], x_size: int, y_size: int, skeleton: Skeleton | None
 ) -> RowLayout:
-    """The columns that the file states, which have to be as many as it has."""
+    """The file's layout of columns. Their number has to match the arrays."""
     if "layout" not in meta:
         layout = _guess_layout(x_size, y_size, skeleton)
     else:
@@ -118,7 +117,9 @@ def _layout(
         for key, (least, most) in known.items():
             checks.whole(path, f"layout.{key}", given[key], least, most)
         if given["window"] % given["step"]:
-            raise InputError(path, f"layout: a window of {given['window']} is no multiple of {given['step']}")
+            raise InputError(
+                path, f"layout: the window {given['window']} is not a multiple of the step {given['step']}"
+            )
         try:
             layout = RowLayout.from_dict(given)
         except (KeyError, TypeError, ValueError, OverflowError) as error:
@@ -126,7 +127,7 @@ def _layout(
         for name, columns in layout.channels:
             if name not in NAMES:
                 raise InputError(
-                    path, f"is told {name!a:.40}, a channel that is not here: {', '.join(NAMES)}"
+                    path, f"has the unknown channel {name!a:.40}; known channels: {', '.join(NAMES)}"
                 )
             checks.whole(path, f"layout.channels.{name}", columns, 0, x_size)
     if (layout.x_size, layout.y_size) != (x_size, y_size):
@@ -135,8 +136,10 @@ def _layout(
 
 
 def _guess_layout(x_size: int, y_size: int, skeleton: Skeleton | None) -> RowLayout:
-    """The layout of a file without one: the default window, joints from Y, and what X has left is the first
-    channel of so many columns."""
+    """The layout of a file without one: the default window, with the number of joints from the size of Y.
+
+    Columns of X that are left over become the first channel with that many columns.
+    """
     joints = max(1, (y_size - RowLayout(0).y_size) // 9)
     left = x_size - RowLayout(joints).x_size
     if left <= 0:
@@ -155,25 +158,25 @@ def _gaits(path: str | Path, meta: Mapping[str, Any]) -> tuple[str, ...]:
 def _labels(
     path: str | Path, name: str, meta: Mapping[str, Any], layout: RowLayout, skeleton: Skeleton | None
 ) -> tuple[str, ...]:
-    """The labels of a channel, by the file, else by the skeleton. Raises InputError where they do not fit."""
-    said = checks.mapping(path, "channels", meta.get("channels", {})).get(name)
-    given = said or next((meta[key] for key in channel(name).former if meta.get(key)), None)
+    """The labels of a channel, from the file or else the skeleton. Raises InputError if they do not fit."""
+    stated = checks.mapping(path, "channels", meta.get("channels", {})).get(name)
+    given = stated or next((meta[key] for key in channel(name).former if meta.get(key)), None)
     if given is None and skeleton is not None:
         given = channel(name).columns(skeleton)
     labels, columns = checks.names(path, f"channel {name}", given or ()), dict(layout.channels)[name]
     if len(labels) != columns:
-        raise InputError(path, f"{columns} inputs of channel {name}, but {len(labels)} are named")
+        raise InputError(path, f"channel {name} has {columns} inputs, but {len(labels)} labels")
     return labels
 
 
 def _limits(
     path: str | Path, meta: Mapping[str, Any], channels: Mapping[str, tuple[str, ...]], gaits: int
 ) -> dict[str, Limits]:
-    """How fast each channel that slows the body lets it go, where the file says so."""
+    """The speed limits of each channel that slows the body, if the file has them."""
     out = {}
     for name, given in checks.mapping(path, "limits", meta.get("limits", {})).items():
         if name not in channels:
-            raise InputError(path, f"has limits of {name!a:.40}, which it is not told")
+            raise InputError(path, f"has limits of {name!a:.40}, which is not one of its channels")
         table = checks.mapping(path, f"limits of {name}", given)
         try:
             out[name] = Limits.from_dict(table, gaits, len(channels[name]), channel(name).highest)
@@ -182,10 +185,10 @@ def _limits(
     return out
 
 
-def _try(path: str | Path, network: Network) -> None:
-    """Its weights may each be sound and overflow together: ask it for the mean input around the cycle."""
+def _check_prediction(path: str | Path, network: Network) -> None:
+    """Predict for the mean input at eight phases: weights that pass one by one may overflow together."""
     phase = np.arange(8) / 8
     with np.errstate(all="ignore"):
         y = network.predict(np.repeat(network.x_mean[None], len(phase), axis=0), phase)
     if not np.all(np.abs(y) < LARGEST_Y):
-        raise InputError(path, "predicts no finite pose, not even for its mean input", fix=checks.DIVERGED)
+        raise InputError(path, "does not predict a finite pose for its mean input", fix=checks.DIVERGED)

@@ -1,4 +1,4 @@
-"""What a folder of networks says of itself to those who train and load one."""
+"""The interface of a kind of network, as training and loading use it."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from hobble.models.trainable import Trainable
 
 
-class Made(Protocol):
-    """What training or building ends with, as it is written into a file."""
+class FinishedNetwork(Protocol):
+    """The result of training or building, ready to be written to a file."""
 
     @property
     def kind(self) -> str:
         """Its folder in hobble.models."""
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """What a file holds of it, from which its `Model.read` builds the network."""
+        """The arrays of its file; `Model.read` builds the network from them."""
 
     @property
     def about(self) -> dict[str, Any]:
-        """What a file's meta says of it, as JSON."""
+        """Its entries in the file's meta, as JSON."""
 
     @property
     def described(self) -> str:
@@ -38,10 +38,10 @@ class Made(Protocol):
 
 
 class Model(ABC):
-    """One kind of network: `MODEL` of its folder is a `Trained` or a `Built`.
+    """One kind of network. `MODEL` in its folder is a `Trained` or a `Built`.
 
-    What it takes to configure (pydantic), to train (PyTorch) and to run (numba) is imported in the methods
-    that need it: a game needs no PyTorch, and a configuration is checked without either.
+    Methods import pydantic, PyTorch and numba only when they need them. So a game needs no PyTorch, and
+    checking a configuration needs neither PyTorch nor numba.
     """
 
     @abstractmethod
@@ -52,37 +52,39 @@ class Model(ABC):
     def read(self, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Network:
         """The network of a file's arrays, as `Trainable.arrays` wrote them.
 
-        common: the fields of `hobble.models.network.Network`, already checked. Raises InputError, naming
-        `path`, for anything that could not run (`hobble.models.checks` helps).
+        common: the fields of `hobble.models.network.Network`, already checked. Raises InputError, with
+        `path`, for arrays that cannot run. Use `hobble.models.checks`.
         """
 
     def read_folder(self, folder: Path) -> Mapping[str, np.ndarray] | None:
-        """The arrays of a folder in a format of another program, or None where it is none of this kind's."""
+        """The arrays of a folder in another program's format, or None if it is not of this kind."""
         return None
 
 
 class Trained(Model):
-    """A kind that learns from the shuffled rows of a database, pass after pass."""
+    """A kind that is trained in passes over the shuffled rows of a database."""
 
     @abstractmethod
     def parameters(self, options: Any, inputs: int, outputs: int) -> int:
-        """How many numbers are trained, for rows of `inputs` and `outputs` columns."""
+        """The number of trained parameters, for rows of `inputs` and `outputs` columns."""
 
     @abstractmethod
     def trainable(self, options: Any, layout: RowLayout, skeleton: Skeleton, seed: int) -> Trainable:
-        """A network that has learnt nothing yet, on the CPU; the same seed gives the same one.
+        """A new, untrained network on the CPU. The same seed gives the same network.
 
-        layout: its columns, of the joints of `skeleton`.
+        layout: its columns, with the joints of `skeleton`.
         """
 
 
 class Built(Model):
-    """A kind that learns nothing: it is made at once, from the rows of the training clips in their order."""
+    """A kind without training: it is built from the rows of the training clips in their order."""
 
     @abstractmethod
-    def build(self, options: Any, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton) -> Made:
-        """What is made of the files of rows `clips` (`hobble.rows.clip_rows`).
+    def build(
+        self, options: Any, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton
+    ) -> FinishedNetwork:
+        """Build it from the files of rows `clips` (`hobble.rows.clip_rows`).
 
-        layout: of the database, whose channels may be fewer than those of the files. Raises InputError where
-        a file does not fit it.
+        layout: of the database; it may have fewer channels than the files. Raises InputError if a file does
+        not fit it.
         """

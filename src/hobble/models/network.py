@@ -1,4 +1,4 @@
-"""What every trained network is to those who run, measure and show it, whatever stands inside."""
+"""The interface of a trained network of any kind, as runtime, measurements and page use it."""
 
 from __future__ import annotations
 
@@ -18,51 +18,48 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.seen import Seen
 from hobble.rows.layout import GAITS, RowLayout
 
-TERRAIN_SIDE = 25.0  # centimetres from the path to the side heights, where a file does not tell
+TERRAIN_SIDE = 25.0  # cm from the path to the side heights, if the file does not say
 STORAGES = ("float32", "int16")
 
 Export = Callable[[Path, str], str]
 
 
 class Predictor(Protocol):
-    """A network prepared to run: what a character asks in every frame.
+    """A network prepared for fast evaluation, called in every frame.
 
-    network: what it was made of. One predictor serves one crowd: it may keep buffers between calls. What it
-    has to know of each character is not kept here but in the character: where `Network.memory` is above 0,
-    `evaluate` and `predict` take a last argument, `memory`, (C, Network.memory) float64. It is changed in
-    place, and zeros before a character's first frame.
+    Use one predictor for one crowd: it may keep buffers between calls. State of each character is kept in the
+    character: if `Network.memory` is above 0, `evaluate` and `predict` take a last argument `memory`,
+    (C, Network.memory) float64. They change it in place; it is zero before a character's first frame.
     """
 
     @property
     def network(self) -> Network:
-        """What it was made of."""
+        """The network it was made from."""
 
     def standardise(self, x: Array, z: Array) -> None:
-        """z = the inputs x as the network wants them, both (C, X) float32."""
+        """Write the standardised inputs x into z, both (C, X) float32."""
 
     def evaluate(self, z: Array, phase: Array, out: Array) -> None:
         """Write Y (C, Y) float32 of standardised inputs z (C, X) at phases (C,) in cycles into `out`."""
 
     def predict(self, x: Array, phase: Array, out: Array | None = None) -> Array:
-        """Y (C, Y) float32 of X (C, X) float32 at phases (C,): the two above in one."""
+        """Y (C, Y) float32 of X (C, X) float32 at phases (C,): `standardise`, then `evaluate`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Network(ABC):
-    """A network with the columns it reads and writes.
+    """A network with the columns that it reads and writes.
 
-    x_mean, x_std, y_mean, y_std: what standardises X and restores Y.
-    layout: the columns; gaits: the order of the gait blocks; skeleton: None where the file carries none.
-    channels: name -> labels of its columns, of each channel that it is told. terrain_side: centimetres from
-    the path to the heights at its sides. limits: channel -> how fast it lets the body go.
-    meta: what else the file says. seen: what training showed it, None where the file does not tell.
+    x_mean, x_std, y_mean, y_std: statistics to standardise X and restore Y.
+    layout: the columns; gaits: the order of the gait blocks; skeleton: None if the file has none.
+    channels: name -> labels of its columns, for each input channel. terrain_side: cm from the path to the
+    side heights. limits: channel -> speed limits.
+    meta: the file's other metadata. seen: ranges of the training data, None if the file has none.
     """
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
-    phase: ClassVar[bool] = True  # whether a prediction depends on the phase that it is given
-    rooted: ClassVar[bool] = (
-        False  # whether its movement of the root belongs to its pose, and is never held back
-    )
+    phase: ClassVar[bool] = True  # whether a prediction depends on the phase
+    rooted: ClassVar[bool] = False  # whether root movement belongs to the pose, so that it is never reduced
     modes: ClassVar[tuple[str, ...]] = ("exact",)  # of the predictor; the last one is exact
 
     x_mean: Array = field(repr=False)
@@ -79,9 +76,9 @@ class Network(ABC):
     seen: Seen | None = field(default=None, repr=False)
 
     def trained(self, channel: str) -> tuple[str, ...]:
-        """Labels of a channel's columns that told something in training, as the means of their inputs say.
+        """Labels of a channel's columns that were above 0 in training, by the means of the inputs.
 
-        All where none says so; () for a channel that the network is not told.
+        All labels if all means are 0; () for a channel that the network does not have.
         """
         labels = self.channels.get(channel, ())
         means = self.x_mean[self.layout.x_channel(channel)] if labels else ()
@@ -89,14 +86,14 @@ class Network(ABC):
 
     @property
     def memory(self) -> int:
-        """Numbers that a character keeps for it between frames; see `Predictor`."""
+        """How many numbers the network keeps in each character between frames; see `Predictor`."""
         return 0
 
     @classmethod
     def mode(cls, wanted: str | None) -> str:
-        """Which of `modes` runs where `wanted` is asked for: the exact one by default.
+        """The mode to run: `wanted`, or the exact one by default.
 
-        A network of one mode looks no phase up, so that any is right. Raises ValueError for an unknown one.
+        A network with only one mode accepts any name. Raises ValueError for an unknown mode.
         """
         if wanted is None or len(cls.modes) == 1:
             return cls.modes[-1]
@@ -112,44 +109,46 @@ class Network(ABC):
     @property
     @abstractmethod
     def parameters(self) -> int:
-        """Numbers that one prediction goes through: the weights and biases of one phase."""
+        """How many numbers one prediction reads: the weights and biases of one phase."""
 
     def stored(self, mode: str) -> int:
-        """Numbers that it keeps in memory to run in a mode, one of `modes`."""
+        """How many numbers it keeps in memory to run in a mode, one of `modes`."""
         return self.parameters
 
     @property
     @abstractmethod
     def described(self) -> str:
-        """What it is, for a sentence that begins with "A"."""
+        """What it is, to be put after "A" in a sentence."""
 
     @abstractmethod
     def predict(self, x: Array, phase: Array) -> Array:
-        """Y (n, Y) float32 of X (n, X) at phases (n,) in 0..1, all in raw units, in plain numpy."""
+        """Y (n, Y) float32 of X (n, X) at phases (n,) in 0..1, in raw units. Plain numpy, as a reference."""
 
     @abstractmethod
     def predictor(self, mode: str | None = None, storage: str = "float32") -> Predictor:
-        """Prepare it to run.
+        """Prepare it for fast evaluation.
 
         mode: one of `modes`, by default the exact one. storage: one of STORAGES. Raises ValueError for
-        another mode or storage.
+        an unknown mode or storage.
         """
 
     @abstractmethod
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """What `network.js` of its folder needs, as JSON, to predict the columns `outputs` of Y from the
-        columns `inputs` of X; the others weigh nothing."""
+        """The JSON that `network.js` needs to predict columns `outputs` of Y from columns `inputs` of X.
+
+        The weights of the other inputs are left out.
+        """
 
     @property
     def exports(self) -> dict[str, Export]:
-        """Formats of other programs: name -> write(target, mode), which returns what to tell the user."""
+        """Export formats: name -> write(target, mode), which returns a message for the user."""
         return {}
 
     def export(self, to: str, target: str | Path, mode: str) -> str:
-        """Write the network as `to`; raises HobbleError where it has no such format."""
+        """Write the network in format `to`. Raises HobbleError if it does not have this format."""
         if to not in self.exports:
-            there = ", ".join(self.exports) or "none"
-            raise HobbleError(f"a {self.kind} network cannot be written as {to}; formats: {there}")
+            known = ", ".join(self.exports) or "none"
+            raise HobbleError(f"a {self.kind} network cannot be written as {to}; formats: {known}")
         return self.exports[to](Path(target), mode)
 
 
@@ -160,5 +159,5 @@ def standardised(network: Network, x: Array) -> Array:
 
 
 def inverse(std: Array) -> Array:
-    """1 / std, and 0 for a column that never varied: it tells nothing and must not blow up."""
+    """1 / std, and 0 for a column that never varied, to avoid a division by 0."""
     return np.where(std > 0, 1 / np.maximum(std, 1e-30), 0)

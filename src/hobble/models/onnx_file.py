@@ -1,8 +1,8 @@
-"""Networks as one ONNX file: standardised, evaluated and restored inside the graph, and checked when written.
+"""Write and check a network as one ONNX file, with standardisation inside the graph.
 
-Inputs `x` (batch, X) and `phase` (batch,) in cycles, output `y` (batch, Y), float32, any batch. A network
-without a phase has that input too, so that every file is called alike. What it takes to write and to check a
-file is wanted here alone: pip install "hobble[onnx]".
+Inputs `x` (batch, X) and `phase` (batch,) in cycles, output `y` (batch, Y), float32, any batch. Networks that
+ignore the phase have this input too, so that all files are called in the same way. Only this module needs the
+onnx packages: pip install "hobble[onnx]".
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from hobble.core.files import atomic_path
 from hobble.models.network import Network, inverse
 
 OPSET = 15
-TOLERANCE = 1e-4  # of the runtime, in the units of Y, or of the value where it is above 1
+TOLERANCE = 1e-4  # difference from the runtime, in units of Y, relative for values above 1
 CHECKED_ROWS = 64
 
 
 class Graph:
-    """Collects nodes and constants under names of their own."""
+    """Collects nodes and constants and gives each a unique name."""
 
     def __init__(self, helper: Any, numpy_helper: Any) -> None:
         self.helper, self.numpy_helper = helper, numpy_helper
@@ -32,7 +32,7 @@ class Graph:
         self.constants: list[Any] = []
 
     def constant(self, value: Any, dtype: Any = np.float32) -> str:
-        """Its name in the graph."""
+        """Add a constant; returns its name."""
         name = f"c{len(self.constants)}"
         array = np.ascontiguousarray(value, dtype).reshape(np.shape(value))
         self.constants.append(self.numpy_helper.from_array(array, name))
@@ -49,10 +49,10 @@ Body = Callable[[Graph, str], str]
 
 
 def export(path: str | Path, network: Network, mode: str, body: Body) -> None:
-    """Write the network; its columns, skeleton and channels go along as metadata `hobble`.
+    """Write the network, with its columns, skeleton and channels as the metadata entry `hobble`.
 
-    body: adds what lies between standardised inputs, by name, and standardised outputs, whose name it
-    returns; "phase" names the phases. Raises HobbleError where the onnx package is not installed.
+    body: gets the name of the standardised inputs, adds the nodes of the network and returns the name of the
+    standardised outputs; "phase" is the name of the phases. Raises HobbleError if onnx is not installed.
     """
     try:
         import onnx
@@ -80,18 +80,17 @@ def export(path: str | Path, network: Network, mode: str, body: Body) -> None:
         producer_name="hobble",
         ir_version=helper.find_min_ir_version_for([opset]),
     )
-    helper.set_model_props(model, {"hobble": json.dumps(_about(network, mode))})
+    helper.set_model_props(model, {"hobble": json.dumps(_metadata(network, mode))})
     onnx.checker.check_model(model, full_check=True)
     with atomic_path(path) as temporary:
         temporary.write_bytes(model.SerializeToString(deterministic=True))
 
 
 def check(path: str | Path, network: Network, mode: str) -> float:
-    """The largest difference between the file, run by onnxruntime, and the runtime, over random rows.
+    """The largest difference between onnxruntime with the file and Hobble's runtime, over random rows.
 
-    It is in the units of Y, or in shares of the value where that is above 1.
-
-    Raises InputError where it is above TOLERANCE, HobbleError where onnxruntime is not installed.
+    In units of Y, relative for values above 1. Raises InputError if it is above TOLERANCE, HobbleError if
+    onnxruntime is not installed.
     """
     try:
         import onnxruntime
@@ -109,19 +108,19 @@ def check(path: str | Path, network: Network, mode: str) -> float:
     expected = network.predictor(mode).predict(x, phase.astype(float))
     difference = float((np.abs(y - expected) / np.maximum(1.0, np.abs(expected))).max())
     if not difference <= TOLERANCE:
-        raise InputError(path, f"onnxruntime gives other numbers than the runtime: off by {difference:.2g}")
+        raise InputError(path, f"onnxruntime and the runtime differ by {difference:.2g}")
     return difference
 
 
 def write(path: str | Path, network: Network, mode: str, body: Body) -> float:
-    """Export, and check before the file has its name; returns and raises what the two functions do."""
+    """`export` to a temporary file, `check` it, then give it its name. Returns the largest difference."""
     with atomic_path(path) as temporary:
         export(temporary, network, mode, body)
         return check(temporary, network, mode)
 
 
-def _about(network: Network, mode: str) -> dict[str, Any]:
-    """What a reader has to know of the columns."""
+def _metadata(network: Network, mode: str) -> dict[str, Any]:
+    """The metadata: what a reader needs to use the columns."""
     keys = ("configuration", "contacts", "limits", "units")
     return {
         "mode": mode,

@@ -1,4 +1,4 @@
-"""What every kind's section `network` of a configuration has."""
+"""The part of a configuration's `network` section that all kinds share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Matrix products at the speed of the machine."""
+"""Fast matrix products."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ _ONEDNN = torch.backends.mkldnn.is_available() and hasattr(torch.ops.mkldnn, "_l
 def product(a: Tensor, b: Tensor) -> Tensor:
     """a @ b.T for a (m, n) and b (k, n).
 
-    On a CPU, float32 goes to oneDNN: PyTorch gives it to MKL, which knows no 512-bit kernels for processors
-    other than Intel's and runs at half the speed (220 against 470 GFLOP/s on two cores of an EPYC 9005).
+    On a CPU, float32 uses oneDNN. PyTorch's default is MKL, which has no 512-bit kernels for processors other
+    than Intel's and is half as fast there (220 against 470 GFLOP/s on two cores of an EPYC 9005).
     """
     if _ONEDNN and a.dtype == torch.float32 and a.device.type == "cpu":
         return torch.ops.mkldnn._linear_pointwise(a, b, None, "none", [], "")

@@ -1,4 +1,4 @@
-"""What a network saw in training: the range of each column, the fastest joint, and a frame to start from."""
+"""Facts of the training data: the range of each column, the fastest joint, and a frame to start from."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ ARRAYS = {
     "start_x": "start_x",
     "start_y": "start_y",
 }
-STANDING = 0.99  # share of the gait from which a frame counts as standing
-FEW = 0.005  # share of the rows below which standing is too rare to be a start
+STANDING_GAIT = 0.99  # a frame with at least this share of the gait "stand" counts as standing
+MIN_STANDING_SHARE = 0.005  # if fewer rows stand, the start frame is not a standing one
 
 
 @dataclass(frozen=True)
 class Seen:
     """x_low, x_high, start_x (X,), y_low, y_high, start_y (Y,): raw units, float32.
 
-    fastest: of any joint in any row, cm a frame. start_x, start_y, start_phase: a row, one of a figure that
-    stands where the rows have it, else the one that is nearest to the mean of all.
+    fastest: largest speed of any joint in any row, cm a frame. start_x, start_y, start_phase: the row to
+    start from, which is the stillest standing one, or the row nearest to the mean if standing is rare.
     """
 
     x_low: Array = field(repr=False)
@@ -44,7 +44,7 @@ class Seen:
     fastest: float
 
     def arrays(self) -> dict[str, Array]:
-        """As they stand in a file."""
+        """The arrays of the file."""
         of_rows = {name: getattr(self, key) for name, key in ARRAYS.items()}
         return {**of_rows, "start_phase": np.float64(self.start_phase), "fastest": np.float64(self.fastest)}
 
@@ -53,7 +53,7 @@ class Seen:
         """From blocks of standardised rows, as `Database.blocks` gives them, and their statistics."""
         s = statistics
         stand = layout.x_gait.start + GAITS.index("stand") * layout.samples + layout.samples // 2
-        rest = s.x_mean[stand] > FEW
+        rest = s.x_mean[stand] > MIN_STANDING_SHARE
         body = np.r_[layout.x_position, layout.x_direction, layout.x_joint_position, layout.x_joint_velocity]
         low, high = (np.inf, np.inf), (-np.inf, -np.inf)
         best, start, fastest = np.inf, None, 0.0
@@ -63,9 +63,9 @@ class Seen:
             high = tuple(np.maximum(a, rows.max(axis=0)) for a, rows in zip(high, (x, y), strict=True))
             speed = np.linalg.norm(y[:, layout.y_joint_velocity].reshape(len(y), -1, 3), axis=-1)
             fastest = max(fastest, float(speed.max()))
-            if rest:  # the stillest of those that stand
+            if rest:  # the stillest standing row
                 far = np.square(x[:, layout.x_position]).sum(axis=1) + np.square(speed).sum(axis=1)
-                far = np.where(x[:, stand] >= STANDING, far, np.inf)
+                far = np.where(x[:, stand] >= STANDING_GAIT, far, np.inf)
             else:
                 far = np.square(block.x[:, body]).mean(axis=1)
             k = int(far.argmin())
@@ -80,7 +80,7 @@ class Seen:
 
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], x_size: int, y_size: int) -> Seen | None:
-        """From a file's arrays; None where it has none, as the original release. Raises InputError."""
+        """From a file's arrays; None if it has none, as the original release. Raises InputError."""
         if not any(name in arrays for name in (*ARRAYS, "start_phase", "fastest")):
             return None
         found: dict[str, Any] = {}
@@ -94,7 +94,7 @@ class Seen:
                 or np.shape(arrays[name]) != ()
                 or np.asarray(arrays[name]).dtype.kind != "f"
             ):
-                raise InputError(path, f"{name} is no number")
+                raise InputError(path, f"{name} is not a number")
             found[name] = checks.length(path, name, float(arrays[name]), 1e6, -1e-9)
         for block in "xy":
             if (found[f"{block}_low"] > found[f"{block}_high"]).any():

@@ -1,7 +1,7 @@
-"""Stacked layers prepared to run on a CPU: K sets of weights each, whose outputs are blended by given shares.
+"""Layers prepared to run on a CPU: K sets of weights each, whose outputs are blended by given shares.
 
-sum_k c_k (W_k x + b_k) equals blending the weights first, and no blended matrix is ever written to memory.
-One character is limited by how fast weights stream from memory; of a crowd, four go through a row together.
+sum_k c_k (W_k x + b_k) equals blending the weights first, but writes no blended matrix to memory. One
+character is limited by reading the weights from memory. In a crowd, four characters share each row read.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.network import STORAGES, Network, inverse
 
-BLOCK = 4  # characters of a crowd that go through a row of weights together
-FEW = 2  # up to so many, each goes by itself
-NEGLIGIBLE = 1e-7  # a share of which single precision keeps nothing beside another near 1
+BLOCK = 4  # characters of a crowd that are multiplied with a row of weights together
+SINGLE_UP_TO = 2  # up to this many characters, each is computed by itself
+NEGLIGIBLE = 1e-7  # smaller shares are below single precision next to a share near 1
 
 
 class Stack:
     """Layers (K, out, in) with biases (K, out), an ELU between them.
 
     storage: "float32", or "int16" with a factor for each row: half the memory traffic. Raises ValueError for
-    another.
+    any other.
     """
 
     def __init__(self, weights: Sequence[Array], biases: Sequence[Array], storage: str = "float32") -> None:
@@ -42,7 +42,7 @@ class Stack:
 
 
 class StackPredictor:
-    """What the predictors of networks made of stacks have in common: statistics, and buffers for a crowd."""
+    """Base of the predictors that use `Stack`: standardises inputs and restores outputs."""
 
     def __init__(self, network: Network) -> None:
         self.network = network
@@ -69,12 +69,12 @@ class StackPredictor:
         return out
 
     def restore(self, out: Array) -> None:
-        """Standardised outputs (C, Y) become raw ones, in place."""
+        """Turn standardised outputs (C, Y) into raw ones in place."""
         restore(out, self._y_mean, self._y_std)
 
 
 def _pack(weights: Array, storage: str) -> tuple[Array, Array]:
-    """Weights (K, out, in) as stored, and the factor of each row (K, out)."""
+    """Weights (K, out, in) in their storage type, and the factor of each row (K, out)."""
     if storage == "float32":
         return np.ascontiguousarray(weights), np.ones(weights.shape[:2], np.float32)
     scale = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30)
@@ -97,12 +97,12 @@ def restore(y: Any, mean: Any, std: Any) -> None:
             y[c, i] = y[c, i] * std[i] + mean[i]
 
 
-# Only the functions called from outside are kept on disk, and what they call is forced into them: otherwise
-# the compiler may round sums in another order when they come from disk.
+# Only functions called from Python are cached on disk; their callees are inlined. Otherwise the compiler may
+# sum in another order after loading from the cache, which changes the rounding.
 @njit(fastmath=True, forceinline=True, cache=False)
-def _one(w: Any, s: Any, b: Any, share: Any, x: Any, y: Any) -> None:
-    """y (out,) of one character's x (in,): four sets of weights stream side by side, those that weigh nothing
-    stay where they are."""
+def _run_one(w: Any, s: Any, b: Any, share: Any, x: Any, y: Any) -> None:
+    """y (out,) of one character's x (in,). Four sets of weights are read side by side; those with a
+    negligible share are skipped."""
     rows, columns = w.shape[1], w.shape[2]
     used, count = np.empty(w.shape[0], np.int64), 0
     for k in range(w.shape[0]):
@@ -133,13 +133,13 @@ def _one(w: Any, s: Any, b: Any, share: Any, x: Any, y: Any) -> None:
 
 
 @njit(fastmath=True, forceinline=True, cache=False)
-def _crowd(w: Any, s: Any, b: Any, shares: Any, x: Any, y: Any) -> None:
-    """y (C, out) of x (C, in): a row of each set of weights stays in the cache for all, four at a time."""
+def _run_crowd(w: Any, s: Any, b: Any, shares: Any, x: Any, y: Any) -> None:
+    """y (C, out) of x (C, in). A row of weights stays in the cache for all characters, four at a time."""
     sets, rows, columns = w.shape
     zero, last = np.float32(0), x.shape[0] - 1
     for r in range(rows):
         for start in range(0, x.shape[0], BLOCK):
-            # Where the last block is not full, its last character is computed again.
+            # If the last block is not full, its last character is computed several times.
             i, j = start, min(start + 1, last)
             m, n = min(start + 2, last), min(start + 3, last)
             x0, x1, x2, x3 = x[i], x[j], x[m], x[n]
@@ -165,11 +165,11 @@ def _run(weights: Any, scales: Any, biases: Any, x: Any, shares: Any, out: Any) 
     count, h = x.shape[0], x
     for i in range(len(weights)):
         y = np.empty((count, weights[i].shape[1]), np.float32)
-        if count > FEW:
-            _crowd(weights[i], scales[i], biases[i], shares, h, y)
+        if count > SINGLE_UP_TO:
+            _run_crowd(weights[i], scales[i], biases[i], shares, h, y)
         else:
             for m in range(count):
-                _one(weights[i], scales[i], biases[i], shares[m], h[m], y[m])
+                _run_one(weights[i], scales[i], biases[i], shares[m], h[m], y[m])
         if i < len(weights) - 1:
             for m in range(count):
                 for r in range(y.shape[1]):

@@ -1,8 +1,8 @@
-"""Products of a few rows with many weights, whose sums do not depend on how many rows there are.
+"""Products of a few rows with many weights. A row's bits do not depend on the number of rows.
 
-Weights lie in panels of WIDTH outputs: (panels, inputs, WIDTH), so that one input meets WIDTH weights that
-lie side by side. Every output is one running sum over the inputs in their order, each term fused into it. A
-tile keeps the sums of some rows by some panels in registers; its shape decides the speed and never the bits.
+Weights are stored in panels of WIDTH outputs, (panels, inputs, WIDTH), so that each input is multiplied with
+WIDTH neighbouring weights. Every output is one running sum over the inputs in their order, by fused
+multiply-add. A tile keeps the sums of some rows and panels in registers; its shape changes only the speed.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from numba.extending import intrinsic
 from hobble.core.compiled import njit
 from hobble.core.quat import Array
 
-WIDTH = 16  # outputs a panel: two registers with AVX2, one with AVX-512
-DEPTH = 256  # inputs at a time, or a little fewer: a panel of them stays in the first cache
+WIDTH = 16  # outputs in a panel: two registers with AVX2, one with AVX-512
+DEPTH = 256  # largest number of inputs at a time: their part of a panel stays in the L1 cache
 ALIGNMENT = 64  # bytes of a cache line
 
 
 def panels_of(outputs: int) -> int:
-    """How many panels hold so many outputs."""
+    """The number of panels for `outputs` outputs."""
     return -(-outputs // WIDTH)
 
 
 def aligned(size: int, dtype: Any) -> Array:
-    """(size,) zeros that begin at a cache line."""
+    """(size,) zeros, aligned to a cache line."""
     dtype = np.dtype(dtype)
     room = np.zeros(size * dtype.itemsize + ALIGNMENT, np.uint8)
     start = -room.ctypes.data % ALIGNMENT
@@ -38,7 +38,7 @@ def aligned(size: int, dtype: Any) -> Array:
 
 
 def in_panels(weights: Array) -> Array:
-    """Weights (..., out, in) as (..., panels, in, WIDTH), zeros behind the last output."""
+    """Weights (..., out, in) as (..., panels, in, WIDTH), padded with zeros after the last output."""
     *lead, outputs, inputs = weights.shape
     panels = panels_of(outputs)
     padded = np.zeros((*lead, panels * WIDTH, inputs), weights.dtype)
@@ -49,8 +49,10 @@ def in_panels(weights: Array) -> Array:
 def _write_tile(  # type: ignore[no-untyped-def]
     builder, rows, panels, weights, x, y, y_at, first, step, depth, x_at, x_step
 ):
-    """Write the loop of `_tile` in the compiler's own language, whose vectors are WIDTH numbers whatever the
-    processor: the sums stay in registers, which no compiler finds out from plain loops."""
+    """Write the loop of `_tile` in LLVM IR with vectors of WIDTH numbers, on every processor.
+
+    This keeps the sums in registers, which compilers do not achieve from plain loops.
+    """
     index, vector = ir.IntType(64), ir.VectorType(ir.FloatType(), WIDTH)
     fused = cgutils.get_or_insert_function(
         builder.module, ir.FunctionType(vector, [vector] * 3), f"llvm.fmuladd.v{WIDTH}f32"
@@ -98,18 +100,18 @@ def _weights_at(builder, weights, place, vector):  # type: ignore[no-untyped-def
 
 
 def _spread(builder, one, vector):  # type: ignore[no-untyped-def]
-    """A vector of the same number throughout."""
+    """A vector with the same number in all places."""
     nothing, lane = ir.Constant(vector, ir.Undefined), ir.IntType(32)
     first = builder.insert_element(nothing, one, lane(0))
     return builder.shuffle_vector(first, nothing, ir.Constant(ir.VectorType(lane, WIDTH), [0] * WIDTH))
 
 
 def _typed_tile(typing, rows, panels, weights, first, step, depth, x, x_at, x_step, y, y_at):  # type: ignore[no-untyped-def]
-    """Add to `rows` rows of y what `depth` inputs give for `panels` panels of weights.
+    """Add the products of `depth` inputs with `panels` panels of weights to `rows` rows of y.
 
-    weights, x, y: (n,) arrays. first: where the first panel's weights of these inputs are, step: from there
-    to the next panel's. x_at, x_step: where the first row's inputs are, and from there to the next row's.
-    y_at: (rows,) where each row's sums for the first panel are. rows, panels: known when compiled.
+    weights, x, y: (n,) arrays. first: index of the first panel's weights for these inputs; step: distance to
+    the next panel's. x_at: index of the first row's inputs; x_step: distance to the next row's. y_at: (rows,)
+    index of each row's sums for the first panel. rows, panels: compile-time constants.
     """
     if not (isinstance(rows, types.IntegerLiteral) and isinstance(panels, types.IntegerLiteral)):
         return None
@@ -136,9 +138,9 @@ def _has_32_registers() -> bool:
     return not getattr(config, "CPU_NAME", None) and bool(llvm.get_host_cpu_features().get("avx512f"))
 
 
-# Panels that go together with one row, with two or three, with four to six: about as many sums as there are
-# registers for, and enough to hide how long one addition takes.
-FEW, SOME, MANY = (6, 4, 4) if _has_32_registers() else (4, 2, 1)
+# Panels in a tile of one row, of two or three rows, and of four to six rows. The sums about fill the
+# registers, and there are enough of them to hide the latency of an addition.
+PANELS_FOR_1_ROW, PANELS_FOR_3_ROWS, PANELS_FOR_6_ROWS = (6, 4, 4) if _has_32_registers() else (4, 2, 1)
 ROWS = 6
 
 
@@ -148,12 +150,12 @@ def multiply(
 ) -> None:
     """Add W x to rows of y.
 
-    weights: (n,), of which those from `start` on are (panels, inputs, WIDTH). x: (n,) that begins with (rows,
-    inputs). y: (n,) with room for panels * WIDTH sums at each of y_at (rows,).
+    weights: (n,), from `start` on (panels, inputs, WIDTH). x: (n,), from 0 on (rows, inputs). y: (n,), with
+    panels * WIDTH sums at each index of y_at (rows,).
     """
     at = np.empty(ROWS, np.int64)
     tiles = -(-rows // ROWS)
-    wide = FEW if rows == 1 else SOME if rows <= 3 else MANY
+    wide = PANELS_FOR_1_ROW if rows == 1 else PANELS_FOR_3_ROWS if rows <= 3 else PANELS_FOR_6_ROWS
     stretches = -(-inputs // DEPTH)
     for stretch in range(stretches):
         k = inputs * stretch // stretches
@@ -162,8 +164,8 @@ def multiply(
         while panel < panels:
             together = wide if panel + wide <= panels else 1
             first = start + (panel * inputs + k) * WIDTH
-            # These weights stay in the first cache for all rows. Tiles of about the same height: a low one
-            # takes as long as a high one.
+            # These weights stay in the L1 cache for all rows. Tiles get about the same number of rows, since
+            # a tile with fewer rows takes as long as a full one.
             for n in range(tiles):
                 row = rows * n // tiles
                 count = rows * (n + 1) // tiles - row
@@ -180,33 +182,33 @@ def _chosen_tile(
     rows: int, panels: int, weights: Any, first: int, step: int, depth: int, x: Any, x_at: int, x_step: int,
     y: Any, at: Any,
 ) -> None:  # fmt: skip
-    """`_tile` for as many rows and panels as are known only now."""
+    """Call `_tile` with `rows` and `panels` as compile-time constants."""
     if rows == 1:
-        if panels == FEW:
-            _tile(1, FEW, weights, first, step, depth, x, x_at, x_step, y, at)
+        if panels == PANELS_FOR_1_ROW:
+            _tile(1, PANELS_FOR_1_ROW, weights, first, step, depth, x, x_at, x_step, y, at)
         else:
             _tile(1, 1, weights, first, step, depth, x, x_at, x_step, y, at)
     elif rows == 2:
-        if panels == SOME:
-            _tile(2, SOME, weights, first, step, depth, x, x_at, x_step, y, at)
+        if panels == PANELS_FOR_3_ROWS:
+            _tile(2, PANELS_FOR_3_ROWS, weights, first, step, depth, x, x_at, x_step, y, at)
         else:
             _tile(2, 1, weights, first, step, depth, x, x_at, x_step, y, at)
     elif rows == 3:
-        if panels == SOME:
-            _tile(3, SOME, weights, first, step, depth, x, x_at, x_step, y, at)
+        if panels == PANELS_FOR_3_ROWS:
+            _tile(3, PANELS_FOR_3_ROWS, weights, first, step, depth, x, x_at, x_step, y, at)
         else:
             _tile(3, 1, weights, first, step, depth, x, x_at, x_step, y, at)
     elif rows == 4:
-        if panels == MANY:
-            _tile(4, MANY, weights, first, step, depth, x, x_at, x_step, y, at)
+        if panels == PANELS_FOR_6_ROWS:
+            _tile(4, PANELS_FOR_6_ROWS, weights, first, step, depth, x, x_at, x_step, y, at)
         else:
             _tile(4, 1, weights, first, step, depth, x, x_at, x_step, y, at)
     elif rows == 5:
-        if panels == MANY:
-            _tile(5, MANY, weights, first, step, depth, x, x_at, x_step, y, at)
+        if panels == PANELS_FOR_6_ROWS:
+            _tile(5, PANELS_FOR_6_ROWS, weights, first, step, depth, x, x_at, x_step, y, at)
         else:
             _tile(5, 1, weights, first, step, depth, x, x_at, x_step, y, at)
-    elif panels == MANY:
-        _tile(6, MANY, weights, first, step, depth, x, x_at, x_step, y, at)
+    elif panels == PANELS_FOR_6_ROWS:
+        _tile(6, PANELS_FOR_6_ROWS, weights, first, step, depth, x, x_at, x_step, y, at)
     else:
         _tile(6, 1, weights, first, step, depth, x, x_at, x_step, y, at)

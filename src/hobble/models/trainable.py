@@ -1,4 +1,4 @@
-"""A network while it is trained: parameters in one buffer, and a way to find their gradient."""
+"""The interface of a network in training: parameters in one buffer, and a step that finds the gradient."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-EVERY = slice(None)
+ALL_ROWS = slice(None)
 
 
 class Step(Protocol):
     """The gradient of the mean squared error on one batch.
 
-    gradients: of the last call, one for each layer, of as many numbers in the same order. error: of the last
-    call, (B, Y), prediction minus y. generator: of the dropout, on CUDA.
+    gradients: of the last call, one for each layer, with the layer's numbers in the same order. error: of the
+    last call, (B, Y), prediction minus y. generator: for dropout on CUDA.
     """
 
     gradients: list[Tensor]
@@ -28,22 +28,25 @@ class Step(Protocol):
     generator: torch.Generator
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
-        """Find `gradients` for x (B, X), y (B, Y), p (B,); the mean squared error, a scalar tensor."""
+        """Find `gradients` for x (B, X), y (B, Y), p (B,). Returns the mean squared error, a scalar."""
 
-    def masks(self, rows: int, own: slice = EVERY) -> list[Tensor]:
-        """Draw the dropout of a batch of `rows` rows; that of the rows `own`, the others are for others."""
+    def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
+        """Draw the dropout masks of a batch of `rows` rows, and return those of the rows `own`.
+
+        Processes that share a batch each take their own rows of the same masks.
+        """
 
     def seed(self, seed: int) -> None:
-        """Begin a new sequence of dropout, 0 <= seed < 2^63."""
+        """Start a new sequence of dropout masks, 0 <= seed < 2^63."""
 
 
 @dataclass(frozen=True)
 class Trainable(ABC):
-    """Every parameter in one buffer `flat`, layer by layer.
+    """All parameters in one buffer `flat`, layer by layer.
 
-    A layer is (out, K, in + 1): K sets of weights, blended in whatever way the network has, the last column
-    being the bias. So the optimiser is one sweep and knows no architecture, and a layer is one product with
-    inputs expanded by a 1 and by the shares of the K.
+    A layer is (out, K, in + 1): K sets of weights that the network blends, with the bias as the last column.
+    So the optimiser is one loop for all architectures, and a layer is one product with the inputs, extended
+    by a 1 and multiplied by the K shares.
     """
 
     kind: ClassVar[str] = ""  # its folder in hobble.models
@@ -71,24 +74,21 @@ class Trainable(ABC):
 
     @abstractmethod
     def step(self, dropout: float, half: bool) -> Step:
-        """The way to find its gradient on the device it is on, as fast as can be.
-
-        half: round the factors of the products to bfloat16.
-        """
+        """The fastest `Step` on the network's device. half: round the factors of the products to bfloat16."""
 
     @abstractmethod
     def arrays(self) -> dict[str, np.ndarray]:
-        """What a file holds of it, from which its `Model.read` builds the network."""
+        """The arrays of its file; `Model.read` builds the network from them."""
 
     @property
     @abstractmethod
     def about(self) -> dict[str, Any]:
-        """What a file's meta says of it, as JSON; `network` is what it computes, in a line."""
+        """Its entries in the file's meta, as JSON. `network` is its formula in one line."""
 
     @property
     @abstractmethod
     def described(self) -> str:
-        """Its shape in a few words: a training goes on only with a network of the same."""
+        """Its shape in a few words. A training resumes only with a network of the same shape."""
 
     @cached_property
     def layers(self) -> list[Tensor]:
@@ -96,12 +96,12 @@ class Trainable(ABC):
         return self.views(self.flat)
 
     def views(self, flat: Tensor) -> list[Tensor]:
-        """The layers of a buffer laid out like `self.flat`: of a gradient, of a moment."""
+        """The layers of a buffer laid out like `self.flat`, such as a gradient."""
         parts = flat.split([prod(shape) for shape in self.shapes])
         return [part.view(shape) for part, shape in zip(parts, self.shapes, strict=True)]
 
     def to(self, device: torch.device | str, dtype: torch.dtype | None = None) -> Self:
-        """A copy elsewhere, or in another type."""
+        """A copy on another device or in another type."""
         return replace(self, flat=self.flat.to(device, dtype, copy=True))
 
 

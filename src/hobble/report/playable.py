@@ -18,7 +18,7 @@ from hobble.rows.layout import RowLayout
 from hobble.runtime import animation, controller, feet, trajectory
 from hobble.runtime.bounds import Bounds
 from hobble.runtime.character import start
-from hobble.runtime.limits import HURRIED, LAME_BELOW
+from hobble.runtime.limits import HURRY_FACTOR, LAME_BELOW
 from hobble.runtime.options import Runtime
 
 UNSEEN = 1e-7  # an input with a smaller scale has no effect
@@ -164,13 +164,13 @@ def _constants() -> dict[str, float]:
         "owedRate": trajectory.OWED_RATE,
         "owedWithin": trajectory.OWED_WITHIN,
         "mostOwed": trajectory.MOST_OWED,
-        "held": trajectory.HELD,
+        "held": trajectory.UNWISHED_LOSS,
         "furthestTurn": float(trajectory.FURTHEST_TURN),
         "strafeFrom": float(trajectory.STRAFE_FROM),
         "turnInPlace": float(animation.TURN_IN_PLACE),
         "jogFrom": animation.JOG_FROM,
         "lameBelow": LAME_BELOW,
-        "hurried": HURRIED,
+        "hurried": HURRY_FACTOR,
         "lockAt": feet.LOCK_AT,
         "release": feet.RELEASE,
         "tooFar": feet.TOO_FAR,
@@ -179,6 +179,6 @@ def _constants() -> dict[str, float]:
         "floating": feet.FLOATING,
         "bodyMix": feet.BODY_MIX,
         "bodyFree": feet.BODY_FREE,
-        "bodyFrom": feet.BODY_FROM,
+        "bodyFrom": feet.BODY_MIN_CONTACT,
         "mostAdded": feet.MOST_ADDED,
     }

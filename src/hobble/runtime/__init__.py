@@ -1,4 +1,4 @@
-"""The character at run time: the next pose, every frame. `ProceduralAnimation` is what a game takes."""
+"""The character at run time. A game uses `ProceduralAnimation`, which returns one pose a frame."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ __all__ = ["Pose", "ProceduralAnimation"]
 
 
 def __getattr__(name: str) -> Any:
-    """What the package offers, imported when it is first asked for.
+    """Import the public names on first use.
 
-    Snakemake reads the options of this package for every job, and need not wait for numpy and numba.
+    Snakemake reads the options of this package for every job and should not wait for numpy and numba.
     """
     if name in __all__:
         return getattr(importlib.import_module("hobble.runtime.animation"), name)

@@ -1,4 +1,4 @@
-"""A network for other programs: python -m hobble.runtime onnx|bin|bvh NETWORK TARGET.
+"""Export a network to other formats: python -m hobble.runtime onnx|bin|bvh NETWORK TARGET.
 
 python -m hobble.runtime onnx results/holden/network holden.onnx --mode cubic
 python -m hobble.runtime bin results/holden/network pfnn
@@ -23,17 +23,17 @@ from hobble.runtime.scenarios import write_motions
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
     parser = argparse.ArgumentParser(
-        prog="python -m hobble.runtime", description="A network for other programs."
+        prog="python -m hobble.runtime", description="Export a network to other formats."
     )
     parser.add_argument(
         "to",
         choices=("onnx", "bin", "bvh"),
-        help="one ONNX file, checked with onnxruntime; the original release's .bin files; generated motions",
+        help="onnx: one file, checked with onnxruntime; bin: the original release's files; bvh: motions",
     )
-    parser.add_argument("network", help="weights.npz, a folder that holds it, or a folder of .bin files")
+    parser.add_argument("network", help="weights.npz, its folder, or a folder of .bin files")
     parser.add_argument("target", help="the file or folder to write")
-    parser.add_argument("--mode", choices=get_args(PhaseMode), default="cubic", help="how phase is looked up")
-    parser.add_argument("--skeleton", help="for a network that carries none: a file of config/skeletons")
+    parser.add_argument("--mode", choices=get_args(PhaseMode), default="cubic", help="phase lookup")
+    parser.add_argument("--skeleton", help="a file of config/skeletons, if the network has no skeleton")
     options = parser.parse_args(arguments)
     try:
         network = load_network(options.network, options.skeleton)
@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _write(to: str, network: Network, target: str, mode: str) -> str:
     if to == "bvh":
         if network.skeleton is None:
-            raise HobbleError("the network carries no skeleton: name one with --skeleton")
+            raise HobbleError("the network has no skeleton: pass one with --skeleton")
         names = [track.scenario.name for track in write_motions(network, target, Runtime(mode=mode))]
         return f"{target}: {', '.join(names)}"
     return network.export(to, target, mode)

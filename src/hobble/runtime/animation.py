@@ -1,4 +1,4 @@
-"""The character as a game programmer takes it: load it once, ask it for the next pose every frame."""
+"""The public character: load it once, then call `next_pose` every frame."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.runtime.axes import Axes
-from hobble.runtime.character import Character, Kept, start
+from hobble.runtime.channel_values import ChannelValues, UnknownName
+from hobble.runtime.character import Character, Snapshot, start
 from hobble.runtime.controller import Controller
 from hobble.runtime.ground import as_ground
-from hobble.runtime.limits import JOG_FROM, Holder
-from hobble.runtime.told import Told, UnknownName
-from hobble.runtime.trajectory import STILL, wished
+from hobble.runtime.limits import JOG_FROM, SpeedLimiter
+from hobble.runtime.trajectory import STILL, facing_wish
 from hobble.runtime.waypoints import Follower, Waypoint
 
-# What a body can do, with room: sprinters reach 21 cm a frame, and the highest mountain is 9 km high.
+# Limits of the input, well above what is real: sprinters reach 21 cm a frame, mountains 9 km.
 FASTEST_WISH = 30.0  # cm a frame, 18 m/s
-FARTHEST = 1e7  # cm from the origin, 100 km: beyond it, places lose digits that a step needs
-TURN_IN_PLACE = np.radians(20)  # a standing figure steps around to face what is further aside than this
+FARTHEST = 1e7  # cm from the origin, 100 km: beyond it, positions are too imprecise for a step
+TURN_IN_PLACE = np.radians(20)  # a standing character steps around if it has to turn further than this
 
 
 @dataclass(frozen=True)
 class Pose:
-    """One frame, the caller's to keep and to change. For one character the leading axis C is left out.
+    """One frame. The caller may keep and change it. A single character has no leading axis C.
 
     positions: (C, J, 3); rotations: (C, J, 4) world, w first; contacts: (C, 4) left heel, left toe, right
-    heel, right toe, 0..1; phase: (C,) in cycles; root: (C, 3) where the trajectory is; yaw: (C,) radians of
-    its facing, 0 for +Z, growing to the left; told: channel -> (C, its columns), as the network was told.
+    heel, right toe, 0..1; phase: (C,) in cycles; root: (C, 3) on the trajectory; yaw: (C,) radians of the
+    root's facing, 0 for +Z, growing to the left; told: channel -> (C, columns), the network's inputs.
     """
 
     positions: Array = field(repr=False)
@@ -50,12 +50,12 @@ class Pose:
 
 
 class ProceduralAnimation:
-    """One or many characters that one network moves.
+    """One or many characters driven by one network.
 
         character = ProceduralAnimation.load("results/injured/network")
         pose = character.next_pose((0, 2.5), injury={"LeftUpLeg-LeftLeg": 7})
 
-    All characters answer to the same calls; with C > 1 every argument may be given once for all or for each.
+    One call moves all characters. With C > 1, every argument is either one value for all or one for each.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class ProceduralAnimation:
         facing: Any = None,
     ) -> None:
         if network.skeleton is None:
-            raise ValueError("the network carries no skeleton: load it with skeleton=")
+            raise ValueError("the network has no skeleton: load it with skeleton=")
         for name, value, least in (
             ("characters", characters, 1),
             ("steering", steering, 0),
@@ -88,7 +88,7 @@ class ProceduralAnimation:
                 raise ValueError(f"{name} is {value!r}, but has to be {bound}")
         self.network, self.skeleton = network, network.skeleton
         self.characters, self.axes = characters, axes or Axes()
-        self._told = Told(network, scales or {})
+        self._channel_values = ChannelValues(network, scales or {})
         self._limited = limits
         self._of_controller: dict[str, Any] = {
             "rates": {name: channel(name).rate for name in network.channels} | dict(rates or {}),
@@ -109,29 +109,32 @@ class ProceduralAnimation:
     def load(
         cls, path: str | Path, *, skeleton: Skeleton | str | Path | None = None, **options: Any
     ) -> ProceduralAnimation:
-        """From weights.npz, a folder that holds it, or a folder of the original release's .bin files.
+        """Load weights.npz, its folder, or a folder of the original release's .bin files.
 
-        skeleton: where the file carries none; it, or a file of config/skeletons. mode: "constant", "linear"
-        or "cubic". storage: "float32" or "int16". characters: how many. waypoints: a track to follow when
-        `next_pose` is given no velocity. rates: channel -> largest change of its values in a second, instead
-        of the channel's own; scales: channel -> what its values are divided by. foot_locking: hold feet in
-        contact where they landed. steering: how hard a velocity that is not reached is asked for, 0 as the
-        original. limits: hold the wish to what a body that is hurt so
-        can do. axes: the caller's convention. position, facing: as of `reset`. Raises InputError where the
-        file is not a network that fits, ValueError for an option out of range, UnknownName for a gait that
-        the network does not have.
+        skeleton: a Skeleton or a file of config/skeletons, for a file without one.
+        mode: "constant", "linear" or "cubic". storage: "float32" or "int16".
+        characters: how many.
+        waypoints: the track to follow when `next_pose` gets no velocity.
+        rates: channel -> largest change of its values per second; default: the channel's own rate.
+        scales: channel -> divisor of its values.
+        foot_locking: hold feet in contact where they landed.
+        steering: gain of the correction when the wished velocity is not reached; 0 as in the original.
+        limits: limit the wished speed to what the injured body can do.
+        axes: the caller's axes and unit. position, facing: see `reset`.
+
+        Raises InputError for a file that is not a usable network, ValueError for an option out of range,
+        UnknownName for a gait that the network does not have.
         """
         network = load_network(path, skeleton)
         if network.skeleton is None:
-            fix = f"Pass skeleton=, one of {network.layout.joints} joints: a file of config/skeletons, say."
-            raise InputError(path, "carries no skeleton", fix=fix)
+            fix = f"Pass skeleton= with {network.layout.joints} joints, such as a file of config/skeletons."
+            raise InputError(path, "has no skeleton", fix=fix)
         return cls(network, **options)
 
     def reset(self, position: Any = None, facing: Any = None) -> None:
-        """Stand anew at `position` (3,) or (C, 3) facing the direction `facing` (3,) or (C, 3), healthy.
+        """Restart healthy at `position` (3,) or (C, 3), facing the direction `facing` (3,) or (C, 3).
 
-        By default at the origin facing forward, or at the start of the waypoints, all characters in one
-        place.
+        Default: all characters at the origin facing forward, or at the start of the waypoints.
         """
         count = self.characters
         self.follower = Follower(self._waypoints, count) if self._waypoints is not None else None
@@ -153,18 +156,18 @@ class ProceduralAnimation:
         self._wish_gait = np.zeros((count, len(self._gaits)))
         self._wish_strafe, self._wish_look = np.zeros(count), np.zeros((count, 2))
         self._nowhere = np.zeros((count, 2))
-        self._holder = Holder(self.network, self._told.columns, count)
+        self._limiter = SpeedLimiter(self.network, self._channel_values.columns, count)
 
     @property
     def seconds(self) -> Array:
-        """(6,) seconds that the last frame spent in prepare, input, insert, predict, output, update."""
+        """(6,) seconds of the last frame's steps: prepare, input, insert, predict, output, update."""
         return self._controller.seconds
 
     @property
     def predicted_rotations(self) -> Array:
-        """(C, J, 4) world rotations that the network predicted for the last frame, before any was held back.
+        """(C, J, 4) world rotations that the network predicted for the last frame, before any limit.
 
-        In axes of our own: Y up, Z ahead.
+        In Hobble's axes: Y up, Z forward.
         """
         made = self._controller
         turns = made.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)
@@ -179,43 +182,47 @@ class ProceduralAnimation:
         terrain: Any = None,
         **told: Mapping[str, Any] | Array | None,
     ) -> Pose:
-        """One 60 Hz frame on.
+        """Advance by one 60 Hz frame and return the pose.
 
-        target_velocity: (2,) on the ground or (3,), or (C, 2 or 3), how far to go in this frame (at 60 Hz, in
-        your unit); None follows the waypoints or stands. facing: direction to look in, likewise, of any
-        length; None or zero looks where it goes. gait: a name ("walk"), one for each, shares (6,) or (C, 6),
-        or None to choose by speed; below 0.1 cm a frame the figure stands, whatever the gait. told: by the
-        name of a channel (injury={"LeftUpLeg-LeftLeg": 7}) label -> value (or (C,) values), or (L,) or (C,
-        L); labels not named go back to 0; None, or no such keyword, leaves the channel as it was. terrain:
-        None for flat at zero, a function of two ground coordinates (arrays) to heights, a `ground.Heightmap`
-        or a 2D array around the origin, all in your axes and unit; give the same object every frame. Raises
-        UnknownName (a KeyError) for a label or gait that the network does not have, TypeError for a keyword
-        that is no channel, ValueError for a channel that the network is not told, for values out of range (a
-        velocity above 18 m/s, a share of a gait above 1, ground above 100 km) and for what is not finite or
-        of another shape. Whatever is raised, in the terrain function too, the state is as it was.
+        target_velocity: (2,) on the ground, (3,), or (C, 2 or 3): distance per frame, in your unit. None
+        follows the waypoints, or stands.
+        facing: direction to look in, same shapes, any length. None or zero: where the character goes.
+        gait: a name ("walk"), one name for each character, shares (6,) or (C, 6), or None to choose by speed.
+        Below 0.1 cm a frame the character stands, whatever the gait.
+        terrain: None for flat ground at 0; a function of two ground coordinates (arrays) that returns
+        heights; a `ground.Heightmap`; or a 2D array around the origin. All in your axes and unit. Pass the
+        same object every frame.
+        told: keywords named after channels, such as injury={"LeftUpLeg-LeftLeg": 7}. The value is
+        label -> value (or (C,) values), or an array (L,) or (C, L). Labels that are not named go back to 0.
+        None, or no keyword, leaves the channel unchanged.
+
+        Raises UnknownName (a KeyError) for a label or gait that the network does not have; TypeError for a
+        keyword that is no channel; ValueError for a channel that the network has no input for, for values out
+        of range (velocity above 18 m/s, gait share above 1, ground above 100 km), for values that are not
+        finite and for wrong shapes. After any error, also in the terrain function, the state is unchanged.
         """
         velocity, ahead, gait = self._wish(target_velocity, facing, gait)
         strafe, direction = self._wish_strafe, self._wish_look
         ahead = self._nowhere if ahead is None else ahead
-        wished(velocity, ahead, self.state.target_direction, strafe, direction)
+        facing_wish(velocity, ahead, self.state.target_direction, strafe, direction)
         shares = self._gait(velocity, direction, gait)
         if terrain is not self._terrain[0]:
             self._terrain = (terrain, as_ground(terrain, self.axes))
         targets = [
-            self._told.values(name, given, self.characters)
+            self._channel_values.values(name, given, self.characters)
             for name, given in told.items()
             if given is not None
         ]
         made = self._controller
-        before = None if self._terrain[1] is None else Kept(self.state, made.root, made.yaw)
+        before = None if self._terrain[1] is None else Snapshot(self.state, made.root, made.yaw)
         try:
             for columns, values in targets:
                 self.state.told_target[:, columns] = values
             if self._limited:
-                self._holder.hold(self.state.told, velocity, shares)
+                self._limiter.hold(self.state.told, velocity, shares)
             made.frame(velocity, direction, strafe, shares, self._terrain[1])
         except BaseException:
-            if before is not None:  # without a ground of the caller's own nothing in a frame can fail
+            if before is not None:  # on flat ground nothing in a frame can fail
                 before.restore()
             raise
         return self._pose()
@@ -244,7 +251,7 @@ class ProceduralAnimation:
         return wish, ahead, [w.gait for w in heading] if gait is None else gait
 
     def _level(self, what: str, vector: Any, convert: Any) -> Array:
-        """The caller's vectors as our x, z (C, 2); two components are those on the ground."""
+        """The caller's vectors as Hobble's x, z (C, 2). Two components are taken as ground coordinates."""
         v = np.asarray(vector, float)
         if (
             v.shape[-1:] not in ((2,), (3,))
@@ -252,7 +259,7 @@ class ProceduralAnimation:
             or v.shape[:-1] not in ((), (1,), (self.characters,))
         ):
             each = f", or one for each of {self.characters}" if self.characters > 1 else ""
-            raise ValueError(f"{what} is a vector of 2 or 3 components{each}, not of shape {v.shape}")
+            raise ValueError(f"{what} has to be a vector of 2 or 3 components{each}, not of shape {v.shape}")
         if not np.isfinite(v).all():
             raise ValueError(f"{what} is not a finite vector: {vector}")
         if v.shape[-1] == 2:
@@ -266,7 +273,7 @@ class ProceduralAnimation:
         return np.array(np.broadcast_to(v[..., ::2], (self.characters, 2)), order="C")
 
     def _gait(self, velocity: Array, direction: Array, gait: Any) -> Array:
-        """Shares (C, 6) of each gait that the wish amounts to."""
+        """Shares (C, 6) of the gaits, from the caller's gait, speed and facing."""
         shares = self._wish_gait
         speed = np.hypot(velocity[:, 0], velocity[:, 1])
         given = np.asarray(gait)
@@ -274,8 +281,8 @@ class ProceduralAnimation:
             known = (given >= 0) & (given <= 1)
             if given.shape not in (shares.shape, shares.shape[1:]) or not known.all():
                 raise ValueError(
-                    f"shares of gaits are {shares.shape[1:]} or {shares.shape} numbers from 0 to 1, not "
-                    f"{given.tolist()}; their order: {', '.join(self._gaits)}"
+                    f"gait shares have to be {shares.shape[1:]} or {shares.shape} numbers from 0 to 1, not "
+                    f"{given.tolist()}; order: {', '.join(self._gaits)}"
                 )
             shares[:] = given
             return shares
@@ -300,7 +307,7 @@ class ProceduralAnimation:
             raise UnknownName("no gait", name, self._gaits)
 
     def _turning(self, c: int, direction: Array) -> float:
-        """1 where a standing figure has to step around to face `direction`, else 0."""
+        """1 if a standing character has to step around to face `direction`, else 0."""
         x, z = self.state.direction[c, self.network.layout.window]
         angle = np.arctan2(direction[0] * z - direction[1] * x, direction[0] * x + direction[1] * z)
         return float(abs(angle) > TURN_IN_PLACE)
@@ -312,7 +319,7 @@ class ProceduralAnimation:
             positions[:], root[:] = self.axes.points_out(positions), self.axes.points_out(root)
             rotations = self.axes.rotations_out(rotations)
         contacts = np.minimum(np.maximum(c.y[:, self._contacts], 0), 1)
-        told = {name: state.told[:, columns].copy() for name, columns in self._told.columns.items()}
+        told = {name: state.told[:, columns].copy() for name, columns in self._channel_values.columns.items()}
         if self.characters > 1:
             return Pose(positions, rotations, contacts, state.phase.copy(), root, c.yaw.copy(), told)
         return Pose(

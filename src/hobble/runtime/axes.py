@@ -1,4 +1,4 @@
-"""The caller's axes and unit, converted in one place; ours: right-handed, Y up, +Z forward, cm."""
+"""Conversion between the caller's axes and unit and Hobble's: right-handed, Y up, +Z forward, cm."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-# Rows: the caller's x, y, z in terms of ours (left, up, forward).
+# Rows: the caller's x, y, z, as combinations of Hobble's axes (left, up, forward).
 MATRICES = {
     ("right", "Y"): ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
     # Unity: x to the right, z forward.
     ("left", "Y"): ((-1, 0, 0), (0, 1, 0), (0, 0, 1)),
-    # Blender: a figure faces -y, its left is +x.
+    # Blender: the character faces -y, and its left is +x.
     ("right", "Z"): ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
     # Unreal: x forward, y to the right.
     ("left", "Z"): ((0, 0, 1), (-1, 0, 0), (0, 1, 0)),
@@ -24,7 +24,7 @@ UNITS = {"cm": 1.0, "m": 0.01}
 
 @dataclass(frozen=True)
 class Axes:
-    """A convention: handedness, the axis that points up, and the unit of length.
+    """The caller's convention: handedness, up axis, unit of length.
 
     Velocities are per 60 Hz frame in every convention; quaternions are w first.
     """
@@ -39,37 +39,37 @@ class Axes:
 
     @property
     def native(self) -> bool:
-        """Whether nothing needs converting."""
+        """Whether this is Hobble's own convention, so that no conversion is needed."""
         return (self.handed, self.up, self.unit) == ("right", "Y", "cm")
 
     @property
     def matrix(self) -> Array:
-        """(3, 3) signed permutation that takes our directions to the caller's."""
+        """(3, 3) signed permutation from Hobble's directions to the caller's."""
         return np.array(MATRICES[self.handed, self.up], float)
 
     @property
     def scale(self) -> float:
-        """The caller's units in a centimetre."""
+        """How many of the caller's units are one centimetre."""
         return UNITS[self.unit]
 
     def directions_out(self, v: Array) -> Array:
-        """Our directions (..., 3) as the caller's."""
+        """Convert Hobble's directions (..., 3) to the caller's."""
         return v @ self.matrix.T
 
     def directions_in(self, v: Array) -> Array:
-        """The caller's directions (..., 3) as ours."""
+        """Convert the caller's directions (..., 3) to Hobble's."""
         return v @ self.matrix
 
     def points_out(self, p: Array) -> Array:
-        """Our positions or velocities (..., 3), cm, as the caller's."""
+        """Convert Hobble's positions or velocities (..., 3), cm, to the caller's."""
         return self.directions_out(p) * self.scale
 
     def points_in(self, p: Array) -> Array:
-        """The caller's positions or velocities (..., 3) as ours, cm."""
+        """Convert the caller's positions or velocities (..., 3) to Hobble's, cm."""
         return self.directions_in(p) / self.scale
 
     def rotations_out(self, q: Array) -> Array:
-        """Our rotations (..., 4) as the caller's: M R M^-1, whose axis turns over with a change of hand."""
+        """Convert Hobble's rotations (..., 4) to the caller's: M R M^-1. A change of hand flips the axis."""
         out = np.array(q, float)
         out[..., 1:] = self.directions_out(out[..., 1:]) * np.linalg.det(self.matrix).round()
         return out

@@ -1,4 +1,4 @@
-"""What a character is between two frames: pose, trajectory, phase, wishes, what it is told, feet."""
+"""A character's state between frames: pose, trajectory, phase, targets, channel values, feet."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from hobble.models.network import Network
 class Character:
     """The state of C characters, changed in place by the controller. World axes, cm, velocities per frame.
 
-    position, direction: (C, T, 2) trajectory; gait: (C, T, 6). ground: (C, samples, 3) heights at left, path,
-    right; root_height: (C,) mean of those on the path. joint_position, joint_velocity: (C, J, 3);
-    joint_rotation: (C, J, 4) world: the network's own copy. phase: (C,). told, told_target: (C, K) every
-    channel's columns side by side.
-    target_velocity, target_direction: (C, 2); strafe: (C,); owed: (C, 2) of `trajectory.follow_wish`.
-    foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2), foot_added (C, 2, 2, 4),
-    body_lift (C,): of `feet`. placed: (C,) whether joints have been lifted to the ground of the start.
-    memory: (C, M) what the network keeps of it, of `Network.memory`.
+    position, direction: (C, T, 2) trajectory; gait: (C, T, 6).
+    ground: (C, samples, 3) heights at left, path, right; root_height: (C,) mean of the heights on the path.
+    joint_position, joint_velocity: (C, J, 3); joint_rotation: (C, J, 4) world. This is the network's copy.
+    phase: (C,). told, told_target: (C, K) present and wanted values of all channels' columns.
+    target_velocity, target_direction: (C, 2); strafe: (C,); owed: (C, 2): see `trajectory.follow_wish`.
+    foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2), foot_added (C, 2, 2, 4), body_lift (C,): see
+    `feet`.
+    placed: (C,) whether the joints have been lifted to the ground at the start.
+    memory: (C, M) the network's own state of the character, see `Network.memory`.
     """
 
     position: Array
@@ -49,24 +50,24 @@ class Character:
     memory: Array
 
 
-class Kept:
-    """What a character is now, with its root and yaw, to be put back where the frame that follows fails."""
+class Snapshot:
+    """A copy of the state (and of other arrays), to restore it if the frame fails."""
 
     def __init__(self, state: Character, *more: Array) -> None:
         arrays = (*(getattr(state, field.name) for field in fields(state)), *more)
         self._arrays = [(array, array.copy()) for array in arrays]
 
     def restore(self) -> None:
-        """Write it back, into the arrays in which it was."""
+        """Copy the values back into the same arrays."""
         for array, before in self._arrays:
             array[...] = before
 
 
 def start(network: Network, characters: int, position: Array, yaw: Array) -> Character:
-    """C characters at ground positions (C, 2), facing `yaw` (C,) in radians, healthy.
+    """C healthy characters at ground positions (C, 2), facing `yaw` (C,) in radians.
 
-    They are in a frame of the clips, one of a figure that stands where there was any, as the network's file
-    has it; in its mean pose where the file has none.
+    They start in the frame that the network's file names, a standing one if the clips have any. If the file
+    names none, they start in the network's mean pose.
     """
     layout, seen = network.layout, network.seen
     count = characters
@@ -107,7 +108,10 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
 
 
 def _past(network: Network) -> tuple[Array, Array, Array]:
-    """Path (T, 2), facing (T, 2) and gait (T, 6) of the start, from its root; still where none is known."""
+    """Path (T, 2), facing (T, 2) and gait (T, 6) of the start frame, relative to its root.
+
+    Standing still if the file has no start frame.
+    """
     layout, seen = network.layout, network.seen
     length = 2 * layout.window
     if seen is None:
@@ -126,7 +130,7 @@ def _past(network: Network) -> tuple[Array, Array, Array]:
 
 
 def _turned(vectors: Array, sin: Array, cos: Array) -> Array:
-    """Vectors (N, 2 or 3) turned about Y by C angles whose sine and cosine are (C, 1): (C, N, 2 or 3)."""
+    """Vectors (N, 2 or 3) turned about Y by C angles: (C, N, 2 or 3). sin, cos: (C, 1)."""
     x, z = vectors[:, 0], vectors[:, -1]
     parts = [
         x * cos + z * sin,

@@ -1,13 +1,11 @@
 """One frame of a character in six timed steps: prepare, input, insert, predict, output, update.
 
-- prepare: the caller's wish becomes targets, the future trajectory bends toward them, the ground is looked
-up;
-- input: trajectory, gait, ground, last pose and what the channels tell are put into a row X, in the root
-frame;
-- insert: the row is standardised into the network's input;
-- predict: the network at the present phase gives Y;
-- output: Y becomes the pose in the world, and the copy for the caller gets its feet placed;
-- update: root, past and future trajectory and phase move on by one frame.
+- prepare: smooth the caller's wish into targets, bend the future trajectory toward them, look up the ground;
+- input: write trajectory, gait, ground, last pose and channel values into a row X, in the root frame;
+- insert: standardise the row;
+- predict: evaluate the network at the present phase, which gives Y;
+- output: turn Y into a world pose, and place the feet of the caller's copy;
+- update: advance root, past and future trajectory, and phase by one frame.
 """
 
 from __future__ import annotations
@@ -27,27 +25,26 @@ from hobble.core.quat import Array
 from hobble.models.network import Predictor
 from hobble.rows.layout import BODY
 from hobble.runtime import feet, trajectory
-from hobble.runtime.bounds import Bounds, keep_within, unsound
+from hobble.runtime.bounds import Bounds, clip_rows, find_unsound
 from hobble.runtime.character import Character, start
 
-met = register_jitable(rule.met)
+joint_place = register_jitable(rule.joint_place)
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
-HIGHEST = 1e7  # cm that ground may be above or below 0, 100 km: beyond it, heights lose digits
-# Radians a frame (1500 degrees a second). No joint of a person who walks or runs turns as fast, but a
-# prediction between rotations half a turn apart, such as hands have, may point anywhere, and a new wish
-# changes the next pose at once.
+HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; beyond it, heights are imprecise
+# Radians a frame (1500 degrees a second). No joint of a walking or running person turns as fast. But a
+# prediction between two rotations half a turn apart, as in hands, may point anywhere, and a new wish changes
+# the next pose at once.
 FASTEST_TURN = np.radians(25)
 
 Ground = Callable[[Array, Array], Array]
 
 
 class Controller:
-    """Runs characters of one network; `seconds` (6,) holds what each of STEPS took in the last frame.
+    """Runs the characters of one network. `seconds` (6,) holds the time of each of STEPS in the last frame.
 
-    rates: channel -> largest change of one of its values in a second; foot_locking: hold feet in contact
-    where they landed; steering: as of `trajectory.follow_wish`; side: centimetres from the path to the side
-    heights.
+    rates: channel -> largest change of its values per second; foot_locking: hold feet in contact where they
+    landed; steering: see `trajectory.follow_wish`; side: cm from the path to the side heights.
     """
 
     def __init__(
@@ -73,9 +70,9 @@ class Controller:
         self.root = np.stack([here[:, 0], np.zeros(count), here[:, 1]], axis=1)
         self.yaw = np.arctan2(ahead[:, 0], ahead[:, 1])
         self.bounds = Bounds.of(network)
-        # What the network keeps of each character, for those that keep anything.
+        # Passed to `evaluate` only if the network has a memory.
         self._memory = (character.memory,) if network.memory else ()
-        self._wild = np.zeros(count, bool)
+        self._unsound = np.zeros(count, bool)
         self.pose_position = character.joint_position.copy()
         self.pose_rotation = character.joint_rotation.copy()
         self._points = np.zeros((count, layout.samples, 3, 2))
@@ -104,26 +101,26 @@ class Controller:
         wish_gait: Array,
         ground: Ground | None,
     ) -> None:
-        """Run one frame; wishes as of `trajectory.follow_wish`; ground gives heights (N,) at x, z (N,)."""
+        """Run one frame. Wishes: see `trajectory.follow_wish`. ground returns heights (N,) at x, z (N,)."""
         clock = perf_counter
         t0 = clock()
         c = self.character
-        if unsound(
+        if find_unsound(
             c.position, c.direction, c.gait, c.joint_position, c.joint_velocity, c.joint_rotation, c.told,
             c.target_velocity, c.target_direction, c.owed, c.foot_hold, c.foot_lift, c.body_lift,
-            c.foot_added, c.memory, c.phase, self._wild,
+            c.foot_added, c.memory, c.phase, self._unsound,
         ):  # fmt: skip
             self._restore("the state")
         self._prepare(wish_velocity, wish_direction, wish_strafe, wish_gait, ground)
         t1 = clock()
         self._input()
-        keep_within(self.x, self.bounds.x_low, self.bounds.x_high, self._wild)
+        clip_rows(self.x, self.bounds.x_low, self.bounds.x_high, self._unsound)
         t2 = clock()
         self.predictor.standardise(self.x, self.z)
         t3 = clock()
         self.predictor.evaluate(self.z, c.phase, self.y, *self._memory)
-        if keep_within(self.y, self.bounds.y_low, self.bounds.y_high, self._wild):
-            self._warn("the network's answer")
+        if clip_rows(self.y, self.bounds.y_low, self.bounds.y_high, self._unsound):
+            self._warn("the network's prediction")
         t4 = clock()
         self._output(ground)
         t5 = clock()
@@ -132,9 +129,9 @@ class Controller:
         self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
 
     def _restore(self, what: str) -> None:
-        """Start the characters of `_wild` anew where they were; what they are told stays."""
+        """Restart the characters marked in `_unsound` where they were; wanted channel values stay."""
         self._warn(what)
-        some = np.flatnonzero(self._wild)
+        some = np.flatnonzero(self._unsound)
         fresh = start(self.predictor.network, len(some), self.root[some][:, ::2], self.yaw[some])
         for part in fields(fresh):
             if part.name != "told_target":
@@ -143,8 +140,8 @@ class Controller:
     def _warn(self, what: str) -> None:
         if not self._warned:
             warnings.warn(
-                f"{what} was not finite for {int(self._wild.sum())} characters; they go on from a pose of "
-                "the clips, where they were",
+                f"{what} was not finite for {int(self._unsound.sum())} characters; they restart from a pose "
+                "of the clips, where they were",
                 RuntimeWarning,
                 stacklevel=4,
             )
@@ -165,7 +162,7 @@ class Controller:
             level = self._points.reshape(-1, 2)
             c.ground[:] = _heights(ground, level[:, 0], level[:, 1]).reshape(c.ground.shape)
         trajectory.stand_on(c.ground, c.root_height)
-        if not c.placed.all():  # where a figure starts the ground may be anywhere
+        if not c.placed.all():  # at the start the ground may have any height
             new = ~c.placed
             c.joint_position[new, :, 1] += c.root_height[new, None]
             self.root[new, 1] = c.root_height[new]
@@ -204,18 +201,20 @@ class Controller:
     def _update(self, velocity: Array) -> None:
         c = self.character
         whole = self.predictor.network.rooted
-        held = trajectory.HELD if self.steering > 0 and not whole else 0.0
+        held = trajectory.UNWISHED_LOSS if self.steering > 0 and not whole else 0.0
         trajectory.advance(
             self.y, self._y_columns, velocity, held, whole, c.position, c.direction, c.gait, c.phase
         )  # fmt: skip
 
 
 def _heights(ground: Ground, x: Array, z: Array) -> Array:
-    """The caller's ground at x, z (N,); raises ValueError where it is not finite, which would stay in the
-    state."""
+    """The caller's ground at x, z (N,).
+
+    Raises ValueError for heights that are not finite, because they would stay in the state.
+    """
     heights = np.asarray(ground(x, z), float)
     if heights.shape not in ((), x.shape):
-        raise ValueError(f"the terrain gave heights of shape {heights.shape} for {x.size} places")
+        raise ValueError(f"the terrain returned heights of shape {heights.shape} for {x.size} points")
     if not np.isfinite(heights).all():
         raise ValueError("the terrain has heights that are not finite")
     if np.abs(heights).max() > HIGHEST:
@@ -228,7 +227,7 @@ def _fill_input(
     position: Any, direction: Any, gait: Any, ground: Any, height: Any, joints: Any, velocities: Any,
     told: Any, at: Any, told_at: Any, step: int, x: Any,
 ) -> None:  # fmt: skip
-    """Fill rows X; at: first columns of the blocks of BODY; told_at: (K,) the columns of what is told."""
+    """Fill rows X. at: first columns of the blocks of BODY; told_at: (K,) columns of the channel values."""
     middle, samples = position.shape[1] // 2, ground.shape[1]
     for c in range(x.shape[0]):
         px, pz = position[c, middle]
@@ -266,9 +265,12 @@ def _take_output(
     y: Any, at: Any, position: Any, direction: Any, height: Any, joints: Any, velocities: Any, rotations: Any,
     fastest: float, root: Any, yaw: Any, pose_position: Any, pose_rotation: Any,
 ) -> None:  # fmt: skip
-    """Bring predicted joints into the world; positions meet halfway with where their velocity carries
-    them. No joint moves further than `fastest`, up and down not counting what the ground does, and no
-    rotation goes further from that of the frame before than FASTEST_TURN."""
+    """Turn the prediction into a world pose.
+
+    A joint's position is the mean of the predicted one and the old one plus velocity. No joint moves further
+    than `fastest` (not counting the change of the ground's height), and no joint turns by more than
+    FASTEST_TURN from the last frame.
+    """
     slowest = np.cos(FASTEST_TURN / 2)
     middle, count = position.shape[1] // 2, joints.shape[1]
     for c in range(y.shape[0]):
@@ -285,9 +287,11 @@ def _take_output(
             velocities[c, j, 2] = y[c, v + 2] * cos - y[c, v] * sin
             new_x = y[c, p] * cos + y[c, p + 2] * sin + root[c, 0]
             new_z = y[c, p + 2] * cos - y[c, p] * sin + root[c, 2]
-            sx = met(joints[c, j, 0] + velocities[c, j, 0], new_x) - joints[c, j, 0]
-            sy = met(joints[c, j, 1] + velocities[c, j, 1], y[c, p + 1] + root[c, 1]) - joints[c, j, 1]
-            sz = met(joints[c, j, 2] + velocities[c, j, 2], new_z) - joints[c, j, 2]
+            sx = joint_place(joints[c, j, 0] + velocities[c, j, 0], new_x) - joints[c, j, 0]
+            sy = (
+                joint_place(joints[c, j, 1] + velocities[c, j, 1], y[c, p + 1] + root[c, 1]) - joints[c, j, 1]
+            )
+            sz = joint_place(joints[c, j, 2] + velocities[c, j, 2], new_z) - joints[c, j, 2]
             step = np.sqrt(sx * sx + (sy - climbed) ** 2 + sz * sz)
             if step > fastest:
                 sx, sy, sz = (
@@ -312,7 +316,7 @@ def _take_output(
             dot = old[0] * w + old[1] * rx + old[2] * ry + old[3] * rz
             keep, take = 0.0, 1.0
             if abs(dot) < slowest:
-                # Along the shorter way (slerp), so far as it may turn.
+                # Turn by FASTEST_TURN along the shorter way (slerp).
                 whole = np.arccos(abs(dot))
                 keep = np.sin(whole - FASTEST_TURN / 2) / np.sin(whole)
                 take = np.sin(FASTEST_TURN / 2) / np.sin(whole) * (1.0 if dot >= 0 else -1.0)

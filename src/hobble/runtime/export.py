@@ -1,4 +1,4 @@
-"""Generated motion as clips and BVH files that other tools open."""
+"""Write generated motion as clips and BVH files for other tools."""
 
 from __future__ import annotations
 
@@ -20,11 +20,10 @@ FPS = 60.0
 
 
 def motion_clip(name: str, skeleton: Skeleton, positions: Array, rotations: Array) -> Clip:
-    """A clip of world positions (F, J, 3) in cm and world rotations (F, J, 4) in our axes.
+    """A clip of world positions (F, J, 3) in cm and world rotations (F, J, 4), in Hobble's axes.
 
-    The root is placed at its position, every other joint by its rotation and the skeleton's bones. Predicted
-    rotations and positions differ by some millimetres, which at the feet is seen as sliding: legs are bent so
-    that heels come to where they were predicted.
+    The root gets its position, every other joint its rotation. Predicted rotations and positions differ by
+    some millimetres, which would show as sliding feet. So the legs are bent, see `jointed`.
     """
     world, _ = jointed(skeleton, positions, rotations)
     local = quat.continuous(local_rotations(skeleton, world))
@@ -32,10 +31,10 @@ def motion_clip(name: str, skeleton: Skeleton, positions: Array, rotations: Arra
 
 
 def jointed(skeleton: Skeleton, positions: Array, rotations: Array) -> tuple[Array, Array]:
-    """World rotations (F, J, 4) and positions (F, J, 3) of a body whose bones keep their lengths.
+    """World rotations (F, J, 4) and positions (F, J, 3) of a body with constant bone lengths.
 
-    The root is where it was predicted, rotations decide all else, and legs are bent so that toes come to
-    where they were predicted.
+    The root has its predicted position, all other joints their predicted rotations. Then the legs are bent so
+    that the toes reach their predicted positions.
     """
     local = local_rotations(skeleton, np.asarray(rotations, float))
     world, reached = forward_kinematics(skeleton, local, np.asarray(positions[:, 0], float))
@@ -47,8 +46,10 @@ def jointed(skeleton: Skeleton, positions: Array, rotations: Array) -> tuple[Arr
 
 
 def _reach(world: Array, positions: Array, leg: Array, target: Array) -> None:
-    """Turn thigh and shank in `world` (F, J, 4) so that the heel comes to target (F, 3); the foot keeps its
-    turn."""
+    """Turn thigh and shank in `world` (F, J, 4) so that the heel reaches target (F, 3).
+
+    The foot's rotation stays.
+    """
     hip, knee, heel = leg[:3]
     thigh, shank = positions[:, knee] - positions[:, hip], positions[:, heel] - positions[:, knee]
     upper, lower = (float(np.linalg.norm(bone, axis=-1).mean()) for bone in (thigh, shank))
@@ -58,9 +59,9 @@ def _reach(world: Array, positions: Array, leg: Array, target: Array) -> None:
 
 
 def fitted_skeleton(skeleton: Skeleton, positions: Array, rotations: Array) -> Skeleton:
-    """The skeleton with the bones that a motion has: mean position of each joint in its parent's frame.
+    """The skeleton with a motion's bone lengths: mean position of each joint in its parent's frame.
 
-    For networks that were trained on another body than `skeleton` describes.
+    For networks that were trained on a body other than `skeleton`.
     """
     offsets = np.zeros((len(skeleton.joints), 3))
     for j, p in enumerate(skeleton.parents):
@@ -71,8 +72,7 @@ def fitted_skeleton(skeleton: Skeleton, positions: Array, rotations: Array) -> S
 
 
 def export_bvh(path: str | Path, name: str, skeleton: Skeleton, positions: Array, rotations: Array) -> None:
-    """Write world positions (F, J, 3) and rotations (F, J, 4), our axes, as a 60 Hz BVH file in
-    centimetres."""
+    """Write world positions (F, J, 3) and rotations (F, J, 4), Hobble's axes, as a 60 Hz BVH file in cm."""
     write_bvh(path, motion_clip(name, skeleton, positions, rotations))
 
 

@@ -1,4 +1,4 @@
-"""Feet on the ground: a foot in contact is held where it landed, and the leg bends to reach (two-bone IK)."""
+"""Foot placement: hold a foot in contact where it landed, and bend the leg to reach it (two-bone IK)."""
 
 from __future__ import annotations
 
@@ -10,21 +10,22 @@ from hobble.core.compiled import njit
 from hobble.core.skeleton import Skeleton
 from hobble.models.network import Network
 
-# Contact more likely than not. The original waits for .8, and a foot slides 4.8 cm a step before and after.
+# Contact from which a foot is held. With the original's .8, a foot slides 4.8 cm a step before and after.
 LOCK_AT = 0.5
-# Share of the hold given up each frame afterwards. With .075 the foot drags behind the swing, and the knee
-# bends by 46 degrees where the network's does by 53.
+# Share of the hold that is released each frame after contact. With .075 the foot drags behind the swing, and
+# the knee bends by 46 degrees instead of the network's 53.
 RELEASE = 0.2
-TOO_FAR = 20.0  # centimetres the network may want a held foot elsewhere before it is let go
-HEIGHT_MIX = 0.5
-# Radians a frame that placing a foot may turn thigh and shank further than the network does. One frame in
-# 2,000 needs more, where a leg snapped by up to 148 degrees; now the foot arrives some frames later.
+TOO_FAR = 20.0  # cm between a held foot and the network's foot at which the foot is released
+HEIGHT_MIX = 0.5  # share of the remaining foot lift that is applied each frame
+# Radians a frame by which foot placement may turn thigh and shank beyond the network's own turn. One frame in
+# 2,000 needs more; then the foot arrives some frames later. Without the limit, legs snapped by up to 148
+# degrees.
 MOST_ADDED = float(np.radians(28))
-BODY_MIX = 0.15  # a frame, of what the whole figure is still to be raised or lowered by
-BODY_FREE = 3.0  # centimetres that standing feet may be off the ground before the figure follows
-BODY_FROM = 0.3  # sum of the contacts of both feet below which nothing is known of the ground
-FLOATING = 3.0  # centimetres above SOLE that a standing foot may be, as rigs differ
-SOLE = (5.0, 4.0)  # centimetres of heel and toe joint above the ground under a standing foot
+BODY_MIX = 0.15  # share of the remaining body lift that is applied each frame
+BODY_FREE = 3.0  # cm that standing feet may be off the ground before the body is raised or lowered
+BODY_MIN_CONTACT = 0.3  # sum of both feet's contacts below which the feet say nothing about the ground
+FLOATING = 3.0  # cm that a standing foot may be above SOLE, since rigs differ
+SOLE = (5.0, 4.0)  # height of heel and toe joint above the ground in a standing foot, cm
 
 
 def leg_joints(skeleton: Skeleton) -> np.ndarray:
@@ -36,20 +37,20 @@ def leg_joints(skeleton: Skeleton) -> np.ndarray:
 def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
     """(2,) heel and toe height below which a foot is in the ground: SOLE, or less on a rig with lower feet.
 
-    A rig's mean heel and toe heights, of which the mean pose of the network tells, are those of feet that are
-    in the air half of the time; 60% of them is below any standing foot.
+    The network's mean pose gives the mean heel and toe heights. Feet are in the air half of the time, so 60%
+    of these means is below any standing foot.
     """
     layout = network.layout
     height = network.y_mean[layout.y_joint_position].reshape(-1, 3)[:, 1]
     return np.minimum(SOLE, 0.6 * height[legs[:, 2:]].mean(axis=0).astype(float))
 
 
-# Vectors are written out by component below: compiling array expressions takes seconds, and calls allocate.
+# Vectors below are written out by component: array expressions take seconds to compile and allocate memory.
 
 
 @njit
 def between(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
-    """The least rotation (w, x, y, z) that takes direction a to b; none where they are opposite."""
+    """The smallest rotation (w, x, y, z) from direction a to b; the identity if they are opposite."""
     w = np.sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)) + ax * bx + ay * by + az * bz
     x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     norm = np.sqrt(w * w + x * x + y * y + z * z)
@@ -60,7 +61,10 @@ def between(ax: float, ay: float, az: float, bx: float, by: float, bz: float) ->
 
 @njit
 def approach(held: Any, w: float, x: float, y: float, z: float) -> bool:
-    """Turn `held` (4,) in place to the rotation (w, x, y, z), by MOST_ADDED at most; whether it is late."""
+    """Turn `held` (4,) in place toward the rotation (w, x, y, z), by MOST_ADDED at most.
+
+    Returns whether it did not reach it.
+    """
     dot = held[0] * w + held[1] * x + held[2] * y + held[3] * z
     if dot < 0.0:
         dot, w, x, y, z = -dot, -w, -x, -y, -z
@@ -96,10 +100,10 @@ def turn(by: Any, rotation: Any) -> None:
 
 @njit
 def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, sz: float) -> None:
-    """Move the heel of a pose, positions (J, 3), by (sx, sy, sz), bending the knee.
+    """Move the heel of a pose, positions (J, 3), by (sx, sy, sz), by bending the knee.
 
-    Bone lengths stay; the knee keeps to the side it bends to; a target out of reach is approached to .1% of
-    full stretch (the law of cosines, as `hobble.core.ik.two_bone_knee`).
+    Bone lengths stay, and the knee keeps bending to the same side. A target out of reach is approached up to
+    99.9% of full stretch (law of cosines, as `hobble.core.ik.two_bone_knee`).
     """
     hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]
     tx, ty, tz = position[knee, 0] - hx, position[knee, 1] - hy, position[knee, 2] - hz
@@ -115,7 +119,7 @@ def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, s
     distance = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * 0.999)
     cosine = (upper * upper + distance * distance - lower * lower) / (2 * upper * distance)
     cosine = min(max(cosine, -1.0), 1.0)
-    # The knee's side of the leg, turned with the leg: the side seen from the new leg alone may be the back.
+    # Turn the old bend direction with the leg. Computed from the new leg alone, the knee may bend backwards.
     along = tx * ax + ty * ay + tz * az
     ox, oy, oz = tx - along * ax, ty - along * ay, tz - along * az
     turn = (ox * wx + oy * wy + oz * wz) / max(1 + ax * wx + ay * wy + az * wz, 1e-6)
@@ -134,10 +138,10 @@ def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, s
 
 @njit
 def bend(position: Any, rotation: Any, hip: int, knee: int, heel: int, shift: Any, added: Any) -> None:
-    """`reach` by `shift` (3,); thigh and shank turn no further than MOST_ADDED beyond the network's own turn.
+    """`reach` by `shift` (3,), where thigh and shank turn at most MOST_ADDED beyond the network's own turn.
 
-    added: (2, 4) by how much thigh and shank of the last frame were turned from where the network had them;
-    it is changed to this frame's. Where a joint was to turn further, the heel is not there yet.
+    added: (2, 4) rotations added to the network's thigh and shank in the last frame; updated to this frame's.
+    If a joint would have to turn further, the heel does not reach its target in this frame.
     """
     hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]
     kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
@@ -162,7 +166,7 @@ def bend(position: Any, rotation: Any, hip: int, knee: int, heel: int, shift: An
 
 @njit
 def sunk(position: Any, heel: int, toe: int, ground_heel: float, ground_toe: float, sole: Any) -> float:
-    """Centimetres that a foot of a pose (J, 3) is in the ground; below 0, how far it is above."""
+    """How deep a foot of a pose (J, 3) is in the ground, cm; negative if it is above."""
     heel_sunk = ground_heel + sole[0] - position[heel, 1]
     toe_sunk = ground_toe + sole[1] - position[toe, 1]
     return max(heel_sunk, toe_sunk)
@@ -173,14 +177,15 @@ def carry_body(
     y: Any, first: int, ground: Any, hips: int, hips_low: float, hips_high: float, legs: Any, sole: Any,
     lift: Any, position: Any,
 ) -> None:  # fmt: skip
-    """Raise or lower whole figures, positions (C, J, 3), so that they stand on the ground that is under them.
+    """Raise or lower whole bodies, positions (C, J, 3), so that they stand on the ground under them.
 
-    The network knows the ground by the mean height along two seconds of path. On a hill of a few metres this
-    is 30 cm off, and a network that saw gentler hills does not make up for it: legs fold, or hang in the air.
-    So the figure goes where its standing feet say, and its hips stay as far above the ground as they were in
-    training. ground: (C, 5) heights under the feet as of `place_feet`, then under the hips; hips_low,
-    hips_high: the range of the hips; lift: (C,) cm that the figure is raised by, kept from frame to frame;
-    the rest as of `place_feet`.
+    The network gets the ground as the mean height along two seconds of path. On a hill a few metres long this
+    is 30 cm off, and a network trained on gentler hills does not correct it: legs fold, or hang in the air.
+    So the standing feet decide the height of the body, and the hips stay within their height range above the
+    ground in training.
+
+    ground: (C, 5) heights under the feet as in `place_feet`, then under the hips; hips_low, hips_high: range
+    of the hips; lift: (C,) cm by which the body is raised, kept between frames; the rest: see `place_feet`.
     """
     for c in range(position.shape[0]):
         wanted, weight = 0.0, 0.0
@@ -190,7 +195,7 @@ def carry_body(
             stands = min(max(y[c, first + 2 * f], y[c, first + 2 * f + 1], 0.0), 1.0)
             wanted += stands * (max(rise - BODY_FREE, 0.0) + min(rise + BODY_FREE, 0.0))
             weight += stands
-        if weight > BODY_FROM:
+        if weight > BODY_MIN_CONTACT:
             lift[c] += BODY_MIX * (wanted / weight - lift[c])
         above = position[c, hips, 1] - ground[c, 4]
         lift[c] = min(max(lift[c], hips_low - above), hips_high - above)
@@ -203,12 +208,12 @@ def place_feet(
     y: Any, first: int, ground: Any, locking: bool, legs: Any, below: Any, sole: Any,
     lock: Any, hold: Any, lift: Any, added: Any, position: Any, rotation: Any,
 ) -> None:  # fmt: skip
-    """Hold feet in contact and keep feet out of the ground; changes the pose and the state of the feet.
+    """Hold feet in contact and keep feet out of the ground. Changes the pose and the state of the feet.
 
-    y: (C, outputs), whose columns from `first` on are the contacts of left heel, left toe, right heel, right
-    toe. ground: (C, 4 or more) heights under them. legs: (2, 4) of `leg_joints`; below: (2, J) bool of
-    `carried`; sole: (2,) of `sole_heights`. lock (C, 2) share of the hold; hold (C, 2, 2) x, z where the
-    toe landed; lift (C, 2) smoothed rise of the heel; added (C, 2, 2, 4) of `bend`.
+    y: (C, outputs); from column `first`: contacts of left heel, left toe, right heel, right toe.
+    ground: (C, 4 or more) heights under them. legs: (2, 4), see `leg_joints`; below: (2, J) bool, see
+    `carried`; sole: (2,), see `sole_heights`. lock: (C, 2) share of the hold; hold: (C, 2, 2) x, z where the
+    toe landed; lift: (C, 2) smoothed rise of the heel; added: (C, 2, 2, 4), see `bend`.
     """
     shift = np.zeros(3)
     for c in range(position.shape[0]):
@@ -221,13 +226,13 @@ def place_feet(
                 lock[c, f] = 0.0
             elif y[c, first + 2 * f + 1] >= LOCK_AT and far < TOO_FAR:
                 if lock[c, f] < 1.0:
-                    # Where the foot is seen now, so that contact found again midway does not pull it back.
+                    # Hold the foot where it is shown now, so that renewed contact does not pull it back.
                     away_x, away_z = lock[c, f] * away_x, lock[c, f] * away_z
                     hold[c, f, 0], hold[c, f, 1] = x + away_x, z + away_z
                 lock[c, f] = 1.0
             else:
                 lock[c, f] = max(0.0, lock[c, f] - RELEASE)
-            # Up out of the ground; down to it too for a foot that should stand and floats.
+            # Lift a foot out of the ground; lower a held foot that floats.
             rise = sunk(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
             rise = max(rise, 0.0) + lock[c, f] * min(rise + FLOATING, 0.0)
             lift[c, f] += HEIGHT_MIX * (rise - lift[c, f])
@@ -243,7 +248,7 @@ def place_feet(
 
 
 def carried(skeleton: Skeleton, legs: np.ndarray) -> np.ndarray:
-    """(2, J) which joints hang below each heel and move with it."""
+    """(2, J) bool: the joints below each heel, which move with it."""
     out = np.zeros((2, len(skeleton.joints)), bool)
     for f in range(2):
         for j, p in enumerate(skeleton.parents):

@@ -1,4 +1,4 @@
-"""The character for a game engine: body, skeleton and what it was scripted to do, as one glTF file."""
+"""The character for a game engine: body, skeleton and the scripted scenarios in one glTF file."""
 
 from __future__ import annotations
 
@@ -16,14 +16,16 @@ from hobble.figure.gltf import Motion, write_glb
 from hobble.models.network import Network
 from hobble.runtime.export import fitted_skeleton, jointed
 
-FPS = 30.0  # poses a second that are kept; viewers go evenly from one to the next
+FPS = 30.0  # poses a second in the file; viewers interpolate between them
 
 
 def export_glb(path: str | Path, network: Network, scenarios: str | Path) -> None:
-    """Write the body of a network's skeleton with every scenario of `scenarios` (runtime/scenarios.npz) as an
-    animation of its name. Raises HobbleError for a network without a skeleton."""
+    """Write the body of a network's skeleton, with one animation for each scenario.
+
+    scenarios: runtime/scenarios.npz. Raises HobbleError for a network without a skeleton.
+    """
     if network.skeleton is None:
-        raise HobbleError("this network carries no skeleton, so it has no body to write")
+        raise HobbleError("this network has no skeleton, so there is no body to write")
     data = load_npz(scenarios)
     skeleton = network.skeleton
     if "skeleton" not in network.meta:

@@ -1,4 +1,4 @@
-"""The ground under a character as the caller has it: a function, a heightmap, an array, or nothing (flat)."""
+"""The caller's ground: a function, a heightmap, an array, or None (flat)."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.runtime.axes import Axes
 
-CELL = 3.937007874  # centimetres a cell of the heightmaps of Holden et al. 2017
+CELL = 3.937007874  # cm, the cell size of the heightmaps of Holden et al. 2017
 
 
 @dataclass(frozen=True)
 class Heightmap:
-    """Heights (rows, columns), `cell` apart, about `centre`: of a character, in its caller's axes and unit.
+    """Heights (rows, columns) on a grid around `centre` with spacing `cell`, in the caller's axes and unit.
 
-    Columns run along the first of the two ground coordinates and rows along the second: +X and +Z, or +X and
-    +Y where Z is up. Without `cell`, cells are 3.937 cm, whatever the unit. Outside, the border goes on.
+    Columns run along the first ground coordinate and rows along the second: +X and +Z, or +X and +Y if Z is
+    up. The default cell is 3.937 cm in every unit. Outside the grid, the border heights continue.
     """
 
     heights: Array = field(repr=False)
@@ -30,7 +30,9 @@ class Heightmap:
     def __post_init__(self) -> None:
         heights = np.ascontiguousarray(self.heights, float)
         if heights.ndim != 2 or min(heights.shape) < 2 or not np.all(np.isfinite(heights)):
-            raise ValueError(f"a heightmap is a finite 2D array of 2 x 2 or more, not {heights.shape}")
+            raise ValueError(
+                f"a heightmap has to be a 2D array of finite numbers, at least 2 x 2, not {heights.shape}"
+            )
         object.__setattr__(self, "heights", heights)
 
     def __call__(self, x: Array, z: Array) -> Array:
@@ -40,10 +42,10 @@ class Heightmap:
 
 
 def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | None:
-    """A function of our x, z (N,) to our heights (N,) from what the caller gave in the axes given.
+    """The caller's terrain as a function from Hobble's x, z (N,) to Hobble's heights (N,).
 
-    terrain: None (flat at zero), a function of the caller's two ground coordinates (arrays) to heights, a
-    Heightmap, or a 2D array of heights (a Heightmap around the origin), all in the caller's axes and unit.
+    terrain: None (flat at 0); a function of the caller's two ground coordinates (arrays) that returns
+    heights; a Heightmap; or a 2D array of heights around the origin. All in the caller's axes and unit.
     Raises TypeError for anything else, ValueError for an array that is no heightmap.
     """
     if terrain is None:
@@ -52,7 +54,7 @@ def as_ground(terrain: Any, axes: Axes) -> Callable[[Array, Array], Array] | Non
         terrain = Heightmap(terrain)
     if not callable(terrain):
         raise TypeError(
-            f"terrain is a function, a Heightmap, a 2D array or None, not {type(terrain).__name__}"
+            f"terrain has to be a function, a Heightmap, a 2D array or None, not {type(terrain).__name__}"
         )
     if axes.native:
         return terrain  # type: ignore[no-any-return]

@@ -1,4 +1,4 @@
-"""A hurt body is asked for what it can do: the wish is held to how fast such a body goes, its gait to how."""
+"""Limit the wished speed and gait to what a body with these injuries can do."""
 
 from __future__ import annotations
 
@@ -9,16 +9,13 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.models.network import Network
 
-JOG_FROM = 5.0  # cm a frame: between walking at 2.5 and jogging at 7.5
-LAME_BELOW = 4.5  # cm a frame: who cannot jog as fast as that walks
-HURRIED = 1.25  # times the limit of a walk: how fast those limp who wanted to jog
+JOG_FROM = 5.0  # cm a frame: half way between walking at 2.5 and jogging at 7.5
+LAME_BELOW = 4.5  # cm a frame: a body that cannot jog at this speed walks instead
+HURRY_FACTOR = 1.25  # such a body may walk at this multiple of its walking limit if a jog is wished
 
 
-class Holder:
-    """Holds the wishes of C characters to what they can do.
-
-    columns: channel -> its columns among all that is told.
-    """
+class SpeedLimiter:
+    """Limits the wishes of C characters. columns: channel -> its columns among the channel values."""
 
     def __init__(self, network: Network, columns: Mapping[str, slice], characters: int) -> None:
         self._tables = [(columns[name], limits) for name, limits in network.limits.items()]
@@ -27,10 +24,10 @@ class Holder:
         self._told: Array | None = None
 
     def hold(self, told: Array, velocity: Array, shares: Array) -> None:
-        """Shorten velocities (C, 2) to what bodies that are told (C, K) can do in gaits of shares (C, G).
+        """Shorten velocities (C, 2) to the limits of bodies with channel values `told` (C, K).
 
-        Both are changed in place. Who cannot run any more limps in a hurry: a jog slower than LAME_BELOW is
-        none.
+        shares: (C, G) of the gaits. Both are changed in place: a body whose jog would be slower than
+        LAME_BELOW gets a hurried walk instead.
         """
         if not self._tables:
             return
@@ -42,7 +39,7 @@ class Holder:
             return
         walk, jog = self._gaits["walk"], self._gaits["jog"]
         lame = self._allowed[:, jog] < LAME_BELOW
-        hurry = 1.0 + (HURRIED - 1.0) * np.where(lame, shares[:, jog], 0.0)
+        hurry = 1.0 + (HURRY_FACTOR - 1.0) * np.where(lame, shares[:, jog], 0.0)
         shares[lame, walk] += shares[lame, jog]
         shares[lame, jog] = 0.0
         going = shares.copy()

@@ -12,13 +12,14 @@ from hobble.core.section import PhaseMode, PositiveFloat, Section
 class Runtime(Section):
     """The character."""
 
-    mode: PhaseMode = Field("cubic", description="how phase is looked up")
+    mode: PhaseMode = Field("cubic", description="phase lookup of the network")
     rates: dict[str, PositiveFloat] = Field(
-        {}, description="channel: largest change of its values in a second, instead of the channel's own"
+        {}, description="channel: largest change of its values per second; default: the channel's own rate"
     )
-    scales: dict[str, PositiveFloat] = Field({}, description="channel: what its values are divided by")
+    scales: dict[str, PositiveFloat] = Field({}, description="channel: divisor of its values")
     foot_locking: bool = True
-    limits: bool = Field(True, description="whether a hurt body is asked for no more than it can do")
+    limits: bool = Field(True, description="limit the wished speed to what the injured body can do")
     steering: Annotated[float, Field(ge=0)] = Field(
-        2.0, description="how hard a velocity that is not reached is asked for; 0 is the original runtime"
+        2.0,
+        description="gain of the correction of a velocity that is not reached; 0 is the original runtime",
     )

@@ -1,4 +1,4 @@
-"""Scripted scenarios: what a network's character is asked to do for the report and the BVH files."""
+"""Scripted scenarios (walk, jog, strafe, ...) for the report and the BVH files."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ Wish = tuple[Array, Array | None, str]  # velocity, facing, gait
 
 @dataclass(frozen=True)
 class Scenario:
-    """`frames` of wishes: wish(frame) gives velocity (2,) cm a frame, facing (2,) or None, and gait.
+    """wish(frame) gives velocity (2,) in cm a frame, facing (2,) or None, and gait, for `frames` frames.
 
-    swept: the channel and its column that is told from 0 to the highest over the walk, or None.
+    swept: channel and column whose value rises from 0 to its highest during the walk, or None.
     """
 
     name: str
@@ -36,8 +36,8 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Track:
-    """What came of a scenario: positions (F, J, 3), rotations (F, J, 4), contacts (F, 4), phase (F,), target
-    (F, 2), root (F, 3), gait (F,) names, told (F,) of the swept column."""
+    """The motion of a scenario: positions (F, J, 3), rotations (F, J, 4), contacts (F, 4), phase (F,),
+    target (F, 2) wished velocity, root (F, 3), gait (F,) names, told (F,) values of the swept column."""
 
     scenario: Scenario
     positions: Array
@@ -55,7 +55,7 @@ def _ahead(speed: float, degrees: float = 0.0) -> Array:
 
 
 def scenarios(network: Network) -> list[Scenario]:
-    """The scenarios of a network; a walk for each column that its channels sweep."""
+    """The scenarios of a network, with one more walk for each column that its channels sweep."""
     facing = _ahead(1.0)
     out = [
         Scenario("walk", 900, lambda f: (_ahead(2.5, max(0, f - 300) * 0.5), None, "walk")),
@@ -74,8 +74,7 @@ def scenarios(network: Network) -> list[Scenario]:
 
 
 def swept(network: Network) -> dict[str, tuple[str, str]]:
-    """What the scenarios sweep: name -> the channel and its column; empty for a network that is told
-    nothing."""
+    """Swept scenarios: name -> channel and column. Empty for a network without channels."""
     if network.skeleton is None:
         return {}
     return {
@@ -113,7 +112,7 @@ def run_scenario(network: Network, scenario: Scenario, options: Runtime) -> Trac
 
 
 def write_motions(network: Network, bvh: str | Path, options: Runtime) -> Iterator[Track]:
-    """Run every scenario, write each as a BVH file into the folder `bvh` and yield what came of it."""
+    """Run every scenario, write each as a BVH file into the folder `bvh`, and yield its motion."""
     assert network.skeleton is not None
     for scenario in scenarios(network):
         track = run_scenario(network, scenario, options)
@@ -126,12 +125,12 @@ def write_motions(network: Network, bvh: str | Path, options: Runtime) -> Iterat
 
 
 def generate(network: Network, npz: str | Path, bvh: str | Path, options: Runtime) -> None:
-    """Run every scenario and write `npz` and, into the folder `bvh`, a BVH file each.
+    """Run every scenario; write all to the file `npz` and each as a BVH file into the folder `bvh`.
 
-    npz: names (N,), joints (J,), parents (J,), fps; for scenario <name>: <name>/positions (F, J, 3) float32
-    cm, <name>/rotations (F, J, 4) world, w first, <name>/contacts (F, 4), <name>/phase (F,), <name>/gait (F,)
-    str, <name>/target (F, 2), <name>/root (F, 3), <name>/told (F,) float32 of the column that is swept,
-    <name>/swept (2,): its channel and its name, both "" where none is.
+    npz: names (N,), joints (J,), parents (J,), fps; for each scenario <name>: <name>/positions (F, J, 3)
+    float32 cm, <name>/rotations (F, J, 4) world, w first, <name>/contacts (F, 4), <name>/phase (F,),
+    <name>/gait (F,) str, <name>/target (F, 2), <name>/root (F, 3), <name>/told (F,) float32 values of the
+    swept column, <name>/swept (2,) channel and column, both "" if nothing is swept.
     """
     assert network.skeleton is not None
     arrays: dict[str, Any] = {}

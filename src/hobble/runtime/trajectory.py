@@ -1,8 +1,8 @@
-"""The path of a character on the ground: one entry a frame, half of it past, half wished for and predicted.
+"""The character's trajectory on the ground: one entry per frame, half past, half future.
 
-Arrays lead with the characters: position and direction (C, T, 2) hold world x and z, gait (C, T, 6); T is
-twice the window (120) and entry T/2 is the present frame. Angles are yaw: 0 faces +Z, growing toward +X (the
-left). The formulas are those of the runtime of Holden et al. 2017.
+The first axis is the characters: position and direction (C, T, 2) hold world x and z, gait (C, T, 6). T is
+twice the window (120); entry T/2 is the present frame. Angles are yaw: 0 faces +Z, growing toward +X (left).
+The formulas are those of the runtime of Holden et al. 2017.
 """
 
 from __future__ import annotations
@@ -18,30 +18,32 @@ from hobble.rows.layout import RowLayout
 
 phase_change, moving_share = register_jitable(rule.phase_change), register_jitable(rule.moving)
 
-STEERING_LIMIT = 2.0  # with 1, a network that saw few starts stands for seconds before it sets off
-TARGET_MIX = 0.9
+# Largest correction of the wish, as a multiple of it. With 1, a network trained on few starts stands for
+# seconds before it walks.
+STEERING_LIMIT = 2.0
+TARGET_MIX = 0.9  # share of the remaining difference to the wish that is applied each frame
 GAIT_MIX = 0.1
-OWED_RATE = 0.01  # a frame, of what is missing: a second or two until it is made good
-OWED_WITHIN = 0.8  # share of the wish; who lacks more is still on the way to it
-MOST_OWED = 1.0  # share of the wish
-FURTHEST_TURN = np.radians(137)
-HELD = 0.5  # share of a movement that nobody asked for; all of it would drag the feet along
-STRAFE_FROM = np.radians(45)  # from this angle between facing and going, strafing is full
-STILL = 0.1  # cm a frame: a slower wish is a wish to stand
+OWED_RATE = 0.01  # integral gain a frame: a steady error is corrected within a second or two
+OWED_WITHIN = 0.8  # share of the wish; with a larger error the character is still turning or starting
+MOST_OWED = 1.0  # largest integral correction, as a share of the wish
+FURTHEST_TURN = np.radians(137)  # largest turn to ask for; beyond it the other way round may be shorter
+UNWISHED_LOSS = 0.5  # share of movement against the wish that is removed; removing all would drag the feet
+STRAFE_FROM = np.radians(45)  # angle between facing and velocity from which the strafe share is 1
+STILL = 0.1  # cm a frame: a slower wish means standing
 
 
 @njit
 def wrap(angle: float) -> float:
-    """The same angle within -pi..pi."""
+    """The angle in -pi..pi."""
     return angle - 2 * np.pi * np.floor((angle + np.pi) / (2 * np.pi))
 
 
 @njit
-def wished(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: Any) -> None:
-    """How much each figure strafes, into `strafe` (C,), and where it wants to look, into `look` (C, 2).
+def facing_wish(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: Any) -> None:
+    """Write the share of strafing into `strafe` (C,) and the wished facing into `look` (C, 2).
 
-    velocity (C, 2): where it is to go; ahead (C, 2): where it is to look, or zero to look where it goes, and
-    where it stands as before, in `direction` (C, 2).
+    velocity: (C, 2) wished. ahead: (C, 2) direction to look in; zero looks where the character goes, or keeps
+    `direction` (C, 2) if it stands.
     """
     for c in range(velocity.shape[0]):
         x, z = velocity[c, 0], velocity[c, 1]
@@ -61,11 +63,11 @@ def follow_wish(
     wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
     velocity: Any, direction: Any, strafe: Any, gait: Any, position: Any, heading: Any, owed: Any,
 ) -> None:  # fmt: skip
-    """Move the smoothed targets toward what the caller asks for; the present frame's gait blends slowly.
+    """Move the smoothed targets toward the caller's wish; the gait of the present frame blends slowly.
 
     wish_velocity, wish_direction, velocity, direction, owed: (C, 2); wish_strafe, strafe: (C,); wish_gait:
-    (C, 6); position, heading: (C, T, 2) of the trajectory. What is asked for beyond the wish is that of
-    `_ask` and `_ask_turn`; with `steering` 0 nothing is, as in the original runtime.
+    (C, 6); position, heading: (C, T, 2) of the trajectory. `_ask_velocity` and `_ask_turn` correct the wish;
+    with `steering` 0 there is no correction, as in the original runtime.
     """
     middle = gait.shape[1] // 2
     for c in range(velocity.shape[0]):
@@ -75,7 +77,7 @@ def follow_wish(
             if x * x + z * z >= STILL * STILL:
                 facing = np.arctan2(heading[c, middle, 0], heading[c, middle, 1])
                 goal += _ask_turn(0.5 * steering, wrap(goal - facing))
-            x, z = _ask(steering, x, z, position[c], owed[c])
+            x, z = _ask_velocity(steering, x, z, position[c], owed[c])
         velocity[c, 0] += TARGET_MIX * (x - velocity[c, 0])
         velocity[c, 1] += TARGET_MIX * (z - velocity[c, 1])
         now = np.arctan2(direction[c, 0], direction[c, 1])
@@ -87,13 +89,13 @@ def follow_wish(
 
 
 @njit
-def _ask(steering: float, x: float, z: float, position: Any, owed: Any) -> tuple[float, float]:
-    """The velocity to ask for so that (x, z) comes of it.
+def _ask_velocity(steering: float, x: float, z: float, position: Any, owed: Any) -> tuple[float, float]:
+    """The velocity to ask the network for, so that the character reaches (x, z).
 
-    A network goes on as it has been going: it answers to its past as much as to the bent future. So what the
-    last half of the past window lacks of the wish is asked for on top, `steering` times over, up to
-    STEERING_LIMIT times the wish. What is still missing then, as where a network strafes less to one side, is
-    owed: it adds up in `owed` (2,), along the wish and across it to the left, in shares of the wish.
+    A network tends to keep its past velocity. So the error (wish minus mean velocity over the last half of
+    the past window) is added to the wish, times `steering`, up to STEERING_LIMIT times the wish. A steady
+    error, such as weaker strafing to one side, is integrated in `owed` (2,): along the wish and across it to
+    the left, as shares of the wish.
     """
     middle = position.shape[0] // 2
     span = middle // 2
@@ -106,7 +108,7 @@ def _ask(steering: float, x: float, z: float, position: Any, owed: Any) -> tuple
     else:
         more_x += owed[0] * x + owed[1] * z
         more_z += owed[0] * z - owed[1] * x
-        # Not while it turns round or sets off: that is late, not out of true.
+        # Do not integrate while the character turns or starts: that error goes away by itself.
         if lack_x * lack_x + lack_z * lack_z < (OWED_WITHIN * speed) ** 2:
             rate = steering * OWED_RATE / (speed * speed)
             owed[0] += rate * (lack_x * x + lack_z * z)
@@ -119,18 +121,17 @@ def _ask(steering: float, x: float, z: float, position: Any, owed: Any) -> tuple
 
 @njit
 def _ask_turn(gain: float, turn: float) -> float:
-    """Radians to ask for beyond a `turn` that is still to be made: `gain` times it, and never as far round
-    as to be nearer the other way."""
+    """Radians to add to the remaining `turn`: `gain` times it, limited by FURTHEST_TURN in all."""
     room = max(FURTHEST_TURN - abs(turn), 0.0)
     return min(max(gain * turn, -room), room)
 
 
 @njit
 def blend_future(velocity: Any, target: Any, strafe: Any, position: Any, direction: Any, gait: Any) -> None:
-    """Bend the predicted future toward the wished velocity and facing, more the further ahead.
+    """Bend the predicted future toward the wished velocity and facing; the bend grows with time.
 
-    The share of the wish is 1 - (1 - t)^b: b .5 for the position (1 when strafing), 2 for the direction (.5
-    when strafing). velocity, target: (C, 2) smoothed wishes.
+    At t in 0..1 of the future, the share of the wish is 1 - (1 - t)^b, with b = .5 for the position (1 when
+    strafing) and 2 for the direction (.5 when strafing). velocity, target: (C, 2) smoothed wishes.
     """
     length = position.shape[1]
     middle = length // 2
@@ -156,7 +157,7 @@ def blend_future(velocity: Any, target: Any, strafe: Any, position: Any, directi
 
 @njit
 def sample_points(position: Any, direction: Any, step: int, side: float, points: Any) -> None:
-    """Where the ground is looked up: points (C, samples, 3, 2) to the left, on the path and to the right."""
+    """Write the points (C, samples, 3, 2) where the ground is looked up: left, on the path, right."""
     for c in range(points.shape[0]):
         for s in range(points.shape[1]):
             x, z = position[c, s * step]
@@ -168,7 +169,7 @@ def sample_points(position: Any, direction: Any, step: int, side: float, points:
 
 @njit
 def stand_on(ground: Any, height: Any) -> None:
-    """height (C,): the mean of the heights (C, samples, 3) on the path."""
+    """Write the mean ground height on the path into height (C,). ground: (C, samples, 3)."""
     for c in range(ground.shape[0]):
         total = 0.0
         for s in range(ground.shape[1]):
@@ -182,10 +183,10 @@ def prepare(
     velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
     owed: Any, told: Any, told_target: Any, told_step: Any, step: int, side: float, points: Any,
 ) -> None:  # fmt: skip
-    """All of the above in one call, and what is told (C, K) moves toward its target, at most by told_step
-    (K,).
+    """`follow_wish`, `blend_future` and `sample_points` in one call.
 
-    In this file because compiled code kept on disk is renewed when its own file changes, not its callees'.
+    Also moves the channel values told (C, K) toward told_target, by told_step (K,) at most. All are in this
+    file because numba renews cached code only when its own file changes, not when a callee's does.
     """
     follow_wish(
         wish_velocity, wish_direction, wish_strafe, wish_gait, steering, velocity, target, strafe, gait,
@@ -203,13 +204,13 @@ def prepare(
 def advance(
     y: Any, at: Any, wish: Any, held: float, whole: bool, position: Any, direction: Any, gait: Any, phase: Any
 ) -> None:
-    """One frame on: shift the past, move and turn the root, take the predicted future, advance the phase.
+    """Advance one frame: shift the past, move and turn the root, take the predicted future and phase change.
 
-    y: (C, outputs) prediction; at: columns of y (root velocity, turn, phase change, position, direction) and
-    the future samples and step. A standing figure is held: movement is scaled by (1 - stand)^.25. So is one
-    that goes where it should not: `held` is the share that it loses of its movement against the velocity
-    `wish` (C, 2), and of all of it where it is to turn on the spot; 0 is the original runtime. `whole`: who
-    stands is not held either, since the movement belongs to the pose (`Network.rooted`).
+    y: (C, outputs) prediction. at: columns of y (root velocity, turn, phase change, position, direction),
+    then the number of future samples and the step.
+    Movement is scaled by (1 - stand)^.25, except with `whole` (`Network.rooted`), where movement belongs to
+    the pose. held: the share that is removed of movement against the wished velocity `wish` (C, 2), or of all
+    movement if the wish is to turn on the spot; 0 is the original runtime.
     The predicted yaw velocity is that of the world seen from the root, so the root turns by its negative.
     """
     length = position.shape[1]
@@ -239,7 +240,7 @@ def advance(
         sin, cos = np.sin(yaw), np.cos(yaw)
         direction[c, middle, 0], direction[c, middle, 1] = sin, cos
         for i in range(middle + 1, length):
-            # Past the last predicted sample the line through the last two goes on.
+            # Beyond the last predicted sample, extrapolate the line through the last two.
             place = (i - middle) / step
             k = min(int(place), future - 2)
             m = place - k
@@ -258,7 +259,7 @@ def advance(
 
 
 def advance_columns(layout: RowLayout) -> np.ndarray:
-    """The columns that `advance` reads, as the integers it takes."""
+    """The argument `at` of `advance`."""
     blocks = (
         layout.y_root_velocity, layout.y_turn, layout.y_phase_change, layout.y_position, layout.y_direction
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Following a track of waypoints: where to go, how fast, in which gait, facing where."""
+"""Following a closed track of waypoints, each with speed, gait and facing."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hobble.core.quat import Array
 
 @dataclass(frozen=True)
 class Waypoint:
-    """A place to reach: ground position x, z in cm, gait and speed (cm a frame) on the way there.
+    """A ground position x, z in cm, with the gait and speed (cm a frame) on the way to it.
 
     facing: world direction (x, z) to look in on the way (strafing); None looks ahead.
     """
@@ -34,22 +34,22 @@ TRACK = (
     Waypoint((1000.0, -1000.0), "crouch", 2.0),
     Waypoint((2500.0, 5000.0), "walk", 2.5, (0.0, -1.0)),
 )
-ARRIVED = 100.0  # centimetres from a waypoint at which it counts as reached
+ARRIVED = 100.0  # cm: a waypoint counts as reached within this distance
 
 
 class Follower:
-    """Leads C characters around a closed track, each at its own place on it.
+    """Leads C characters around a closed track, each at its own waypoint.
 
-    Every character starts toward waypoint 0, coming from the last one. `reached` (C,) counts waypoints;
-    `off_path` (C,) is the present distance in cm from the straight line between the two waypoints it is
-    between.
+    Every character starts at the last waypoint and goes toward waypoint 0. `reached` (C,) counts the
+    waypoints reached; `off_path` (C,) is the present distance in cm from the line between the last waypoint
+    and the next.
     """
 
     def __init__(
         self, track: Sequence[Waypoint] = TRACK, characters: int = 1, arrived: float = ARRIVED
     ) -> None:
         if len(track) < 2:
-            raise ValueError("a track has two waypoints or more")
+            raise ValueError("a track needs at least two waypoints")
         self.track, self.arrived = tuple(track), arrived
         self.places = np.array([w.position for w in self.track], float)
         self._speeds = np.array([w.speed for w in self.track], float)
@@ -58,13 +58,12 @@ class Follower:
 
     @property
     def start(self) -> tuple[Array, float]:
-        """Where a lap begins, (2,) cm, and the yaw that looks toward waypoint 0."""
+        """Start of a lap, (2,) cm, and the yaw toward waypoint 0."""
         way = self.places[0] - self.places[-1]
         return self.places[-1].copy(), float(np.arctan2(way[0], way[1]))
 
     def lead(self, position: Array) -> tuple[Array, list[Waypoint]]:
-        """Velocities (C, 2) toward the present waypoints of characters at ground positions (C, 2), and
-        those."""
+        """Velocities (C, 2) toward the next waypoints, and the waypoints. position: (C, 2) on the ground."""
         velocity = np.empty((len(position), 2))
         _lead(self.places, self._speeds, self.arrived, position, self.reached, self.off_path, velocity)
         return velocity, [self.track[n % len(self.track)] for n in self.reached.tolist()]
@@ -72,7 +71,7 @@ class Follower:
 
 @njit
 def _distance_to_line(p: Any, a: Any, b: Any) -> float:
-    """Distance in cm of point p from the stretch from a to b, each (2,)."""
+    """Distance of point p from the segment a to b, each (2,) cm."""
     ax, az, bx, bz = p[0] - a[0], p[1] - a[1], b[0] - a[0], b[1] - a[1]
     t = min(max((ax * bx + az * bz) / max(bx * bx + bz * bz, 1e-9), 0.0), 1.0)
     return np.sqrt((ax - t * bx) ** 2 + (az - t * bz) ** 2)

@@ -1,4 +1,4 @@
-"""Batches out of the database's blocks, and a watch over their losses."""
+"""Batches from the database's blocks, and a monitor of their losses."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from hobble.database.stretches import Stretch
 from hobble.training.processes import ALONE, Processes
 
 TRAIN = "train"
-LOOK_EVERY = 2048  # samples between looks at the losses: an accelerator is not waited for at each small batch
-DIVERGED = 100.0  # predicting nothing but the mean has an error of 1
-NAMED = 8  # clips that a message names
+CHECK_EVERY = 2048  # samples between checks of the losses; checking every batch would wait for the GPU
+DIVERGED = 100.0  # a larger error means that training diverged; predicting the mean gives 1
+MOST_NAMED = 8  # clips in a message
 
 Piece = tuple[Tensor, Tensor, Tensor, np.ndarray, np.ndarray]  # the first five of a batch
 
@@ -25,7 +25,7 @@ Piece = tuple[Tensor, Tensor, Tensor, np.ndarray, np.ndarray]  # the first five 
 class Batch(NamedTuple):
     """n samples on the training's device: x (n, X), y (n, Y), p (n,); clip and frame (n,) as in a `Block`.
 
-    whole: samples of the batch over all processes; these n, maybe none, are those of one process.
+    These are the samples of one process, maybe none. whole: number of samples over all processes.
     """
 
     x: Tensor
@@ -37,9 +37,9 @@ class Batch(NamedTuple):
 
 
 class HostRows:
-    """The training rows of a database, read and composed by its own reader, then sent to `device`.
+    """The training rows of a database, read and composed on the host, then copied to `device`.
 
-    processes, stretches: who shares a batch, and from how many places of a section it is taken.
+    processes: those that share a batch; stretches: parts of a section from which each batch is taken.
     """
 
     def __init__(
@@ -53,26 +53,26 @@ class HostRows:
         self.processes, self.stretches = processes, stretches
 
     def batches(self, pass_index: int, section: int, sections: int, seed: int, size: int) -> Iterator[Batch]:
-        """The samples of one section in consecutive batches of `size`.
+        """This process's rows of the section's consecutive batches of `size`.
 
-        Only the last may be shorter; it is trained like the others (a loss is a mean over its rows), so that
-        a section sees each of its samples once and leaves nothing over for the next: a checkpoint between
-        the two is complete. Of each batch there are the rows of this process.
+        The last batch may be shorter and is trained like the others (a loss is a mean over its rows). So a
+        section uses each of its samples once and leaves none for the next section, and a checkpoint between
+        sections is complete.
         """
         place = (pass_index, section, sections, seed)
-        # By the whole batch: the order of the rows depends on it, and must not on the number of processes.
+        # By the whole batch: the order of the rows depends on it, but must not depend on the processes.
         window = self.database.window(TRAIN, self.database.block_rows(size))
         total = self.database.section_pairs(TRAIN, section, sections)
         sharing = self.processes.sharing(total, size, self.stretches)
         read = [self._pieces(place, stretch, window) for stretch in sharing.read()]
         for whole, _ in sharing.sizes():
-            # Those of a short batch fill its first places, so the later stretches have none left for it.
+            # A short batch fills its first places only, so later stretches may have no samples for it.
             pieces = [piece for one in read if (piece := next(one, None)) is not None]
             piece = pieces[0] if len(pieces) == 1 else _joined(pieces, self._nothing)
             yield Batch(*piece, whole)
 
     def _pieces(self, place: tuple[int, int, int, int], stretch: Stretch, window: int) -> Iterator[Piece]:
-        """What one stretch gives to one batch after another."""
+        """The samples of one stretch, batch by batch."""
         size = stretch.high - stretch.low
         rows = self.database.block_rows(size)
         for block in self.database.blocks(TRAIN, *place, rows, stretch, window):
@@ -95,10 +95,10 @@ def _joined(pieces: Sequence[Piece], nothing: Piece) -> Piece:
 
 
 class Watch:
-    """Adds up the losses of a section, and stops the training where it diverges.
+    """Adds up the losses of a section, and stops the training if it diverges.
 
-    where: the pass and section, as a person would say it. clips: names by index. processes: all of them stop
-    together, with the message of the one that has the rows at fault.
+    where: the pass and section, for messages. clips: names by index. processes: all stop together, with the
+    message of the process that has the broken rows.
     """
 
     def __init__(self, where: str, clips: tuple[str, ...], processes: Processes = ALONE) -> None:
@@ -112,18 +112,18 @@ class Watch:
         self._waiting.append((loss, batch))
         self.seen += batch.whole
         self._new += batch.whole
-        if self._new >= LOOK_EVERY:
-            self._look()
+        if self._new >= CHECK_EVERY:
+            self._check()
 
     def mean(self) -> float:
-        """The mean loss over the section's samples; raises HobbleError where that is no learning any more."""
-        self._look()
+        """The mean loss over the section's samples; raises HobbleError if training diverged."""
+        self._check()
         mean = self._total / max(self.samples, 1)
         if mean > DIVERGED and self._worst is not None:
             raise HobbleError(self._message(f"its error is {mean:.3g} on the average", *self._worst[1:]))
         return mean
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         if not self._waiting:
             return
         losses = torch.stack([loss for loss, _ in self._waiting]).double().cpu().numpy()
@@ -140,16 +140,16 @@ class Watch:
 
     def _message(self, what: str, number: int, batch: Batch) -> str:
         text = f"training diverged in {self.where}, batch {number}: {what}"
-        return self.processes.best_told(*self._explained(text, batch))
+        return self.processes.most_certain(*self._explained(text, batch))
 
     def _explained(self, text: str, batch: Batch) -> tuple[str, bool]:
-        """The text with what the batch says about it, and whether that is the cause."""
+        """The message with the rows or clips of the batch, and whether the rows are the cause."""
         x, y, p = (part.isfinite().cpu().numpy() for part in batch[:3])
         bad = ~(x.all(1) & y.all(1) & p)
         if bad.any():
             places = zip(batch.clip[bad], batch.frame[bad], strict=True)
             rows = _some([f"{self.clips[clip]} frame {frame}" for clip, frame in places])
-            return f"{text}, since rows of the database are not: {rows}. Look at the clip there.", True
+            return f"{text}, because rows of the database are not finite: {rows}. Check these frames.", True
         names = _some([self.clips[clip] for clip in np.unique(batch.clip)])
         return (
             f"{text}. The batch holds frames of {names}. The last checkpoint is kept. "
@@ -158,5 +158,5 @@ class Watch:
 
 
 def _some(names: list[str]) -> str:
-    more = len(names) - NAMED
-    return ", ".join(names[:NAMED]) + (f" and {more} more" if more > 0 else "")
+    more = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

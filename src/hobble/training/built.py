@@ -1,4 +1,4 @@
-"""A network that is built from the clips at once instead of trained, such as motion matching."""
+"""A network that is built from the clips without training, such as motion matching."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
 from hobble.models import model
 from hobble.models.load import load_network
-from hobble.models.model import Built, Made
+from hobble.models.model import Built, FinishedNetwork
 from hobble.models.network import Network
 from hobble.models.options import Options
 from hobble.training.batches import TRAIN
@@ -39,10 +39,11 @@ def run_built(
     checkpoint: Path,
     terrain_side: float,
 ) -> None:
-    """Build it and write the three files that a training writes.
+    """Build it and write the same three files as a training.
 
-    clips: name -> file of its rows in order, for the training clips of the database at least. The history is
-    one row: every frame is read once. The checkpoint says what was built; nothing can go on from it.
+    clips: name -> file of its rows in order; all training clips of the database have to be there. The history
+    has one row, since every frame is read once. The checkpoint only names what was built; training cannot
+    resume from it.
     """
     began = time.perf_counter()
     made, frames = build(database, network, clips)
@@ -57,23 +58,25 @@ def run_built(
     save_npz(checkpoint, network=np.array(made.described), sections=np.array(0))
 
 
-def build(database: Database, network: Options, clips: Mapping[str, str | Path]) -> tuple[Made, int]:
-    """What is built of the database's training clips, and how many rows they have.
+def build(
+    database: Database, network: Options, clips: Mapping[str, str | Path]
+) -> tuple[FinishedNetwork, int]:
+    """The network built from the database's training clips, and the number of their rows.
 
-    Raises InputError where a file does not fit the database, HobbleError where one is missing.
+    Raises InputError if a file does not fit the database, HobbleError if one is missing.
     """
     kind = model(network.kind)
-    assert isinstance(kind, Built), "what is trained is not built"
+    assert isinstance(kind, Built), "this kind is trained, not built"
     used = [clip for clip in database.manifest.clips if clip["split"] == TRAIN and clip["rows"]]
     if missing := [clip["clip"] for clip in used if clip["clip"] not in clips]:
-        raise HobbleError(f"the database has rows of {', '.join(missing)}, whose files were not given")
+        raise HobbleError(f"the database has rows of {', '.join(missing)}, but their files are missing")
     files = [clips[clip["clip"]] for clip in used]
     made = kind.build(network, files, database.layout, Skeleton.from_dict(database.skeleton))
     return made, sum(clip["rows"] for clip in used)
 
 
 class Standardised:
-    """A network that is read, asked in standardised units as one that is trained."""
+    """A network read from a file, with standardised inputs and outputs like a network in training."""
 
     def __init__(self, network: Network) -> None:
         self.network, self.outputs = network, len(network.y_mean)

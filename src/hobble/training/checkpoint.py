@@ -1,4 +1,4 @@
-"""Everything a run needs to go on as if it had never stopped, in one file that is whole or absent."""
+"""Checkpoints: the complete state of a training in one file, written atomically."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ HELD_OUT = COLUMNS.index("held_out_mse")
 
 @dataclass
 class State:
-    """Where a training stands after `sections` whole sections, counted from its very start.
+    """The state of a training after `sections` whole sections, counted from its start.
 
-    recipe: names what determined it (`hobble.training.start.run_name`).
-    samples, seconds: seen and spent so far. best, best_mse: flat weights of the lowest held-out error so far.
-    history: a row of numbers for each section, in the order of `hobble.training.history.columns`. Random
-    choices (order of the rows, dropout) are seeded by pass and section, so the position is their state.
+    recipe: hash of everything that determines the result (`hobble.training.start.run_name`).
+    samples, seconds: used so far. best, best_mse: flat weights with the lowest held-out error so far.
+    history: one row of numbers per section, in the order of `hobble.training.history.columns`. There is no
+    state of random generators: the order of the rows and dropout are seeded by pass and section.
     """
 
     network: Trainable
@@ -46,13 +46,13 @@ class State:
 
     @property
     def since_best(self) -> int:
-        """Sections since the one after which the held-out error was the lowest; 0 before there is one."""
+        """Sections since the one with the lowest held-out error; 0 before the first section."""
         errors = [row[HELD_OUT] for row in self.history]
         return len(errors) - 1 - int(np.argmin(errors)) if errors else 0
 
 
 def pack(state: State) -> dict[str, np.ndarray]:
-    """Copies of everything in `state`, as arrays for one npz."""
+    """Copies of everything in `state`, as arrays for an npz file."""
     best = state.network.flat if state.best is None else state.best
     return {
         "weights": _copied(state.network.flat),
@@ -71,14 +71,14 @@ def pack(state: State) -> dict[str, np.ndarray]:
 
 
 def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
-    """Set `state` to what a checkpoint holds; raises InputError where it is of a network of another shape."""
+    """Set `state` from a checkpoint. Raises InputError if its network has another shape."""
     try:
         described = str(data["network"])
         if described != state.network.described:
             raise InputError(
                 path,
                 f"holds a network of {described:.200}, not of {state.network.described}",
-                fix="A training can only go on with the network it started with.",
+                fix="Training can resume only with the network that it started with.",
             )
         state.network.flat.copy_(torch.from_numpy(data["weights"]))
         state.adam.first.copy_(torch.from_numpy(data["first"]))
@@ -89,7 +89,7 @@ def unpack(data: Mapping[str, np.ndarray], state: State, path: Path) -> None:
         state.seconds = float(data["seconds"])
         state.history = data["history"].tolist()
     except KeyError as error:
-        raise InputError(path, f"is no checkpoint of a training: it has no {error}") from None
+        raise InputError(path, f"is not a checkpoint of a training: it has no {error}") from None
 
 
 def _copied(flat: torch.Tensor) -> np.ndarray:
@@ -97,7 +97,7 @@ def _copied(flat: torch.Tensor) -> np.ndarray:
 
 
 class Saver:
-    """Writes checkpoints behind the training's back, one at a time, each whole before it takes its name."""
+    """Writes checkpoints in a background thread, one at a time. A file gets its name when it is complete."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -113,12 +113,12 @@ class Saver:
         self._worker.shutdown(wait=True)
 
     def save(self, arrays: dict[str, np.ndarray]) -> None:
-        """Wait for the checkpoint before this one (its errors are raised here), then write this one."""
+        """Wait for the previous checkpoint (its errors are raised here), then start to write this one."""
         self.wait()
         self._pending = self._worker.submit(save_npz, self.path, **arrays)
 
     def wait(self) -> None:
-        """Return when the last checkpoint is on disk; raises what writing it raised."""
+        """Wait until the last checkpoint is on disk; raises the errors of writing it."""
         if self._pending is not None:
             self._pending.result()
             self._pending = None

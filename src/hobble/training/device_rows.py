@@ -17,15 +17,15 @@ from hobble.rows.compose import compose, fit_columns, x_columns
 from hobble.training.batches import TRAIN, Batch, HostRows
 from hobble.training.processes import ALONE, Processes
 
-AT_ONCE = 4096  # rows composed in one go: few launches, 10 MB
-OF_MEMORY = 0.6  # of the device's; the rest is for the network and its buffers
+ROWS_AT_ONCE = 4096  # rows composed at a time: few kernel launches, 10 MB
+MEMORY_SHARE = 0.6  # of the device's memory for rows; the rest is for the network and its buffers
 
 
 class DeviceRows:
-    """All training rows of `database`, uploaded chunk by chunk, so that only one is in the host's memory.
+    """All training rows of `database` on the device, uploaded chunk by chunk to save host memory.
 
-    What comes is what the database's own reader gives where it holds every row at a time. Only which row
-    and which of its fits comes next is found on the host, and sent once a section.
+    The batches equal those of the database's reader when it holds all rows in memory. The host computes only
+    the order of rows and fits, and sends it once a section.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class DeviceRows:
         rows, fits = self._read(sharing, (pass_index, section, sections, seed))
         sent, fits_sent = (torch.from_numpy(part).to(self.device) for part in (rows, fits))
         own = len(sharing.own)
-        step = own * max(1, AT_ONCE // own)
+        step = own * max(1, ROWS_AT_ONCE // own)
         sizes = sharing.sizes()
         for at in range(0, max(len(rows), 1), step):
             x, y, p = self._composed(sent[at : at + step], fits_sent[at : at + step])
@@ -84,11 +84,11 @@ class DeviceRows:
             for start in range(0, len(p), own):
                 part = slice(start, start + own)
                 yield Batch(x[part], y[part], p[part], clip[part], frame[part], next(sizes)[0])
-        for whole, _ in sizes:  # the last batch is too short to reach this process
+        for whole, _ in sizes:  # the last batch is too short to have rows for this process
             yield Batch(x[:0], y[:0], p[:0], clip[:0], frame[:0], whole)
 
     def _read(self, sharing: Sharing, place: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
-        """Rows and fits that this process reads of a section, batch after batch."""
+        """Numbers of the rows and fits that this process reads in a section, batch by batch."""
         places, batches = [], []
         for stretch in sharing.read():
             parts = list(self._places(*place, stretch))
@@ -105,7 +105,7 @@ class DeviceRows:
     def _places(
         self, pass_index: int, section: int, sections: int, seed: int, stretch: Stretch
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Rows and fits of a stretch in their order, a layer at a time; all chunks are one group."""
+        """Rows and fits of a stretch in order, one layer at a time. All chunks are one group."""
         visits, cut = self.database.manifest.visits, (stretch.start, stretch.stop)
         every, of_each = range(len(self.chunks)), [chunk.rows for chunk in self.chunks]
         nothing = np.empty(0, np.int64)
@@ -115,7 +115,7 @@ class DeviceRows:
             yield order.shown(every, of_each, self.count, self.first, visits, place, slice(start, stop))
 
     def _composed(self, rows: Tensor, fits: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """x (n, X), y (n, Y) and p (n,), composed where they lie."""
+        """x (n, X), y (n, Y) and p (n,), composed on the device."""
         layout = self.database.layout
         ground, y = self.fits[fits].float(), self.y[rows].float()
         x = torch.empty(len(rows), layout.x_size, device=self.device)
@@ -127,16 +127,16 @@ class DeviceRows:
 def rows_for(
     database: Database, device: torch.device, processes: Processes = ALONE, stretches: int | None = None
 ) -> HostRows | DeviceRows:
-    """The training rows on an accelerator where they have room there, else composed by the host."""
+    """The training rows on the GPU if they fit, else composed on the host."""
     on_device = device.type == "cuda" and fits_on(device, database.manifest)
     return (DeviceRows if on_device else HostRows)(database, device, processes, stretches)
 
 
 def fits_on(device: torch.device, manifest: Manifest) -> bool:
-    """Whether the training rows have room on an accelerator beside what the training itself needs.
+    """Whether the training rows fit on the GPU beside the training itself.
 
-    By all its memory, not by what is free: the order of the rows depends on it, and a run that goes on has to
-    take them in the same.
+    Uses its total memory, not the free memory: the order of the rows depends on the result, and a resumed run
+    has to use the same order.
     """
     needed = sum(chunk.bytes for chunk in manifest.chunks[TRAIN])
-    return needed < OF_MEMORY * torch.cuda.mem_get_info(device)[1]
+    return needed < MEMORY_SHARE * torch.cuda.mem_get_info(device)[1]

@@ -1,4 +1,4 @@
-"""The error on clips that the network never trains on, and on which block of Y it lies."""
+"""The held-out error: on clips that are not in training, in all and for each block of Y."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from torch import Tensor
 from hobble.database.reader import Database
 
 SPLIT = "held_out"
-AT_ONCE = 2048  # rows in one product: large enough to be fast, small enough to stay in 50 MB
+ROWS_AT_ONCE = 2048  # rows in one product: fast, and within 50 MB
 
 
-class Asked(Protocol):
-    """What is asked for predictions: a network in training, or one that is read."""
+class Predicts(Protocol):
+    """A network that predicts standardised outputs: in training, or read from a file."""
 
     @property
     def outputs(self) -> int:
@@ -29,9 +29,9 @@ class Asked(Protocol):
 class HeldOut:
     """Rows of the held-out clips, each with one of its terrain fits, kept in memory.
 
-    section: samples of a section of the training; a tenth of that is measured after each, 2,000 to 20,000
-    rows, so that measuring costs a few hundredths of the training. `whole` measures every row, as it streams
-    by.
+    section: samples of a section of the training. After each section a tenth as many rows are measured, 2,000
+    to 20,000, which takes a few percent of the training time. `whole` measures every row, without keeping
+    them.
     """
 
     def __init__(self, database: Database, device: torch.device, section: int) -> None:
@@ -45,15 +45,15 @@ class HeldOut:
             if rows <= 0:
                 break
 
-    def errors(self, network: Asked) -> list[float]:
+    def errors(self, network: Predicts) -> list[float]:
         """Mean squared error of the standardised output on the sample, then that of each block of Y."""
         return self._errors(network, self.sample)
 
-    def whole(self, network: Asked) -> list[float]:
+    def whole(self, network: Predicts) -> list[float]:
         """The same over every held-out row."""
         return self._errors(network, self._stream())
 
-    def _errors(self, network: Asked, batches: Iterable[tuple[Tensor, ...]]) -> list[float]:
+    def _errors(self, network: Predicts, batches: Iterable[tuple[Tensor, ...]]) -> list[float]:
         total = np.zeros(network.outputs)
         rows = 0
         for x, y, p in batches:
@@ -64,7 +64,7 @@ class HeldOut:
         return [float(mean.mean()), *(float(mean[columns].mean()) for columns in self.blocks.values())]
 
     def _stream(self) -> Iterator[tuple[Tensor, ...]]:
-        """Every row once, in random order: the part of a pass in which each row comes for the first time."""
+        """Every row once, in random order: the first layer of a pass."""
         visits = self.database.manifest.visits
-        for block in self.database.blocks(SPLIT, 0, 0, visits, 0, AT_ONCE):
+        for block in self.database.blocks(SPLIT, 0, 0, visits, 0, ROWS_AT_ONCE):
             yield tuple(torch.from_numpy(array).to(self.device) for array in block[:3])

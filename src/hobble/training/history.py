@@ -1,4 +1,4 @@
-"""What a training looked like, section by section: history.csv, and the line that says how it goes."""
+"""The history of a training: history.csv with one row per section, and times for log lines."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ COLUMNS = ("pass", "section", "samples", "seconds", "train_mse", "held_out_mse")
 
 
 def columns(blocks: Iterable[str]) -> list[str]:
-    """Names of the columns: samples and seconds count from the start, passes and sections from 1.
+    """Names of the columns. Samples and seconds count from the start, passes and sections from 1.
 
-    train_mse is the mean over the section's batches, with dropout; the held-out errors are at its end,
-    without. All are mean squared errors of the standardised output.
+    train_mse is the mean over the section's batches, with dropout. The held-out errors are measured at the
+    end of the section, without dropout. All are mean squared errors of the standardised output.
     """
     return [*COLUMNS, *(f"held_out_{name}" for name in blocks)]
 
 
 def write_history(path: Path, blocks: Iterable[str], rows: Sequence[Sequence[float]]) -> None:
-    """Write history.csv; a value that does not exist (no clip is held out) is left empty."""
+    """Write history.csv. Missing values (without held-out clips) are left empty."""
     lines = [",".join(columns(blocks))]
     lines += [",".join(_cell(i, value) for i, value in enumerate(row)) for row in rows]
     write_text(path, "\n".join(lines) + "\n")
@@ -33,7 +33,7 @@ def _cell(column: int, value: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time a person reads at a glance.
+    """A time in words.
 
     >>> duration(42.4), duration(754), duration(7512)
     ('42 s', '12 min 34 s', '2 h 05 min')

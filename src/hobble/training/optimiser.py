@@ -1,4 +1,4 @@
-"""Adam, with the L1 term of the loss, in one sweep over the flat parameters."""
+"""Adam with the L1 term of the loss, in one loop over the flat parameters."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ import torch
 from torch import Tensor
 
 from hobble.core.compiled import njit
-from hobble.models.kernels import bits, team, widened
+from hobble.models.kernels import as_numpy, to_float32, use_threads
 from hobble.models.trainable import Trainable
 
 EPSILON = 1e-8
 
 
 def l1_slopes(network: Trainable, l1: float) -> list[float]:
-    """What the L1 term adds to the gradient of a weight, times its sign, for each layer.
+    """For each layer, the factor of sign(w) that the L1 term adds to the gradient of a weight w.
 
-    The term is l1 * sum over the layers of mean|W| / (2 * layers): the original divides by the number of its
-    parameter arrays, three of weights and three of biases.
+    The term is l1 * sum over the layers of mean|W| / (2 * layers). The original divides by its number of
+    parameter arrays: three of weights and three of biases.
     """
     layers = network.layers
     return [l1 / (2 * len(layers)) / layer[:, :, :-1].numel() for layer in layers]
 
 
 class Adam:
-    """Adam (Kingma and Ba 2015) on `network.flat`; it adds the gradient of the L1 term itself.
+    """Adam (Kingma and Ba 2015) on `network.flat`. It adds the gradient of the L1 term.
 
-    first, second: the running moments, laid out like `network.flat`. steps: how many were made.
+    first, second: the running moments, laid out like `network.flat`. steps: number of steps so far.
     """
 
     def __init__(
@@ -43,9 +43,9 @@ class Adam:
         self.second = torch.zeros_like(network.flat)
 
     def step(self, gradients: list[Tensor], share: float = 1.0) -> None:
-        """Move the parameters by one step against `gradients`, (out, K (in + 1)) for each layer.
+        """Take one step against `gradients`, (out, K (in + 1)) for each layer.
 
-        share: of the learning rate.
+        share: factor of the learning rate.
         """
         self.steps += 1
         if self.network.flat.device.type == "cpu":
@@ -55,27 +55,27 @@ class Adam:
             self.move(gradients, numbers.to(self.network.flat.device, non_blocking=True))
 
     def numbers(self, share: float) -> tuple[float, float]:
-        """What changes from step to step: (rate, root).
+        """The factors that change from step to step: (rate, root).
 
-        rate: the learning rate, made up for the first moment's start at 0; root: likewise for the root of the
-        second.
+        rate: learning rate with the bias correction of the first moment; root: bias correction of the root of
+        the second moment.
         """
         steps = max(self.steps, 1)
         rate = share * self.learning_rate / (1 - self.beta1**steps)
         return rate, 1 / (1 - self.beta2**steps) ** 0.5
 
     def _sweep(self, gradients: list[Tensor], rate: float, root: float) -> None:
-        """One pass over memory, whose bandwidth is all that bounds it on a CPU."""
+        """The step on a CPU, in one pass over memory, whose bandwidth limits the speed."""
         views = [self.network.layers, self.network.views(self.first), self.network.views(self.second)]
         for *layer, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
-            arrays = [bits(array.flatten(0, 1)) for array in layer]
-            arrays.append(bits(gradient.view(layer[0].shape).flatten(0, 1)))
-            team(layer[0].numel())
+            arrays = [as_numpy(array.flatten(0, 1)) for array in layer]
+            arrays.append(as_numpy(gradient.view(layer[0].shape).flatten(0, 1)))
+            use_threads(layer[0].numel())
             numbers = (self.beta1, self.beta2, rate, root, slope, EPSILON)
-            _fused(*arrays, *(arrays[0].dtype.type(number) for number in numbers))
+            _adam_loop(*arrays, *(arrays[0].dtype.type(number) for number in numbers))
 
     def move(self, gradients: list[Tensor], numbers: Tensor) -> None:
-        """The same in PyTorch on any device; `numbers` (2,) are those of `numbers`, on it."""
+        """The step in PyTorch on any device. numbers: (2,) the result of `numbers`, on the device."""
         rate, root = numbers.to(self.network.flat.dtype).unbind()
         views = [self.network.layers, self.network.views(self.first), self.network.views(self.second)]
         for w, m, v, gradient, slope in zip(*views, gradients, self.slopes, strict=True):
@@ -87,7 +87,7 @@ class Adam:
 
 
 @njit(parallel=True, error_model="numpy")
-def _fused(
+def _adam_loop(
     w: Any, m: Any, v: Any, g: Any, b1: Any, b2: Any, rate: Any, root: Any, slope: Any, epsilon: Any
 ) -> None:
     one, zero = w.dtype.type(1), w.dtype.type(0)
@@ -95,7 +95,7 @@ def _fused(
     half = g.itemsize == 2
     for row in numba.prange(w.shape[0]):
         for i in range(w.shape[1]):
-            d = w.dtype.type(widened(g[row, i])) if half else w.dtype.type(g[row, i])
+            d = w.dtype.type(to_float32(g[row, i])) if half else w.dtype.type(g[row, i])
             if i < last:  # the last column holds the biases
                 d += slope * (one if w[row, i] > zero else (-one if w[row, i] < zero else zero))
             m[row, i] = b1 * m[row, i] + (one - b1) * d

@@ -10,74 +10,76 @@ from hobble.core.section import Positive, PositiveFloat, Section, Share
 
 
 class Recipe(Section):
-    """What is learnt and how; a pass is every (frame, fit) pair once, in `sections` sections."""
+    """How a network is trained. A pass is every (frame, fit) pair once, in `sections` sections."""
 
     passes: Positive = 20
     sections: Positive = 10
-    batch: Positive = Field(32, description="samples of a step, over all processes together")
+    batch: Positive = Field(32, description="samples of a step, over all processes")
     learning_rate: PositiveFloat = 1e-4
     schedule: Literal["constant", "cosine"] = Field(
-        "constant", description="of the learning rate; cosine falls to 0 at the end of the last pass"
+        "constant", description="course of the learning rate; cosine falls to 0 at the end of the last pass"
     )
-    warm_up: Annotated[float, Field(ge=0)] = Field(0.0, description="passes in which the rate rises from 0")
+    warm_up: Annotated[float, Field(ge=0)] = Field(
+        0.0, description="passes during which the rate rises from 0"
+    )
     beta1: Share = 0.9
     beta2: Share = 0.999
     dropout: Share = Field(0.3, description="share of units dropped before each layer, the input included")
-    l1: Annotated[float, Field(ge=0)] = Field(0.01, description="weight of the mean absolute weights")
+    l1: Annotated[float, Field(ge=0)] = Field(
+        0.01, description="factor of the mean absolute weights in the loss"
+    )
     rollout: Positive = Field(
-        1, description="frames over which errors of the network stay in the pose that it is given; 1: none"
+        1, description="frames over which the network's errors are carried in its input pose; 1: none"
     )
     keep: Literal["last", "best"] = Field(
         "last",
-        description="which weights are written: those at the end, as in the original, or those with the "
-        "lowest held-out error after a section",
+        description="weights to write: those at the end, as in the original, or those with the lowest "
+        "held-out error after a section",
     )
     patience: Positive | None = Field(
         None,
-        description="the training ends after so many sections without a lower held-out error; none: after "
+        description="end the training after this many sections without a lower held-out error; none: after "
         "all passes",
     )
     seed: int = 1
-    memory_mb: Positive = Field(
-        512, description="largest part of the database held in memory, by each process"
-    )
+    memory_mb: Positive = Field(512, description="memory for the rows of the database, for each process")
     continues: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}$")] | None = Field(
-        None, description="a configuration whose last checkpoint is the start"
+        None, description="a configuration whose last checkpoint the training starts from"
     )
     device: Literal["auto", "cpu", "cuda"] = "auto"
     precision: Literal["auto", "float32", "tf32", "bfloat16"] = Field(
         "auto",
-        description="factors of the products; auto: bfloat16 from batch 256 on where it is fast, below "
-        "it tf32 on CUDA; a CPU has no tf32 and takes float32",
+        description="precision of the factors of products; auto: bfloat16 from batch 256 on if it is fast, "
+        "else tf32 on CUDA and float32 on a CPU",
     )
     stretches: Positive | None = Field(
         None,
-        description="parts of a section from which each batch is taken, side by side; as many as processes "
-        "where there is none, so that each reads a part of its own",
+        description="parts of a section from which each batch takes its samples; default: the number of "
+        "processes, so that each process reads its own part",
     )
 
     @model_validator(mode="after")
     def _can_go_on(self) -> Recipe:
         if self.continues and self.schedule != "constant":
-            raise ValueError(
-                "`continues` needs `schedule: constant`; after another there is nothing to go on with"
-            )
+            raise ValueError("`continues` needs `schedule: constant`; another schedule ends at a rate of 0")
         if self.stretches and self.stretches > self.batch:
             raise ValueError(f"`stretches` ({self.stretches}) is above `batch` ({self.batch})")
         return self
 
 
 class Machines(Section):
-    """Where it runs: `nodes` machines, on each a process for each of its GPUs, or so many on its CPU.
+    """Where the training runs: on `nodes` machines, each with one process per GPU or `processes` on its CPU.
 
-    No part of the recipe: with another number of them a training goes on from its checkpoint.
+    This is not part of the recipe: a training can resume from its checkpoint with other values.
     """
 
     nodes: Annotated[int, Field(gt=0, le=10_000)] = 1
     gpus: Annotated[int, Field(ge=0, le=1_000)] = Field(
-        0, description="of each node, with a process each; 0: `processes` on its CPU"
+        0, description="GPUs of each node, with one process each; 0: `processes` on its CPU"
     )
-    processes: Annotated[int, Field(gt=0, le=1_000)] = Field(1, description="on each node, where `gpus` is 0")
+    processes: Annotated[int, Field(gt=0, le=1_000)] = Field(
+        1, description="processes on each node if `gpus` is 0"
+    )
 
     @property
     def each(self) -> int:
@@ -97,12 +99,12 @@ class Training(Machines, Recipe):
     def _have_work(self) -> Training:
         if self.gpus and self.processes > 1:
             raise ValueError(
-                "give `gpus` or `processes`, not both: there is one process for each GPU of a node"
+                "set `gpus` or `processes`, not both: there is one process for each GPU of a node"
             )
         if self.gpus and self.device == "cpu":
             raise ValueError("`gpus` needs `device: cuda` or `auto`")
         if self.count > self.batch:
             raise ValueError(
-                f"{self.count} processes share a batch of {self.batch}: each needs one sample of it at least"
+                f"{self.count} processes share a batch of {self.batch}: each needs at least one sample"
             )
         return self

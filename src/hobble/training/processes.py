@@ -1,8 +1,8 @@
-"""The processes that train one network together: who each is, and what they tell each other.
+"""Several processes that train one network together, and their communication.
 
-Each has all the weights and finds the gradient on its own rows of a batch. The gradients are summed over the
-processes, so that all take the same step. They are started by `hobble.training.launch`; alone there is
-nothing to tell, and PyTorch's engine is not loaded.
+Each process has all the weights and finds the gradient on its own rows of a batch. The gradients are summed
+over the processes, so that all take the same step. They are started by torchrun. A single process does not
+communicate and does not start torch.distributed.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from torch import Tensor
 from hobble.core.errors import HobbleError
 from hobble.database.stretches import Sharing, own_places
 
-PATIENCE = timedelta(minutes=30)  # for the slowest process; one that died is noticed at once
+PATIENCE = timedelta(minutes=30)  # wait for the slowest process; a dead process is noticed at once
 
 
 @dataclass(frozen=True)
 class Processes:
-    """Process `rank`, from 0, of `count`; `local` is its number on its machine."""
+    """One process: number `rank`, from 0, of `count`; `local` is its number on its machine."""
 
     rank: int = 0
     count: int = 1
@@ -35,29 +35,29 @@ class Processes:
 
     @property
     def first(self) -> bool:
-        """Whether it is the one that writes files and tells how it goes."""
+        """Whether this process writes the files and the log."""
         return self.rank == 0
 
     @property
     def alone(self) -> bool:
-        """Whether there is no other."""
+        """Whether there is only one process."""
         return self.count == 1
 
     def places(self, batch: int) -> range:
-        """The places in a batch that it fills."""
+        """The places in a batch that this process fills."""
         return own_places(batch, self.rank, self.count)
 
     def sharing(self, total: int, batch: int, stretches: int | None) -> Sharing:
-        """What it reads of a section; where `stretches` is None there are as many as processes."""
+        """What this process reads of a section. stretches: None means one for each process."""
         return Sharing.of(total, batch, stretches or self.count, self.rank, self.count)
 
     def sum(self, values: Tensor) -> None:
-        """Replace values (n,) by their sum over the processes, which is the same to the bit in each."""
+        """Replace values (n,) by their sum over the processes. All processes get the same bits."""
         if not self.alone:
             torch.distributed.all_reduce(values)
 
     def take_from_first(self, *tensors: Tensor) -> None:
-        """Replace tensors by those of the first process."""
+        """Replace the tensors by those of the first process."""
         if not self.alone:
             for tensor in tensors:
                 torch.distributed.broadcast(tensor, 0)
@@ -69,16 +69,16 @@ class Processes:
             torch.distributed.broadcast_object_list(shared, 0)
         return list(shared[0])
 
-    def best_told(self, text: str, certain: bool) -> str:
-        """The text of the first process that is certain of it; else that of the first process."""
+    def most_certain(self, text: str, certain: bool) -> str:
+        """The text of the first process that is certain of the cause; else the text of process 0."""
         if self.alone:
             return text
-        told: list[Any] = [None] * self.count
-        torch.distributed.all_gather_object(told, (not certain, text))
-        return str(min(enumerate(told), key=lambda one: (one[1][0], one[0]))[1][1])
+        texts: list[Any] = [None] * self.count
+        torch.distributed.all_gather_object(texts, (not certain, text))
+        return str(min(enumerate(texts), key=lambda one: (one[1][0], one[0]))[1][1])
 
     def check_same(self, flat: Tensor) -> None:
-        """Raise HobbleError where the processes have come to hold different weights."""
+        """Raise HobbleError if the processes hold different weights."""
         if self.alone:
             return
         sums: list[Any] = [None] * self.count
@@ -95,7 +95,7 @@ ALONE = Processes()
 
 @contextlib.contextmanager
 def joined(on_cuda: bool) -> Iterator[Processes]:
-    """This process among those that torchrun started: over NCCL on GPUs, over gloo on CPUs."""
+    """Join the processes that torchrun started: with NCCL on GPUs, with gloo on CPUs."""
     numbers = (int(os.environ[name]) for name in ("RANK", "WORLD_SIZE", "LOCAL_RANK"))
     processes = Processes(*numbers)
     if on_cuda:

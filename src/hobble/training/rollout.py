@@ -1,28 +1,28 @@
-"""Roll-outs in training: poses that carry the network's own errors, as a running character's do."""
+"""Roll-outs in training: input poses with the network's own errors, as in a running character."""
 
 from __future__ import annotations
 
 import torch
 from torch import Tensor
 
-from hobble.character.rule import met
+from hobble.character.rule import joint_place
 from hobble.database.reader import Database
 
 
 class RollOut:
-    """Adds to the pose in X what the network's own errors would have made of it; Y stays as it is.
+    """Adds the errors that the network would have accumulated to the pose in X; Y is unchanged.
 
-    A character's next joints come to lie half way between where the predicted velocities carry them and
-    where they are predicted. So if they were d off, and the network errs by v in velocities and by p in
-    positions, they are (d + v + p) / 2 off in the next frame, and their velocities v. (How the root turned
-    meanwhile, a few hundredths of a radian, is left out.)
+    A joint's next position is the mean of the predicted one and the old one plus the predicted velocity. So
+    if it was off by d, and the network errs by v in velocity and p in position, it is off by (d + v + p) / 2
+    in the next frame, and its velocity by v. (The turn of the root meanwhile, a few hundredths of a radian,
+    is ignored.)
 
-    Each place in a batch is a roll-out over the rows that come to stand there, in any order: what goes on
-    from one to the next is how large errors grow and which joints err together. (With the errors of its own
-    past a row is learnt by heart, and held-out clips fare worse.)
+    Each place in a batch carries its errors to the same place in the next batch, although the rows are
+    shuffled. So the errors have a realistic size and pattern over the joints. (If a row got the errors of its
+    own past, the network would learn the row by heart, and held-out clips get worse.)
 
-    frames: how long a roll-out is; its first pose is the recorded one, so 1 changes nothing. batch: the most
-    rows of a batch. first: the place of the first of them, where other processes have those before.
+    frames: length of a roll-out; its first pose is the recorded one, so 1 changes nothing. batch: largest
+    number of this process's rows in a batch. first: the place of its first row in the whole batch.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class RollOut:
         self.frames, self.first = frames, first
         self.x_place, self.x_speed = layout.x_joint_position, layout.x_joint_velocity
         self.y_place, self.y_speed = layout.y_joint_position, layout.y_joint_velocity
-        # Standard deviations of Y in those of X.
+        # Factors from errors in standardised Y to errors in standardised X.
         self.place_of_place, self.place_of_speed, self.speed_of_speed = (
             torch.from_numpy(s.y_std[of_y] / s.x_std[of_x]).to(device, torch.float32)
             for of_x, of_y in (
@@ -45,25 +45,25 @@ class RollOut:
         self.batches = 0
 
     def begin(self) -> None:
-        """Forget, so that a section does not depend on the one before."""
+        """Set all errors to 0, so that a section does not depend on the previous one."""
         self.place.zero_()
         self.speed.zero_()
         self.batches = 0
 
     def add(self, x: Tensor) -> None:
-        """Change standardised inputs x (B, X) in place."""
+        """Add the errors to standardised inputs x (B, X) in place."""
         if self.frames > 1:
             x[:, self.x_place] += self.place[: len(x)]
             x[:, self.x_speed] += self.speed[: len(x)]
 
     def remember(self, error: Tensor) -> None:
-        """Go on by a frame with the errors (B, Y) of the standardised output, prediction minus truth."""
+        """Advance by a frame. error: (B, Y) of the standardised output, prediction minus truth."""
         if self.frames == 1:
             return
         rows = len(error)
         place, speed = error[:, self.y_place], error[:, self.y_speed]
         made = place * self.place_of_place + speed * self.place_of_speed
-        self.place[:rows] = met(self.place[:rows], made)
+        self.place[:rows] = joint_place(self.place[:rows], made)
         torch.mul(speed, self.speed_of_speed, out=self.speed[:rows])
         self.batches += 1
         ended = slice((self.batches - self.first) % self.frames, None, self.frames)

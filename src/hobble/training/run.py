@@ -1,4 +1,4 @@
-"""The stage as its script calls it: from a database on disk to weights, history and checkpoint."""
+"""Entry point of the stage: from a database on disk to weights, history and checkpoint."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ def run(
 ) -> None:
     """Train on the database folder and write the three files; see `hobble.training.train.train`.
 
-    The weights written are those at the end, as in the original, or with `training.keep: best` those of the
-    lowest held-out error; the checkpoint holds both. terrain_side: centimetres from the path to the side
-    heights in the database's rows. clips: name -> file of its rows in order; read where the network is of a
-    kind that is built and not trained.
+    Writes the weights at the end, as in the original, or with `training.keep: best` those with the lowest
+    held-out error; the checkpoint holds both. terrain_side: cm from the path to the side heights in the
+    database's rows. clips: name -> file of its rows in order, needed only for a network that is built, not
+    trained.
     """
     data = Database.open(database, training.memory_mb)
     if isinstance(model(network.kind), Built):
@@ -73,7 +73,7 @@ def run(
     if training.keep == "best" and state.best is not None:
         state.network.flat.copy_(state.best)
         best_section = state.sections - state.since_best
-        log.info("weights of section %d of %d, of the lowest held-out error", best_section, state.sections)
+        log.info("best weights: section %d of %d, by the held-out error", best_section, state.sections)
     whole = HeldOut(data, state.network.flat.device, 0).whole(state.network)
     each = zip(["held out, every row", *blocks], whole, strict=True)
     log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in each))

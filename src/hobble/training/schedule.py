@@ -1,4 +1,4 @@
-"""How the learning rate goes over a training."""
+"""The schedule of the learning rate."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import math
 from hobble.training.options import Training
 
 
-def share(training: Training, passes: float) -> float:
-    """The share of `training.learning_rate` that counts after `passes` passes, parts of one included.
+def learning_rate_share(training: Training, passes: float) -> float:
+    """The factor of `training.learning_rate` after `passes` passes, which may be a fraction.
 
-    It rises straight from 0 over `warm_up` passes. `constant` then stays at 1; `cosine` falls to 0 in half a
-    wave over all the passes (Loshchilov and Hutter 2017, without restarts).
+    It rises linearly from 0 over `warm_up` passes. `constant` then stays at 1; `cosine` falls to 0 at the end
+    of the last pass (Loshchilov and Hutter 2017, without restarts).
 
     >>> recipe = Training(schedule="cosine", warm_up=0.5, passes=8)
-    >>> [round(share(recipe, passes), 3) for passes in (0, 0.25, 2, 4, 8)]
+    >>> [round(learning_rate_share(recipe, passes), 3) for passes in (0, 0.25, 2, 4, 8)]
     [0.0, 0.499, 0.854, 0.5, 0.0]
     """
     rise = min(1.0, passes / training.warm_up) if training.warm_up else 1.0
@@ -24,5 +24,5 @@ def share(training: Training, passes: float) -> float:
 
 
 def depends_on_passes(training: Training) -> bool:
-    """Whether a training of more passes is another one from its start, and not a longer one."""
+    """Whether the number of passes changes the training from its start, not only its length."""
     return training.schedule != "constant"

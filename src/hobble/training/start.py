@@ -1,4 +1,4 @@
-"""How a training begins: its threads and device, its name, and where it goes on from."""
+"""The start of a training: threads, device, recipe hash, and the checkpoint to resume from."""
 
 from __future__ import annotations
 
@@ -28,31 +28,35 @@ from hobble.training.schedule import depends_on_passes
 
 log = logging.getLogger("hobble.training")
 
-NOT_IN_THE_NAME = ("continues", "device", "keep", "patience", *Machines.model_fields)
-OF_ADAM = ("learning_rate", "beta1", "beta2", "l1")
-OF_A_START = ("weights", "first", "second", "steps", "sections")  # what it gives to the run that goes on
-HALF_FROM = 256  # batch from which the products take most of the time
+NOT_IN_RECIPE_HASH = ("continues", "device", "keep", "patience", *Machines.model_fields)
+ADAM_KEYS = ("learning_rate", "beta1", "beta2", "l1")
+START_ARRAYS = (
+    "weights",
+    "first",
+    "second",
+    "steps",
+    "sections",
+)  # that a run takes from its start checkpoint
+BFLOAT16_FROM_BATCH = 256  # from this batch size on the products take most of the time
 
 
 def use_threads(threads: int) -> None:
-    """Use as many threads in PyTorch and numba, at most one a core, and only algorithms that give the same
-    bits again."""
+    """Set the threads of PyTorch and numba, at most one for each core, and use deterministic algorithms."""
     threads = max(1, min(threads, cores(), numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
     torch.set_num_threads(threads)
     numba.set_num_threads(threads)
     torch.use_deterministic_algorithms(True)
-    # Nothing is read before it is written, so nothing has to be filled first.
+    # No memory is read before it is written, so it need not be filled.
     torch.utils.deterministic.fill_uninitialized_memory = False  # type: ignore[attr-defined]
 
 
 def recipe_hash(network: Options, training: Training, database: Database, code: str | None) -> str:
-    """Names all that determines a training section by section.
+    """A hash of everything that determines a training, section by section.
 
-    How many passes there are is no part of it, unless the learning rate goes by that. Nor are the machines:
-    a training goes on with another number of them.
-    code: a fingerprint of the training's source, where there is one.
+    The number of passes counts only if the learning rate depends on it. Machines and processes do not count,
+    since a training can resume with other ones. code: a fingerprint of the training's source, or None.
     """
-    kept = training.model_dump(mode="json", exclude=set(NOT_IN_THE_NAME))
+    kept = training.model_dump(mode="json", exclude=set(NOT_IN_RECIPE_HASH))
     if not depends_on_passes(training):
         del kept["passes"]
     if training.stretches is None:
@@ -63,14 +67,14 @@ def recipe_hash(network: Options, training: Training, database: Database, code: 
 
 
 def run_name(recipe: str, start: Arrays | None) -> str:
-    """The recipe, and with it what a run starts from where that was made by another recipe.
+    """The name of a run: the recipe hash, combined with its start checkpoint if that has another recipe.
 
-    A start of the same recipe is where the run itself would have come by.
+    A start with the same recipe does not count: the run itself would pass through that state.
     """
     if start is None or str(start.get("recipe")) == recipe:
         return recipe
     name = hashlib.sha256(recipe.encode())
-    for part in OF_A_START:
+    for part in START_ARRAYS:
         name.update(start[part].tobytes())
     return name.hexdigest()[:16]
 
@@ -84,30 +88,30 @@ def begin(
     start: Path | None,
     processes: Processes = ALONE,
 ) -> tuple[State, Path]:
-    """The run's own checkpoint, else the one it is to start from, else a new network; and where its own lies.
+    """The state from the run's own checkpoint, else from `start`, else a new one; and the path of its own.
 
-    A checkpoint of its own that is past the passes wanted (they were lowered) is left aside. Raises
-    InputError where a checkpoint is damaged or of a network of another shape, and where a start is past the
-    passes wanted or of other sections. Of several processes the first reads the checkpoint and tells the
-    others.
+    An own checkpoint that is past `training.passes` (after they were lowered) is ignored. Raises InputError
+    for a checkpoint that is damaged or has a network of another shape, and for a start that is past
+    `training.passes` or has another number of sections. With several processes, the first one reads the
+    checkpoint and sends the state to the others.
     """
     begun = load_npz(start) if start is not None and processes.first else None
     state = fresh(database, network, training, processes)
     if not processes.first:
-        return _told(state, processes), checkpoints
-    state, own = _found(state, training, recipe, checkpoints, start, begun)
-    return _told(state, processes), own
+        return _send_state(state, processes), checkpoints
+    state, own = _restored(state, training, recipe, checkpoints, start, begun)
+    return _send_state(state, processes), own
 
 
-def _told(state: State, processes: Processes) -> State:
-    """Where the first process stands, in all of them."""
+def _send_state(state: State, processes: Processes) -> State:
+    """Copy the first process's state to all processes."""
     processes.take_from_first(state.network.flat, state.adam.first, state.adam.second)
     numbers = processes.numbers_of_first(state.adam.steps, state.sections, state.samples)
     state.adam.steps, state.sections, state.samples = numbers
     return state
 
 
-def _found(
+def _restored(
     state: State,
     training: Training,
     recipe: str,
@@ -115,7 +119,7 @@ def _found(
     start: Path | None,
     begun: Arrays | None,
 ) -> tuple[State, Path]:
-    """A fresh state, set to what a checkpoint holds where there is one; and where its own lies."""
+    """Restore `state` from the own checkpoint or the start, if there is one; and the path of its own."""
     state.recipe = run_name(recipe, begun)
     own = checkpoints / state.recipe / "checkpoint.npz"
     goal = training.passes * training.sections
@@ -123,68 +127,68 @@ def _found(
         data = load_npz(own)
         if int(data.get("sections", 0)) <= goal:
             unpack(data, state, own)
-            log.info("going on from %s, after section %d of %d", own, state.sections, goal)
+            log.info("resuming from %s, after section %d of %d", own, state.sections, goal)
             return state, own
-        log.warning("%s is past %d passes; starting anew", own, training.passes)
+        log.warning("%s is past %d passes; starting again", own, training.passes)
     if start is not None and begun is not None:
         unpack(begun, state, start)
         _check_start(state, training, start)
         if state.recipe != recipe:
-            log.warning("%s was made with other settings, data or code; going on from it all the same", start)
-        log.info("going on from %s, after section %d of %d", start, state.sections, goal)
+            log.warning("%s was made with other settings, data or code; training resumes from it", start)
+        log.info("resuming from %s, after section %d of %d", start, state.sections, goal)
     return state, own
 
 
 def _check_start(state: State, training: Training, path: Path) -> None:
-    """Where a training stands is counted in sections, so those of the start have to be its own."""
+    """Check that the start has as many sections a pass as the training, and no more passes."""
     sections = int(max(row[1] for row in state.history)) if state.history else training.sections
     if sections != training.sections:
         raise InputError(
             path,
-            f"was trained in {sections} sections a pass, and is to go on in {training.sections}",
-            fix=f"Give training.sections {sections}, or leave out training.continues.",
+            f"was trained with {sections} sections a pass, but training.sections is {training.sections}",
+            fix=f"Set training.sections to {sections}, or remove training.continues.",
         )
     passes = state.sections // sections
     if passes > training.passes:
         raise InputError(
             path,
-            f"stands after {passes} passes, and is to go on to {training.passes}",
-            fix=f"Give training.passes more than {passes}, or leave out training.continues.",
+            f"has {passes} passes, but training.passes is {training.passes}",
+            fix=f"Set training.passes to more than {passes}, or remove training.continues.",
         )
 
 
 def fresh(database: Database, network: Options, training: Training, processes: Processes = ALONE) -> State:
-    """A new network, sized for the database's rows, and an optimiser that has not moved."""
+    """A new network for the database's rows, and a new optimiser."""
     skeleton = Skeleton.from_dict(database.skeleton)
     kind = model(network.kind)
-    assert isinstance(kind, Trained), "what is built is not trained"
+    assert isinstance(kind, Trained), "this kind is built, not trained"
     new = kind.trainable(network, database.layout, skeleton, training.seed)
     new = new.to(device(training.device, processes))
-    return State(new, Adam(new, **training.model_dump(include=set(OF_ADAM))))
+    return State(new, Adam(new, **training.model_dump(include=set(ADAM_KEYS))))
 
 
 def device(wanted: str, processes: Processes = ALONE) -> torch.device:
-    """The device of `training.device`: auto, cpu or cuda; of several processes each has a GPU of its own.
+    """The device of `training.device`: auto, cpu or cuda. Each of several processes has its own GPU.
 
-    Raises HobbleError where there is no such thing.
+    Raises HobbleError if cuda is wanted but not available.
     """
-    there = torch.cuda.is_available()
-    if wanted == "cuda" and not there:
+    has_cuda = torch.cuda.is_available()
+    if wanted == "cuda" and not has_cuda:
         raise HobbleError("training.device is cuda, but PyTorch finds no CUDA device here; use auto or cpu")
-    if not there or wanted == "cpu":
+    if not has_cuda or wanted == "cpu":
         return torch.device("cpu")
     return torch.device("cuda") if processes.alone else torch.device("cuda", processes.local)
 
 
 def step_for(network: Trainable, training: Training) -> Step:
-    """The way to find gradients that suits the device, the precision wanted and the size of a batch.
+    """The `Step` for the device, the precision and the batch size.
 
-    Sums are float32 whatever the factors. TF32, which rounds factors to 11 bits, is a setting of the process.
+    Sums are always float32. TF32, which rounds factors to 11 bits, is set for the whole process.
     """
     on_cpu = network.flat.device.type == "cpu"
     precision = training.precision
     half = precision == "bfloat16"
-    if precision == "auto" and training.batch >= HALF_FROM:
+    if precision == "auto" and training.batch >= BFLOAT16_FROM_BATCH:
         half = multiplies_bfloat16() if on_cpu else torch.cuda.is_bf16_supported(including_emulation=False)
     torch.backends.cuda.matmul.allow_tf32 = precision in ("auto", "tf32")
     torch.backends.cuda.matmul.allow_bf16_reduced_precision_reduction = False

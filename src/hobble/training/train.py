@@ -1,4 +1,4 @@
-"""The training: passes of sections of batches; loss, step, log, checkpoint."""
+"""The training loop: passes, sections, batches; loss, step, log, checkpoint."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from hobble.training.history import duration
 from hobble.training.options import Training
 from hobble.training.processes import ALONE, Processes
 from hobble.training.rollout import RollOut
-from hobble.training.schedule import share
+from hobble.training.schedule import learning_rate_share
 from hobble.training.start import begin, recipe_hash, step_for, use_threads
 from hobble.training.update import update_for
 
@@ -40,23 +40,24 @@ def train(
 ) -> State:
     """Train to `training.passes` passes over the database's training clips; returns where that ends.
 
-    network, training: those sections of a configuration. checkpoints: a folder in which the run keeps its
-    state, by the hash of all that determines it; a run that finds its own there goes on from it. start: a
-    checkpoint to begin from where there is none yet; a run from another start is another run. processes: who
-    trains together, each calling this; the first reads and writes checkpoints and keeps the history. The
-    result depends on the arguments and the number of threads, never on interruptions. Raises HobbleError
-    where an error is no finite number, naming the batch (the last checkpoint stays), where there are fewer
-    samples than sections, and where `keep` or `patience` ask for a held-out error that there is not.
+    network, training: these sections of a configuration. checkpoints: a folder with one subfolder for each
+    run, named by the hash of everything that determines it; a run resumes from its own checkpoint there.
+    start: a checkpoint to start from if the run has none of its own; it is part of the hash. processes: those
+    that train together, each of which calls this; the first reads and writes checkpoints and the history.
+
+    The result depends on the arguments and the number of threads, never on interruptions. Raises HobbleError
+    if an error is not finite (the message names the batch, and the last checkpoint stays), if there are fewer
+    samples than sections, and if `keep` or `patience` need a held-out error but no clip is held out.
     """
     use_threads(threads)
     if (training.patience or training.keep == "best") and not database.rows(SPLIT):
         raise HobbleError(
-            "training.keep: best and training.patience go by the held-out error, but no clip is held out. "
-            "Name some under held_out in the data set."
+            "training.keep: best and training.patience need the held-out error, but no clip is held out. "
+            "List some under held_out in the data set."
         )
     pairs, sections = database.pairs(TRAIN), training.sections
     if pairs < sections:
-        raise HobbleError(f"{pairs} samples to train on are fewer than training.sections, {sections}")
+        raise HobbleError(f"{pairs} training samples are fewer than training.sections, {sections}")
     recipe = recipe_hash(network, training, database, code)
     state, path = begin(database, network, training, recipe, Path(checkpoints), start, processes)
     if not processes.first:
@@ -80,7 +81,7 @@ def _run(
     pairs = database.pairs(TRAIN)
     for turn in range(state.sections, passes * sections):
         if training.patience and processes.numbers_of_first(state.since_best)[0] >= training.patience:
-            log.info("no lower held-out error for %d sections: it ends here", training.patience)
+            log.info("no lower held-out error for %d sections: training ends", training.patience)
             break
         pass_index, section = divmod(turn, sections)
         where = f"pass {pass_index + 1} of {passes}, section {section + 1} of {sections}"
@@ -89,7 +90,7 @@ def _run(
         roll_out.begin()
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
             roll_out.add(batch.x)
-            rate = share(training, (state.samples + watch.seen) / pairs)
+            rate = learning_rate_share(training, (state.samples + watch.seen) / pairs)
             watch.add(update(batch.x, batch.y, batch.p, rate, batch.whole), batch)
             roll_out.remember(step.error)
             if record:
@@ -104,12 +105,12 @@ def _run(
 
 
 def section_seed(seed: int, turn: int) -> int:
-    """Seed of what is drawn at random in section `turn`, counted from the start: dropout."""
+    """The seed of dropout in section `turn`, counted from the start of the training."""
     return int(np.random.SeedSequence([seed, 1, turn]).generate_state(1, np.uint64)[0] >> 1)
 
 
 class Record:
-    """What is kept of a training, and how it goes: errors, history, checkpoints, a bar, a line a section."""
+    """Records a training: held-out errors, history, checkpoints, progress bar, and one log line a section."""
 
     def __init__(self, state: State, database: Database, training: Training, saver: Saver) -> None:
         self.state, self.saver = state, saver
@@ -122,7 +123,7 @@ class Record:
         )
 
     def section(self, where: str, place: list[int], train_mse: float) -> None:
-        """Measure the network after a section, note it and save all; `place`: pass and section from 1."""
+        """Measure the network after a section, add to the history, save. place: pass and section, from 1."""
         state = self.state
         state.seconds = self.before + time.perf_counter() - self.began
         errors = self.held_out.errors(state.network)
@@ -132,12 +133,12 @@ class Record:
         self._report(where)
 
     def close(self) -> None:
-        """Return when all is on disk."""
+        """Wait until everything is on disk."""
         self.bar.close()
         self.saver.wait()
 
     def _report(self, where: str) -> None:
-        """Say how it goes: speed, time left, errors."""
+        """Log speed, time left and errors."""
         state, seconds = self.state, time.perf_counter() - self.began
         speed = (state.samples - self.first) / seconds
         left = duration((self.goal - state.samples) / speed)

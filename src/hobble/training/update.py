@@ -1,4 +1,4 @@
-"""What one batch does to a training: gradient, optimiser; on CUDA as one captured graph."""
+"""The update of one batch: gradient and optimiser; on CUDA as one captured graph."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from hobble.models.trainable import Step
 from hobble.training.optimiser import Adam
 from hobble.training.processes import ALONE, Processes
 
-CAPTURED_UP_TO = 1024  # rows of a batch: from there on the products outlast the launches
-WARM_UP = 3  # runs before a capture, in which libraries choose their algorithms and take their memory
+CAPTURED_UP_TO = 1024  # rows of a batch; with more, launches cost little compared with the products
+WARM_UP = 3  # runs before the capture, in which libraries choose algorithms and allocate memory
 
 
 class Update:
-    """Draws a batch's dropout, finds its gradient and moves the network."""
+    """Draws the dropout masks of a batch, finds the gradient and takes a step."""
 
     def __init__(self, step: Step, adam: Adam) -> None:
         self.step, self.adam = step, adam
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, whole: int | None = None) -> Tensor:
-        """Train on x (B, X), y (B, Y), p (B,) at `share` of the learning rate; the loss, a scalar tensor.
+        """Train on x (B, X), y (B, Y), p (B,). Returns the loss, a scalar tensor.
 
-        whole: rows of the batch over all processes, where there are several.
+        share: factor of the learning rate. whole: rows of the batch over all processes, if there are several.
         """
         loss = self.step(x, y, p, self.step.masks(len(x)))
         self.adam.step(self.step.gradients, share)
@@ -30,10 +30,10 @@ class Update:
 
 
 class SharedUpdate(Update):
-    """The same by several processes, each of which has some rows of the batch, maybe none.
+    """The update by several processes, each with its own rows of the batch, maybe none.
 
-    The loss is a mean over the rows of the batch. So each process's gradient and loss count by its share of
-    those rows, and their sum over the processes is that of the whole batch. One message holds both.
+    The loss is a mean over the rows of the batch. So each process multiplies its gradient and loss by its
+    share of the rows, and the sum over the processes is that of the whole batch. One message holds both.
     """
 
     def __init__(self, step: Step, adam: Adam, processes: Processes, batch: int) -> None:
@@ -62,11 +62,11 @@ class SharedUpdate(Update):
 
 
 class CapturedUpdate(Update):
-    """The same on a CUDA device for batches of `rows` rows: a hundred small kernels started by one launch.
+    """The update on a CUDA device for batches of `rows` rows: one launch instead of about a hundred.
 
-    Batches of another size, such as the last of a section, go the plain way. What changes from step to step
-    lies in memory that the graph reads: the batch and the optimiser's numbers; the generator of the dropout
-    is known to it, and goes on, or begins anew, as it would without.
+    Batches of another size, such as the last of a section, use the plain update. The graph reads the batch
+    and the optimiser's numbers from fixed memory, which is filled before each replay. The dropout generator
+    is registered with the graph, so it advances and can be seeded as usual.
     """
 
     def __init__(self, step: Step, adam: Adam, rows: int) -> None:
@@ -105,12 +105,12 @@ class CapturedUpdate(Update):
         self.adam.steps += 1
         self.numbers.copy_(torch.tensor(self.adam.numbers(share)), non_blocking=True)
         self.graph.replay()
-        self.step.error = self.error  # a batch that went the plain way left another
+        self.step.error = self.error  # a plain update may have replaced it
         return self.loss.clone()
 
 
 def update_for(step: Step, adam: Adam, rows: int, processes: Processes = ALONE) -> Update:
-    """Captured where that is possible and pays: on CUDA, for small batches of one process."""
+    """The update to use: captured on CUDA for small batches of one process, where it is faster."""
     if not processes.alone:
         return SharedUpdate(step, adam, processes, rows)
     if adam.network.flat.device.type == "cuda" and rows <= CAPTURED_UP_TO:

@@ -1,4 +1,4 @@
-"""network/weights.npz: what the runtime needs of a trained network, and nothing else."""
+"""Write network/weights.npz, which holds everything that the runtime needs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hobble.channels import channel
 from hobble.core.files import save_npz
 from hobble.core.skeleton import Skeleton
 from hobble.database.reader import Database
-from hobble.models.model import Made
+from hobble.models.model import FinishedNetwork
 from hobble.models.seen import Seen
 from hobble.rows.layout import CONTACTS, GAITS
 from hobble.training.batches import TRAIN
@@ -22,13 +22,11 @@ UNITS = "centimetres, 60 Hz frames, velocities per frame, right-handed, Y up, +Z
 
 
 def write_weights(
-    path: Path, network: Made, database: Database, configuration: str, facts: Mapping[str, Any]
+    path: Path, network: FinishedNetwork, database: Database, configuration: str, facts: Mapping[str, Any]
 ) -> None:
-    """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd`, those of `Seen` and `meta`, a JSON
-    text.
+    """Write the network's arrays, `Xmean`, `Xstd`, `Ymean`, `Ystd`, the arrays of `Seen`, and `meta` (JSON).
 
-    facts: numbers about the training and its rows that go into `meta` as they are. Equal networks give equal
-    bytes.
+    facts: numbers about the training, which are added to `meta`. Equal networks give equal bytes.
     """
     s = database.statistics
     arrays = {**network.arrays(), "Xmean": s.x_mean, "Xstd": s.x_std, "Ymean": s.y_mean, "Ystd": s.y_std}
@@ -36,8 +34,8 @@ def write_weights(
     save_npz(path, **arrays, meta=np.array(meta(network, database, configuration, facts)))
 
 
-def meta(network: Made, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
-    """What the columns mean and where the network comes from, as JSON; the joints keep their order."""
+def meta(network: FinishedNetwork, database: Database, configuration: str, facts: Mapping[str, Any]) -> str:
+    """The file's meta as JSON: meaning of the columns and origin of the network."""
     rig = Skeleton.from_dict(database.skeleton)
     channels = [channel(name) for name, _ in database.layout.channels]
     return json.dumps(
@@ -54,4 +52,4 @@ def meta(network: Made, database: Database, configuration: str, facts: Mapping[s
             **network.about,
             **facts,
         }
-    )  # not sorted: the order of the skeleton's joints is that of the columns
+    )  # keys not sorted: the order of the skeleton's joints is that of the columns

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hobble.core import quat
-from hobble.models.matching.inertia import OF_JOINT, OFFSETS, ROW, remembered, show
+from hobble.models.matching.inertia import OFFSETS, OFFSETS_PER_JOINT, ROW, memory_size, show_rows
 
 J, HALFLIFE = 3, 6.0
 AT = np.array([0, 3 * J, 6 * J, 9 * J])  # positions, velocities, rotations, change of phase
@@ -32,12 +32,12 @@ def two_runs(rng: np.random.Generator) -> np.ndarray:
 
 def played(frames: np.ndarray, rows: list[int]) -> np.ndarray:
     """What is shown of rows, one a frame, whatever their order."""
-    memory, shown = np.zeros((1, remembered(J))), []
+    memory, shown = np.zeros((1, memory_size(J))), []
     phases = (0.02 * np.arange(len(frames)) % 1).astype(np.float32)
     before = -1
     for row in rows:
         out = np.zeros((1, frames.shape[1]), np.float32)
-        show(
+        show_rows(
             memory, frames, np.ones(frames.shape[1], np.float32), phases, np.array([before]),
             np.array([before + 1 if before >= 0 else -1]), np.array([row]), np.array([row != before + 1]),
             phases[row : row + 1].astype(float), J, AT, HALFLIFE, out,
@@ -93,18 +93,18 @@ def test_transitions_on_transitions_add_up() -> None:
     frames = two_runs(np.random.default_rng(5))
     there_and_back = played(frames, [*range(1, 20), 70, *range(21, 30)])
     assert np.abs(there_and_back[20:24, : 3 * J] - frames[21:25, : 3 * J]).max() > 0.01
-    memory = np.zeros((1, remembered(J)))
-    assert memory.shape[1] == OFFSETS + OF_JOINT * J
+    memory = np.zeros((1, memory_size(J)))
+    assert memory.shape[1] == OFFSETS + OFFSETS_PER_JOINT * J
 
 
 @pytest.mark.parametrize("off", [0.3, -0.3])
 def test_the_phase_is_led_back_to_that_of_the_clips(off: float) -> None:
     frames = two_runs(np.random.default_rng(6))
-    memory, phases = np.zeros((1, remembered(J))), (0.02 * np.arange(120) % 1).astype(np.float32)
+    memory, phases = np.zeros((1, memory_size(J))), (0.02 * np.arange(120) % 1).astype(np.float32)
     phase = np.array([off % 1.0])
     for row in range(60):
         out = np.zeros((1, frames.shape[1]), np.float32)
-        show(
+        show_rows(
             memory, frames, np.ones(frames.shape[1], np.float32), phases, np.array([row - 1]),
             np.array([row if row else -1]), np.array([row]), np.array([False]), phase, J, AT, HALFLIFE, out,
         )  # fmt: skip

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.character.rule import met, moving, phase_change
+from hobble.character.rule import joint_place, moving, phase_change
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.evaluation.captured import rotate_by_yaw, unbroken
@@ -158,7 +158,7 @@ def roll_out(
         before = row[:, layout.x_joint_position].reshape(alive, -1, 3).astype(float)
         speed[:alive] = y[:, layout.y_joint_velocity].reshape(alive, -1, 3)
         guess = y[:, layout.y_joint_position].reshape(alive, -1, 3)
-        place[:alive] = met(_carried(before, asked, at) + speed[:alive], guess)
+        place[:alive] = joint_place(_carried(before, asked, at) + speed[:alive], guess)
         made.append(place[:alive].copy())
         moved = phase_change(asked.moving[at], y[:, layout.y_phase_change][:, 0])
         phase[:alive] = np.mod(phase[:alive] + moved, 1.0)

@@ -1,4 +1,4 @@
-"""The mode-adaptive network (Zhang, Starke, Komura, Saito 2018). `forward` is all of it in plain words."""
+"""The mode-adaptive network (Zhang, Starke, Komura, Saito 2018). Start reading at `forward`."""
 
 from __future__ import annotations
 

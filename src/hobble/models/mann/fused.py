@@ -1,4 +1,4 @@
-"""The step on a CPU: what lies between the experts' products, as compiled loops over rows."""
+"""The step on a CPU: compiled loops over rows for everything but the experts' products."""
 
 from __future__ import annotations
 
@@ -8,34 +8,34 @@ import numba
 from torch import Tensor
 
 from hobble.core.compiled import njit
-from hobble.models.fused import Fused
-from hobble.models.kernels import bits, rounded, team, widened
+from hobble.models.fused_base import FusedBase
+from hobble.models.kernels import as_numpy, to_bfloat16, to_float32, use_threads
 from hobble.models.mann.step import Step
 
 
-class FusedStep(Fused, Step):
-    """As `Step`, several times faster outside the products, in buffers that are kept from batch to batch."""
+class FusedStep(FusedBase, Step):
+    """As `Step`, but several times faster outside the products, with buffers reused for every batch."""
 
     def prepared(self, number: int, x: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
         """As in `Step`, in one sweep."""
         inputs = self.buffer(f"inputs {number}", len(x), x.shape[1] + 1, self.factors.dtype)
         slope = self.buffer(f"slope {number}", *x.shape)
-        team(x.numel())
-        _prepare(x.numpy(), mask.numpy(), bits(inputs), slope.numpy())
+        use_threads(x.numel())
+        _prepare(x.numpy(), mask.numpy(), as_numpy(inputs), slope.numpy())
         return inputs, slope
 
     def blended(self, number: int, outputs: Tensor, c: Tensor) -> Tensor:
         """As in `Step`, in one sweep."""
         h = self.buffer(f"h {number}", len(c), outputs.shape[1] // c.shape[1])
-        team(outputs.numel())
-        _blend(bits(outputs), c.numpy(), h.numpy())
+        use_threads(outputs.numel())
+        _blend(as_numpy(outputs), c.numpy(), h.numpy())
         return h
 
     def spread(self, number: int, d: Tensor, outputs: Tensor, c: Tensor, dc: Tensor) -> Tensor:
         """As in `Step`, in one sweep."""
         da = self.buffer(f"da {number}", len(c), outputs.shape[1], self.factors.dtype)
-        team(outputs.numel())
-        _spread(d.numpy(), bits(outputs), c.numpy(), bits(da), dc.numpy())
+        use_threads(outputs.numel())
+        _spread(d.numpy(), as_numpy(outputs), c.numpy(), as_numpy(da), dc.numpy())
         return da
 
 
@@ -50,8 +50,8 @@ def _prepare(x: Any, mask: Any, inputs: Any, slope: Any) -> None:
             slope[row, i] = mask[row, i] * min(x[row, i] + one, one)
         if half:
             for i in range(width):
-                inputs[row, i] = rounded(mask[row, i] * x[row, i])
-            inputs[row, width] = rounded(one)
+                inputs[row, i] = to_bfloat16(mask[row, i] * x[row, i])
+            inputs[row, width] = to_bfloat16(one)
         else:
             for i in range(width):
                 inputs[row, i] = mask[row, i] * x[row, i]
@@ -69,16 +69,16 @@ def _blend(outputs: Any, c: Any, h: Any) -> None:
             start, share = k * width, c[row, k]
             if half:
                 for i in range(width):
-                    h[row, i] += share * widened(outputs[row, start + i])
+                    h[row, i] += share * to_float32(outputs[row, start + i])
             else:
                 for i in range(width):
                     h[row, i] += share * outputs[row, start + i]
 
 
-# The sums may be taken in any order, and so several at a time.
+# Reassociation lets the compiler sum several terms at a time.
 @njit(parallel=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 def _spread(d: Any, outputs: Any, c: Any, da: Any, dc: Any) -> None:
-    """da (B, K out) from d (B, out), and what it adds to dc (B, K)."""
+    """Write da (B, K out) from d (B, out), and add this layer's part to dc (B, K)."""
     rows, width = d.shape
     half = outputs.itemsize == 2
     for row in numba.prange(rows):
@@ -86,8 +86,8 @@ def _spread(d: Any, outputs: Any, c: Any, da: Any, dc: Any) -> None:
             start, share, total = k * width, c[row, k], c.dtype.type(0)
             if half:
                 for i in range(width):
-                    total += d[row, i] * widened(outputs[row, start + i])
-                    da[row, start + i] = rounded(share * d[row, i])
+                    total += d[row, i] * to_float32(outputs[row, start + i])
+                    da[row, start + i] = to_bfloat16(share * d[row, i])
             else:
                 for i in range(width):
                     total += d[row, i] * outputs[row, start + i]

@@ -1,4 +1,4 @@
-"""The trained mode-adaptive network: its experts and its gate, and what each part of Hobble gets of them."""
+"""The trained mode-adaptive network: reading, prediction, page data and export."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_EXPERTS = 64
 @dataclass(frozen=True)
 class Mann(Network):
     """weights: per layer (K, out, in) float32; biases: per layer (K, out); gate_weights: (out, in) and
-    gate_biases: (out,) of the gating network; columns: of X, (G,), those that it sees."""
+    gate_biases: (out,) of the gating network; columns: (G,) columns of X that the gating network gets."""
 
     kind: ClassVar[str] = "mann"
     phase: ClassVar[bool] = False
@@ -44,7 +44,7 @@ class Mann(Network):
         weights, biases = stacked(path, arrays, ("W", "b"), 3, inputs, outputs)
         experts = len(weights[0])
         if not 2 <= experts <= MOST_EXPERTS:
-            raise InputError(path, f"{experts} experts; 2 to {MOST_EXPERTS} are read")
+            raise InputError(path, f"{experts} experts; 2 to {MOST_EXPERTS} are allowed")
         gate_weights, gate_biases = stacked(path, arrays, ("V", "d"), 2, len(columns), experts)
         return cls(
             weights=weights,
@@ -67,7 +67,7 @@ class Mann(Network):
 
     @property
     def parameters(self) -> int:
-        """All weights and biases: each prediction goes through all experts."""
+        """All weights and biases: each prediction evaluates all experts."""
         gate = sum(w.size + b.size for w, b in zip(self.gate_weights, self.gate_biases, strict=True))
         return gate + self.experts * sum(a * b + b for a, b in pairwise(self.sizes))
 
@@ -80,7 +80,7 @@ class Mann(Network):
         )
 
     def predict(self, x: Array, phase: Array) -> Array:
-        """As in `Network`; the phase is not looked at."""
+        """As in `Network`; the phase is ignored."""
         z = standardised(self, x)
         y = forward(self.weights, self.biases, self.gate_weights, self.gate_biases, self.columns, z)
         return y * self.y_std + self.y_mean
@@ -91,8 +91,8 @@ class Mann(Network):
         return MannPredictor(self, storage)
 
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """As in `Network`: weights as integers with a factor for each row, `gate`: the places among `inputs`
-        that the gating network sees."""
+        """As in `Network`. Weights are integers with a factor for each row; `gate` holds the positions in
+        `inputs` that the gating network gets."""
         weights, biases, gate = list(self.weights), list(self.biases), list(self.gate_weights)
         weights[0] = weights[0][:, :, inputs]
         weights[-1], biases[-1] = weights[-1][:, outputs], biases[-1][:, outputs]
@@ -120,18 +120,18 @@ class Mann(Network):
 
 
 class MannPredictor(StackPredictor):
-    """It prepared to run, its experts' weights stored as float32 or int16."""
+    """The network prepared to run, with the experts' weights stored as float32 or int16."""
 
     network: Mann
 
     def __init__(self, network: Mann, storage: str = "float32") -> None:
         super().__init__(network)
         self._experts = Stack(network.weights, network.biases, storage)
-        # Its rounding would be multiplied by every expert, and it is small.
+        # Always float32: it is small, and its rounding error would affect every expert.
         self._gate = Stack([w[None] for w in network.gate_weights], [b[None] for b in network.gate_biases])
 
     def evaluate(self, z: Array, phase: Array, out: Array) -> None:
-        """As in `Predictor`; the phase is not looked at."""
+        """As in `Predictor`; the phase is ignored."""
         self._experts.run(z, self.shares(z), out)
         self.restore(out)
 

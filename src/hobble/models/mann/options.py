@@ -1,4 +1,4 @@
-"""The keys of a configuration's `network` section where its kind is mann."""
+"""The keys of a configuration's `network` section for kind mann."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hobble.models.options import Options
 
 
 class MannOptions(Options):
-    """The mode-adaptive network; the sizes are those of Zhang et al. 2018."""
+    """The mode-adaptive network, with the sizes of Zhang et al. 2018."""
 
     kind: Literal["mann"] = "mann"
     experts: Annotated[int, Field(ge=2, le=32)] = 8

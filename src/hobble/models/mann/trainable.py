@@ -1,4 +1,4 @@
-"""The mode-adaptive network while it is trained: its experts, its gate, what they compute."""
+"""The mode-adaptive network in training: parameters of the experts and the gate."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from hobble.models.trainable import Step, Trainable, uniform_start
 class TrainableMann(Trainable):
     """The layers of the gate, then those of the experts.
 
-    A layer of experts lies in the buffer as (K * out, 1, in + 1), expert after expert: one product gives the
-    outputs of all, and the shares blend them behind it.
-    sizes: units of an expert from the input to the output; gate_sizes: of the gate, of which the last is K,
-    the number of experts; columns: of X, those that the gate sees.
+    A layer of experts is stored as (K * out, 1, in + 1), expert after expert. One product gives the outputs
+    of all experts, which are then blended.
+    sizes: units of an expert, from input to output; gate_sizes: units of the gate, the last is K, the number
+    of experts; columns: the columns of X that the gate gets.
     """
 
     kind: ClassVar[str] = "mann"
@@ -52,7 +52,7 @@ class TrainableMann(Trainable):
         return self.sizes[-1]
 
     def __call__(self, x: Tensor, p: Tensor) -> Tensor:
-        """As in `Trainable`; p is not looked at."""
+        """As in `Trainable`; p is ignored."""
         gates = len(self.gate_sizes) - 1
         h = x[:, list(self.columns)]
         for number, layer in enumerate(self.layers[:gates]):
@@ -126,5 +126,5 @@ def initialise(
 
 
 def with_one(x: Tensor) -> Tensor:
-    """x (B, n) with a 1 behind each row, which the bias multiplies."""
+    """x (B, n) with a 1 appended to each row, for the bias."""
     return torch.cat([x, torch.ones_like(x[:, :1])], dim=1)

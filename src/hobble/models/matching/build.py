@@ -1,4 +1,4 @@
-"""The tables that motion matching goes through, from the rows of clips in their order."""
+"""Build the tables that motion matching searches, from the rows of clips in their order."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from hobble.rows.layout import RowLayout
 
 @dataclass(frozen=True)
 class Tables:
-    """R frames of clips, one run of consecutive frames after another.
+    """R frames of clips, in runs of consecutive frames.
 
-    features: (R, n) float32, weighted; y: (R, Y) float32 raw; phase: (R,); left: (R,) int32, frames that
-    follow in the run; columns: (n,) of X, weights: (n,) of the features. every, halflife: of the options.
+    features: (R, n) float32, weighted; y: (R, Y) float32 raw; phase: (R,); left: (R,) int32, how many frames
+    follow in the run; columns: (n,) of X, weights: (n,) of the features. every, halflife: from the options.
     """
 
     kind: ClassVar[str] = "matching"
@@ -40,7 +40,7 @@ class Tables:
     halflife: float
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """What a file holds of them."""
+        """The arrays of the file."""
         return {
             "features": self.features,
             "frames": self.y,
@@ -52,7 +52,7 @@ class Tables:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What a file's meta says of them."""
+        """Entries in the file's meta, as JSON."""
         return {
             "network": "y is the frame of the clips whose weighted columns of x are nearest, and the frames "
             "that follow it until the next search",
@@ -62,16 +62,16 @@ class Tables:
 
     @property
     def described(self) -> str:
-        """Their size in a few words."""
+        """The size in a few words."""
         return f"{len(self.y):,} frames of clips, compared by {len(self.columns)} features"
 
 
 def build(
     options: MatchingOptions, clips: Sequence[str | Path], layout: RowLayout, skeleton: Skeleton
 ) -> Tables:
-    """The tables of clips' files of rows, laid out as `layout`.
+    """The tables of the clips' files of rows, with columns as in `layout`.
 
-    Raises InputError where a file is none, is of another layout, or all of them together hold no frame.
+    Raises InputError if a file is not a file of rows or has another layout, or if no file has a frame.
     """
     xs, ys, phases, lefts = [], [], [], []
     for path in clips:
@@ -103,7 +103,7 @@ def build(
 
 
 def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
-    """x (R, X) and y (R, Y) float32 raw, of each row once, with the mean of its terrain fits under it."""
+    """Raw x (R, X) and y (R, Y) float32, each row once, on the mean of its terrain fits."""
     x = np.empty((len(rows), layout.x_size), np.float32)
     y = rows.y.astype(np.float32)
     if not len(rows):
@@ -117,10 +117,10 @@ def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
 
 
 def in_runs(rows: ClipRows) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """The rows (R',) whose frames follow one another, and how many frames follow each in its run (R',).
+    """Row numbers (R',) with each frame once, and how many frames follow each in its run (R',).
 
-    Cycles that touch share a frame, which stands in the file twice: the later row, with which a cycle begins,
-    is kept.
+    Adjacent cycles share a frame, which the file has twice. The later row is kept: the next cycle begins with
+    it.
     """
     frame = rows.frame
     one = np.flatnonzero(np.diff(frame, append=-1) != 0)

@@ -1,8 +1,8 @@
-"""What a frame of the clips and a frame of the character are compared by: weighted columns of X.
+"""The features that motion matching compares: weighted columns of X.
 
-After Holden, Kanoun, Perepichka, Popa, Learned Motion Matching (2020), section 3: the path and the facing a
-third, two thirds and a whole window ahead, position and velocity of both feet and velocity of the hips. Added
-are the gait, the heights ahead and what the channels tell.
+After Holden, Kanoun, Perepichka, Popa, Learned Motion Matching (2020), section 3: path and facing at one
+third, two thirds and the whole window ahead, position and velocity of both feet, and velocity of the hips.
+Hobble adds the gait, the heights ahead and the channel values.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from hobble.models.matching.options import MatchingOptions
 from hobble.rows.layout import GAITS, RowLayout
 
 FEET = ("left_heel", "right_heel")
-LEAST = 1e-6  # spread below which a group of columns tells nothing
+LEAST_SPREAD = 1e-6  # a group of columns with a smaller spread gets weight 0
 
 
 def groups(
     layout: RowLayout, skeleton: Skeleton, options: MatchingOptions
 ) -> list[tuple[str, list[int], float]]:
-    """(name, columns of X, weight) of each group of features whose columns share one scale."""
+    """(name, columns of X, weight) of each group of features. A group has one scale."""
     samples, now = layout.samples, layout.samples // 2
     ahead = sorted({now + max(0, round(layout.future * part / 3) - 1) for part in (1, 2, 3)})
     joint, speed = layout.x_joint_position.start, layout.x_joint_velocity.start
@@ -49,11 +49,11 @@ def groups(
 def columns_and_weights(
     layout: RowLayout, skeleton: Skeleton, options: MatchingOptions, x: Array
 ) -> tuple[NDArray[np.int64], Array]:
-    """Columns of X (n,), and what each is multiplied by (n,) float32, so that distances can be added up.
+    """Columns of X (n,) and their factors (n,) float32, which make distances comparable.
 
-    x: (R, X) the rows of the clips, raw. A group is divided by the mean spread of its columns, as in the
-    source: standardising each alone would blow up those that hardly vary. A channel is divided by its highest
-    value, so that it says nothing about how often a clip has it.
+    x: (R, X) the rows of the clips, raw. A group is divided by the mean standard deviation of its columns, as
+    in the paper: dividing each column by its own would amplify columns that hardly vary. A channel is divided
+    by its highest value, so that its scale does not depend on how often the clips have it.
     """
     columns: list[int] = []
     weights: list[Array] = []
@@ -63,7 +63,7 @@ def columns_and_weights(
         else:
             spread = float(x[:, group].std(axis=0, dtype=np.float64).mean())
         columns += group
-        weights.append(np.full(len(group), weight / spread if spread > LEAST else 0.0, np.float32))
+        weights.append(np.full(len(group), weight / spread if spread > LEAST_SPREAD else 0.0, np.float32))
     return np.array(columns, np.int64), np.concatenate(weights)
 
 

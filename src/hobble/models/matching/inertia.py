@@ -1,11 +1,11 @@
-"""What a character remembers between frames, and how a transition is hidden: by inertialisation.
+"""Inertialisation: smooth transitions between clips, with offsets kept in the character's memory.
 
-At a transition the pose changes at once to that of another frame of the clips. The difference, and that of
-the velocities, is remembered, added to the poses that follow, and decays like a critically damped spring that
-is let go (Bollo, Inertialization, GDC 2018; the spring in closed form after Holden, Spring-It-On, 2021). No
-joint jumps, and only one pose is read in a frame.
+At a transition the source changes at once to another frame of the clips. The differences in pose and velocity
+are stored as offsets and added to the following poses. They decay like a critically damped spring (Bollo,
+Inertialization, GDC 2018; closed form after Holden, Spring-It-On, 2021). So no joint jumps, and each frame
+reads only one pose.
 
-Rotations are axes times half the angle, as in Y. All is in the root frame, centimetres, per frame.
+Rotations are axis times half the angle, as in Y. Units: root frame, cm, per frame.
 """
 
 from __future__ import annotations
@@ -16,22 +16,26 @@ import numpy as np
 
 from hobble.core.compiled import njit
 
-ROW, SINCE, OFFSETS = 0, 1, 2  # places in the memory: 1 + the row shown last, frames since the search
-OF_JOINT = 12  # offsets of position, velocity, rotation and turn, three numbers each
-FASTEST_PULL = 0.002  # cycles a frame by which a phase may go beyond that of the clips to catch up
+ROW, SINCE, OFFSETS = (
+    0,
+    1,
+    2,
+)  # indices in the memory: 1 + the last row shown, frames since the search, offsets
+OFFSETS_PER_JOINT = 12  # offsets of position, velocity, rotation and rotation speed, three numbers each
+FASTEST_PULL = 0.002  # cycles a frame: largest correction of the phase toward the clip's phase
 
 
-def remembered(joints: int) -> int:
-    """Numbers that are remembered of one character."""
-    return OFFSETS + OF_JOINT * joints
+def memory_size(joints: int) -> int:
+    """How many numbers the memory of one character has."""
+    return OFFSETS + OFFSETS_PER_JOINT * joints
 
 
 @njit
-def go_on(memory: Any, left: Any, every: int, before: Any, following: Any, due: Any) -> None:
-    """Where each character's run goes on, and who is due for a search.
+def find_following(memory: Any, left: Any, every: int, before: Any, following: Any, due: Any) -> None:
+    """Find the next row of each character's run, and mark the characters that need a search.
 
-    memory: (C, M); left: (R,) frames that follow each row in its run. before: (C,) the row shown last, or -1;
-    following: (C,) the row after it, or -1 where its run ends there; due: (C,).
+    memory: (C, M); left: (R,) frames that follow each row in its run. Writes before (C,): the last row shown,
+    or -1; following (C,): the row after it, or -1 if its run ends; due (C,): whether to search.
     """
     rows = len(left)
     for c in range(len(memory)):
@@ -43,15 +47,15 @@ def go_on(memory: Any, left: Any, every: int, before: Any, following: Any, due: 
 
 
 @njit(error_model="numpy")
-def show(
+def show_rows(
     memory: Any, frames: Any, scale: Any, phases: Any, before: Any, following: Any, shown: Any, due: Any,
     phase: Any, joints: int, at: Any, halflife: float, out: Any,
 ) -> None:  # fmt: skip
-    """Write what each character shows of row `shown` (C,) into `out` (C, Y), and remember it.
+    """Write row `shown` (C,) plus the offsets of each character into `out` (C, Y), and update the memory.
 
-    frames: (R, Y), times scale (Y,); phases: (R,); at: first columns of joint positions, velocities,
-    rotations and of the change of phase. A character whose row follows on its last one goes on; any other
-    makes a transition. No row may be the first of its run, but the one that a character begins with.
+    frames: (R, Y), to be multiplied by scale (Y,); phases: (R,); at: first columns of joint positions,
+    velocities, rotations and of the change of phase. A row other than `following` starts a transition. Only a
+    character's very first row may be the first of its run.
     """
     damping = 2.0 * np.log(2.0) / halflife
     for c in range(len(memory)):
@@ -61,7 +65,7 @@ def show(
             memory[c] = 0.0
         else:
             if row != following[c]:
-                _begin(memory[c], frames, scale, before[c], following[c], row, joints, at)
+                _start_transition(memory[c], frames, scale, before[c], following[c], row, joints, at)
             _decay(memory[c, OFFSETS:], damping)
             _add(memory[c, OFFSETS:], joints, at, out[c])
             off = phases[row] - phase[c]
@@ -72,17 +76,17 @@ def show(
 
 
 @njit(forceinline=True, cache=False)
-def _begin(
+def _start_transition(
     memory: Any, frames: Any, scale: Any, before: int, following: int, row: int, joints: int, at: Any
 ) -> None:
-    """Add to the offsets what the pose that would have come next differs by from that of `row`."""
+    """Add to the offsets the difference between the pose that would have come next and that of `row`."""
     o = memory[OFFSETS:]
     old, new = frames[following if following >= 0 else before] * scale, frames[row] * scale
-    # How fast a joint turns is the step between two rows of one run.
+    # The rotation speed is the turn between two rows of one run.
     before_old, before_new = frames[before] * scale, frames[max(row - 1, 0)] * scale
     q, p, r = np.empty(4), np.empty(4), np.empty(3)
     for j in range(joints):
-        k = OF_JOINT * j
+        k = OFFSETS_PER_JOINT * j
         for i in range(3):
             o[k + i] += old[at[0] + 3 * j + i] - new[at[0] + 3 * j + i]
             o[k + 3 + i] += old[at[1] + 3 * j + i] - new[at[1] + 3 * j + i]
@@ -104,7 +108,7 @@ def _begin(
 
 @njit(forceinline=True, cache=False)
 def _decay(o: Any, damping: float) -> None:
-    """One frame of x'' = -2 d x' - d^2 x, for position with its velocity and rotation with its turn."""
+    """One frame of x'' = -2 d x' - d^2 x, for position and velocity, and for rotation and its speed."""
     fade = np.exp(-damping)
     for k in range(0, len(o), 6):
         for i in range(k, k + 3):
@@ -117,7 +121,7 @@ def _add(o: Any, joints: int, at: Any, y: Any) -> None:
     """Add the offsets to a row Y."""
     q, p = np.empty(4), np.empty(4)
     for j in range(joints):
-        k, turn = OF_JOINT * j, at[2] + 3 * j
+        k, turn = OFFSETS_PER_JOINT * j, at[2] + 3 * j
         for i in range(3):
             y[at[0] + 3 * j + i] += o[k + i]
             y[at[1] + 3 * j + i] += o[k + 3 + i]
@@ -150,14 +154,14 @@ def _log(a: Any, b: Any, v: Any, at: int) -> None:
 
 @njit(forceinline=True, cache=False)
 def _between(a: Any, b: Any, v: Any) -> None:
-    """What turns b into a: the axis times half the angle of a b^-1. b becomes its inverse."""
+    """The rotation from b to a, as axis times half the angle of a b^-1. b is replaced by its inverse."""
     b[1], b[2], b[3] = -b[1], -b[2], -b[3]
     _log(a, b, v, 0)
 
 
 @njit(forceinline=True, cache=False)
 def _step(now: Any, earlier: Any, turn: int, v: Any) -> None:
-    """How far a joint turned from one row to the next."""
+    """The turn of a joint from one row to the next, as axis times half the angle."""
     q, p = np.empty(4), np.empty(4)
     _exp(now, turn, q)
     _exp(earlier, turn, p)

@@ -3,7 +3,7 @@
 import { bytes } from "../../report/web/numbers.js";
 import { createScales, floats } from "../layers.js";
 
-const ROW = 0, SINCE = 1, OFFSETS = 2, OF_JOINT = 12, FASTEST_PULL = .002, SURROUNDING = 20;
+const ROW = 0, SINCE = 1, OFFSETS = 2, OFFSETS_PER_JOINT = 12, FASTEST_PULL = .002, SURROUNDING = 20;
 const { sqrt, sin, cos, atan2, exp, floor, min, max, abs } = Math;
 
 const toQuaternion = (v, i) => {
@@ -58,12 +58,12 @@ export const createNetwork = (spec) => {
   const begin = (o, before, following, row) => {
     const past = frame(before), old = following < 0 ? past : frame(following), next = frame(row), earlier = frame(max(row - 1, 0));
     for (let j = 0; j < joints; j++) for (let i = 0; i < 3; i++) {
-      o[OF_JOINT * j + i] += old[position + 3 * j + i] - next[position + 3 * j + i];
-      o[OF_JOINT * j + 3 + i] += old[velocity + 3 * j + i] - next[velocity + 3 * j + i];
+      o[OFFSETS_PER_JOINT * j + i] += old[position + 3 * j + i] - next[position + 3 * j + i];
+      o[OFFSETS_PER_JOINT * j + 3 + i] += old[velocity + 3 * j + i] - next[velocity + 3 * j + i];
     }
     const turn = [0, 0, 0];
     for (const [j, r] of turning) {
-      const k = OF_JOINT * j;
+      const k = OFFSETS_PER_JOINT * j;
       toVector(toQuaternion(old, r), inverted(toQuaternion(next, r)), turn, 0);
       toVector(toQuaternion(o, k + 6), toQuaternion(turn, 0), o, k + 6);
       if (following < 0) continue;
@@ -82,10 +82,10 @@ export const createNetwork = (spec) => {
   };
   const add = (o, y) => {
     for (let j = 0; j < joints; j++) for (let i = 0; i < 3; i++) {
-      y[position + 3 * j + i] += o[OF_JOINT * j + i];
-      y[velocity + 3 * j + i] += o[OF_JOINT * j + 3 + i];
+      y[position + 3 * j + i] += o[OFFSETS_PER_JOINT * j + i];
+      y[velocity + 3 * j + i] += o[OFFSETS_PER_JOINT * j + 3 + i];
     }
-    for (const [j, r] of turning) toVector(toQuaternion(o, OF_JOINT * j + 6), toQuaternion(y, r), y, r);
+    for (const [j, r] of turning) toVector(toQuaternion(o, OFFSETS_PER_JOINT * j + 6), toQuaternion(y, r), y, r);
   };
 
   return (x, phase, memory = new Float64Array(spec.network.memory)) => {

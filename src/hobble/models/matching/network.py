@@ -1,4 +1,4 @@
-"""Motion matching as the rest of Hobble sees a network: its tables, and what each part gets of them."""
+"""Motion matching with the interface of a network: reading, search, page data."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from scipy.spatial import cKDTree
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.models import checks
-from hobble.models.matching.inertia import remembered
+from hobble.models.matching.inertia import memory_size
 from hobble.models.matching.predictor import MatchingPredictor
 from hobble.models.network import Network, standardised
 from hobble.models.packing import packed, packed_columns
 
-MOST_ROWS = 1 << 24  # more would not be told apart by the page's float32
+MOST_ROWS = 1 << 24  # the page keeps row numbers in float32, which is exact up to here
 MOST_WEIGHT = 1e9
-LONGEST = 1_000_000  # frames
-FEWEST_LEFT = 20  # frames that have to follow a row for a run to begin there
-MOST_ON_PAGE = 8000  # rows, about 8 MB of text; a page of several characters is to stay below 20 MB
+MOST_FRAMES = 1_000_000  # frames
+FEWEST_LEFT = 20  # a search finds only rows followed by at least this many frames of their run
+MOST_ON_PAGE = 8000  # rows, about 8 MB of text; a page with several characters should stay below 20 MB
 
 
 @dataclass(frozen=True)
 class Matching(Network):
-    """features: (R, n) float32; frames: (R, Y) float32 raw; phases: (R,) float32; left: (R,) frames that
+    """features: (R, n) float32; frames: (R, Y) float32 raw; phases: (R,) float32; left: (R,) how many frames
     follow in the run; columns: (n,) of X and weights: (n,) of the features. every: frames between two
-    searches; halflife: frames of the inertialisation.
+    searches; halflife: of the inertialisation, frames.
     """
 
     kind: ClassVar[str] = "matching"
@@ -62,16 +62,16 @@ class Matching(Network):
         found = {"frames": frames, "features": features, "phase": phases, "left": left}
         for name, shape in expected.items():
             if found[name].shape != shape:
-                raise InputError(path, f"{name} is {found[name].shape} where {shape} belongs")
+                raise InputError(path, f"{name} has shape {found[name].shape}, expected {shape}")
         if weights.shape != (n,) or weights.min() < 0:
-            raise InputError(path, f"feature_weights are not {n} numbers of 0 or more")
+            raise InputError(path, f"feature_weights has to hold {n} numbers of 0 or more")
         if rows > MOST_ROWS:
-            raise InputError(path, f"{rows} frames; {MOST_ROWS} at most are read")
-        # Where frames follow, the next row is the next frame: playing it never leaves the table.
+            raise InputError(path, f"{rows} frames; at most {MOST_ROWS} are allowed")
+        # This check guarantees that playing a run never leaves the table.
         if left[-1] != 0 or (left[:-1][left[:-1] > 0] != left[1:][left[:-1] > 0] + 1).any():
             raise InputError(path, "left does not count down to the end of each run")
         if common["skeleton"] is None:
-            raise InputError(path, "motion matching without a skeleton: its meta has none")
+            raise InputError(path, "motion matching needs a skeleton, but its meta has none")
         return cls(
             features=features,
             frames=frames,
@@ -79,13 +79,13 @@ class Matching(Network):
             left=left,
             columns=columns,
             weights=weights,
-            every=checks.whole(path, "every", meta.get("every"), 1, LONGEST),
-            halflife=checks.length(path, "halflife", meta.get("halflife"), LONGEST),
+            every=checks.whole(path, "every", meta.get("every"), 1, MOST_FRAMES),
+            halflife=checks.length(path, "halflife", meta.get("halflife"), MOST_FRAMES),
             **common,
         )
 
     def shortened(self, most: int) -> Matching:
-        """The same with the first part of each run, as long as leaves `most` rows or a few more in all."""
+        """A copy with only the first part of each run, so that about `most` rows remain in all."""
         rows = len(self.left)
         if rows <= most:
             return self
@@ -105,9 +105,9 @@ class Matching(Network):
 
     @cached_property
     def starts(self) -> NDArray[np.int64]:
-        """Rows that a search may find: not at the end of a run, nor the first of one, which has no turn.
+        """Rows that a search may find: not near the end of a run, and not its first row (no rotation speed).
 
-        All rows where no run is so long.
+        If all runs are too short, all rows but the first of each run; if there are none, all rows.
         """
         begins = np.r_[True, self.left[:-1] == 0]
         found = np.flatnonzero((self.left >= FEWEST_LEFT) & ~begins)
@@ -115,13 +115,13 @@ class Matching(Network):
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Of the features of `starts`."""
+        """A k-d tree of the features of `starts`."""
         return cKDTree(self.features[self.starts])
 
     @property
     def memory(self) -> int:
-        """As in `Network`: the row shown, the frames since the search, and what inertialisation adds."""
-        return remembered(self.layout.joints)
+        """As in `Network`: the row shown, the frames since the search, and the offsets."""
+        return memory_size(self.layout.joints)
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -148,9 +148,9 @@ class Matching(Network):
         return self.starts[self.tree.query(queries)[1]]
 
     def predict(self, x: Array, phase: Array) -> Array:
-        """The frame that is nearest to each row of x (n, X); the phase is not looked at.
+        """The nearest frame for each row of x (n, X); the phase is ignored.
 
-        This is a search for each row, without the runs and transitions of a character.
+        This searches for each row, without the runs and transitions of a character.
         """
         return self.frames[self.nearest(self.queries(standardised(self, x)))]
 
@@ -160,8 +160,8 @@ class Matching(Network):
         return MatchingPredictor(self, storage)
 
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
-        """As in `Network`: frames as integers with a factor for each column; features are as they are, so
-        that the page finds the same rows. Of many rows only MOST_ON_PAGE are there, of each run the first."""
+        """As in `Network`. Frames are integers with a factor for each column. Features stay float32, so that
+        the page finds the same rows. Large tables are shortened to MOST_ON_PAGE rows, see `shortened`."""
         return self.shortened(MOST_ON_PAGE)._packed(inputs, outputs)
 
     def _packed(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
@@ -200,5 +200,5 @@ def _whole(path: str | Path, arrays: Mapping[str, Any], name: str, most: int) ->
     if array.dtype.kind not in "iu" or array.ndim != 1 or not array.size:
         raise InputError(path, f"{name} has shape {array.shape} and type {array.dtype}, not whole numbers")
     if array.min() < 0 or array.max() > most:
-        raise InputError(path, f"{name} holds numbers that are not from 0 to {most}")
+        raise InputError(path, f"{name} holds numbers outside 0 to {most}")
     return array.astype(np.int64)

@@ -1,4 +1,4 @@
-"""Motion matching at run time: play a run of the clips, search every few frames, hide the transitions.
+"""Motion matching at run time: play a run of a clip, search every few frames, smooth the transitions.
 
 Clavet, Motion Matching and the Road to Next-Gen Animation, GDC 2016.
 """
@@ -11,20 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hobble.core.quat import Array
-from hobble.models.matching.inertia import go_on, show
+from hobble.models.matching.inertia import find_following, show_rows
 from hobble.models.network import STORAGES, inverse
 from hobble.models.stack import standardise
 
 if TYPE_CHECKING:
     from hobble.models.matching.network import Matching
 
-SURROUNDING = (
-    20  # frames around the one that follows, of which none is worth a transition (Holden et al. 2020)
-)
+SURROUNDING = 20  # no transition to a row within this many frames of the next one (Holden et al. 2020)
 
 
 class MatchingPredictor:
-    """Its tables prepared to run. storage: "float32", or "int16" with a factor for each column of frames."""
+    """The tables prepared to run. storage: "float32", or "int16" with a factor for each column of frames."""
 
     def __init__(self, network: Matching, storage: str = "float32") -> None:
         if storage not in STORAGES:
@@ -42,37 +40,38 @@ class MatchingPredictor:
         self._x_mean, self._x_inverse = (
             np.ascontiguousarray(a, np.float32) for a in (network.x_mean, inverse(network.x_std))
         )
-        _ = network.tree  # planted now, not in the first frame
+        _ = network.tree  # build the tree now, not in the first frame
 
     def standardise(self, x: Array, z: Array) -> None:
         """As in `Predictor`."""
         standardise(x, self._x_mean, self._x_inverse, z)
 
     def evaluate(self, z: Array, phase: Array, out: Array, memory: Array | None = None) -> None:
-        """As in `Predictor`. memory: (C, M) float64 of `Network.memory`; None or zeros where nothing is
-        remembered: then each shows the frame that is nearest."""
+        """As in `Predictor`. memory: (C, M) float64, see `Network.memory`. With None or zeros, each character
+        shows its nearest frame."""
         network, count = self.network, len(z)
         if memory is None:
             memory = np.zeros((count, network.memory))
         before, following = np.empty(count, np.int64), np.empty(count, np.int64)
         due = np.empty(count, np.bool_)
-        go_on(memory, network.left, network.every, before, following, due)
+        find_following(memory, network.left, network.every, before, following, due)
         shown = following.copy()
         if due.any():
             some = np.flatnonzero(due)
             shown[some] = self._searched(network.queries(z[some]), following[some])
-        show(
+        show_rows(
             memory, self._frames, self._scale, network.phases, before, following, shown, due, phase,
             network.layout.joints, self._at, network.halflife, out,
         )  # fmt: skip
 
     def _searched(self, queries: Array, following: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The rows (n,) to show for queries (n, F): those that follow, unless another is nearer."""
+        """The rows (n,) to show for queries (n, F): the following row, unless another row is nearer."""
         network = self.network
         apart = queries - network.features[following]
         known = np.where(following >= 0, np.sqrt(np.square(apart).sum(axis=1)), np.inf)
         _, found = network.tree.query(queries, distance_upper_bound=float(known.max()))
-        rows = network.starts[np.minimum(found, len(network.starts) - 1)]  # past the last: none is nearer
+        # The tree returns len(starts) where no row is nearer.
+        rows = network.starts[np.minimum(found, len(network.starts) - 1)]
         nearer = np.square(queries - network.features[rows]).sum(axis=1) < known**2
         stay = ~nearer | (np.abs(rows - following) <= SURROUNDING)
         return np.where(stay & (following >= 0), following, rows)

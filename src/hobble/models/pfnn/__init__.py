@@ -1,4 +1,4 @@
-"""The phase-functioned network (Holden, Komura, Saito 2017). `forward` is all of it in plain words."""
+"""The phase-functioned network (Holden, Komura, Saito 2017). Start reading at `forward`."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
 """The phase-functioned network in plain numpy: start reading here (Holden, Komura, Saito 2017).
 
-Each layer has K control points of its weights, equally spaced over a cycle of two steps. At a phase, the
-weights are those of a cyclic cubic spline through them:
+Each layer has K control points of its weights, equally spaced over a cycle of two steps. The weights at a
+phase lie on a cyclic cubic spline through the control points:
 
     h1 = elu(W0(p) x + b0(p))    h2 = elu(W1(p) h1 + b1(p))    y = W2(p) h2 + b2(p)
 
-Everything else in this folder computes the same: `step` and `fused` with its gradient, `predictor` fast for
-one character or a crowd, `onnx_export` and `network.js` elsewhere.
+The rest of this folder computes the same: `step` and `fused` with its gradient, `predictor` fast for one
+character or a crowd, `onnx_export` and `network.js` for other programs.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-# Rows: the four control points about a place between the second and the third; columns: powers of that place.
+# Rows: four neighbouring control points; columns: powers of t, 0 at the second point and 1 at the third.
 CATMULL_ROM = 0.5 * np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]], float)
-BINS = 50  # phases for which the original stores its weights in its constant mode
+BINS = 50  # the original's constant mode stores its weights at this many phases
 
 
 def forward(weights: Sequence[Array], biases: Sequence[Array], z: Array, phase: Array) -> Array:
@@ -66,6 +66,6 @@ def weights_at(points: Array, phase: Array) -> Array:
 
 
 def binned(phase: Array) -> Array:
-    """Phases (n,) as the original's constant mode looks weights up: that of the bin of 50 they lie in."""
-    # in single precision, as the original does: in double, 0.24 stored as float32 falls into bin 11
+    """Phases (n,) rounded down to the 50 bins of the original's constant mode."""
+    # In single precision, as in the original. In double precision, 0.24 stored as float32 falls into bin 11.
     return np.minimum(np.floor(np.asarray(phase, np.float32) * np.float32(BINS)), BINS - 1) / BINS

@@ -1,4 +1,4 @@
-"""The step on a CPU: what lies between the products, as compiled loops over rows."""
+"""The step on a CPU: compiled loops over rows for everything but the products."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numba
 from torch import Tensor
 
 from hobble.core.compiled import njit
-from hobble.models.fused import Fused
-from hobble.models.kernels import bits, rounded, team, widened
+from hobble.models.fused_base import FusedBase
+from hobble.models.kernels import as_numpy, to_bfloat16, to_float32, use_threads
 from hobble.models.pfnn.step import Step
 
 
-class FusedStep(Fused, Step):
-    """As `Step`, several times faster outside the products, in buffers that are kept from batch to batch."""
+class FusedStep(FusedBase, Step):
+    """As `Step`, but several times faster outside the products, with buffers reused for every batch."""
 
     def coefficients(self, p: Tensor) -> Tensor:
-        """(B, K) of phases (B,)."""
+        """Spline coefficients (B, K) of phases (B,)."""
         c = self.buffer("c", len(p), self.network.control_points)
         _coefficients(p.numpy(), c.numpy())
         return c
@@ -26,15 +26,15 @@ class FusedStep(Fused, Step):
         """As in `Step`, in one sweep."""
         e = self.buffer(f"e {number}", len(x), c.shape[1] * (x.shape[1] + 1), self.factors.dtype)
         slope = self.buffer(f"slope {number}", *x.shape)
-        team(e.numel())
-        _expand(x.numpy(), c.numpy(), mask.numpy(), bits(e), slope.numpy())
+        use_threads(e.numel())
+        _expand(x.numpy(), c.numpy(), mask.numpy(), as_numpy(e), slope.numpy())
         return e, slope
 
     def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
         """As in `Step`, in one sweep."""
         d = self.buffer(f"d {number}", *slope.shape)
-        team(de.numel())
-        _contract(bits(de), c.numpy(), slope.numpy(), d.numpy())
+        use_threads(de.numel())
+        _contract(as_numpy(de), c.numpy(), slope.numpy(), d.numpy())
         return d
 
 
@@ -66,8 +66,8 @@ def _expand(x: Any, c: Any, mask: Any, e: Any, slope: Any) -> None:
             start, share = k * (width + 1), c[row, k]
             if half:
                 for i in range(width):
-                    e[row, start + i] = rounded(share * mask[row, i] * x[row, i])
-                e[row, start + width] = rounded(share)
+                    e[row, start + i] = to_bfloat16(share * mask[row, i] * x[row, i])
+                e[row, start + width] = to_bfloat16(share)
             else:
                 for i in range(width):
                     e[row, start + i] = share * mask[row, i] * x[row, i]
@@ -85,7 +85,7 @@ def _contract(de: Any, c: Any, slope: Any, d: Any) -> None:
             start, share = k * (width + 1), c[row, k]
             if half:
                 for i in range(width):
-                    d[row, i] += share * widened(de[row, start + i])
+                    d[row, i] += share * to_float32(de[row, start + i])
             else:
                 for i in range(width):
                     d[row, i] += share * de[row, start + i]

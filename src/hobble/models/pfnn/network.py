@@ -1,4 +1,4 @@
-"""The trained phase-functioned network: its control points, and what each part of Hobble gets of it."""
+"""The trained phase-functioned network: reading, prediction, page data and export."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hobble.models.packing import packed_rows
 from hobble.models.pfnn.forward import binned, forward
 from hobble.models.pfnn.predictor import MODES, PfnnPredictor
 
-FEWEST, MOST = 4, 64  # control points: a cyclic cubic needs four
+FEWEST_POINTS, MOST_POINTS = 4, 64  # control points: a cyclic cubic needs four
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,10 @@ class Pfnn(Network):
         inputs, outputs = len(common["x_mean"]), len(common["y_mean"])
         weights, biases = stacked(path, arrays, ("W", "b"), 3, inputs, outputs)
         points = len(weights[0])
-        if not FEWEST <= points <= MOST:
+        if not FEWEST_POINTS <= points <= MOST_POINTS:
             raise InputError(
-                path, f"{points} control points; there are {FEWEST} or more in a cyclic cubic, {MOST} at most"
+                path,
+                f"{points} control points; from {FEWEST_POINTS} to {MOST_POINTS} are allowed",
             )
         return cls(weights=weights, biases=biases, **common)
 
@@ -63,7 +64,7 @@ class Pfnn(Network):
         return sum(a * b + b for a, b in pairwise(self.sizes))
 
     def stored(self, mode: str) -> int:
-        """As in `Network`: the weights of so many phases, or the control points."""
+        """As in `Network`: the weights at the mode's phases, or the control points."""
         return (MODES[mode] or self.control_points) * self.parameters
 
     @property
@@ -76,7 +77,7 @@ class Pfnn(Network):
         )
 
     def predict(self, x: Array, phase: Array, constant: bool = False) -> Array:
-        """As in `Network`. constant: with the weights of the phase's bin, as the original's constant mode."""
+        """As in `Network`. constant: use the weights of the phase's bin, as the original's constant mode."""
         z = standardised(self, x)
         y = forward(self.weights, self.biases, z, binned(phase) if constant else phase)
         return y * self.y_std + self.y_mean
@@ -111,7 +112,7 @@ class Pfnn(Network):
 
 
 def formula(hidden: int) -> str:
-    """What a file of `hidden` hidden layers computes, in a line."""
+    """The formula of a network with `hidden` hidden layers, in one line."""
     inside = "x"
     for i in range(hidden):
         inside = f"elu(W{i} {inside} + b{i})"

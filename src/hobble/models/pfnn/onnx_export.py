@@ -1,4 +1,4 @@
-"""The phase-functioned network as ONNX, the phase looked up in the graph; see `hobble.models.onnx_file`."""
+"""The phase-functioned network as ONNX, with the phase lookup in the graph; see `hobble.models.onnx_file`."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ __all__ = ["OPSET", "TOLERANCE", "check_onnx", "export_onnx", "write_checked"]
 
 
 def export_onnx(path: str | Path, network: Pfnn, mode: str = "cubic") -> None:
-    """Write the network in one phase mode; raises as `onnx_file.export`, ValueError for an unknown mode.
+    """Write the network in one phase mode. Raises as `onnx_file.export`, and ValueError for an unknown mode.
 
-    cubic blends the outputs of all control points, which is exact; linear and constant look weights up.
+    cubic blends the outputs of all control points, which is exact; linear and constant use tables of weights.
     """
     onnx_file.export(path, network, mode, _body(network, mode))
 
 
 def write_checked(path: str | Path, network: Pfnn, mode: str = "cubic") -> float:
-    """Export, and check before the file has its name; returns and raises what the two functions do."""
+    """As `hobble.models.onnx_file.write`."""
     return onnx_file.write(path, network, mode, _body(network, mode))
 
 
@@ -50,9 +50,9 @@ def _body(network: Pfnn, mode: str) -> onnx_file.Body:
 
 
 def _lookup(g: Graph, mode: str, points: int) -> tuple[str, str]:
-    """Which points a phase blends (batch, n) and their shares (batch, n, 1); for cubic, of all points."""
+    """The points that a phase blends, (batch, n), and their shares (batch, n, 1); for cubic, all points."""
     one = g.constant(1.0)
-    # A phase of exactly 1 is the end of the cycle and not its start, as in `PfnnPredictor`.
+    # A phase of exactly 1 is the end of the cycle, not its start, as in `PfnnPredictor`.
     wrapped = g("Where", g("Equal", "phase", one), "phase", g("Sub", "phase", g("Floor", "phase")))
     scaled = g("Mul", wrapped, g.constant(points))
     last = g.constant(points - 1)
@@ -69,7 +69,7 @@ def _lookup(g: Graph, mode: str, points: int) -> tuple[str, str]:
     else:
         square = g("Mul", t, t)
         powers = g("Concat", g("Add", g("Sub", t, t), one), t, square, g("Mul", square, t), axis=1)
-        # A column for each point: the four that are blended, then zeros, turned round to where the phase is.
+        # One column for each point: four coefficients, then zeros, rotated to the position of the phase.
         table = np.pad(CATMULL_ROM.T, ((0, 0), (0, points - 4)))
         shares = g("MatMul", powers, g.constant(table))
         turned = g("Sub", g.constant([[k + 1 + points for k in range(points)]], np.int64), index)
@@ -78,7 +78,7 @@ def _lookup(g: Graph, mode: str, points: int) -> tuple[str, str]:
 
 
 def _all_points(g: Graph, w: Array, b: Array, share: str, h: str) -> str:
-    """sum_k c_k (W_k h + b_k): one product with the control points side by side."""
+    """sum_k c_k (W_k h + b_k) over all points, as one product."""
     points, rows, columns = w.shape
     side_by_side = g("MatMul", h, g.constant(w.reshape(points * rows, columns).T))
     each = g("Add", g("Reshape", side_by_side, g.constant([-1, points, rows], np.int64)), g.constant(b))
@@ -86,7 +86,7 @@ def _all_points(g: Graph, w: Array, b: Array, share: str, h: str) -> str:
 
 
 def _gathered(g: Graph, w: Array, b: Array, index: str, share: str, h: str) -> str:
-    """The same over the points in `index` (batch, n) alone."""
+    """The same sum over only the points in `index` (batch, n)."""
     weights, biases = g("Gather", g.constant(w), index), g("Gather", g.constant(b), index)
     column = g("Unsqueeze", h, g.constant([1, 3], np.int64))
     each = g("Squeeze", g("MatMul", weights, column), g.constant([3], np.int64))

@@ -1,4 +1,4 @@
-"""The keys of a configuration's `network` section where its kind is pfnn."""
+"""The keys of a configuration's `network` section for kind pfnn."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hobble.models.options import Options
 
 
 class PfnnOptions(Options):
-    """The phase-functioned network. Two hidden layers is what the published weight sizes show."""
+    """The phase-functioned network. The published weights have two hidden layers."""
 
     kind: Literal["pfnn"] = "pfnn"
     hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2

@@ -1,10 +1,9 @@
 """Evaluating the network at a phase: three modes, float32 or int16 storage, one character or a crowd.
 
-The outputs are blended and not the weights: sum_k c_k (W_k x + b_k) is the same number (a layer is linear
-before its activation), and no blended matrix is ever written to memory. One character is limited by how fast
-weights stream from memory; a crowd reads each weight once for all who need it. A character's prediction has
-the same bits alone and in any crowd: its sums go through its points and their inputs in one order, whoever
-is beside it (`hobble.models.tiles`).
+Outputs are blended, not weights: sum_k c_k (W_k x + b_k) is the same (a layer is linear before its
+activation), and no blended matrix is written to memory. One character is limited by reading weights from
+memory; a crowd reads each weight once for all characters that use it. A character's prediction has the same
+bits alone and in any crowd, because its sums always have the same order (`hobble.models.tiles`).
 """
 
 from __future__ import annotations
@@ -22,13 +21,13 @@ from hobble.models.tiles import WIDTH, aligned, in_panels, multiply, panels_of
 if TYPE_CHECKING:
     from hobble.models.pfnn.network import Pfnn
 
-MODES = {"constant": 50, "linear": 10, "cubic": None}
+MODES = {"constant": 50, "linear": 10, "cubic": None}  # mode: stored phases; None: the control points
 
 
 class PfnnPredictor:
     """A network prepared for one phase mode.
 
-    mode: "constant" (50 phases, the one at or before the phase), "linear" (10, blended), "cubic" (exact).
+    mode: "constant" (50 phases, rounded down), "linear" (10 phases, blended), "cubic" (exact).
     storage: "float32", or "int16" with a scale for each row: half the memory traffic, poses within 0.1 mm.
     """
 
@@ -42,7 +41,7 @@ class PfnnPredictor:
             np.ascontiguousarray(a, np.float32)
             for a in (network.x_mean, inverse(network.x_std), network.y_mean, network.y_std)
         )
-        self._weights, self._numbers, self._plan = _flat(tables, storage, y_mean, y_std)
+        self._weights, self._numbers, self._plan = _flatten(tables, storage, y_mean, y_std)
         self._kind = 4 if mode == "cubic" else 2 if mode == "linear" else 1
 
     def predict(self, x: Array, phase: Array, out: Array | None = None) -> Array:
@@ -64,9 +63,9 @@ class PfnnPredictor:
 
 
 def phase_tables(network: Pfnn, mode: str) -> list[tuple[Array, Array]]:
-    """What a mode looks up or blends: for each layer weights (points, out, in) and biases (points, out).
+    """The tables of a mode: for each layer weights (points, out, in) and biases (points, out).
 
-    50 or 10 points, or the control points themselves. Raises ValueError for an unknown mode.
+    The points are 50 or 10 phases, or the control points. Raises ValueError for an unknown mode.
     """
     if mode not in MODES:
         raise ValueError(f"mode {mode!r}: not one of {', '.join(MODES)}")
@@ -80,18 +79,21 @@ def phase_tables(network: Pfnn, mode: str) -> list[tuple[Array, Array]]:
     ]
 
 
-# What a row of the plan says of a layer: how many it takes and gives, and where its weights, its scales and
-# its biases begin. Few flat arrays: handing one over to compiled code takes some 0.3 microseconds.
+# Columns of the plan, one row per layer: numbers of inputs and outputs, and where weights, scales and biases
+# begin. Everything is in a few flat arrays, since each array argument costs 0.3 microseconds.
 INPUTS, OUTPUTS, WEIGHTS, SCALES, BIASES = range(5)
 
 
-def _flat(
+def _flatten(
     tables: list[tuple[Array, Array]], storage: str, y_mean: Array, y_std: Array
 ) -> tuple[Array, Array, Array]:
-    """All layers as compiled code takes them: weights (n,) in panels, point by point; numbers (n,) float32:
-    y_mean, y_std, and of each layer the factors of its rows and its biases at each point; and the plan."""
+    """All layers in flat arrays: (weights, numbers, plan).
+
+    weights: (n,) in panels, point by point. numbers: (n,) float32: y_mean, y_std, then for each layer the
+    row factors and the biases at each point. plan: see INPUTS to BIASES.
+    """
     numbers, plan, at, size = [y_mean, y_std], [], 0, 2 * len(y_mean)
-    weights = aligned(sum(_room(w) for w, _ in tables), storage)
+    weights = aligned(sum(_panel_numbers(w) for w, _ in tables), storage)
     for table, biases in tables:
         points, outputs, inputs = table.shape
         stored, scales = _pack(table, storage)
@@ -103,13 +105,13 @@ def _flat(
     return weights, np.concatenate(numbers), np.array(plan, np.int64)
 
 
-def _room(table: Array) -> int:
+def _panel_numbers(table: Array) -> int:
     points, outputs, inputs = table.shape
     return int(points * panels_of(outputs) * WIDTH * inputs)
 
 
 def _pack(weights: Array, storage: str) -> tuple[Array, Array]:
-    """Weights (K, out, in) as stored, and the factor of each row (K, out)."""
+    """Weights (K, out, in) in their storage type, and the factor of each row (K, out)."""
     if storage == "float32":
         return np.asarray(weights, np.float32), np.ones(weights.shape[:2], np.float32)
     scale = np.maximum(np.abs(weights).max(axis=-1) / 32767, 1e-30)
@@ -123,16 +125,14 @@ def _standardise(x: Any, mean: Any, inverse: Any, z: Any) -> None:
             z[c, i] = (x[c, i] - mean[i]) * inverse[i]
 
 
-# Only the functions called from outside are kept on disk, and what they call is forced into them: into
-# functions of their own the compiler may look the first time and not when they come from disk, and then
-# rounds sums in another order.
+# Only functions called from Python are cached on disk; their callees are inlined. Otherwise the compiler may
+# optimise across calls the first time but not after loading from the cache, which changes the rounding.
 @njit(forceinline=True, cache=False)
 def _phase(phase: float, kind: int, points: int, index: Any, share: Any) -> None:
-    """Fill the `kind` points that phase blends and their coefficients."""
-    # A phase of exactly 1 is the end of the cycle, not its start: in constant mode the two have different
-    # weights.
+    """Write the points that `phase` blends (`kind` of them: 1, 2 or 4) and their coefficients."""
+    # A phase of exactly 1 is the end of the cycle, not its start; in constant mode their weights differ.
     wrapped = phase if phase == 1.0 else phase - np.floor(phase)
-    # In single precision, as the original looks its phase up: .04 * 50 is 2, not just below it.
+    # In single precision, as in the original: .04 * 50 is 2, not just below it.
     scaled = np.float64(np.float32(wrapped) * np.float32(points)) if kind == 1 else wrapped * points
     first = min(int(scaled), points - 1)
     t = scaled - first
@@ -152,7 +152,7 @@ def _phase(phase: float, kind: int, points: int, index: Any, share: Any) -> None
 
 @njit(forceinline=True, cache=False)
 def _exp(x: Any) -> Any:
-    """e^x for x <= 0 in float32, within 2e-7 of 1; written out so that a row of them goes side by side."""
+    """e^x for x <= 0 in float32, relative error 2e-7; written out so that the compiler can vectorise it."""
     one = np.float32(1)
     x = max(x, np.float32(-87))
     n = np.floor(x * np.float32(1.44269504) + np.float32(0.5))
@@ -188,7 +188,7 @@ def _evaluate(
         padded = -(-outputs // WIDTH) * WIDTH
         y[: count * outputs] = np.float32(0)
         for point in range(points):
-            rows = _who(point, index, share, members, shares)
+            rows = _characters_at(point, index, share, members, shares)
             if rows == 0:
                 continue
             for m in range(rows):
@@ -211,8 +211,8 @@ def _evaluate(
 
 
 @njit(forceinline=True, cache=False)
-def _who(point: int, index: Any, share: Any, members: Any, shares: Any) -> int:
-    """Write down which characters blend `point`, and their shares of it; returns how many."""
+def _characters_at(point: int, index: Any, share: Any, members: Any, shares: Any) -> int:
+    """Write the characters that blend `point`, and their shares; returns how many there are."""
     rows = 0
     for c in range(index.shape[0]):
         for k in range(index.shape[1]):
@@ -222,8 +222,8 @@ def _who(point: int, index: Any, share: Any, members: Any, shares: Any) -> int:
     return rows
 
 
-# The loops below run from 0 through what they are given: with an offset in the index the compiler looks for
-# negative ones at every step and takes numbers one by one.
+# The loops below start at index 0 of their arguments. With an offset in the index, the compiler checks for
+# negative indices at every step and does not vectorise.
 
 
 @njit(forceinline=True, cache=False)

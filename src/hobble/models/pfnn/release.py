@@ -1,7 +1,7 @@
-"""The folder of .bin files of the original release, read and written: its ports play what Hobble trains.
+"""Read and write the original release's folder of .bin files, which its ports to other languages can play.
 
-W0_000.bin .. W2_049.bin and b0_000.bin .. b2_049.bin hold the weights at phases i / 50, Xmean.bin, Xstd.bin,
-Ymean.bin and Ystd.bin the statistics: raw little-endian float32, row-major (out, in).
+W0_000.bin .. W2_049.bin and b0_000.bin .. b2_049.bin hold the weights at phases i / 50. Xmean.bin, Xstd.bin,
+Ymean.bin and Ystd.bin hold the statistics. All are raw little-endian float32, row-major (out, in).
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 PHASES = 50
 CONTROL_POINTS = 4
-MOST_COLUMNS = 1 << 16  # of a row, or units of a layer
-MOST_WEIGHTS = 1 << 21  # of a layer, which is read fifty times; the original's have 262,144
-# Of single precision weights near 1; a folder of another spline than ours is off by far more.
+MOST_COLUMNS = 1 << 16  # of a row; also units of a layer
+MOST_WEIGHTS = 1 << 21  # in one file of a layer, which has fifty; the original's have 262,144
+# For single precision weights near 1. If the weights are not on our spline, the residual is far larger.
 LARGEST_RESIDUAL = 1e-4
 
 
@@ -45,21 +45,21 @@ def write_release(folder: str | Path, network: Pfnn) -> None:
 def read_release(folder: str | Path) -> Mapping[str, Array]:
     """The folder as arrays W0 (4, out, in), b0 (4, out), ..., Xmean, ...: control points by least squares.
 
-    Raises InputError where a file is missing, of a wrong size or not of finite numbers, or the 50 phases do
-    not lie on one cyclic cubic with 4 control points.
+    Raises InputError if a file is missing, has a wrong size or numbers that are not finite, or if the weights
+    at the 50 phases do not lie on a cyclic cubic spline with 4 control points.
     """
     folder = Path(folder)
     arrays = {name: _read(folder / f"{name}.bin") for name in STATISTICS}
     layers = sum(1 for _ in folder.glob("b[0-9]*_000.bin"))
     if not 0 < layers <= MOST_LAYERS:
         raise InputError(
-            folder, f"{layers} layers of weights b0_000.bin, b1_000.bin, ...; there are 1 to {MOST_LAYERS}"
+            folder, f"{layers} layers (b0_000.bin, b1_000.bin, ...); 1 to {MOST_LAYERS} are allowed"
         )
     size = len(arrays["Xmean"])
     for i in range(layers):
         rows = len(_read(folder / f"b{i}_000.bin"))
         if rows * size > MOST_WEIGHTS:
-            problem = f"{rows} x {size} weights in a layer; {MOST_WEIGHTS} at most are read"
+            problem = f"{rows} x {size} weights in a layer; at most {MOST_WEIGHTS} are allowed"
             raise InputError(folder / f"b{i}_000.bin", problem)
         biases = np.stack([_read(folder / f"b{i}_{k:03d}.bin", rows) for k in range(PHASES)])
         weights = np.stack([_read(folder / f"W{i}_{k:03d}.bin", rows * size) for k in range(PHASES)])
@@ -74,20 +74,20 @@ def _control_points(folder: Path, name: str, phases: Array) -> Array:
     if beyond := np.flatnonzero(~(np.abs(phases) <= LARGEST_WEIGHT).all(axis=1)).tolist():
         raise InputError(
             folder / f"{name}_{beyond[0]:03d}.bin",
-            f"holds numbers that are not finite or beyond {LARGEST_WEIGHT:g}",
+            f"holds numbers that are not finite or above {LARGEST_WEIGHT:g}",
         )
     shares = phase_shares(np.arange(PHASES) / PHASES, CONTROL_POINTS)
     points = np.linalg.lstsq(shares, phases.astype(float), rcond=None)[0]
     residual = float(np.abs(shares @ points - phases).max())
     if not residual < LARGEST_RESIDUAL:
         raise InputError(
-            folder, f"{name} at 50 phases is no cyclic cubic of 4 control points (off by {residual:.2g})"
+            folder, f"{name} at 50 phases is not a cyclic cubic of 4 control points (off by {residual:.2g})"
         )
     return points.astype(np.float32)
 
 
 def _read(path: Path, size: int | None = None) -> Array:
-    """`size` float32 numbers, or as many as the file holds up to MOST_COLUMNS."""
+    """`size` float32 numbers, or without `size` all of the file, up to MOST_COLUMNS."""
     data = read_bytes(path, 4 * (MOST_COLUMNS if size is None else size))
     if len(data) % 4 or not data or (size is not None and len(data) != 4 * size):
         raise InputError(path, f"{len(data)} bytes" + (f", expected {4 * size}" if size else ""))

@@ -1,12 +1,12 @@
-"""One batch: loss and gradient by hand, as three large products for each layer.
+"""Loss and gradient of one batch, written out as three large products for each layer.
 
-With e the inputs of a layer, a 1 behind them, times each of the K spline coefficients: (B, K (in + 1)), and W
-its weights and biases, (out, K (in + 1)):
+e: inputs of a layer with a 1 appended, times each of the K spline coefficients, (B, K (in + 1)); W: weights
+and biases, (out, K (in + 1)):
 
     a = e W'        dW = da' e        de = da W        dx = sum_k c_k de_k
 
-This is the network whose weights are blended for each sample, since sum_k c_k (W_k x) = (sum_k c_k W_k) x, at
-a fraction of the memory traffic.
+This equals blending the weights for each sample, since sum_k c_k (W_k x) = (sum_k c_k W_k) x, at a fraction
+of the memory traffic.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from torch import Tensor
 
 from hobble.models.pfnn.trainable import TrainablePfnn, coefficients, expand
 from hobble.models.products import product
-from hobble.models.trainable import EVERY
+from hobble.models.trainable import ALL_ROWS
 
 
 class Step:
     """The gradient of the mean squared error of a network under dropout, in PyTorch, on any device.
 
-    network: what is trained; read anew at every call.
-    dropout: share of units dropped before each layer, the input included; the rest is scaled up to make up
-    for it. half: round the factors of the products to bfloat16; their sums, and all else, stay float32.
+    network: the network in training, read at every call.
+    dropout: share of units dropped before each layer, inputs included; the others are scaled up.
+    half: round the factors of the products to bfloat16; sums and everything else stay float32.
     gradients: of the last call, (out, K (in + 1)) for each layer, in bfloat16 with `half`. error: of the last
     call, (B, Y), prediction minus y.
     """
@@ -42,7 +42,7 @@ class Step:
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
         """Find `gradients` for x (B, X), y (B, Y), p (B,); returns the mean squared error, a scalar tensor.
 
-        masks: one for each layer, as `masks` draws them.
+        masks: one for each layer, from `masks`.
         """
         if self.half:
             self.factors.copy_(self.network.flat)
@@ -66,27 +66,27 @@ class Step:
         return torch.mean(torch.square(self.error))
 
     def seed(self, seed: int) -> None:
-        """Begin a new sequence of dropout masks, 0 <= seed < 2^63."""
+        """Start a new sequence of dropout masks, 0 <= seed < 2^63."""
         self.generator.manual_seed(seed)
 
-    def masks(self, rows: int, own: slice = EVERY) -> list[Tensor]:
-        """What each layer's inputs (rows, in) are multiplied by: 0 for those dropped, 1 / keep for others."""
+    def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
+        """Masks (rows, in) for each layer's inputs: 0 for dropped ones, 1 / keep for the others."""
         flat, widths = self.network.flat, self.widths
         drawn = torch.rand(rows, sum(widths), generator=self.generator, device=flat.device)[own]
         return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(widths, dim=1))
 
     def coefficients(self, p: Tensor) -> Tensor:
-        """(B, K) of phases (B,)."""
+        """Spline coefficients (B, K) of phases (B,)."""
         return coefficients(p, self.network.control_points)
 
     def expanded(self, number: int, x: Tensor, c: Tensor, mask: Tensor) -> tuple[Tensor, Tensor]:
-        """Layer `number`'s inputs x (B, n) under its mask, expanded (B, K (n + 1)), and the slopes (B, n).
+        """Layer `number`'s masked inputs x (B, n), expanded to (B, K (n + 1)), and the slopes (B, n).
 
-        The slope is that of the ELU which gave x, found from its value (e^a = x + 1 below 0), times the mask.
+        The slope is the derivative of the ELU at x times the mask. It follows from x: below 0 it is x + 1.
         """
         return expand(x * mask, c).to(self.factors.dtype), mask * torch.clamp(x + 1, max=1)
 
     def contracted(self, number: int, de: Tensor, c: Tensor, slope: Tensor) -> Tensor:
-        """(B, n): the gradient before layer `number`'s ELU, from that of what is expanded, (B, K (n + 1))."""
+        """The gradient (B, n) before layer `number`'s ELU, from de (B, K (n + 1)) of the expanded inputs."""
         parts = de.to(c.dtype).view(len(c), c.shape[1], -1)[:, :, :-1]
         return torch.bmm(c[:, None, :], parts)[:, 0, :] * slope

@@ -1,4 +1,4 @@
-"""The phase-functioned network while it is trained: parameters, their spline, what it computes."""
+"""The phase-functioned network in training: parameters and spline coefficients."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hobble.models.trainable import Step, Trainable, uniform_start
 class TrainablePfnn(Trainable):
     """Layers of `sizes` units whose weights and biases are cyclic cubic splines of the phase.
 
-    sizes: units from the input to the output, such as (342, 512, 512, 311). control_points: K knots of the
+    sizes: units from input to output, such as (342, 512, 512, 311). control_points: K, the knots of the
     spline, equally spaced over a cycle.
     """
 
@@ -81,7 +81,7 @@ class TrainablePfnn(Trainable):
 
 
 def parameters(sizes: tuple[int, ...], control_points: int) -> int:
-    """How many numbers a network is: the length of its `flat`."""
+    """The number of parameters, which is the length of `flat`."""
     return control_points * sum((size + 1) * out for size, out in pairwise(sizes))
 
 
@@ -96,7 +96,7 @@ def initialise(sizes: tuple[int, ...], control_points: int, seed: int) -> Traina
 def coefficients(p: Tensor, control_points: int) -> Tensor:
     """(B, K) weights of the control points at phases (B,): the cyclic cubic Catmull-Rom spline.
 
-    They sum to 1; at p = k / K they single out control point k.
+    They sum to 1. At p = k / K only the weight of control point k is not 0.
     """
     position = torch.remainder(p, 1.0) * control_points
     knot = torch.floor(position)
@@ -117,5 +117,5 @@ def coefficients(p: Tensor, control_points: int) -> Tensor:
 
 
 def expand(x: Tensor, c: Tensor) -> Tensor:
-    """(B, K (n + 1)): each row of x (B, n), with a 1 behind it, times each of its coefficients (B, K)."""
+    """Each row of x (B, n) with a 1 appended, times each of its coefficients c (B, K): (B, K (n + 1))."""
     return torch.cat([c[:, :, None] * x[:, None, :], c[:, :, None]], dim=2).flatten(1)

@@ -1,4 +1,4 @@
-"""A feed-forward network that is given sine and cosine of the phase: shows what control points buy."""
+"""A feed-forward network with the phase as input: the baseline that shows the gain of control points."""
 
 from __future__ import annotations
 

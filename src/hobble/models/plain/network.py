@@ -1,4 +1,4 @@
-"""A feed-forward network with sine and cosine of the phase behind its inputs: `Plain.predict` is it."""
+"""A feed-forward network with sine and cosine of the phase as extra inputs; see `Plain.predict`."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from hobble.models.network import Export, Network, standardised
 from hobble.models.packing import packed_rows
 from hobble.models.stack import Stack, StackPredictor
 
-OF_PHASE = 2  # columns behind those of X: sine, cosine
+PHASE_COLUMNS = 2  # inputs after the columns of X: sine and cosine of the phase
 
 
 @dataclass(frozen=True)
 class Plain(Network):
-    """weights: per layer (out, in) float32, the first with OF_PHASE more inputs than X; biases: (out,)."""
+    """weights: per layer (out, in) float32; biases: (out,). The first layer gets X and PHASE_COLUMNS more."""
 
     kind: ClassVar[str] = "plain"
 
@@ -32,7 +32,7 @@ class Plain(Network):
     @classmethod
     def read(cls, path: str | Path, arrays: Mapping[str, Any], common: Mapping[str, Any]) -> Plain:
         """From the arrays W0 (out, in), b0 (out,), ... of a file; see `hobble.models.load`."""
-        inputs, outputs = len(common["x_mean"]) + OF_PHASE, len(common["y_mean"])
+        inputs, outputs = len(common["x_mean"]) + PHASE_COLUMNS, len(common["y_mean"])
         weights, biases = stacked(path, arrays, ("W", "b"), 2, inputs, outputs)
         return cls(weights=weights, biases=biases, **common)
 
@@ -44,7 +44,7 @@ class Plain(Network):
     @property
     def parameters(self) -> int:
         """All weights and biases."""
-        return sum(a * b + b for a, b in pairwise(self.sizes)) + OF_PHASE * self.sizes[1]
+        return sum(a * b + b for a, b in pairwise(self.sizes)) + PHASE_COLUMNS * self.sizes[1]
 
     @property
     def described(self) -> str:
@@ -54,7 +54,7 @@ class Plain(Network):
 
     def predict(self, x: Array, phase: Array) -> Array:
         """As in `Network`."""
-        h = np.concatenate([standardised(self, x), of_phase(phase)], axis=1)
+        h = np.concatenate([standardised(self, x), phase_columns(phase)], axis=1)
         for number, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             h = h @ weight.T + bias
             if number < len(self.weights) - 1:
@@ -69,7 +69,7 @@ class Plain(Network):
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`: weights as integers with a factor for each row."""
         weights, biases = list(self.weights), list(self.biases)
-        phase = len(self.x_mean) + np.arange(OF_PHASE)
+        phase = len(self.x_mean) + np.arange(PHASE_COLUMNS)
         weights[0] = weights[0][:, np.concatenate([inputs, phase])]
         weights[-1], biases[-1] = weights[-1][outputs], biases[-1][outputs]
         return {"layers": [packed_rows(w[None], b[None]) for w, b in zip(weights, biases, strict=True)]}
@@ -87,7 +87,7 @@ class Plain(Network):
 
 
 class PlainPredictor(StackPredictor):
-    """It prepared to run, its weights stored as float32 or int16."""
+    """The plain network prepared to run, with weights stored as float32 or int16."""
 
     network: Plain
 
@@ -97,12 +97,12 @@ class PlainPredictor(StackPredictor):
 
     def evaluate(self, z: Array, phase: Array, out: Array) -> None:
         """As in `Predictor`."""
-        inputs = np.concatenate([z, of_phase(phase)], axis=1)
+        inputs = np.concatenate([z, phase_columns(phase)], axis=1)
         self._stack.run(inputs, np.ones((len(z), 1), np.float32), out)
         self.restore(out)
 
 
-def of_phase(phase: Array) -> Array:
+def phase_columns(phase: Array) -> Array:
     """(n, 2) float32: sine and cosine of phases (n,) in cycles."""
     angle = 2 * np.pi * np.asarray(phase, float)
     return np.stack([np.sin(angle), np.cos(angle)], axis=1).astype(np.float32)

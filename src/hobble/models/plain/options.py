@@ -1,4 +1,4 @@
-"""The keys of a configuration's `network` section where its kind is plain."""
+"""The keys of a configuration's `network` section for kind plain."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hobble.models.options import Options
 
 
 class PlainOptions(Options):
-    """A feed-forward network of the sizes of the phase-functioned one."""
+    """A feed-forward network with the sizes of the phase-functioned one."""
 
     kind: Literal["plain"] = "plain"
     hidden_layers: Annotated[int, Field(ge=1, le=8)] = 2
@@ -22,5 +22,5 @@ class PlainOptions(Options):
         return (self.units,) * self.hidden_layers
 
     def sizes(self, inputs: int, outputs: int) -> tuple[int, ...]:
-        """Units of each layer, the columns of X first; the first layer is given two more, of the phase."""
+        """Units of each layer, the columns of X first. The first layer also gets two inputs for the phase."""
         return (inputs, *self.hidden, outputs)

@@ -1,4 +1,4 @@
-"""The plain network while it is trained, and its step: that of layers with one set of weights each."""
+"""The plain network in training. Its step is that of `pfnn` with one set of weights."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from torch import Tensor
 
 from hobble.models.pfnn.fused import FusedStep
 from hobble.models.pfnn.step import Step as BlendedStep
-from hobble.models.plain.network import OF_PHASE
+from hobble.models.plain.network import PHASE_COLUMNS
 from hobble.models.products import product
-from hobble.models.trainable import EVERY, Step, Trainable, uniform_start
+from hobble.models.trainable import ALL_ROWS, Step, Trainable, uniform_start
 
 
 @dataclass(frozen=True)
 class TrainablePlain(Trainable):
-    """units: of each layer, the columns of X first; the first layer has OF_PHASE more inputs."""
+    """units: of each layer, the columns of X first. The first layer has PHASE_COLUMNS more inputs."""
 
     kind: ClassVar[str] = "plain"
-    control_points: ClassVar[int] = 1  # as the step calls sets of weights
+    control_points: ClassVar[int] = 1  # the step's name for sets of weights
 
     units: tuple[int, ...]
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Inputs of each layer, those of the phase among them, and the outputs."""
-        return (self.units[0] + OF_PHASE, *self.units[1:])
+        """Inputs of each layer, with those of the phase, then the outputs."""
+        return (self.units[0] + PHASE_COLUMNS, *self.units[1:])
 
     @property
     def shapes(self) -> list[tuple[int, int, int]]:
@@ -83,17 +83,17 @@ class TrainablePlain(Trainable):
         return f"{'-'.join(map(str, self.units))} units, given the phase ({self.flat.numel():,} parameters)"
 
 
-class _OfPhase:
-    """Puts sine and cosine behind the inputs of a step whose layers have one set of weights."""
+class _WithPhase:
+    """Appends sine and cosine of the phase to the inputs of a step with one set of weights."""
 
     def __call__(self, x: Tensor, y: Tensor, p: Tensor, masks: list[Tensor]) -> Tensor:
         """As in `Step`."""
         return super().__call__(with_phase(x, p), y, p, masks)  # type: ignore[misc]
 
-    def masks(self, rows: int, own: slice = EVERY) -> list[Tensor]:
-        """As in `Step`; the phase is never dropped, no more than where control points follow it."""
+    def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
+        """As in `Step`, but the phase is never dropped, as it never is in `pfnn`."""
         masks: list[Tensor] = super().masks(rows, own)  # type: ignore[misc]
-        masks[0][:, -OF_PHASE:] = 1
+        masks[0][:, -PHASE_COLUMNS:] = 1
         return masks
 
     def coefficients(self, p: Tensor) -> Tensor:
@@ -101,23 +101,23 @@ class _OfPhase:
         return torch.ones_like(p[:, None])
 
 
-class PlainStep(_OfPhase, BlendedStep):  # type: ignore[misc]
-    """Its gradient in PyTorch, on any device."""
+class PlainStep(_WithPhase, BlendedStep):  # type: ignore[misc]
+    """The plain network's step in PyTorch, on any device."""
 
 
-class FusedPlainStep(_OfPhase, FusedStep):  # type: ignore[misc]
-    """Its gradient on a CPU."""
+class FusedPlainStep(_WithPhase, FusedStep):  # type: ignore[misc]
+    """The plain network's step in compiled loops on a CPU."""
 
 
 def with_phase(x: Tensor, p: Tensor) -> Tensor:
-    """x (B, X) with sine and cosine of phases (B,) behind it."""
+    """x (B, X) with sine and cosine of phases (B,) appended."""
     angle = 2 * torch.pi * p[:, None]
     return torch.cat([x, torch.sin(angle), torch.cos(angle)], dim=1)
 
 
 def shapes(units: tuple[int, ...]) -> list[tuple[int, int, int]]:
     """(out, 1, in + 1) of each layer."""
-    inputs = (units[0] + OF_PHASE, *units[1:-1])
+    inputs = (units[0] + PHASE_COLUMNS, *units[1:-1])
     return [(out, 1, size + 1) for size, out in zip(inputs, units[1:], strict=True)]
 
 

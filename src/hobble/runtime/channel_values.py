@@ -1,4 +1,4 @@
-"""What a caller tells a character by the names of channels, as the columns of its state."""
+"""Channel values given by the caller, checked and converted to the state's columns."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hobble.models.network import Network
 
 
 class UnknownName(KeyError):
-    """A label of a channel, or a gait, that the network does not have; the text names the nearest."""
+    """The network does not have this label or gait. The message lists the nearest names."""
 
     def __init__(self, what: str, name: object, known: Iterable[str]) -> None:
         names = list(known)
@@ -26,8 +26,8 @@ class UnknownName(KeyError):
         return str(self.args[0])
 
 
-class Told:
-    """The channels of a network; `columns`: name -> those of the state, all channels side by side."""
+class ChannelValues:
+    """The channels of a network. columns: name -> its columns in the state. scales: name -> divisor."""
 
     def __init__(self, network: Network, scales: Mapping[str, float]) -> None:
         self.labels = {
@@ -41,10 +41,10 @@ class Told:
             start += count
 
     def values(self, name: str, given: Any, characters: int) -> tuple[slice, Array]:
-        """The columns of channel `name` and what they are to be, (C, columns).
+        """The columns of channel `name` in the state, and their new values (C, columns).
 
-        given: label -> value, or (C,) values; or (columns,) or (C, columns). Raises as
-        `ProceduralAnimation.next_pose` says.
+        given: label -> value or (C,) values; or an array (columns,) or (C, columns). Raises the errors listed
+        in `ProceduralAnimation.next_pose`.
         """
         if name not in NAMES:
             raise TypeError(f"next_pose() got an unexpected keyword argument {name!r}")
@@ -55,22 +55,24 @@ class Told:
                 self._name(name, label)
                 if np.shape(value) not in ((), (1,), (characters,)):
                     shape = np.shape(value)
-                    raise ValueError(f"{label}: one {one.value}, or {characters}, not of shape {shape}")
+                    raise ValueError(
+                        f"{label} has to be one {one.value} or {characters}, not of shape {shape}"
+                    )
                 values[:, labels[label]] = value
         else:
             array = np.asarray(given, float)
             if not labels and array.size:
-                raise ValueError(f"{array.size} numbers given for {name}, but {_blind(name)}")
+                raise ValueError(f"{array.size} numbers given for {name}, but {_no_input(name)}")
             if array.shape not in (values.shape, values.shape[1:]):
                 raise ValueError(
-                    f"{name} is {values.shape[1:]} or {values.shape} numbers, not of shape {array.shape}"
+                    f"{name} has to have shape {values.shape[1:]} or {values.shape}, not {array.shape}"
                 )
             values[:] = array
         wrong = ~((values >= 0) & (values <= one.highest))
         if wrong.any():
             c, k = np.argwhere(wrong)[0]
             raise ValueError(
-                f"the {one.value} of {list(labels)[k]} is {values[c, k]:g}, but it is a number from 0 to "
+                f"the {one.value} of {list(labels)[k]} is {values[c, k]:g}, but has to be from 0 to "
                 f"{one.highest:g}"
             )
         return self.columns.get(name, slice(0, 0)), values / self.scales.get(name, 1.0)
@@ -78,10 +80,10 @@ class Told:
     def _name(self, name: str, label: str) -> None:
         labels = self.labels.get(name, {})
         if not labels:
-            raise ValueError(f"{label} cannot be told: {_blind(name)}")
+            raise ValueError(f"{label} cannot be set: {_no_input(name)}")
         if label not in labels:
             raise UnknownName(f"{name} has no", label, labels)
 
 
-def _blind(name: str) -> str:
-    return f"this network is not told {name}; train a configuration with `channels: [{name}]`"
+def _no_input(name: str) -> str:
+    return f"this network has no input for {name}; train a configuration with `channels: [{name}]`"

@@ -1,0 +1,51 @@
+"""Shared by the fast training steps on a CPU: dropout masks, and buffers that are reused for every batch."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from hobble.models.kernels import counter_after, draw, use_threads
+from hobble.models.trainable import ALL_ROWS
+
+
+class FusedBase:
+    """First base class of a kind's fused step; the second is the kind's `Step`.
+
+    network, keep, widths: set by the `Step`: the network in training, the share of units that dropout keeps,
+    and the number of inputs of each layer, in the order of the masks.
+    """
+
+    network: Any
+    keep: float
+    widths: Any
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.counter = np.uint64(0)
+        self.buffers: dict[tuple[str, int], Tensor] = {}
+
+    def seed(self, seed: int) -> None:
+        """Start a new sequence of dropout masks, 0 <= seed < 2^63."""
+        self.counter = np.uint64(seed)
+
+    def masks(self, rows: int, own: slice = ALL_ROWS) -> list[Tensor]:
+        """As in `Step`, with another generator; the masks are valid until the next call."""
+        first, stop, _ = own.indices(rows)
+        masks = []
+        for number, width in enumerate(self.widths):
+            masks.append(self.buffer(f"mask {number}", stop - first, width))
+            use_threads((stop - first) * width)
+            draw(masks[-1].numpy(), counter_after(self.counter, first * width), self.keep)
+            self.counter = counter_after(self.counter, rows * width)
+        return masks
+
+    def buffer(self, name: str, rows: int, width: int, dtype: torch.dtype | None = None) -> Tensor:
+        """(rows, width) of uninitialised memory. The same name and width give the same memory."""
+        key = (name, width)
+        if key not in self.buffers or len(self.buffers[key]) < rows:
+            self.buffers[key] = torch.empty(rows, width, dtype=dtype or self.network.flat.dtype)
+        return self.buffers[key][:rows]
