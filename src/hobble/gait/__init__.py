@@ -1,1 +1,3 @@
-"""How a walk differs from a healthy one: its cycles, the sizes of effects, and which limp of people it is."""
+"""Compares a walk with a healthy one: its cycles, the sizes of effects, and which limp of people it
+resembles.
+"""

@@ -1,4 +1,4 @@
-"""What a walk is called, and how it differs: python -m hobble.gait CLIP.bvh --healthy CLIP.bvh."""
+"""Recognises a limp and measures its effects: python -m hobble.gait CLIP.bvh --healthy CLIP.bvh."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from hobble.gait.profile import NO_CYCLE, Profile
 from hobble.gait.read import SKELETONS, read_clip
 from hobble.gait.recogniser import RIGHT
 
-NO_HEALTHY = "No healthy walk was given: beside the mean of people, its own build and manner count too."
+NO_HEALTHY = "No healthy walk was given. Compared with the mean of people, a person's build counts, too."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns the exit status."""
+    """Run the command. Returns the exit status."""
     parser = argparse.ArgumentParser(
         prog="python -m hobble.gait",
-        description="What a walk is called, and how it differs from a healthy one.",
+        description="Recognises the limp of a walk and measures how it differs from a healthy walk.",
     )
     parser.add_argument("clips", nargs="+", metavar="CLIP.bvh", help="walks to measure")
     parser.add_argument(
-        "--healthy", nargs="+", default=[], metavar="CLIP.bvh", help="healthy walks of the figure"
+        "--healthy", nargs="+", default=[], metavar="CLIP.bvh", help="healthy walks of the same person"
     )
     parser.add_argument("--side", choices=("right", "left"), help="the hurt side; by default as recognised")
-    parser.add_argument("--window", type=_seconds, default=4.0, help="seconds that are judged at once")
-    parser.add_argument("--skeletons", default=SKELETONS, help="folder of the known rigs")
+    parser.add_argument("--window", type=_seconds, default=4.0, help="length of a window, seconds")
+    parser.add_argument("--skeletons", default=SKELETONS, help="folder of the skeleton files")
     options = parser.parse_args(arguments)
     try:
         healthy = _healthy(options.healthy, options.skeletons)
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _seconds(text: str) -> float:
-    """A window's length from the command line: a cycle or more, a clip at most."""
+    """A window's length from the command line: at least a cycle, at most a clip."""
     seconds = float(text)
     if not 1.0 <= seconds <= 3600.0:
         raise ValueError
@@ -70,7 +70,7 @@ def _compared(path: str, options: argparse.Namespace, healthy: Profile) -> Compa
 
 
 def describe(name: str, seen: Comparison, side: str | None = None) -> str:
-    """The answers, and the effects beside those of people, as text."""
+    """The answers, and the effects next to people's, as text."""
     answer, grade = seen.answer, seen.grade
     side = side or answer.side or grade.side or RIGHT
     likely = ", ".join(f"{gait} {answer.probabilities[gait]:.2f}" for gait in GAITS)

@@ -1,4 +1,4 @@
-"""A clip beside the healthy walk of the same figure: what it is called, and by how much it differs."""
+"""Compares a clip with a healthy walk of the same figure."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ from hobble.gait.recogniser import RIGHT, SIDES, Answer, recognise, windows
 
 @dataclass(frozen=True)
 class Comparison:
-    """What was measured and said of a clip.
+    """Measurements of a clip and the recognisers' answers.
 
-    walk: its cycles. profile: its numbers. answer, grade: what the whole clip is called by the linear
-    classifier of people's strong limps, and by the recogniser that is made for mild ones too. windows,
-    grades: (first frame, answer or grade) of each window of some seconds. effects: side -> sizes, as if that
-    side were the hurt one.
+    walk: its cycles. profile: its numbers. answer: the linear classifier's, for the whole clip. grade: the
+    graded recogniser's, which knows mild limps. windows, grades: (first frame, answer or grade) of each
+    window. effects: side -> sizes, as if that side were hurt.
     """
 
     walk: Walk = field(repr=False)
@@ -34,15 +33,15 @@ class Comparison:
 
     @property
     def side(self) -> str:
-        """The side that is taken for the hurt one; right where the walk is called normal."""
+        """The side that counts as hurt; right if the walk is recognised as normal."""
         return self.answer.side or RIGHT
 
     def named(self) -> dict[str, float]:
-        """Share of the windows that the linear classifier calls each label and side: "antalgic right"."""
+        """Share of windows for each label and side ("antalgic right") of the linear classifier."""
         return _shares([answer for _, answer in self.windows])
 
     def graded(self) -> dict[str, float]:
-        """The same of the recogniser of mild limps."""
+        """The same for the graded recogniser."""
         return _shares([answer for _, answer in self.grades])
 
 
@@ -57,20 +56,20 @@ def measure_clip(clip: Clip) -> Walk:
 
 
 def healthy_profile(clips: Sequence[Clip]) -> Profile:
-    """The profile of a figure's healthy clips, all cycles together; without any, that of people.
+    """The profile of a figure's healthy clips, all cycles together. Without clips, people's mean.
 
-    Raises HobbleError where no clip holds a cycle.
+    Raises HobbleError if no clip has a cycle.
     """
     return profile(joined(measure_clip(clip) for clip in clips)) if clips else people().normal()
 
 
 def compare(clip: Clip, healthy: Profile, seconds: float = 4.0) -> Comparison:
-    """Measure a clip beside a healthy profile; windows last `seconds`. Raises HobbleError without a cycle."""
+    """Compare a clip with a healthy profile, in windows of `seconds`. Raises HobbleError without a cycle."""
     return compare_walk(measure_clip(clip), len(clip), healthy, seconds)
 
 
 def compare_walk(walk: Walk, frames: int, healthy: Profile, seconds: float = 4.0) -> Comparison:
-    """The same of the cycles that `measure` found in a motion of `frames` frames."""
+    """The same for the cycles that `measure` found in a motion of `frames` frames."""
     own = profile(walk)
     parts = [(start, profile(part)) for start, part in windows(walk, frames, seconds)]
     return Comparison(

@@ -1,7 +1,7 @@
-"""The cycles of a walk, from one landing of a foot to its next, and each cycle in numbers.
+"""The cycles of a walk, from one landing of a foot to its next, and the numbers of each cycle.
 
-A foot lands where its ankle is furthest ahead of the hips. That is defined for a foot that drags and for one
-that is set down beside the other, where contacts and zero crossings are not.
+A foot lands where its ankle is furthest ahead of the hips. This also works for feet that drag and for feet
+that are set down next to the other, where contacts and zero crossings fail.
 """
 
 from __future__ import annotations
@@ -27,21 +27,20 @@ SCALARS = (
     "step_L",
     "step_width",
 )
-SLOW = 0.35  # of the walking speed: a slower ankle stands
+SLOW = 0.35  # share of the walking speed: a slower ankle stands
 SHORTEST, LONGEST = 0.4, 3.5  # s, a cycle
-LEAST_TRAVEL = 0.2  # leg lengths in a cycle; less is standing
-LEAST_SWING = 0.12  # leg lengths that an ankle goes back and forth, or it makes no step
-OF_RANGE = 0.4  # of the ankle's range within the longest cycle: lesser turns of it are no step
-STRAIGHT = 25.0  # degrees that the path turns in a cycle at most: people were measured on straight paths
-AHEAD = 0.7  # mean cosine between facing and travel; less is a walk backward or sideways
+LEAST_TRAVEL = 0.2  # leg lengths in a cycle; a shorter one is standing
+LEAST_SWING = 0.12  # leg lengths: least range of an ankle in a step
+LEAST_TURN = 0.4  # share of the ankle's range within the longest cycle; smaller turns are no step
+STRAIGHT = 25.0  # degrees: most that the path turns in a cycle; people were measured on straight paths
+AHEAD = 0.7  # least mean cosine between facing and travel; below it the walk is backward or sideways
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """A cycle of the right leg: frames `start` to `end`, its landings.
+    """A cycle of the right leg, from its landing in frame `start` to the next in frame `end`.
 
-    scalars: by name of SCALARS. curves: (22, 50), rows as CURVES, the first sample at `start` and the
-    50 steps equal.
+    scalars: by name of SCALARS. curves: (22, 50), rows as CURVES, at 50 equal steps from `start`.
     """
 
     start: int
@@ -52,10 +51,10 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Walk:
-    """The cycles of a stretch of walking: `right` begin as the right foot lands.
+    """The cycles of a stretch of walking.
 
-    left: those that begin as the left foot lands, each as seen in a mirror, so that in them too the leg that
-    lands first is called R.
+    right: cycles that begin as the right foot lands. left: those that begin as the left foot lands, mirrored,
+    so that the leg that lands first is called R there, too.
     """
 
     fps: float
@@ -63,25 +62,24 @@ class Walk:
     left: tuple[Cycle, ...] = field(repr=False)
 
     def __len__(self) -> int:
-        """Cycles of the side that has fewer."""
+        """The number of cycles of the side with fewer."""
         return min(len(self.right), len(self.left))
 
     def within(self, start: float, end: float) -> Walk:
-        """The cycles that lie between two frames whole."""
+        """The cycles that are completely between two frames."""
         kept = ((c for c in side if start <= c.start and c.end <= end) for side in (self.right, self.left))
         return Walk(self.fps, *map(tuple, kept))
 
     def mirrored(self) -> Walk:
-        """The same walk seen in a mirror."""
+        """The same walk, mirrored."""
         return Walk(self.fps, self.left, self.right)
 
 
 def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> Walk:
     """Find and measure the cycles in which a figure walks straight ahead.
 
-    positions: (F, J, 3) world, cm, Y up. Standing, turning, walking backward and sideways, and steps
-    without one step of the other foot between them make no cycle; of a clip shorter than a cycle nothing is
-    left.
+    positions: (F, J, 3) world, cm, Y up. Standing, turning, walking backward or sideways, and steps without
+    exactly one step of the other foot between them give no cycle. A clip shorter than a cycle has none.
     """
     if len(positions) < SHORTEST * fps:
         return Walk(fps, (), ())
@@ -90,7 +88,7 @@ def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> Walk:
 
 
 def joined(walks: Iterable[Walk]) -> Walk:
-    """The cycles of several clips of one walker as one walk; their frames then mean nothing any more."""
+    """The cycles of several clips of one person as one walk. Their frame numbers have no meaning any more."""
     walks = tuple(walks)
     right, left = (
         tuple(itertools.chain(*side)) for side in zip(*((w.right, w.left) for w in walks), strict=True)
@@ -99,12 +97,12 @@ def joined(walks: Iterable[Walk]) -> Walk:
 
 
 def landings(forward: Array, fps: float) -> list[int]:
-    """Frames where an ankle (F,), leg lengths ahead of the hips, is furthest ahead.
+    """Frames where an ankle, (F,) leg lengths ahead of the hips, is furthest ahead.
 
-    A turn counts where the ankle goes back by OF_RANGE of what it moves within the longest cycle around.
+    The ankle must then go back by LEAST_TURN of its range within the longest cycle around.
     """
     reach = int(LONGEST * fps / 2)
-    least = np.maximum(LEAST_SWING, OF_RANGE * _ranges(forward, reach))
+    least = np.maximum(LEAST_SWING, LEAST_TURN * _ranges(forward, reach))
     found: list[int] = []
     high = low = 0
     rising = True
@@ -122,7 +120,7 @@ def landings(forward: Array, fps: float) -> list[int]:
 
 
 def _ranges(values: Array, reach: int) -> Array:
-    """(F,) largest minus least value within `reach` frames to either side."""
+    """(F,) largest minus smallest value within `reach` frames on each side."""
     padded = np.pad(values, reach, mode="edge")
     return np.ptp(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1), axis=1)
 

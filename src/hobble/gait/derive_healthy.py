@@ -1,9 +1,10 @@
-"""Write healthy.npz from walks of the CMU database: python -m hobble.gait.derive_healthy CMU_FOLDER
-[OUT.npz].
+"""Writes healthy.npz from walks of the CMU database.
 
-How much a healthy walk differs from the same walker's other healthy walks: at other speeds, on slight
-curves, from one window to the next. The motion was obtained from mocap.cs.cmu.edu, which NSF EIA-0196217
-funded.
+python -m hobble.gait.derive_healthy CMU_FOLDER [OUT.npz]
+
+The file says how much a healthy walk differs from other healthy walks of the same person: at other speeds, on
+slight curves, between windows. The motion was obtained from mocap.cs.cmu.edu, which was funded by NSF
+EIA-0196217.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from hobble.gait.profile import Profile, mirrored, profile
 from hobble.gait.read import SKELETONS, read_clip
 from hobble.gait.recogniser import windows
 
-# performer -> the walks that make the reference, and others: slow, quick, on curves
+# performer -> reference walks, and other walks: slow, quick, on curves
 REFERENCE = {
     "105": ("105_29", "105_31", "105_34", "105_36"),
     "07": ("07_01", "07_02", "07_03", "07_06"),
@@ -45,7 +46,7 @@ SECONDS = 4.0
 def healthy_windows(
     folder: str | Path, performer: str, skeletons: str | Path = SKELETONS
 ) -> Iterator[tuple[str, Profile, Profile]]:
-    """(clip, profile, that of the performer's other healthy walks) of each window of a performer."""
+    """(clip, profile, profile of the performer's other healthy walks) of each window of a performer."""
     names = REFERENCE[performer] + OTHERS[performer]
     clips = {name: read_clip(Path(folder, f"{name}.bvh"), skeletons) for name in names}
     for name, clip in clips.items():
@@ -55,16 +56,16 @@ def healthy_windows(
 
 
 def _parts(clip: Clip) -> list[Walk]:
-    """A clip's windows; the whole of one that is too short for a window, if it has a cycle."""
+    """A clip's windows. A clip that is too short for one counts whole if it has a cycle."""
     walk = measure_clip(clip)
     found = [part for _, part in windows(walk, len(clip), SECONDS)]
     return found or [walk] * bool(len(walk))
 
 
 def covariance(seen: Iterable[tuple[str, Profile, Profile]]) -> tuple[Array, int]:
-    """(D, D) mean square of the windows' features, left and right alike, each clip counting the same.
+    """(D, D) mean square of the windows' features, and the number of clips.
 
-    Returns with it how many clips there are.
+    Left and right count equally, and so does each clip.
     """
     by_clip: dict[str, list[Array]] = {}
     for name, walk, healthy in seen:
@@ -75,7 +76,7 @@ def covariance(seen: Iterable[tuple[str, Profile, Profile]]) -> tuple[Array, int
 
 
 def derive(folder: str | Path, out: str | Path = HEALTHY) -> None:
-    """Write the covariance of each performer, and of how many clips it is the mean."""
+    """Write the covariance of each performer, and the number of clips that it is the mean of."""
     each = [covariance(healthy_windows(folder, performer)) for performer in REFERENCE]
     save_npz(
         out,
@@ -86,7 +87,7 @@ def derive(folder: str | Path, out: str | Path = HEALTHY) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns the exit status."""
+    """Run the command. Returns the exit status."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     if len(given) not in (1, 2):
         print("python -m hobble.gait.derive_healthy CMU_FOLDER [HEALTHY.npz]", file=sys.stderr)

@@ -1,7 +1,8 @@
-"""Write people.npz from the curves of Jun et al.: python -m hobble.gait.derive_people WALKS.npz [PEOPLE.npz].
+"""Writes people.npz from the curves of Jun et al.: python -m hobble.gait.derive_people WALKS.npz
+[PEOPLE.npz].
 
-WALKS.npz holds, for each gait and person, the median over the cycles: `gaits` (6), `curves` (22 names),
-`scalars` (8 names), `curve` (6, people, 22, 50) and `scalar` (6, people, 8), as profile.py defines them.
+WALKS.npz has, for each gait and person, the median over the cycles: `gaits` (6), `curves` (22 names),
+`scalars` (8 names), `curve` (6, people, 22, 50) and `scalar` (6, people, 8), as defined in profile.py.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from hobble.gait.signals import CURVES
 
 
 def derive(walks: str | Path, out: str | Path = FILE) -> None:
-    """Mean and spread over people, and each person's profile. Raises InputError for another file."""
+    """Write mean and spread over people, and each person's profile. Raises InputError for other files."""
     data = load_npz(walks)
     for name, wanted in (("gaits", GAITS), ("curves", CURVES), ("scalars", SCALARS)):
         if tuple(map(str, data[name])) != tuple(wanted):
@@ -42,7 +43,7 @@ def derive(walks: str | Path, out: str | Path = FILE) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns the exit status."""
+    """Run the command. Returns the exit status."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     if len(given) not in (1, 2):
         print(__doc__.splitlines()[0], file=sys.stderr)

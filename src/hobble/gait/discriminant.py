@@ -1,4 +1,4 @@
-"""Linear discriminant analysis: the class whose mean is nearest, measured in spreads within the classes."""
+"""Linear discriminant analysis: finds the class with the nearest mean, in spreads within the classes."""
 
 from __future__ import annotations
 
@@ -9,23 +9,26 @@ import numpy as np
 
 from hobble.core.quat import Array
 
-# Of the covariance towards its diagonal, since there are few windows for so many features; of 0.02 to 0.8,
-# the one with which captured motion that was left out is named best.
+# Shrinkage of the covariance towards its diagonal, because there are few windows for so many features. Of the
+# values 0.02 to 0.8, this one recognises left-out captured motion best.
 SHRINKAGE = 0.02
-CONSTANT = 1e-9  # spread, relative to the size of the numbers, below which a feature says nothing
-NARROWEST = 0.02  # spread within the classes, of that over all, or a lucky constant would decide alone
+CONSTANT = 1e-9  # features with a smaller spread, relative to their size, are constant and ignored
+NARROWEST = 0.02  # least spread within classes, relative to the whole; else a constant would decide alone
 
 
 @dataclass(frozen=True)
 class Discriminant:
-    """`classes`, and for each a linear score: values (n, D) @ weights (D, K) + offset (K,)."""
+    """A classifier.
+
+    The linear scores of `classes` for values (n, D) are values @ weights (D, K) + offset (K,).
+    """
 
     classes: tuple[str, ...]
     weights: Array = field(repr=False)
     offset: Array = field(repr=False)
 
     def scores(self, values: Array) -> Array:
-        """(n, K) log likelihood of each class up to a term that all share; no class is likelier before."""
+        """(n, K) log likelihood of each class up to a common term. All classes have the same prior."""
         return values @ self.weights + self.offset
 
     def names(self, values: Array) -> list[str]:
@@ -34,12 +37,10 @@ class Discriminant:
 
 
 def learn(values: Array, labels: Sequence[str], shrinkage: float = SHRINKAGE) -> Discriminant:
-    """From values (n, D) and their labels. Raises ValueError for fewer than two classes.
+    """Learn from values (n, D) and their labels. Raises ValueError for fewer than two classes.
 
-    shrinkage: of the covariance towards its diagonal, 0 to 1.
-
-    Fisher's linear discriminant with the pooled covariance of standardised values; each class counts the
-    same, however many examples it has.
+    shrinkage: of the covariance towards its diagonal, 0 to 1. This is Fisher's linear discriminant with the
+    pooled covariance of standardised values. Each class has the same weight, however many examples it has.
     """
     classes = tuple(sorted(set(labels)))
     if len(classes) < 2:

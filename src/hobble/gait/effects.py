@@ -1,4 +1,4 @@
-"""How much a hurt walk differs from the same figure's healthy walk, in sizes that are known of people."""
+"""Sizes of the differences between a hurt walk and the same figure's healthy walk."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hobble.gait.people import GAITS, NORMAL, People
 from hobble.gait.profile import Profile, mirrored
 from hobble.gait.recogniser import LEFT, RIGHT
 
-# name -> what it is. "hurt" and "sound" are the sides; a share is of the healthy walk's.
+# name -> meaning. "hurt" and "sound" are the sides. Shares are relative to the healthy walk.
 EFFECTS: dict[str, str] = {
     "speed": "speed, share of healthy",
     "stride": "stride time, share of healthy",
@@ -33,7 +33,7 @@ EFFECTS: dict[str, str] = {
 
 
 def effects(walk: Profile, healthy: Profile, side: str = RIGHT) -> dict[str, float]:
-    """The sizes of EFFECTS of a walk whose `side` is hurt, beside the healthy walk of the same figure."""
+    """The EFFECTS of a walk whose `side` is hurt, relative to the healthy walk of the same figure."""
     if side == LEFT:
         walk, healthy = mirrored(walk), mirrored(healthy)
 

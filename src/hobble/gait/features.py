@@ -1,7 +1,8 @@
-"""A walk against the same walker's healthy one, in some twenty numbers that tell impairments apart.
+"""Features of a walk relative to the same person's healthy walk: about twenty numbers that distinguish
+impairments.
 
-Neither speed nor stride time is among them, and most compare the two sides: a healthy walk changes with its
-speed but stays even.
+Speed and stride time are not used, and most features compare the two sides, because a healthy walk changes
+with its speed but stays symmetric.
 """
 
 from __future__ import annotations
@@ -10,18 +11,18 @@ import numpy as np
 
 from hobble.gait.profile import Profile
 
-LEAST_RANGE = 3.0  # degrees; a joint that moves less keeps still, and a share of nothing would be anything
-MOST = 5.0  # times: larger shares say no more
+LEAST_RANGE = 3.0  # degrees: smaller ranges are raised to this, because ratios of tiny ranges are arbitrary
+MOST = 5.0  # larger ratios are limited to this
 TRUNK_FORWARD, TRUNK_LEFT = "mean trunk_forward", "mean trunk_left"
 TRUNK = (TRUNK_FORWARD, TRUNK_LEFT, "range trunk_forward", "range trunk_left")
 ARMS = "range arm_forward R - L"
 
 
 def features(walk: Profile, healthy: Profile) -> dict[str, float]:
-    """What tells the impairments apart: a walk against the same walker's healthy one.
+    """The features of a walk relative to the same person's healthy walk.
 
-    Degrees, leg lengths, shares of the cycle; of the ranges of knees and hips shares of the healthy range, of
-    arms their logarithm.
+    Degrees, leg lengths and shares of the cycle. Ranges of knees and hips are shares of the healthy range,
+    those of arms logarithms of it.
     """
 
     def change(name: str) -> float:

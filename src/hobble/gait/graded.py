@@ -1,9 +1,11 @@
-"""What hurts, which side, and how much of what people showed: a recogniser that is made for mild limps too.
+"""Recognises what hurts, the side, and the strength relative to people's strong limps.
 
-Each impairment is a direction in which people's walks leave their normal walks. A walk at strength s lies
-near s times the mean over people, spread like s times the spread over people plus the spread of healthy
-walks; a healthy walk has the latter alone. The strengths in between are thus people's own walks, half-way
-and so on, and nothing that a generator of limps has made. What the data cannot tell apart has one label:
+It knows mild limps, too.
+
+An impairment is a direction in which people's walks differ from their normal walks. A walk of strength s is
+at s times the mean over people. Its spread is s times the spread over people plus the spread of healthy
+walks; a healthy walk has only the latter. So walks of medium strength are people's own walks, part of the
+way, and not the output of a generator of limps. Impairments that the data cannot distinguish share a label:
 see PARTS.
 """
 
@@ -26,8 +28,8 @@ from hobble.gait.recogniser import RIGHT, SIDES, examples
 HEALTHY = Path(__file__).with_name("healthy.npz")
 GUARDED_ARM, LEANING = "guarded_arm", "leaning_trunk"
 WAYS = {"forward": (1, 0), "backward": (-1, 0), "to the left": (0, 1), "to the right": (0, -1)}
-# label -> the parts of the body that it can mean. Pain in thigh, shank or foot looks alike in people's
-# data, and an arm is seen by its swing alone, wherever in it the pain is.
+# label -> the parts of the body that it can mean. Pain in thigh, shank or foot looks alike in people's data.
+# An arm is known only by its swing, wherever the pain is.
 PARTS: Mapping[str, tuple[str, ...]] = {
     NORMAL: (),
     "antalgic": ("thigh", "shank", "foot"),
@@ -38,20 +40,19 @@ PARTS: Mapping[str, tuple[str, ...]] = {
     GUARDED_ARM: ("shoulder", "upper arm", "forearm", "hand"),
     LEANING: ("back",),
 }
-STRENGTHS = np.array([0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.2])  # of what people showed, all as likely
-HEALTHY_SPREAD = 2.5  # times the measured covariance: a figure that nobody measured is less like itself
+STRENGTHS = np.array([0.15, 0.3, 0.45, 0.6, 0.8, 1.0, 1.2])  # relative to people's, all equally likely
+HEALTHY_SPREAD = 2.5  # factor on the measured covariance, because an unmeasured figure may vary more
 SHRINKAGE = 0.5  # of both covariances towards their diagonals
 
 
 @dataclass(frozen=True)
 class Grade:
-    """What hurts. label: a key of PARTS. side: "right", "left", or None where it is neither's.
+    """What hurts. label: a key of PARTS. side: "right", "left" or None.
 
-    strength: 0 where the label is normal; 1 is as much as people showed who imitated the impairment.
-    distance: from the nearest walk that is known, in spreads a feature. People who were left out are 0.7
-    from it, at most 1.5; further off is like nobody's walk, and its label is less to be trusted.
-    probabilities: of each label, both sides together; sides: of each label and side, or where the trunk
-    leans.
+    strength: 0 for normal; 1 is as much as the people who imitated the impairment. distance: from the nearest
+    known walk, in spreads per feature. For people who were left out it is 0.7 on average and at most 1.5;
+    beyond that the label is less reliable. probabilities: of each label, both sides together. sides: of each
+    label and side (or direction of the lean).
     """
 
     label: str
@@ -63,21 +64,21 @@ class Grade:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The parts that may be what hurts."""
+        """The parts that may hurt."""
         return PARTS[self.label]
 
     @property
     def impaired(self) -> bool:
-        """Whether something hurting is likelier than nothing."""
+        """Whether an impairment is likelier than none."""
         return self.probabilities[NORMAL] < 0.5
 
 
 @dataclass(frozen=True)
 class Grader:
-    """What walks of each kind look like.
+    """The known walks.
 
-    kinds: (label, side or way to lean) -> the mean (D,) at strength 1 and the covariance (D, D) over people
-    there. healthy: (D, D) covariance of healthy walks.
+    kinds: (label, side or direction of the lean) -> mean (D,) at strength 1 and covariance (D, D) over
+    people. healthy: (D, D) covariance of healthy walks.
     """
 
     kinds: Mapping[tuple[str, str], tuple[Array, Array]] = field(repr=False)
@@ -90,11 +91,11 @@ class Grader:
         means, spreads = zip((np.zeros(len(self.healthy)), 0 * self.healthy), *each, strict=True)
         factors = np.linalg.cholesky(self.healthy + np.array(spreads))
         top = -np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
-        top[1:] -= np.log(len(each))  # healthy or not is as likely; of the others each is
+        top[1:] -= np.log(len(each))  # healthy and impaired have equal priors, and so do all kinds
         return np.array(means), np.linalg.inv(factors), top
 
     def grade(self, walk: Profile, healthy: Profile) -> Grade:
-        """What hurts in the walk of a figure, beside its healthy walk."""
+        """What hurts in a walk, relative to the figure's healthy walk."""
         x = np.array(list(features(walk, healthy).values()))
         means, whiten, top = self._densities
         squares = np.sum(np.einsum("nij,nj->ni", whiten, x - means) ** 2, axis=1)
@@ -116,7 +117,7 @@ class Grader:
 
 
 def learn_grader(known: People, whose: Iterable[int], healthy: Array) -> Grader:
-    """From the walks of some people and the covariance (D, D) of healthy walks."""
+    """Learn from walks of people and the covariance (D, D) of healthy walks."""
     values, classes = examples(known, whose)
     names = list(features(known.normal(), known.normal()))
     labels = np.array(classes)
@@ -136,23 +137,23 @@ def learn_grader(known: People, whose: Iterable[int], healthy: Array) -> Grader:
 
 @cache
 def grader() -> Grader:
-    """Learnt from all that the package knows."""
+    """The grader that learnt from all data of the package."""
     return learn_grader(people(), range(people().count), healthy_covariance())
 
 
 def healthy_covariance() -> Array:
-    """(D, D) mean square of the features of healthy walks, each beside the walker's others."""
+    """(D, D) mean square of the features of healthy walks, relative to the same person's others."""
     known = load_npz(HEALTHY)
     return np.average(known["covariances"], axis=0, weights=known["clips"])
 
 
 def grade(walk: Profile, healthy: Profile) -> Grade:
-    """What hurts in the walk of a figure, beside its healthy walk."""
+    """What hurts in a walk, relative to the figure's healthy walk."""
     return grader().grade(walk, healthy)
 
 
 def _only(names: list[str], kept: Iterable[str], mean: Array, spread: Array) -> tuple[Array, Array]:
-    """A kind in which nothing but the features `kept` differs from a healthy walk."""
+    """A kind that differs from a healthy walk only in the features `kept`."""
     on = np.isin(names, list(kept))
     return mean * on, np.diag(np.diag(spread) * on)
 

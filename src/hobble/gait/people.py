@@ -1,8 +1,8 @@
-"""What is known of people who walk with an impaired right leg.
+"""Statistics of people who walk with an impaired right leg.
 
-From skeleton recordings of ten people, each walking normally and with five impairments that they imitated,
-as told: Jun et al. (2020), "Pathological gait classification using Kinect v2 and gated recurrent neural
-networks", IEEE Access 8. `people.npz` holds statistics of them; `derive_people.py` writes it.
+They come from skeleton recordings of ten people who each walked normally and imitated five impairments: Jun
+et al. (2020), "Pathological gait classification using Kinect v2 and gated recurrent neural networks", IEEE
+Access 8. They are in `people.npz`, which `derive_people.py` writes.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ GAITS = (NORMAL, "antalgic", "stiff_legged", "steppage", "trendelenburg", "lurch
 
 @dataclass(frozen=True)
 class People:
-    """Ten people walking in the six ways of GAITS, the impaired leg on the right.
+    """Ten people walking in the six ways of GAITS, with the impaired leg on the right.
 
-    profiles: (6, 10, 52) of each person, columns as profile.NAMES. curve_mean, curve_spread: (6, 22, 50)
-    mean and standard deviation over people, rows as CURVES, phase 0 the right landing, degrees and leg
-    lengths. scalar_mean, scalar_spread: (6, 8), columns as SCALARS.
+    profiles: (6, 10, 52) of each person, columns as profile.NAMES. curve_mean, curve_spread: (6, 22, 50) mean
+    and standard deviation over people, rows as CURVES, phase 0 at the right landing, degrees and leg lengths.
+    scalar_mean, scalar_spread: (6, 8), columns as SCALARS.
     """
 
     profiles: Array = field(repr=False)
@@ -40,16 +40,16 @@ class People:
 
     @property
     def count(self) -> int:
-        """How many people."""
+        """The number of people."""
         return self.profiles.shape[1]
 
     def profile(self, gait: str, person: int) -> Profile:
-        """One person's walk."""
+        """One person's profile of a gait."""
         row = self.profiles[GAITS.index(gait), person]
         return dict(zip(NAMES, map(float, row), strict=True))
 
     def normal(self) -> Profile:
-        """The mean of their normal walks: the reference where a walker has none of his own."""
+        """The mean of their normal walks: the reference for a figure without a healthy walk."""
         return dict(zip(NAMES, map(float, self.profiles[0].mean(axis=0)), strict=True))
 
     def curve(self, gait: str, name: str) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""A walk in some fifty numbers: the medians of its cycles, as they are known of people."""
+"""A walk as some fifty numbers: medians over its cycles."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from hobble.gait.cycles import SCALARS, Cycle, Walk
 from hobble.gait.signals import CURVES, TURNS_ROUND
 
 Profile = Mapping[str, float]
-NO_CYCLE = "there is no whole cycle of walking straight ahead to measure"
+NO_CYCLE = "there is no whole cycle of straight walking to measure"
 NAMES = (*SCALARS, *(f"{kind} {curve}" for curve in CURVES for kind in ("range", "mean")))
 
 
 def profile(walk: Walk) -> dict[str, float]:
     """The numbers of NAMES: each scalar, and each curve's range and mean over the cycle.
 
-    Of the median over the cycles, that of the cycles of the right leg and that of the left, seen in a mirror,
-    in equal parts, so that the mirrored walk has exactly the mirrored profile. Degrees, leg lengths, seconds.
-    Raises HobbleError where the walk has no cycle.
+    They are medians over the cycles. Cycles of the right leg and mirrored cycles of the left leg count
+    equally, so the mirrored walk has exactly the mirrored profile. Degrees, leg lengths, seconds. Raises
+    HobbleError if the walk has no cycle.
     """
     if not len(walk):
         raise HobbleError(NO_CYCLE)
@@ -39,7 +39,7 @@ def of_curves(curves: Array, scalars: Array) -> dict[str, float]:
 
 
 def mirrored(values: Profile) -> dict[str, float]:
-    """The profile of the same walk seen in a mirror."""
+    """The profile of the mirrored walk."""
     out = {}
     for name in NAMES:
         kind, _, curve = name.rpartition(" ")

@@ -1,4 +1,4 @@
-"""Clips as they are measured: on their own rig and its own bone lengths."""
+"""Reads clips for measurement, on their own rig with its own bone lengths."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ SKELETONS = "config/skeletons"
 
 
 def read_clip(path: str | Path, skeletons: str | Path = SKELETONS) -> Clip:
-    """A BVH file at 60 Hz on its own rig, which must be one of those that the folder `skeletons` describes.
+    """A BVH file at 60 Hz on its own rig, which must have a skeleton file in the folder `skeletons`.
 
-    Raises InputError for a file that cannot be read and for an unknown rig.
+    Raises InputError for a file that cannot be read or an unknown rig.
     """
     options = ClipMotion()
     target = load_skeleton(Path(skeletons) / "holden31.yaml")

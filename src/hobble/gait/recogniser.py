@@ -1,8 +1,8 @@
-"""Which impairment a walk looks like, of those that people showed, and on which side.
+"""Recognises which of people's impairments a walk resembles, and the side.
 
-A linear classifier of people's walks, each against that person's own normal walk, with either leg impaired:
-the left one is the right one in a mirror. Neither speed nor stride time is a feature, and most features
-compare the two sides, since a healthy walk changes with its speed but stays even.
+It is a linear classifier of people's walks, each relative to the same person's normal walk, with either leg
+impaired; the left leg is a mirrored right leg. Speed and stride time are not used, and most features compare
+the two sides, because a healthy walk changes with its speed but stays symmetric.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from hobble.gait.features import features
 from hobble.gait.people import GAITS, NORMAL, People, people
 from hobble.gait.profile import Profile, mirrored
 
-SHRINKAGE = 0.2  # of the covariance towards its diagonal: 110 examples for some twenty features
-LEAST_CYCLES = 3  # in a window that is judged, both legs together: two of one and one of the other
+SHRINKAGE = 0.2  # of the covariance towards its diagonal; there are 110 examples for some twenty features
+LEAST_CYCLES = 3  # in a window, both legs together: two of one leg and one of the other
 RIGHT, LEFT = "right", "left"
 SIDES = (RIGHT, LEFT)
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a walk is called.
+    """The impairment of a walk.
 
-    label: one of people.GAITS. side: of the impaired leg, None where the label is normal. probabilities: of
-    each label, both sides together; they sum to 1. sides: of each impairment and side, such as
-    ("antalgic", "right").
+    label: one of people.GAITS. side: of the impaired leg, None if the label is normal. probabilities: of each
+    label, both sides together; their sum is 1. sides: of each impairment and side, such as ("antalgic",
+    "right").
     """
 
     label: str
@@ -64,12 +64,12 @@ def examples(known: People, whose: Iterable[int]) -> tuple[Array, list[str]]:
 
 @cache
 def classifier() -> Discriminant:
-    """Learnt from all people that the package knows."""
+    """The classifier that learnt from all people of the package."""
     return learn(*examples(people(), range(people().count)), shrinkage=SHRINKAGE)
 
 
 def recognise(walk: Profile, healthy: Profile, judge: Discriminant | None = None) -> Answer:
-    """What the walk of a figure is called beside its healthy walk."""
+    """The impairment of a walk, relative to the figure's healthy walk."""
     judge = judge or classifier()
     scores = judge.scores(np.array([list(features(walk, healthy).values())]))[0]
     likely = np.exp(scores - scores.max())

@@ -1,7 +1,7 @@
-"""A walking body in 22 curves over time, the same that are known of people who walk with an impaired leg.
+"""A walking body as 22 curves over time, as in the data on people with an impaired leg.
 
-Joints are found by role, so that any rig of config/skeletons/ will do. Angles are measured against the
-vertical and the direction of travel, which is what a viewer beside the path sees.
+Joints are found by role, so any rig of config/skeletons/ works. Angles are relative to the vertical and the
+direction of travel, as seen from beside the path.
 """
 
 from __future__ import annotations
@@ -40,18 +40,18 @@ TURNS_ROUND = (
     "pelvis_left_up",
     "pelvis_turn_left",
     "shoulders_turn_left",
-)  # negated in a mirror
-TRAVEL = 0.5  # s, sigma of the smoothing after which the hips' velocity is the direction of travel
+)  # change sign in a mirror
+TRAVEL = 0.5  # seconds: sigma of the smoothing of the hips' velocity, which gives the direction of travel
 
 
 @dataclass(frozen=True)
 class Signals:
-    """F frames of a body on the move; every length is in leg lengths.
+    """F frames of a moving body. All lengths are in leg lengths.
 
-    curves: name of CURVES -> (F,), degrees and leg lengths. heading: (F,) where the body goes, degrees from
-    +Z towards +X, without jumps. ahead: (F,) cosine of the angle between where the body faces and where it
-    goes. hips: (F, 2) path over the ground. ankle_speed: side -> (F,), leg lengths a second, over the
-    ground. across: side -> (F,) how far the ankle is to the left of the hips. leg: cm.
+    curves: name of CURVES -> (F,), degrees and leg lengths. heading: (F,) direction of travel, degrees from
+    +Z towards +X, unwrapped. ahead: (F,) cosine of the angle between facing and travel. hips: (F, 2) path
+    over the ground. ankle_speed: side -> (F,), leg lengths a second, over the ground. across: side -> (F,)
+    how far the ankle is to the left of the hips. leg: cm.
     """
 
     fps: float
@@ -68,7 +68,7 @@ class Signals:
 
 
 def mirrored(signals: Signals) -> Signals:
-    """The same walk seen in a mirror: left and right swapped."""
+    """The same walk, mirrored: left and right swapped."""
     curves = {}
     for name in CURVES:
         other = name[:-1] + {"L": "R", "R": "L"}[name[-1]] if name not in MIDDLE else name
@@ -80,12 +80,12 @@ def mirrored(signals: Signals) -> Signals:
 
 
 def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
-    """The curves of joint positions (F, J, 3), cm, Y up, at `fps` frames a second; F is 2 or more.
+    """The curves of joint positions (F, J, 3), cm, Y up, at `fps` frames a second. F is 2 or more.
 
-    Hip flexion and abduction are the thigh's angles from the vertical, forward and outward; the arm's is that
-    from shoulder to elbow, forward; knee and elbow 0 where straight; foot pitch that of the line from ankle
-    to toe, up positive; the trunk's is the line from hips to neck. A rig without elbows or wrists has none
-    (0).
+    Hip flexion and abduction are the thigh's angles to the vertical, forward and outward. The arm's is from
+    shoulder to elbow, forward. Knee and elbow are 0 if straight. Foot pitch is of the line from ankle to toe,
+    positive upward. The trunk is the line from hips to neck. On a rig without elbows or wrists those curves
+    are 0.
     """
     at = {role: positions[:, skeleton.role(role)].astype(float) for role in skeleton.roles}
     ahead, left = _travel(at["hips"], fps)
@@ -120,7 +120,7 @@ def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
 
 
 def _travel(hips: Array, fps: float) -> tuple[Array, Array]:
-    """Unit vectors (F, 3), level: where the body goes, and the left of that."""
+    """Unit vectors (F, 3), horizontal: the direction of travel, and its left."""
     velocity = gaussian(np.gradient(hips, axis=0), TRAVEL * fps) * [1.0, 0.0, 1.0]
     ahead = velocity / np.maximum(np.linalg.norm(velocity, axis=1, keepdims=True), 1e-9)
     return ahead, np.cross([0.0, 1.0, 0.0], ahead)
@@ -173,7 +173,7 @@ def _angle(part: Array, rest: Array) -> Array:
 
 
 def _bend(a: Array, b: Array, c: Array) -> Array:
-    """Degrees by which the joint at b is bent between a and c, all (F, 3); 0 is straight."""
+    """Degrees by which the joint at b is bent between a and c, all (F, 3). 0 is straight."""
     u, v = b - a, c - b
     return _angle(np.linalg.norm(np.cross(u, v), axis=-1), _dot(u, v))
 

@@ -1,1 +1,1 @@
-"""The embedded data set: a procedural walker, healthy and hurt, written as a user's folder would hold it."""
+"""The embedded data set: a procedural walker, healthy or hurt, written like a user's folder."""

@@ -1,4 +1,4 @@
-"""One clip of the embedded data set: from its plan to motion, footsteps and gait keys."""
+"""Makes one clip of the embedded data set: motion, footsteps and gait keys from a plan."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from hobble.synthetic.pose import pose
 from hobble.synthetic.recipes import GROUND, Segment, generator, plan
 from hobble.synthetic.style import LEFT, RIGHT, healthy_style
 
-SHORTEST = 60  # frames at 60 Hz in which some foot lands; no clip is shorter
+SHORTEST = 60  # frames at 60 Hz: least length of a clip, so that a foot lands in it
 
 
 @dataclass(frozen=True)
 class Walk:
-    """A generated clip and its labels; frames count from 0 at the clip's rate.
+    """A generated clip and its labels. Frames count from 0 at the clip's rate.
 
-    right, left: frames in which a foot lands. gait: (frame, label) keys. ground: what it walks on.
+    right, left: frames in which a foot lands. gait: (frame, label) keys. ground: the kind of ground.
     """
 
     clip: Clip
@@ -42,7 +42,7 @@ class Walk:
 
 
 def generate(clip: str, skeleton: Skeleton, frames: int, recipe: str | None, fps: float, seed: int) -> Walk:
-    """Walk a recipe for `frames` frames at 60 Hz, written at `fps`; the same arguments give the same motion.
+    """Walk a recipe for `frames` frames at 60 Hz, written at `fps`. Equal arguments give equal motion.
 
     Raises HobbleError for an unknown recipe.
     """
@@ -55,7 +55,7 @@ def generate(clip: str, skeleton: Skeleton, frames: int, recipe: str | None, fps
 def walk(
     clip: str, skeleton: Skeleton, segments: list[Segment], total: int, ground: str, fps: float, seed: int
 ) -> Walk:
-    """Walk a plan for `total` frames at `fps`, on a kind of ground that `make_ground` knows."""
+    """Walk a plan for `total` frames at `fps`, on a kind of ground of `make_ground`."""
     path = walk_path(segments, total, fps)
     style = healthy_style(path)
     phase = phase_curve(style, fps, generator(seed, clip, "phase").random())
@@ -86,9 +86,9 @@ def write_clip(
     footsteps: str | pathlib.Path,
     gait: str | pathlib.Path,
 ) -> None:
-    """Generate a clip and write it as a user's folder would hold it. skeleton: as `Skeleton.to_dict`.
+    """Generate a clip and write its files like a user's. skeleton: as `Skeleton.to_dict`.
 
-    options: the section `synthetic`. Raises HobbleError for what cannot be walked, and for too few frames.
+    options: the section `synthetic`. Raises HobbleError for an impossible plan, and for too few frames.
     """
     if frames < SHORTEST:
         enough = math.ceil(options.frames * SHORTEST / max(frames, 1))

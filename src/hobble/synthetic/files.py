@@ -1,4 +1,4 @@
-"""The text files that lie beside a clip: footsteps and gait keys."""
+"""The text files beside a clip: footsteps and gait keys."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import numpy as np
 
 
 def footsteps_text(right: Sequence[int], left: Sequence[int]) -> str:
-    """Lines `a b`: the right foot lands, then the left; frames from 0 in, from 1 in the file."""
+    """Lines `a b`: the right foot lands, then the left. Frames count from 0 in the arguments, from 1 in the
+    file.
+    """
     lines = []
     lefts = np.asarray(left)
     for a, following in itertools.pairwise([*right, np.inf]):
@@ -20,5 +22,5 @@ def footsteps_text(right: Sequence[int], left: Sequence[int]) -> str:
 
 
 def gait_text(keys: Sequence[tuple[int, str]]) -> str:
-    """Lines `frame label`; frames from 0 in, from 1 in the file."""
+    """Lines `frame label`. Frames count from 0 in the argument, from 1 in the file."""
     return "".join(f"{frame + 1} {label}\n" for frame, label in keys)

@@ -1,4 +1,4 @@
-"""Where the ankle is and how the foot is turned: rolling in stance, swinging from one stance to the next."""
+"""Positions of the ankle and rotations of the foot: it rolls in stance and swings to the next stance."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from hobble.synthetic.ground import Ground
 from hobble.synthetic.style import Style
 
 X_AXIS = np.array([1.0, 0.0, 0.0])
-HEEL = np.array([0.0, -4.2, -3.0])  # the back of the sole from the ankle, nearly
+HEEL = np.array([0.0, -4.2, -3.0])  # approximate back of the sole, from the ankle
 READY = 0.95  # share of the swing after which the foot is pitched for its landing
-KICK = 0.68  # below 1 the foot is highest before half of its time
-FOLLOW = 0.45  # share of the pitch rate at which it leaves that the foot keeps
-SPEED_LEFT = 0.36  # share of its mean speed over ground that the foot has left as it lands
-EARLY = 0.81  # below 1 the foot has most of its way behind it before half of its time
-RISE, SETTLE = 0.36, 0.3  # shares of the swing in which the foot goes up and comes down over what it clears
-SOLE_HEIGHT = 2.0  # a moving joint of the foot keeps at least this and the clearance over the ground
+KICK = 0.68  # below 1 the foot is highest in the first half of the swing
+FOLLOW = 0.45  # share of its pitch rate that the foot keeps as it leaves
+SPEED_LEFT = 0.36  # speed of the foot as it lands, as a share of its mean speed
+EARLY = 0.81  # below 1 the foot covers more than half of its distance in the first half of the swing
+RISE, SETTLE = 0.36, 0.3  # shares of the swing in which the foot rises to its clearance and comes down again
+SOLE_HEIGHT = 2.0  # cm: a moving joint of the foot stays this and the clearance above the ground
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Foot:
 
 
 def move_foot(steps: list[Stance], style: Style, side: int, ground: Ground) -> Foot:
-    """The path of one foot through its stances. Frames before the first and after the last one stay zero."""
+    """The path of one foot through its stances. Frames before the first and after the last one stay 0."""
     frames = len(style.duty)
     turns = np.tile(quat.IDENTITY, (frames, 1))
     foot = Foot(np.zeros((frames, 3)), turns, turns.copy())
@@ -57,7 +57,7 @@ def _frames(start: float, end: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Roll:
-    """A stance and the course of the foot's pitch in it: down from its landing, flat, up over the toe."""
+    """A stance and the foot's pitch in it: down from its landing, flat, then up over the toe."""
 
     step: Stance
     land: float
@@ -85,7 +85,7 @@ class _Roll:
         )
 
     def pitch(self, t: Array | float, lands: bool = True, leaves: bool = True) -> Array:
-        """Radians, + toe up, at frames `t` within or just outside of the stance."""
+        """Radians, positive for toe up, at frames `t` in or just outside the stance."""
         u = (np.asarray(t, float) - self.step.land) / (self.step.leave - self.step.land)
         down = u / self.flat
         rise = np.clip((u - self.heel_off) / (1 - self.heel_off), 0, None)
@@ -94,12 +94,18 @@ class _Roll:
         return np.asarray(rest + landing + ((self.off - rest) * rise**self.power if leaves else 0.0))
 
     def toe(self, pitch: Array) -> Array:
-        """(3,) the toe joint: still where the heel is up, on an arc about the ankle where the toe is up."""
+        """(3,) the toe joint.
+
+        It stands while the heel is up, and moves on an arc about the ankle while the toe is up.
+        """
         turned = quat.mul(self.step.turn, quat.from_axis_angle(X_AXIS, -np.maximum(pitch, 0.0)))
         return self.step.ankle + quat.rotate(turned, FOOT)
 
     def ankle(self, pitch: Array) -> Array:
-        """(..., 3): still where the toe is up, on an arc about the still toe joint where the heel is up."""
+        """(..., 3) the ankle.
+
+        It stands while the toe is up, and moves on an arc about the toe joint while the heel is up.
+        """
         turned = quat.mul(self.step.turn, quat.from_axis_angle(X_AXIS, -np.minimum(pitch, 0)))
         return self.step.ankle + quat.rotate(self.step.turn, FOOT) - quat.rotate(turned, FOOT)
 
@@ -124,7 +130,7 @@ def _swing(foot: Foot, here: _Roll, there: _Roll, style: Style, side: int, groun
     rotation = quat.mul(turn, quat.from_axis_angle(X_AXIS, -pitch))
     bend = np.minimum(pitch, 0) * (1 - 0.4 * bump)
     toes = quat.mul(rotation, quat.from_axis_angle(X_AXIS, bend))
-    # The toe joint starts from rest and is stopped by the ground; the ankle follows from it and the pitch.
+    # The toe joint starts at rest and the ground stops it. The ankle follows from toe joint and pitch.
     going = _hermite(0.0, 0.0, 1.0, SPEED_LEFT / EARLY, u**EARLY)
     share = np.stack([going, _ease(u), going], axis=1)
     toe = here.toe(p0) + (there.toe(p1) - here.toe(p0)) * share
@@ -138,7 +144,7 @@ def _swing(foot: Foot, here: _Roll, there: _Roll, style: Style, side: int, groun
 
 
 def _lack(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Ground) -> Array:
-    """(N,) how much higher the swing must go for heel, toe joint and toe tip to clear the ground."""
+    """(N,) how much higher the swing must be for heel, toe joint and toe tip to clear the ground."""
     tip = toe + quat.rotate(toes, np.array([0.0, 0.0, 6.0]))
     heel = toe + quat.rotate(rotation, HEEL - FOOT)
     lack = np.zeros(len(toe))
@@ -148,14 +154,14 @@ def _lack(toe: Array, rotation: Array, toes: Array, clearance: Array, ground: Gr
 
 
 def smooth_above(values: Array, frames: int) -> Array:
-    """A smooth curve nowhere below `values`: their running maximum, averaged over as wide a window."""
+    """A smooth curve that is nowhere below `values`: their running maximum, averaged over an equal window."""
     wide = maximum_filter1d(values, 4 * frames + 1, mode="nearest")
     kernel = np.convolve(np.ones(2 * frames + 1), np.ones(2 * frames + 1))
     return np.convolve(np.pad(wide, 2 * frames, mode="edge"), kernel / kernel.sum(), mode="valid")
 
 
 def _ease(u: Array) -> Array:
-    """From 0 to 1 with no speed at either end."""
+    """From 0 to 1 with zero slope at both ends."""
     u = np.clip(u, 0, 1)
     return u * u * (3 - 2 * u)
 

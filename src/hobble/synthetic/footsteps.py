@@ -1,4 +1,4 @@
-"""When each foot lands and leaves, and where it stands."""
+"""When each foot lands and leaves the ground, and where it stands."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from hobble.synthetic.ground import Ground
 from hobble.synthetic.path import Path
 from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style
 
-ANKLE_HEIGHT = 7.0  # of the ankle joint over the sole; the toe joint is 4.5 cm lower on the skeleton
-FOOT = np.array([0.0, -4.5, 13.5])  # from ankle to toe joint in a foot that stands flat
-STAY = (7.0, np.radians(12.0))  # a standing figure leaves its foot where it would move less than this
-APART = 8.0  # least distance between the ankles, across the way
-STILL = 12.0  # cm/s; slower than this the figure stands
+ANKLE_HEIGHT = 7.0  # cm, of the ankle joint above the sole; the toe joint is 4.5 cm lower
+FOOT = np.array([0.0, -4.5, 13.5])  # from ankle to toe joint in a flat foot
+STAY = (7.0, np.radians(12.0))  # cm and radians: a standing figure does not take smaller steps
+APART = 8.0  # cm: least sideways distance between the ankles
+STILL = 12.0  # cm/s: a slower figure stands
 SOLE = np.array(
     [-11.0, -5.0, 0.0, 6.0, 13.5, 20.5, 27.0, 32.0, 37.0]
 )  # along the foot, room before a step too
-SHIFTS = sorted(np.arange(-20.0, 21.0, 2.0), key=abs)  # how far a foot is moved to keep it off an edge
+SHIFTS = sorted(np.arange(-20.0, 21.0, 2.0), key=abs)  # cm by which a foot may be moved away from an edge
 
 
 @dataclass(frozen=True)
 class Stance:
-    """A foot on the ground from frame `land` to frame `leave` (fractions of frames, of the padded path).
+    """A foot on the ground from frame `land` to frame `leave` (with fractions, of the padded path).
 
-    ankle: (3,) of the flat foot. turn: (4,) its world rotation. swings: was it lifted to get here?
+    ankle: (3,) of the flat foot. turn: (4,) its world rotation. swings: whether it was lifted to get here.
     """
 
     land: float
@@ -38,12 +38,12 @@ class Stance:
 
 
 def phase_curve(style: Style, fps: float, start: float) -> Array:
-    """(F,) cycles, growing; the right foot lands where it is whole."""
+    """(F,) growing cycles. The right foot lands at whole numbers."""
     return start + np.cumsum(style.frequency) / fps
 
 
 def landings(phase: Array, side: int) -> Array:
-    """Frames (with fractions) at which a foot lands."""
+    """Frames (with fractions) in which a foot lands."""
     own = phase - (0.5 if side == LEFT else 0.0)
     whole = np.arange(np.ceil(own[0]), np.floor(own[-1]) + 1)
     return np.interp(whole, own, np.arange(len(own), dtype=float))
@@ -52,13 +52,13 @@ def landings(phase: Array, side: int) -> Array:
 def stances(
     path: Path, style: Style, phase: Array, ground: Ground, rng: np.random.Generator
 ) -> tuple[list[Stance], list[Stance]]:
-    """Every stance of the left and of the right foot along the path, placed in the order they land."""
+    """All stances of the left and of the right foot along the path, in the order of their landings."""
     frames = np.arange(len(path), dtype=float)
     events = [(land, side) for side in (LEFT, RIGHT) for land in landings(phase, side)[:-1]]
     out: tuple[list[Stance], list[Stance]] = ([], [])
     for land, side in sorted(events):
         here = np.interp(land, frames, phase)
-        # The share on the ground is that of the moment of leaving: who speeds up leaves sooner.
+        # The share on the ground is that at the time of leaving, so a faster walker leaves sooner.
         leave = np.interp(here, phase - style.duty[:, side], frames)
         middle = np.interp((here + np.interp(leave, frames, phase)) / 2, phase, frames)
         before, beside = (out[s][-1] if out[s] else None for s in (side, 1 - side))
@@ -80,7 +80,7 @@ def _footprint(
     beside: Stance | None,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
-    """Under the body in mid-stance, but never across the other foot."""
+    """The place of a foot: under the body in mid-stance, but never across the other foot."""
     frames = np.arange(len(path), dtype=float)
 
     def value(curve: Array) -> float:
@@ -102,7 +102,7 @@ def _footprint(
 
 
 def _planted(ground: Ground, place: Array, yaw: float) -> tuple[Array, Array]:
-    """The foot flat on the ground, all of it on one step: ankle position and world rotation."""
+    """The flat foot, all of it on one step: ankle position and world rotation."""
     ahead = np.array([np.sin(yaw), np.cos(yaw)])
 
     def heights(along: Array) -> Array:

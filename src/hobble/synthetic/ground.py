@@ -1,4 +1,4 @@
-"""The ground the walker is planned on: flat, sloping, stepped or uneven, as heights over x and z."""
+"""The ground for which the walk is planned: flat, sloping, stepped or uneven heights over x and z."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ Ground = Callable[[Array, Array], Array]  # x, z in cm -> heights in cm
 
 
 def make_ground(kind: str, rng: np.random.Generator) -> Ground:
-    """The ground of one clip; kind is "flat", "slopes", "steps" or "uneven". The first steps go along +Z."""
+    """The ground of one clip. kind: "flat", "slopes", "steps" or "uneven". The first steps go along +Z."""
     return {"flat": lambda _: flat, "slopes": _slopes, "steps": _steps, "uneven": _uneven}[kind](rng)
 
 
 def flat(x: Array, z: Array) -> Array:
-    """Nothing but zero."""
+    """Height 0 everywhere."""
     return np.zeros(np.broadcast_shapes(np.shape(x), np.shape(z)))
 
 
 def _slopes(rng: np.random.Generator) -> Ground:
-    """Long hills, up to about 12 degrees steep along the way and gentler across it."""
+    """Long hills, up to about 12 degrees steep along the path and less across it."""
     return _waves(rng, lengths=(480, 640, 900), steepness=(0.07, 0.07, 0.07), across=0.35)
 
 
 def _uneven(rng: np.random.Generator) -> Ground:
-    """Bumps and hollows of a few centimetres, no two steps alike."""
+    """Bumps and hollows of a few centimetres."""
     return _waves(
         rng,
         lengths=(110, 150, 190, 260, 340, 600),
@@ -54,7 +54,7 @@ def _waves(
 
 
 def _steps(rng: np.random.Generator) -> Ground:
-    """Steps up and down across the way, 7 to 16 cm high and 62 to 130 cm deep, in flights of up to four."""
+    """Steps up and down across the path, 7 to 16 cm high and 62 to 130 cm deep, in flights of up to four."""
     count = 400
     edges = np.cumsum(rng.uniform(62, 130, count))
     edges -= edges[count // 2]

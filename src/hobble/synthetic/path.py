@@ -1,4 +1,4 @@
-"""From segments to curves over time: where the body goes, where it faces, in which gait."""
+"""Turns segments into curves over time: where the body is, where it faces, and its gait."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from hobble.core.quat import Array
 from hobble.synthetic.recipes import CROUCH, JOG, STAND, WALK, Segment
 
 GAITS = (STAND, WALK, JOG, CROUCH)
-BLEND = 0.30  # seconds, sigma of the change from one segment to the next: about a second from end to end
+BLEND = 0.30  # seconds: sigma of the change between segments, which takes about a second
 
 
 @dataclass(frozen=True)
 class Path:
-    """F frames at `fps`; the clip itself is frames `first` to F - `first`, the rest lets steps begin and end.
+    """F frames at `fps`. The clip is frames `first` to F - `first`; the padding lets steps begin and end.
 
-    position: (F, 2) x and z in cm. facing: (F,) radians, + to the left. velocity: (F, 2) cm/s to the left and
-    forward of the facing direction. gait: (F, 4) shares of GAITS.
+    position: (F, 2) x and z in cm. facing: (F,) radians, positive to the left. velocity: (F, 2) cm/s to the
+    left and forward, relative to facing. gait: (F, 4) shares of GAITS.
     """
 
     fps: float
@@ -71,7 +71,7 @@ def walk_path(segments: Sequence[Segment], frames: int, fps: float) -> Path:
 
 
 def margin(fps: float) -> int:
-    """Frames planned before the first and after the last frame of a clip."""
+    """Number of frames of padding before and after a clip."""
     return round(4 * fps)
 
 
@@ -82,7 +82,7 @@ def _segment_of_frame(segments: Sequence[Segment], frames: int, fps: float) -> n
 
 
 def gait_keys(segments: Sequence[Segment], frames: int, fps: float) -> list[tuple[int, str]]:
-    """(frame, label) keys, frames from 0: labels fade linearly while the motion changes from gait to gait."""
+    """(frame, label) keys, frames from 0. Labels fade linearly while the motion changes its gait."""
     which = _segment_of_frame(segments, frames, fps)
     labels = [segments[i].gait for i in which]
     half = round(1.6 * BLEND * fps)

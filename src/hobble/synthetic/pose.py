@@ -1,4 +1,4 @@
-"""From feet, path and style to the rotations of every joint."""
+"""Rotations of all joints from feet, path and style."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style
 
 X, Y, Z = np.eye(3)
 TWIST = 12.0  # degrees of an upper arm inward
-STRETCH = {True: 0.9975, False: 0.98}  # of the leg's length, at most, on flat and on other ground
-SMOOTH = {True: 0.03, False: 0.06}  # seconds over which the hips come down to where the legs reach
+STRETCH = {
+    True: 0.9975,
+    False: 0.98,
+}  # longest distance hip-ankle, leg lengths, on flat and other ground
+SMOOTH = {True: 0.03, False: 0.06}  # seconds over which the hips come down so that the legs reach the ground
 
 
 def _turn(axis: Array, degrees: Array) -> Array:
@@ -47,7 +50,7 @@ def pose(
 
 
 def _noise(rng: np.random.Generator, frames: int, fps: float, count: int) -> Array:
-    """(F, count) slow unrest of unit variance."""
+    """(F, count) slow noise of unit variance."""
     white = rng.normal(size=(frames, count))
     smooth = gaussian_filter1d(white, 0.45 * fps, axis=0, mode="wrap")
     return smooth / smooth.std(axis=0)
@@ -85,7 +88,7 @@ def _root(
     hips: Array,
     noise: Array,
 ) -> Array:
-    """Hip positions: along the path, swaying and bobbing, so low that no leg is at full stretch."""
+    """Hip positions: along the path, with sway and bob, and low enough that no leg is fully straight."""
     sway = style.sway * (_wave(phase, _centre(style, LEFT)) - _wave(phase, _centre(style, RIGHT))) / 2
     sway = sway + 0.3 * noise[:, 3]
     x = path.position[:, 0] + sway * np.cos(path.facing)
@@ -104,7 +107,7 @@ def _root(
 
 
 def _too_high(skeleton: Skeleton, root: Array, hips: Array, foot: Foot, side: str, stretch: float) -> Array:
-    """(F,) cm by which the hip joint is further from the ankle than this share of the leg's length."""
+    """(F,) cm by which the distance hip-ankle exceeds this share of the leg length."""
     joint = root + quat.rotate(hips, skeleton.offsets[skeleton.index(f"{side}UpLeg")])
     upper, lower = leg_lengths(skeleton, side)
     away = joint - foot.ankle
@@ -134,7 +137,7 @@ def _trunk(skeleton: Skeleton, world: Array, path: Path, hips: Array, chest: Arr
 
 
 def _leg(skeleton: Skeleton, world: Array, root: Array, foot: Foot, side: int) -> None:
-    """Two-bone inverse kinematics; the knee bends between where the pelvis and where the foot points."""
+    """Two-bone inverse kinematics. The knee points between the directions of pelvis and foot."""
     name = ("Left", "Right")[side]
     hips = world[:, 0]
     hip = root + quat.rotate(hips, skeleton.offsets[skeleton.index(f"{name}UpLeg")])
@@ -158,7 +161,7 @@ def _bone(up: Array, side_axis: Array) -> Array:
 
 
 def _arm(skeleton: Skeleton, world: Array, path: Path, style: Style, phase: Array, side: int) -> None:
-    """An arm hangs, swings against the leg of its side, and bends more as it comes forward."""
+    """An arm hangs, swings opposite to the leg of its side, and bends more as it moves forward."""
     name, sign = ("Left", "Right")[side], SIGN[side]
     chest = world[:, skeleton.index("Spine1")]
     upright = quat.slerp(quat.yaw(path.facing), chest, np.full(len(path), 0.55))

@@ -1,4 +1,4 @@
-"""What each clip does: a recipe is a sequence of segments, each a gait, a velocity and a turn for a time."""
+"""Recipes of clips: sequences of segments, each with a gait, a velocity, a turn and a time."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ STAND, WALK, JOG, CROUCH = "stand", "walk", "jog", "crouch"
 
 @dataclass(frozen=True)
 class Segment:
-    """One stretch of a plan.
+    """One segment of a plan.
 
-    speed: cm/s. heading: degrees from the facing direction to the direction of travel, + to the left.
-    turn: degrees the facing direction turns over the whole segment, + to the left. seconds: how long.
+    speed: cm/s. heading: degrees from the facing direction to the direction of travel, positive to the left.
+    turn: degrees by which the facing direction turns in the segment, positive to the left. seconds: its
+    length.
     """
 
     gait: str
@@ -79,15 +80,14 @@ RECIPES: dict[str, tuple[Segment, ...]] = {
     "steps": (_walk(85, 0, 4), _walk(70, 12, 3), _walk(100, -12, 3), _stand(1.8)),
     "uneven": (_walk(115, 0, 3), _walk(95, 70, 3), _walk(125, -70, 3), _walk(70, 0, 2.5)),
 }
-GROUND = {"slopes": "slopes", "steps": "steps", "uneven": "uneven"}  # the others are planned on flat ground
+GROUND = {"slopes": "slopes", "steps": "steps", "uneven": "uneven"}  # all other recipes are on flat ground
 
 
 def plan(recipe: str, frames: float, fps: float, seed: int, clip: str) -> list[Segment]:
-    """The segments of a clip of `frames` frames, each a little different by the clip's own generator.
+    """The segments of a clip of `frames` frames, each varied by the clip's own generator.
 
-    The recipe is walked as often as fits best, at three quarters of its time or more, the turns of
-    every other round mirrored.
-    Raises HobbleError for a recipe that there is not.
+    The recipe is repeated as often as fits best, at three quarters of its time or more. Turns of every other
+    repetition are mirrored. Raises HobbleError for an unknown recipe.
     """
     if recipe not in RECIPES:
         raise HobbleError(f"clip {clip}: there is no recipe {recipe!r}. There are: {', '.join(RECIPES)}.")
@@ -117,5 +117,5 @@ def _varied(segment: Segment, side: float, pace: float, rng: np.random.Generator
 
 
 def generator(seed: int, clip: str, purpose: str) -> np.random.Generator:
-    """The random generator of one clip for one purpose: the same on every machine and in every run."""
+    """The random generator of one clip for one purpose. It is the same on every machine and in every run."""
     return np.random.default_rng([seed, zlib.crc32(clip.encode()), zlib.crc32(purpose.encode())])

@@ -1,7 +1,7 @@
-"""How each gait looks: timing, feet, pelvis, trunk and arms, as functions of speed.
+"""The style of each gait as functions of speed: timing, feet, pelvis, trunk and arms.
 
 Reference values are those of level gait in healthy adults (Perry & Burnfield, Gait Analysis; Winter, The
-Biomechanics and Motor Control of Human Gait; Novacheck 1998 for running), for 1.3 m/s walking.
+Biomechanics and Motor Control of Human Gait; Novacheck 1998 for running), for walking at 1.3 m/s.
 """
 
 from __future__ import annotations
@@ -55,13 +55,13 @@ SIDED: tuple[str, ...] = (
     "arm_swing",
 )
 SIDED += ("arm_mean", "elbow", "elbow_swing", "abduction")
-SPIN = 0.6  # a quicker cadence, share of it at a radian a second and more
+SPIN = 0.6  # relative rise of the cadence when turning by a radian a second or more
 SIGN = (1.0, -1.0)  # +X is the figure's left
 
 
 @dataclass(frozen=True)
 class Style:
-    """How the figure moves in each of F frames: (F,), or (F, 2) left and right. See TABLE; and, beside it:
+    """How the figure moves in each of F frames: (F,), or (F, 2) left and right. See TABLE.
 
     frequency: cycles a second. The left foot lands half a cycle after the right one.
     """
@@ -99,7 +99,7 @@ class Style:
 
 
 def healthy_style(path: Path) -> Style:
-    """The healthy style along a path: each gait's values at the speed of the moment, mixed by gait share."""
+    """The healthy style along a path: each gait's values at the current speed, mixed by gait share."""
     speed = path.speed / 100
     values = {}
     for name, row in TABLE.items():
@@ -115,7 +115,7 @@ def healthy_style(path: Path) -> Style:
 
 
 def _frequencies(speed: Array) -> Array:
-    """(F, 4) cycles a second of each gait: cadence grows with the square root of walking speed."""
+    """(F, 4) cycles a second of each gait. Cadence grows with the square root of walking speed."""
     stand = np.full_like(speed, 1 / 1.5)
     walk = 1.042 * np.sqrt(np.maximum(speed, 0.5) / 1.3)
     jog = 1.41 + 0.08 * (np.clip(speed, 1.5, 5.0) - 2.8)
@@ -125,7 +125,7 @@ def _frequencies(speed: Array) -> Array:
 
 
 def _directed(style: Style, path: Path) -> Style:
-    """Backward and sideways steps: toe first, little roll, wider, quicker, less swing of the arms."""
+    """Changes backward and sideways steps: toe first, little roll, wider, quicker, less arm swing."""
     speed = np.maximum(path.speed, 1e-6)
     moving = np.clip(path.speed / 30, 0, 1)
     ahead = np.where(moving > 0, path.velocity[:, 1] / speed, 1.0) * moving + (1 - moving)
@@ -133,12 +133,12 @@ def _directed(style: Style, path: Path) -> Style:
     forward, back, side = forward[:, None], back[:, None], side[:, None]
     stride = path.speed / style.frequency
     sideways = np.abs(path.velocity[:, 0]) / speed * moving
-    # Who turns on the spot steps around quickly, in steps of some 40 degrees.
+    # A figure that turns in place takes quick steps of some 40 degrees.
     spin = np.clip(np.abs(np.gradient(path.facing)) * path.fps, 0, 1) * np.clip(1 - path.speed / 60, 0, 1)
     return style.changed(
         land_pitch=style.land_pitch * forward - 16 * back - 8 * side,
         off_pitch=style.off_pitch * forward + 8 * back - 16 * side,
-        # Feet that do not cross: the step between them, half a stride, opens and closes about this width.
+        # The feet do not cross: the distance between them varies around this width by half a stride.
         width=style.width + 0.25 * stride / (1 + 0.6 * sideways) * sideways,
         behind=4 + (style.behind - 4) * ahead,
         lift=style.lift + 3 * (back + side),
