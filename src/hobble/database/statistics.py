@@ -28,7 +28,7 @@ class Moments:
     squares: Array = field(repr=False)
 
     def __add__(self, other: Moments) -> Moments:
-        """Of both together: Chan, Golub, LeVeque, Updating formulae (1979)."""
+        """The moments of both sets together (Chan, Golub, LeVeque, Updating formulae, 1979)."""
         weight = self.weight + other.weight
         if weight == 0:
             return self
@@ -38,11 +38,11 @@ class Moments:
         return Moments(weight, mean, squares)
 
     def __mul__(self, times: float) -> Moments:
-        """Of the same values, each weighing so many times as much."""
+        """The moments of the same values with weights multiplied by `times`."""
         return Moments(self.weight * times, self.mean, self.squares * times)
 
     def columns(self, block: slice) -> Moments:
-        """Of some of the columns."""
+        """The moments of some of the columns."""
         return Moments(self.weight, self.mean[block], self.squares[block])
 
     @property
@@ -52,18 +52,18 @@ class Moments:
 
     @classmethod
     def nothing(cls, columns: int) -> Moments:
-        """Of no values."""
+        """The moments of no values."""
         return cls(0.0, np.zeros(columns), np.zeros(columns))
 
     @classmethod
     def of(cls, values: Array, weights: Array | None = None) -> Moments:
-        """Of values (N, C), each row weighing 1 or its entry of `weights` (N,)."""
+        """The moments of values (N, C). Each row has weight 1, or its entry in `weights` (N,)."""
         values = np.asarray(values, np.float64, order="C")
         if not len(values):
             return cls.nothing(values.shape[1])
         w = np.ones((len(values), 1)) if weights is None else np.asarray(weights, np.float64)[:, None]
         total = float(w.sum())
-        # sums and not products of matrices, whose last bits change with where the arrays lie in memory
+        # Sums, not matrix products: the last bits of those depend on the arrays' memory addresses.
         mean = (w * values).sum(axis=0) / total
         return cls(total, mean, (w * (values - mean) ** 2).sum(axis=0))
 
@@ -79,9 +79,9 @@ class Statistics:
 
 
 def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
-    """Moments of X and of Y over the clip's (frame, fit) pairs, laid out as `layout`.
+    """Moments of X and of Y over the clip's (frame, fit) pairs, with columns as in `layout`.
 
-    Each row weighs 1, shared equally by its fits, so that a flat cycle's one fit counts as much as ten.
+    Each row has weight 1, shared equally by its fits. So the one fit of a flat cycle counts as much as ten.
     """
     body = body_layout(layout)
     x, y = Moments.nothing(layout.x_size), Moments.nothing(layout.y_size)
@@ -105,10 +105,10 @@ def clip_moments(rows: ClipRows, layout: RowLayout) -> tuple[Moments, Moments]:
 
 
 def _lowered(values: Array, joints: slice, row_mean: Array, spread: float) -> Moments:
-    """Moments of values whose joint heights have every fit's mean height taken off.
+    """Moments of values after each fit's mean height is subtracted from the joint heights.
 
-    By the law of total variance: the variance between rows of the mean over a row's fits, plus that within
-    rows.
+    By the law of total variance: the variance between rows (of the mean over a row's fits) plus the variance
+    within rows.
     """
     values = values.astype(np.float64)
     heights = slice(joints.start + 1, joints.stop, 3)
@@ -119,7 +119,7 @@ def _lowered(values: Array, joints: slice, row_mean: Array, spread: float) -> Mo
 
 
 def _joined(*parts: Moments) -> Moments:
-    """Columns side by side; every part saw the same rows."""
+    """Moments of columns side by side, all of the same rows."""
     mean = np.concatenate([part.mean for part in parts])
     return Moments(parts[0].weight, mean, np.concatenate([part.squares for part in parts]))
 
@@ -141,7 +141,7 @@ def y_groups(layout: RowLayout) -> list[slice]:
 
 
 def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
-    """Each group's mean deviation in all of its columns, `constant` where a whole group never varies."""
+    """Replace each column's deviation by the mean of its group, or by `constant` if the group never varies."""
     out = np.array(std, np.float64)
     for group in groups:
         mean = float(np.mean(std[group]))
@@ -152,9 +152,9 @@ def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
 def finish(
     layout: RowLayout, x: Moments, y: Moments, joint_weight: float, unseen: Sequence[int]
 ) -> Statistics:
-    """Group the deviations and weigh the joints: block mean / (w joint_weight), w 1e-10 for unseen ones.
+    """Group the deviations and weight the joints: block mean / (w joint_weight), w = 1e-10 for unseen joints.
 
-    Each channel says itself what its columns are divided by.
+    Each channel defines the deviations of its own columns.
     """
     x_std = grouped(x.std, x_groups(layout), SILENT)
     w = np.ones(layout.joints)
@@ -170,6 +170,6 @@ def finish(
 
 
 def unseen_joints(skeleton: Mapping[str, Any]) -> list[int]:
-    """Indices of the skeleton's joints that the network is not shown."""
+    """Indices of the skeleton's joints that are left out of the network's input."""
     joints = list(skeleton["joints"])
     return [joints.index(name) for name in skeleton.get("unseen", ())]
