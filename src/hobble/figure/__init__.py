@@ -1,1 +1,1 @@
-"""The body that a skeleton wears: one closed surface, moved by its joints' rotations."""
+"""The body of a skeleton: one closed surface that the joint rotations move."""

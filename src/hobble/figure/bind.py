@@ -1,4 +1,4 @@
-"""The pose in which a body is modelled: arms and legs a little away from it, so that nothing touches."""
+"""The bind pose of a body: arms and legs slightly spread, so that they do not touch it."""
 
 from __future__ import annotations
 
@@ -18,9 +18,11 @@ SHORTEST = 0.5  # cm; a bone shorter than this has no direction
 
 @dataclass(frozen=True)
 class Bind:
-    """World positions (J, 3) in cm and rotations (J, 4) of all joints; `bones`: role -> the joint that moves
-    that part of the body, for every role, where the skeleton lacks one the next joint above; `at`: role ->
-    where it is (3,)."""
+    """World positions (J, 3) in cm and rotations (J, 4) of all joints.
+
+    `bones`: role -> the joint that moves that part of the body; if the skeleton has no such joint, the next
+    joint above. `at`: role -> its position (3,).
+    """
 
     positions: Array
     rotations: Array
@@ -31,8 +33,8 @@ class Bind:
 def bind(skeleton: Skeleton) -> Bind:
     """The pose of a skeleton whose rest pose stands upright and faces +Z (see config/skeletons/README.md).
 
-    Raises KeyError where one of the roles is missing without which there is no body: hips, head, and of both
-    sides shoulder, hip, knee, heel, toe.
+    Raises KeyError if a required role is missing: hips, head, and on both sides shoulder, hip, knee, heel and
+    toe.
     """
     bones = _bones(skeleton)
     aims = _aims(skeleton, bones)
@@ -69,12 +71,12 @@ def _bones(skeleton: Skeleton) -> dict[str, int]:
         found.setdefault(f"{side}_elbow", found[f"{side}_shoulder"])
         found.setdefault(f"{side}_wrist", found[f"{side}_elbow"])
         for role in ("hip", "knee", "heel", "toe"):
-            skeleton.role(f"{side}_{role}")  # says which one is missing
+            skeleton.role(f"{side}_{role}")  # raises KeyError with the name of the missing role
     return found
 
 
 def _chain(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint and all above it."""
+    """The joint and all its ancestors."""
     out = [joint]
     while skeleton.parents[out[-1]] >= 0:
         out.append(skeleton.parents[out[-1]])
@@ -93,14 +95,14 @@ def _first_below(skeleton: Skeleton, top: int, joint: int) -> int:
 
 
 def _reach(skeleton: Skeleton, joint: int, below: int) -> Array:
-    """From a joint to one below it, (3,) at rest."""
+    """Vector (3,) from a joint to a descendant in the rest pose."""
     way = _chain(skeleton, below)
     steps = way[: way.index(joint)] if joint in way else []
     return skeleton.offsets[steps].sum(axis=0) if steps else np.zeros(3)
 
 
 def _aims(skeleton: Skeleton, bones: dict[str, int]) -> dict[int, tuple[int, Array]]:
-    """Joint -> the joint below it, and the direction (3,) to which that is turned."""
+    """Joint -> (the joint below it, the direction (3,) in which the bone between them should point)."""
     out = {}
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         arm = np.array([sign * np.cos(ARMS_DOWN), -np.sin(ARMS_DOWN), 0.06])
@@ -115,7 +117,7 @@ def _aims(skeleton: Skeleton, bones: dict[str, int]) -> dict[int, tuple[int, Arr
 
 
 def _filled(at: dict[str, Array], positions: Array, skeleton: Skeleton) -> dict[str, Array]:
-    """Places also for the roles that a skeleton lacks, from those around them."""
+    """Positions of all roles; those that the skeleton lacks are estimated from the others."""
     at = dict(at)
     middle = (at["left_shoulder"] + at["right_shoulder"]) / 2
     at.setdefault("neck", middle + 0.35 * (at["head"] - middle))

@@ -1,4 +1,4 @@
-"""Rotations for joints of which only places are known."""
+"""Joint rotations from joint positions."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 
-APART = 0.1  # cm; joints nearer to each other than this lie in one place
+APART = 0.1  # cm; joints nearer to each other count as one place
 
 
 def fitted_rotations(skeleton: Skeleton, positions: Array) -> Array:
-    """World rotations (F, J, 4) under which the bones best point to where the joints are, (F, J, 3).
+    """World rotations (F, J, 4) with which the bones best point to the joint positions (F, J, 3).
 
     A joint with one joint below turns by the shortest way from its parent's rotation; one with several by the
     best fit to all of them (Kabsch, 1976).
@@ -35,7 +35,7 @@ def fitted_rotations(skeleton: Skeleton, positions: Array) -> Array:
 
 
 def _reached(skeleton: Skeleton, joint: int) -> list[tuple[int, Array]]:
-    """The nearest joints below one that lie apart from it, with where they are from it at rest."""
+    """The nearest descendants at another place, with their rest vectors from the joint."""
     out: list[tuple[int, Array]] = []
     for child in skeleton.children(joint):
         offset = np.asarray(skeleton.offsets[child], float)
@@ -47,7 +47,7 @@ def _reached(skeleton: Skeleton, joint: int) -> list[tuple[int, Array]]:
 
 
 def _kabsch(rest: Array, now: Array) -> Array:
-    """Rotations (F, 4) that bring vectors rest (K, 3) nearest to now (F, K, 3)."""
+    """Rotations (F, 4) that best turn the vectors rest (K, 3) to now (F, K, 3)."""
     u, _, vt = np.linalg.svd(np.einsum("fki,kj->fij", now, rest))
     sign = np.sign(np.linalg.det(u @ vt))
     u[..., -1] *= sign[:, None]

@@ -20,7 +20,7 @@ from hobble.figure.bind import bind
 from hobble.figure.mesh import NEEDED, Mesh, body
 from hobble.figure.pack import whole
 
-METRES = 0.01  # of a centimetre
+METRES = 0.01  # metres per centimetre
 MOVES = 1e-5  # a component of a rotation that varies less than this stands still
 COLOUR = (0.72, 0.72, 0.69, 1.0)
 # Component types and targets of the format.
@@ -30,8 +30,7 @@ ARRAY, ELEMENTS = 34962, 34963
 
 @dataclass(frozen=True)
 class Motion:
-    """Something that the body does: place of the root (F, 3) in cm, local rotations (F, J, 4), frames a
-    second."""
+    """A motion of the body: root positions (F, 3) in cm, local rotations (F, J, 4), frames per second."""
 
     name: str
     root: Array = field(repr=False)
@@ -40,7 +39,7 @@ class Motion:
 
 
 class _Buffer:
-    """The file's one buffer, with what says where each array lies in it."""
+    """The buffer of the file, with the views and accessors of its arrays."""
 
     def __init__(self) -> None:
         self.bytes = bytearray()
@@ -57,7 +56,7 @@ class _Buffer:
         normalized: bool = False,
         bounds: bool = False,
     ) -> int:
-        """Append an array; returns the number of its accessor."""
+        """Append an array; returns the index of its accessor."""
         data = np.ascontiguousarray(array)
         self.bytes += b"\0" * (-len(self.bytes) % 4)
         view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": data.nbytes}
@@ -120,7 +119,7 @@ def write_glb(path: str | Path, skeleton: Skeleton, motions: Iterable[Motion] = 
 
 
 def _nodes(skeleton: Skeleton, mesh: Mesh) -> list[dict[str, Any]]:
-    """The joints in the pose in which the body was modelled, standing on the ground."""
+    """The joints in the bind pose, standing on the ground."""
     known = all(skeleton.roles.get(role) in skeleton.joints for role in NEEDED)
     world = bind(skeleton).rotations if known else np.tile(quat.IDENTITY, (len(skeleton.joints), 1))
     local = local_rotations(skeleton, world)
@@ -160,7 +159,7 @@ def _primitive(mesh: Mesh, buffer: _Buffer) -> dict[str, Any]:
 
 
 def _undoing(mesh: Mesh) -> NDArray[np.float32]:
-    """The matrices (B, 16), columns first, that take a corner to where it lies seen from each bone."""
+    """Inverse bind matrices (B, 16), in column order."""
     turn = quat.to_matrix(quat.inv(mesh.rotations))
     out = np.tile(np.eye(4), (len(mesh.bones), 1, 1))
     out[:, :3, :3] = turn
@@ -194,7 +193,7 @@ def _xyzw(rotation: Array) -> Array:
 
 
 def _write(path: str | Path, document: dict[str, Any], data: bytes) -> None:
-    """The container: a header, the JSON padded with spaces, the buffer padded with zeros."""
+    """The .glb container: header, JSON padded with spaces, buffer padded with zeros."""
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     data += b"\0" * (-len(data) % 4)

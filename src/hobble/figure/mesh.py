@@ -1,4 +1,4 @@
-"""The body of a skeleton as a mesh: corners, triangles, what moves them, and the same in any pose."""
+"""The body of a skeleton as a mesh: corners, triangles, skin weights, and posing."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from hobble.figure.surface import FAR, Fine, distances, slopes, surface
 
 STEP = 1.9  # cm between the corners of trunk and limbs
 FINE = {"hand": 0.64, "face": 0.85, "foot": 1.2}
-WIDE = {"": 3.6, "hand": 0.8, "head": 2.6, "foot": 1.8}  # cm over which the shares of two bones meet
+WIDE = {"": 3.6, "hand": 0.8, "head": 2.6, "foot": 1.8}  # cm over which the weights of two bones blend
 OPEN = (
     (1.5, 0.30),
     (4.0, 0.30),
     (9.0, 0.25),
-)  # how far is looked for what shades a corner, and how much it counts
+)  # distances (cm) at which surroundings are sampled for shading, with weights
 NEEDED = ("hips", "head", *(f"{s}_{r}" for s in SIDES for r in ("shoulder", "hip", "knee", "heel", "toe")))
-STICK = (2.6, 1.9)  # half widths of a bone of a skeleton that is no person's
+STICK = (2.6, 1.9)  # cm, half widths of a bone of a skeleton without roles
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Mesh:
     rotations: Array = field(repr=False)
 
     def posed(self, positions: Array, rotations: Array) -> Array:
-        """Corners (V, 3) where the bones are at world positions (B, 3) with rotations (B, 4)."""
+        """Corners (V, 3) with the bones at world positions (B, 3) and rotations (B, 4)."""
         turn = quat.to_matrix(quat.mul(rotations, quat.inv(self.rotations)))
         move = positions - np.einsum("bij,bj->bi", turn, self.positions)
         out = np.zeros_like(self.corners)
@@ -64,7 +64,7 @@ class Mesh:
 
 
 def body(skeleton: Skeleton) -> Mesh:
-    """The body of a skeleton: a person where its roles are known, else a rod for every bone.
+    """The body of a skeleton: a person if it has the roles, else a rod for every bone.
 
     It depends on joints, offsets and roles only, and is made once for each.
     """
@@ -112,7 +112,7 @@ def _made(text: str) -> Mesh:
 
 
 def _fine(stand: Bind) -> list[Fine]:
-    """Where the surface is looked at more closely: hands, face, feet."""
+    """The regions with finer steps: hands, face, feet."""
     size, at = scale(stand), stand.at
     out: list[Fine] = []
     head = at["head"]
@@ -134,7 +134,7 @@ def _fine(stand: Bind) -> list[Fine]:
 
 
 def _reach(owner: NDArray[np.int64], stand: Bind, size: float) -> Array:
-    """Over how many cm the shares of two bones meet, at each corner, by its owner (V,)."""
+    """The distance (V,) in cm over which the weights of two bones blend at each corner."""
     wide = np.full(len(owner), WIDE[""])
     for part, roles in (
         ("hand", ("left_wrist", "right_wrist")),
@@ -146,7 +146,7 @@ def _reach(owner: NDArray[np.int64], stand: Bind, size: float) -> Array:
 
 
 def _shade(solids: Sequence[Solid], corners: Array, normals: Array, size: float) -> Array:
-    """How open the surroundings of each corner are, 0..1: what is found along its normal."""
+    """Ambient shade (V,) of each corner, 0 to 1, from distances along its normal."""
     shade = np.ones(len(corners))
     for away, weight in OPEN:
         reach = size * away

@@ -1,4 +1,4 @@
-"""A body as it lies in the page: integers as base64, and which links lie in each of its parts."""
+"""Packs a body for the page: integers as base64, and the links in each part of the body."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from hobble.core.skeleton import Skeleton
 from hobble.figure.mesh import Mesh, body
 from hobble.models.packing import packed
 
-UNIT = 0.01  # cm of one step of corners and of places of bones
-TURN = 32767  # steps of a component of a rotation
+UNIT = 0.01  # cm, one step of positions of corners and bones
+TURN = 32767  # integer that stands for 1 in a rotation
 
 
 def packed_body(skeleton: Skeleton) -> dict[str, Any]:
-    """The mesh of `mesh.body` and all that is needed to move it; `keep`: the joints that are its bones."""
+    """The mesh of `mesh.body` with the data that moves it. `keep`: the joints that are its bones."""
     mesh = body(skeleton)
     wide = np.uint16 if len(mesh.corners) < 1 << 16 else np.uint32
     return {
@@ -55,7 +55,7 @@ def balls(mesh: Mesh) -> Array:
 
 
 def whole(share: Array) -> NDArray[np.uint8]:
-    """Shares (V, 4) as integers (V, 4) that sum to 255; what rounding leaves over goes to the largest."""
+    """Weights (V, 4) as integers (V, 4) that sum to 255; the largest takes the rounding error."""
     steps = np.floor(share * 255).astype(np.int64)
     steps[np.arange(len(steps)), share.argmax(axis=1)] += 255 - steps.sum(axis=1)
     return steps.astype(np.uint8)
@@ -87,7 +87,7 @@ def regions(skeleton: Skeleton, links: Sequence[str]) -> list[list[int]]:
 
 
 def _below(skeleton: Skeleton, joint: int) -> list[int]:
-    """The joint and all below it, nearest first."""
+    """The joint and all its descendants, nearest first."""
     out = [joint]
     for j in out:
         out += skeleton.children(j)
@@ -95,7 +95,7 @@ def _below(skeleton: Skeleton, joint: int) -> list[int]:
 
 
 def link_ends(joints: Sequence[str], links: Sequence[str]) -> list[tuple[int, int] | None]:
-    """Ends of each link as indices; joint names may hold hyphens themselves, so every place is tried."""
+    """Joint indices of both ends of each link. Joint names may contain hyphens, so every hyphen is tried."""
     pairs: list[tuple[int, int] | None] = []
     for link in links:
         pieces = link.split("-")

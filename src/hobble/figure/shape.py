@@ -13,9 +13,9 @@ from hobble.core.quat import Array
 from hobble.figure.bind import SIDES, Bind
 from hobble.figure.solids import Ball, Floor, Owner, Rod, Solid, Sweep
 
-LEG_LENGTH = 81.0  # hip to ankle of the body that the tables describe
-TOE_HEIGHT = 2.5  # of the ball of the foot above the sole
-# Heights of hip joints, chest, neck and head in the table of the trunk, which are moved to the skeleton's.
+LEG_LENGTH = 81.0  # cm from hip to ankle in the body of the tables
+TOE_HEIGHT = 2.5  # cm, height of the ball of the foot above the sole
+# Heights (cm) of hip joints, chest, neck and head in the table of the trunk. They are scaled to the skeleton.
 LEVELS = (-8.0, 23.0, 38.0, 48.0)
 
 # height, half width, half depth, to the front, squareness
@@ -83,7 +83,7 @@ PALM = (
 )
 # across the palm, where it begins, length, half width
 FINGERS = ((3.1, 8.7, 7.0, 0.84), (1.0, 9.2, 7.8, 0.86), (-1.1, 8.9, 7.2, 0.83), (-3.05, 8.1, 5.6, 0.74))
-CURL = (0.16, 0.30, 0.26)  # radians that each part of a finger is bent more than the one before
+CURL = (0.16, 0.30, 0.26)  # radians, bend of each finger joint
 # place along the foot (share of ankle to ball, and cm), half width, height, towards the other foot
 FOOT = (
     (0.0, -6.0, 2.4, 4.6, 0.0),
@@ -101,7 +101,7 @@ FOOT = (
 
 
 def person(bind: Bind) -> Iterator[Solid]:
-    """The solids of a person, each melted into, or cut from, those before."""
+    """The solids of a person. Each is blended with the ones before it, or cut from them."""
     at = bind.at
     legs = [np.linalg.norm(at[f"{s}_heel"] - at[f"{s}_knee"]) for s in SIDES]
     legs += [np.linalg.norm(at[f"{s}_knee"] - at[f"{s}_hip"]) for s in SIDES]
@@ -117,7 +117,7 @@ def person(bind: Bind) -> Iterator[Solid]:
 
 
 def scale(bind: Bind) -> float:
-    """How large the body is beside that of the tables."""
+    """Size of the body relative to that of the tables."""
     legs = [np.linalg.norm(bind.at[f"{s}_{a}"] - bind.at[f"{s}_{b}"]) for s in SIDES for a, b in
             (("heel", "knee"), ("knee", "hip"))]  # fmt: skip
     return float(max(sum(legs) / 2 / LEG_LENGTH, 0.05))

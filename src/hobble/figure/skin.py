@@ -1,4 +1,4 @@
-"""Which bones move each corner of a body, and by how much."""
+"""Skin weights: which bones move each corner of a body, and how much."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def owners(solids: Sequence[Solid], points: Array, bones: Mapping[str, int]) -> 
 def spread(
     corners: Array, faces: NDArray[np.int64], owner: NDArray[np.int64], reach: float | Array
 ) -> tuple[NDArray[np.int64], Array]:
-    """Joints (V, 4) and their shares (V, 4), most first, that sum to 1.
+    """Joints (V, 4) and their weights (V, 4), largest first. Weights sum to 1.
 
     Each corner begins as its owner's and the shares flow along the surface, as heat would, over about
     `reach` cm (one, or one for each corner). So a hand that hangs beside a thigh takes nothing from it.
@@ -56,12 +56,12 @@ def spread(
     graph = coo_array((np.r_[flow, flow], (np.r_[a, b], np.r_[b, a])), (count, count)).tocsr()
     system = (diags_array(1 + np.asarray(graph.sum(axis=1)).ravel()) - graph).tocsc()
     solve = splu(system).solve
-    for _ in range(2):  # twice, so that what is left of the step at a joint is rounded off
+    for _ in range(2):  # twice, to smooth the step at a joint
         shares = solve(shares)
     order = np.argsort(-shares, axis=1)[:, :MOST]
     kept = np.take_along_axis(shares, order, axis=1)
     if kept.shape[1] < MOST:
         pad = MOST - kept.shape[1]
         kept, order = np.pad(kept, ((0, 0), (0, pad))), np.pad(order, ((0, 0), (0, pad)))
-    kept = np.maximum(kept - 0.01, 0)  # what falls away where a fifth bone would come in fades before it does
+    kept = np.maximum(kept - 0.01, 0)  # a weight fades to 0 before a fifth bone replaces it
     return joints[order], kept / kept.sum(axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Solids that a body is blended from, as distances to their surface: below 0 inside, in centimetres."""
+"""The solids of a body as signed distances to their surface, in cm; negative inside."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from hobble.core.quat import Array
 
-# A part of a solid that one bone moves: from which length along it on, and which role that is.
+# The part of a solid that one bone moves: (where it starts along the solid, role of the bone).
 Owner = tuple[float, str]
 
 
@@ -25,15 +25,15 @@ class Solid:
     cut: bool = field(default=False, kw_only=True)
 
     def distance(self, x: Any, y: Any, z: Any) -> Array:
-        """At world places, arrays that go together."""
+        """Signed distances of world points, given as arrays that broadcast."""
         raise NotImplementedError
 
     def bounds(self) -> tuple[Array, Array]:
-        """Lowest and highest corner (3,) of a box that holds it."""
+        """Lowest and highest corner (3,) of its bounding box."""
         raise NotImplementedError
 
     def along(self, points: Array) -> Array:
-        """How far along it points (N, 3) are, as `owners` counts."""
+        """Position of points (N, 3) along the solid, in the units of `owners`."""
         return np.zeros(len(points))
 
 
@@ -113,7 +113,7 @@ class Ball(Solid):
 
 @dataclass(frozen=True)
 class Rod(Solid):
-    """From one place to another, its half width going from `thick` to `thin` in cm, with round ends."""
+    """A rod between two points with round ends. Its half width goes from `thick` to `thin` (cm)."""
 
     start: Array
     end: Array
@@ -136,7 +136,7 @@ class Rod(Solid):
 
 @dataclass(frozen=True)
 class Floor(Solid):
-    """Takes away what is below a plane through `place`, within `reach` cm of it."""
+    """Removes everything below a plane through `place`, within `reach` cm of that point."""
 
     place: Array
     up: Array
@@ -153,11 +153,11 @@ class Floor(Solid):
 
 
 def united(a: Array, b: Array, blend: float) -> Array:
-    """The smaller distance, rounded off where both are within `blend` cm of each other."""
+    """Smooth minimum of two distances, blended where they differ by less than `blend` cm."""
     near = np.maximum(blend - np.abs(a - b), 0) / max(blend, 1e-9)
     return np.minimum(a, b) - 0.25 * blend * near * near
 
 
 def taken_away(a: Array, b: Array, blend: float) -> Array:
-    """What of `a` lies outside `b`, rounded off."""
+    """Smooth difference: the part of `a` outside `b`."""
     return -united(-a, b, blend)

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from hobble.core.quat import Array
 from hobble.figure.solids import Solid, taken_away, united
 
-FAR = 12.0  # cm; nothing is said of how much further away the surface is
-NEAR = 7.0  # cm around a solid within which it counts; all blends are narrower
+FAR = 12.0  # cm; larger distances to the surface are clipped to this
+NEAR = 7.0  # cm; a solid has no effect farther away; larger than all blends
 # The corners of a cell, and its edges as pairs of them.
 CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if (CORNERS[a] != CORNERS[b]).sum() == 1]
 
-# Where steps are finer: lowest and highest corner of a box (3,), and the step in cm.
+# A box with finer steps: lowest and highest corner (3,), step in cm.
 Fine = tuple[Array, Array, float]
 
 
@@ -37,7 +37,7 @@ def distances(solids: Sequence[Solid], points: Array) -> Array:
 
 
 def ticks(low: float, high: float, step: float, bands: Sequence[tuple[float, float, float]]) -> Array:
-    """Places from low to high, `step` apart and finer within bands (from, to, step), changing gently."""
+    """Coordinates from low to high with spacing `step`, gradually finer within bands (from, to, step)."""
     places, at = [low], low
     while at < high:
         here = min([step, *(_gentle(at, band) for band in bands)])
@@ -47,7 +47,7 @@ def ticks(low: float, high: float, step: float, bands: Sequence[tuple[float, flo
 
 
 def _gentle(at: float, band: tuple[float, float, float]) -> float:
-    """The step allowed at a place: the band's own, and more with distance from it."""
+    """Largest spacing at a coordinate: that of the band, growing with the distance from it."""
     low, high, step = band
     return step + 0.25 * max(low - at, at - high, 0.0)
 

@@ -1,1 +1,1 @@
-"""What is measured of a trained network: one folder a measurement, listed in `registry`."""
+"""Measurements of a trained network: one folder for each, listed in `registry`."""

@@ -1,4 +1,4 @@
-"""What a measurement is given when it is run, and what it gives back."""
+"""The inputs and outputs of a measurement."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Row = Mapping[str, Any]  # of a CSV table: column -> number, text or None
 
 @dataclass(frozen=True)
 class Given:
-    """The inputs of one measurement of one configuration; what it did not ask for is not there.
+    """The inputs of a measurement of one configuration. It gets only those listed in its `Measure.inputs`.
 
-    clips: clip -> its file of rows; facts: the same clips' files of `hobble.rows.facts`; splits: clip ->
-    "train" or "held_out"; runtime: with the keys that it asked for, the others at their defaults; measured:
-    other measurement -> its JSON file.
+    clips: clip -> its file of rows. facts: files of `hobble.rows.facts` of the same clips. splits: clip ->
+    "train" or "held_out". runtime: the keys in its `Measure.runtime`, and defaults for the others. files:
+    other inputs by name, such as the JSON of another measurement.
     """
 
     configuration: str
@@ -35,7 +35,7 @@ class Given:
     runtime: Runtime = field(default_factory=Runtime)
 
     def file(self, name: str) -> Path:
-        """The file of the input `name`. Raises HobbleError where the measurement did not ask for it."""
+        """The file of the input `name`. Raises HobbleError if it is not among the measurement's `inputs`."""
         if name not in self.files:
             raise HobbleError(f"a measurement reads {name!r}, which is not among its `inputs`")
         return self.files[name]
@@ -56,13 +56,13 @@ class Given:
         return yaml.safe_load(self.file("published").read_text(encoding="utf-8"))
 
     def measured(self, name: str) -> Json:
-        """What another measurement found."""
+        """The JSON of another measurement."""
         return read_json(self.file(name))
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a measurement found: `result` becomes <measure>.json, each of `tables` <measure>/<table>.csv.
+    """The output of a measurement: `result` becomes <measure>.json, each of `tables` <measure>/<table>.csv.
 
     says: a line for the log.
     """

@@ -1,4 +1,4 @@
-"""Which joints a measurement is over."""
+"""The option that selects the joints to measure."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hobble.core.section import Section
 
 
 class Joints(Section):
-    """A key that measurements of joint positions share."""
+    """An option of all measurements of joint positions."""
 
     joints: Literal["all", "equivalent"] = Field(
         "all", description="`equivalent`: only the joints that the 31-joint skeleton has too"

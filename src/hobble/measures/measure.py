@@ -1,7 +1,7 @@
-"""What a measurement says of itself, before anything of it is run.
+"""The description of a measurement, which Snakemake reads at planning.
 
-A measurement is a package. Its `__init__` holds `MEASURE`, a `Measure`, and imports nothing heavy: Snakemake
-reads it before it plans. Beside it lie, each found by its name:
+A measurement is a package. Its `__init__` holds `MEASURE`, a `Measure`, and must not import anything slow.
+The other modules of the package are found by name:
 
 - `run.py`: `run(given, options) -> Outcome`, the measuring itself (see `given`);
 - `page.py`: what the report shows of it (see `hobble.report.measured`), if anything;
@@ -19,16 +19,16 @@ from types import ModuleType
 
 from hobble.core.section import Section
 
-# What a measurement can ask for; anything else is the name of another measurement, whose JSON it then reads.
+# Inputs of a measurement. Any other name is that of another measurement, whose JSON is the input.
 INPUTS = ("weights", "clips", "facts", "skeleton", "published")
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What a job asks of a cluster: memory in megabytes, time in seconds.
+    """Memory (MB) and time that a job requests on a cluster.
 
-    memory_mb: whatever the data; memory_each, seconds_each: for a thousand frames of 31 joints, of the
-    longest clip and of all clips; minutes: at least.
+    memory_mb: fixed part. memory_each: for each thousand frames of 31 joints in the longest clip.
+    seconds_each: the same over all clips. minutes: at least.
     """
 
     memory_mb: float = 0.0

@@ -1,4 +1,4 @@
-"""The measurements there are, in the order in which they are run and shown."""
+"""The list of measurements, in the order in which they run and are shown."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hobble.measures.measure import Measure
 
 
 def of_channels() -> Iterator[Measure]:
-    """What the channels bring: the MEASURES of each that has a module `measures`."""
+    """The MEASURES of each channel that has a module `measures`."""
     for name in channels.NAMES:
         module = f"hobble.channels.{name}.measures"
         if importlib.util.find_spec(module) is not None:

@@ -1,4 +1,4 @@
-"""Measuring some clips of a large data set for all: which, how much each counts, and how sure that is.
+"""A stratified sample of the clips of a large data set, with weights and confidence intervals.
 
 The clips are put into strata by split, gait, speed (the slow, middle and fast third of a gait) and channel.
 Of each stratum some are drawn, in proportion to its rows; each split gets half of the rows that are to be
@@ -18,14 +18,14 @@ import numpy as np
 
 from hobble.rows.facts import Facts
 
-LEAST = 2  # clips of a stratum: of one alone nobody knows how much it differs from the others
+LEAST = 2  # clips drawn from a stratum, because the variance needs at least two
 SPEEDS = 3  # strata of a gait by speed
-SURE = 1.96  # standard errors to each side that hold 95 %
+SURE = 1.96  # standard errors on each side of a 95 % confidence interval
 
 
 @dataclass(frozen=True)
 class Stratum:
-    """Clips of a kind. clips: how many there are, rows: theirs together; drawn: name -> rows."""
+    """Similar clips. clips, rows: their number and total rows. drawn: clip in the sample -> its rows."""
 
     split: str
     clips: int
@@ -34,31 +34,31 @@ class Stratum:
 
     @property
     def weight(self) -> float:
-        """How many rows each row that is measured stands for."""
+        """The number of rows that each measured row represents."""
         return self.rows / max(sum(self.drawn.values()), 1)
 
 
 @dataclass(frozen=True)
 class Sample:
-    """The clips that are measured; all of them where there is no stratum. of: clips that there are."""
+    """The clips to measure, by stratum. of: number of all clips."""
 
     strata: tuple[Stratum, ...]
     of: int
 
     @property
     def weights(self) -> dict[str, float]:
-        """Clip that is drawn -> how many rows each of its rows stands for, in the order of the names."""
+        """Clip in the sample -> number of rows that each of its rows represents, sorted by name."""
         return dict(sorted((name, stratum.weight) for stratum in self.strata for name in stratum.drawn))
 
     @property
     def clip_weights(self) -> dict[str, float]:
-        """Clip that is drawn -> how many clips it stands for."""
+        """Clip in the sample -> number of clips that it represents."""
         return {name: s.clips / len(s.drawn) for s in self.strata for name in s.drawn}
 
     def half_width(self, split: str, values: Mapping[str, float]) -> float:
         """Half the width of the 95 % confidence interval of the mean over a split's rows.
 
-        values: clip -> its mean; the clips of a stratum differ, and what was not drawn is not known.
+        values: clip in the sample -> its mean.
         """
         strata = [stratum for stratum in self.strata if stratum.split == split and stratum.rows]
         total = sum(stratum.rows for stratum in strata)
@@ -72,7 +72,7 @@ class Sample:
 
 
 def _variance(stratum: Stratum, values: Mapping[str, float]) -> float:
-    """Of the mean over a stratum's rows, as a ratio of sums over the clips drawn."""
+    """Variance of the mean over a stratum's rows, for a ratio estimate from the sampled clips."""
     n = len(stratum.drawn)
     if n == stratum.clips or n < LEAST:
         return 0.0
@@ -83,9 +83,9 @@ def _variance(stratum: Stratum, values: Mapping[str, float]) -> float:
 
 
 def drawn(facts: Iterable[Facts], splits: Mapping[str, str], frames: int) -> Sample | None:
-    """The clips to measure, of about `frames` rows; None where that is all of them.
+    """A sample of clips with about `frames` rows; None if all clips together have no more.
 
-    The same clips give the same sample, and one clip more changes little of it.
+    The same clips give the same sample, and one more clip changes it only a little.
     """
     clips = [one for one in facts if one.rows]
     if sum(one.rows for one in clips) <= frames:
@@ -101,7 +101,7 @@ def drawn(facts: Iterable[Facts], splits: Mapping[str, str], frames: int) -> Sam
 
 
 def _share(clips: Sequence[Facts], splits: Mapping[str, str], split: str, frames: int) -> float:
-    """Of the rows to measure those of one split: half, or what the other leaves that has fewer."""
+    """Share of the measured rows for one split: half, or more if the other split has too few rows."""
     rows = dict.fromkeys(splits.values(), 0)
     for one in clips:
         rows[splits[one.clip]] += one.rows
@@ -123,7 +123,7 @@ def _kinds(clips: Iterable[Facts], splits: Mapping[str, str]) -> dict[tuple[Any,
 
 
 def _first(members: Sequence[Facts], rows: float) -> dict[str, int]:
-    """Clips of a stratum, `LEAST` of them and as many more as have so many rows, by chance."""
+    """A random choice of `LEAST` clips of a stratum, and more until they have `rows` rows."""
     out: dict[str, int] = {}
     for one in sorted(members, key=lambda one: hashlib.sha256(one.clip.encode()).digest()):
         if len(out) >= LEAST and sum(out.values()) >= rows:

@@ -1,4 +1,4 @@
-"""From how many frames on a measurement is of some clips only; which ones, `hobble.measures.sample` says."""
+"""The option that limits a measurement to a sample of clips (`hobble.measures.sample`)."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from hobble.core.section import Section
 
 
 class Sampling(Section):
-    """A key that measurements of every clip share."""
+    """An option of all measurements of clips."""
 
     sample_frames: int = Field(
         5_000_000,
         gt=0,
-        description="frames measured, where the data set has more: of clips drawn by gait, speed, channel "
-        "and split",
+        description="most frames to measure; a larger data set is sampled by gait, speed, channel and split",
     )

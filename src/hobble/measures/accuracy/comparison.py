@@ -17,7 +17,7 @@ NAME = "accuracy"
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """What each measured, eq. 3.2 of each pair, and the published errors with ours."""
+    """Errors of each configuration, eq. 3.2 of each pair, and the published errors with ours."""
     return SideBySide(
         entries=[{"dataset": m.dataset, **m.found(NAME), "configuration": m.name} for m in all_measured],
         about={m.name: {"joints": m.found(NAME)["joints"]} for m in all_measured},
@@ -77,7 +77,7 @@ def _splits(all_measured: Sequence[ConfigurationResults], published: Json) -> li
 
 
 def _published_clips(all_measured: Sequence[ConfigurationResults], published: Json) -> list[dict[str, Any]]:
-    """Single clips that were published, where a clip of ours has the name."""
+    """Published errors of single clips, next to our clips of the same names."""
     out = []
     for row in published["clips"]:
         for m in all_measured:

@@ -1,4 +1,4 @@
-"""How near one-step predictions come to the truth, per clip and for training and held-out clips.
+"""Errors of one-step predictions, per clip and over the training and held-out clips.
 
 Segerstedt (2021), eq. 3.1: the mean over frames and joints of |t - p| / |t|, Euclidean norms of joint
 positions in the root frame, with its standard deviation over the same. The network is given the true input
@@ -28,12 +28,12 @@ from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
 from hobble.rows.facts import load_facts
 from hobble.rows.layout import RowLayout
 
-LEAST = 1e-3  # cm; below this a joint stands at the root itself and a relative error says nothing
+LEAST = 1e-3  # cm; a joint nearer to the root has no meaningful relative error
 SPLITS = ("train", "held_out")
 REFERENCE = "holden31"
 QUANTILES = {"p05": 0.05, "p25": 0.25, "p50": 0.5, "p75": 0.75, "p95": 0.95}
 COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
-# Bins of the relative error, a fiftieth wide, from which quantiles are read: no error needs to be kept.
+# Bins of the relative error, each 2 % wide. Quantiles come from them, so that no single errors are stored.
 EDGES = np.concatenate([[0.0], np.geomspace(1e-4, 1e2, 701)])
 
 log = logging.getLogger("hobble")
@@ -62,7 +62,7 @@ class Errors:
         return float(np.interp(share * below[-1], below, EDGES))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data, with quantiles of the relative error; None where there was no frame."""
+        """Plain data, with quantiles of the relative error; None values if there was no frame."""
         if not self.frames:
             return {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}
         mean, sd = self.moments.mean, self.moments.std
@@ -136,7 +136,7 @@ def measure(
 
 
 def with_sample(result: dict[str, Any], sample: Sample) -> dict[str, Any]:
-    """The result with what was drawn, and the half widths of the 95 % intervals of each split."""
+    """The result with the sample, and half the width of the 95 % confidence interval of each split."""
     for split in SPLITS:
         clips = [clip for clip in result["clips"] if clip["split"] == split]
         weights = [sample.clip_weights[clip["clip"]] for clip in clips]
@@ -161,12 +161,12 @@ def equivalent_joints(skeleton: Mapping[str, Any], of: str = REFERENCE) -> list[
 
 
 def chosen_joints(given: Given, options: Joints) -> list[str] | None:
-    """Names of the joints that the options ask for; None where that is all."""
+    """Names of the joints that the options select; None for all."""
     return equivalent_joints(given.skeleton) if options.joints == "equivalent" else None
 
 
 def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[int]:
-    """Indices of the joints to measure, in their order: those of `names`, all of them by default."""
+    """Indices of the joints in `names`, in the network's order; all joints by default."""
     if names is None:
         return list(range(network.layout.joints))
     if network.skeleton is None:
@@ -178,7 +178,7 @@ def joint_indices(network: Network, names: Sequence[str] | None = None) -> list[
 
 
 def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
-    """Raise InputError, naming `where`, unless the network has learnt rows of this layout."""
+    """Raise InputError at the file `where` unless the network was trained on rows of this layout."""
     layout = network.layout
     bare = rows.layout.with_channels(()) == replace(layout, channels=(), order=())
     if not bare or not set(layout.channels) <= set(rows.layout.channels):
@@ -186,7 +186,7 @@ def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
 
 
 def clip_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The clips' entries as rows of equal keys."""
+    """The entries of the clips as table rows with equal keys."""
     return [{key: clip.get(key) for key in COLUMNS} for clip in result["clips"]]
 
 

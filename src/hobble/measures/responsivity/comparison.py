@@ -1,4 +1,4 @@
-"""What a frame costs in configurations side by side: times, sizes, and a line of the one over the other."""
+"""Comparison of frame times and network sizes, with straight lines of time over size."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FLOAT = 4  # bytes of a stored weight
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
-    """The laps of each mode, the counts of Table 6.1, and times beside the published ones."""
+    """The laps of each mode, the counts of Table 6.1, and our times with the published ones."""
     about = {m.name: _sizes(m) for m in all_measured}
     return SideBySide(
         entries=[entry for m in all_measured for entry in by_mode(m)],
@@ -134,7 +134,7 @@ def _fit(
 
 
 def lap_means(entry: Json) -> list[float]:
-    """Milliseconds a frame of each lap, all steps together."""
+    """Milliseconds per frame of each lap, all steps together."""
     return [lap["milliseconds"]["total"] for lap in entry["laps"]]
 
 

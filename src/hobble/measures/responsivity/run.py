@@ -1,4 +1,4 @@
-"""Laps of the waypoint track: how long a frame takes, step by step, and how well the track is followed."""
+"""Laps of the waypoint track: the time of each step of a frame, and how closely the track is followed."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
 
 FPS = 60
-RUNS, EVERY = 5, 15  # laps whose way is kept, and frames from one place of it to the next
-WARM_UP = 60  # frames before the first lap, not measured: compiled code is loaded then
+RUNS, EVERY = 5, 15  # laps whose path is stored, and frames between two stored places
+WARM_UP = 60  # frames before the first lap that are not measured, because compiled code is loaded in them
 
 
 def responsivity(
@@ -220,7 +220,7 @@ def _run(number: int, places: Array, off: Array) -> dict[str, Any]:
 
 
 def _held_back(asked: Array, taken: Array) -> int:
-    """Frames in which any joint was not turned as was asked; both (F, J, 4), equal but for rounding."""
+    """Number of frames in which the runtime limited the turn of a joint; both (F, J, 4), else equal."""
     same = np.abs(np.sum(asked * taken, axis=-1)) > 1 - 1e-6
     return int((~same).any(axis=1).sum()) if len(asked) else 0
 

@@ -1,4 +1,4 @@
-"""How far the figure strays when fed its own pose, while the path and all else asked of it are the clip's.
+"""Errors of roll-outs: the network continues from its own poses, with the path and inputs of a clip.
 
 A roll-out starts at a captured frame and goes on for n frames as the runtime does: the joints of the input
 are those it made itself, positions meet half way between where velocities carry them and where they are
@@ -37,8 +37,8 @@ from hobble.rows.facts import load_facts
 from hobble.rows.layout import GAITS, RowLayout
 
 LENGTHS = (1, 10, 60, 300)  # frames
-OVERLAP = 4  # roll-outs of one length that every frame lies in
-BATCH = 1024  # roll-outs side by side
+OVERLAP = 4  # roll-outs of one length that contain each frame
+BATCH = 1024  # roll-outs computed at once
 
 log = logging.getLogger("hobble")
 
@@ -166,7 +166,7 @@ def roll_out(
 
 
 def _carried(place: Array, asked: Inputs, at: np.ndarray) -> Array:
-    """Joints (n, J, 3) in the root frame of frames at - 1, as seen from those at `at`."""
+    """Joints (n, J, 3) moved from the root frame of frames at - 1 to that of frames `at`."""
     out = place.copy()
     level = place[..., ::2] - asked.velocity[at - 1][:, None]
     out[..., ::2] = rotate_by_yaw(level, asked.turn[at - 1][:, None])
@@ -176,7 +176,7 @@ def _carried(place: Array, asked: Inputs, at: np.ndarray) -> Array:
 def clip_roll_outs(
     predictor: Predictor, rows: ClipRows, joints: Sequence[int], lengths: Sequence[int]
 ) -> dict[int, Strayed]:
-    """Length -> how far roll-outs stray, over every frame of the clip.
+    """Length -> errors of roll-outs over every frame of the clip.
 
     A stretch's first frame has no frame before it that would say how its root came there, and starts none.
     Roll-outs begin so often that every frame lies in OVERLAP of them (one where they are one frame long).
