@@ -1,9 +1,9 @@
 """From BVH files to labelled clips through the workflow: wall time of `motion` and `labels` of a data set.
 
-Run `python benchmarks/clips.py MOCAP` with the folder that a data set's own folder lies in, for `cmu` or for
-the set that `--dataset` names. Everything is made in a scratch folder. The time counts Snakemake itself: its
-start, its plan and a process for each of two jobs a clip. Beside it stands how fast one process reads the
-same files.
+Run `python benchmarks/clips.py MOCAP`, where MOCAP is the folder that contains the data set's folder. The
+default data set is `cmu`; `--dataset` chooses another. Results go to a temporary folder. The time includes
+Snakemake itself: start, planning, and one process for each of two jobs a clip. For comparison, it prints how
+fast one process reads the same files.
 """
 
 from __future__ import annotations

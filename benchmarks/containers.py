@@ -3,11 +3,11 @@
     pip install -e .[containers]
     python benchmarks/containers.py [--size-mb 512] [--rounds 3] [--folder DIR]
 
-A table of standardised rows, as wide as those of 31 joints and as smooth from column to column, is written in
-blocks of 4 MB and read back, every block once, in order and in a random order, into the same room in memory.
-Before each reading the files are opened anew and dropped from the page cache. The rates are medians over
-rounds in which the containers take turns, and the ratio is that of a random order to .npy files, one a block;
-the processor's seconds for a GB, also at random, say more where the machine has other work.
+A table of standardised rows, similar to those of 31 joints, is written in blocks of 4 MB. Each block is read
+once, in order and in random order, into the same memory. Before each reading, the files are reopened and
+dropped from the page cache. Rates are medians over rounds in which the containers take turns. The ratio is
+that of random reading to .npy files with one block each. On a busy machine, the processor seconds for a GB
+(random order) are more reliable.
 """
 
 from __future__ import annotations

@@ -2,11 +2,11 @@
 
     python benchmarks/controllers.py DATABASE NAME=WEIGHTS ... [--laps 19] [--minutes 10] [--rollouts]
 
-DATABASE is results/datasets/<dataset>/database/plain, beside the `clips` it was made from. The first of the
-networks is what the frame times of the others are divided by. A frame is timed on one core: one character
-that walks, jogs, stops and turns. Each network makes a stretch of frames in turn, so that other work on the
-machine falls on all alike. What is printed is the median of the ratios of the stretches' means: these hold
-the frames in which motion matching searches and those in which it does not.
+DATABASE is results/datasets/<dataset>/database/plain; the `clips` that it was made from have to be in the
+same folder. Frame times are divided by those of the first network. They are measured on one core, with one
+character that walks, jogs, stops and turns. The networks take turns, a stretch of frames each, so that other
+work on the machine affects all of them equally. The script prints the median of the ratios of the stretches'
+means. A stretch includes frames with and without a search of motion matching.
 """
 
 from __future__ import annotations

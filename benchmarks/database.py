@@ -2,10 +2,10 @@
 
     python benchmarks/database.py [--size-mb 1280] [--memory-mb 128] [--folder DIR] [--joints 31]
 
-Builds a database of made-up rows `size-mb` large, half of them flat and half with ten fits, and reads it back
-from disk in `memory-mb`, from memory, and by the simpler ways that it replaces. Whatever reads from disk does
-so with the page cache dropped and, where a memory cgroup can be made, in one that counts the page cache too,
-of `memory-mb` and what the program itself needs.
+Builds a database of made-up rows of `size-mb`, half of them flat and half with ten fits. Reads it from disk
+within `memory-mb`, from memory, and with simpler methods for comparison. Before reading from disk, the page
+cache is dropped. If possible, reading runs in a memory cgroup of `memory-mb` plus the program's own memory,
+which limits the page cache too.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How much the measurements gain from many figures at once: sweeps of injury, and roll-outs of clips.
+"""Speed of the measurements with many characters at once: injury sweeps, and roll-outs of clips.
 
     python benchmarks/evaluation.py [weights.npz or folder]
 

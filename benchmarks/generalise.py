@@ -1,4 +1,4 @@
-"""What recipes of training give on clips they never saw, and whether their character goes where it is sent.
+"""Training recipes compared on held-out clips: errors, drift, and a lap of the character.
 
     python benchmarks/generalise.py DATABASE < recipes
 

@@ -1,4 +1,4 @@
-"""Whether the ground is honest: feet in contact on it, no foot in it, for every clip of whole data sets.
+"""Check the fitted ground of whole data sets: feet in contact are on it, and no foot is in it.
 
     python benchmarks/ground.py [DATASET ...] [--mocap FOLDER] [--kinds flat rocky jumpy beam] [--workers 2]
 

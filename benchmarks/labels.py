@@ -1,4 +1,4 @@
-"""How fast labels are made: frames a second beside real time, and each part's share.
+"""Speed of labelling: frames a second, compared with real time, and the share of each part.
 
     python benchmarks/labels.py [FOLDER_OF_MOTION_NPZ]
 

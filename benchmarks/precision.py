@@ -1,4 +1,4 @@
-"""What half precision on disk costs in held-out accuracy, beside what another seed does.
+"""Effect of half precision on disk on the held-out error, compared with the effect of another seed.
 
     python benchmarks/precision.py [FOLDER] [--passes 3] [--seeds 1 2]
 

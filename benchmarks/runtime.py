@@ -1,13 +1,13 @@
-"""Microseconds of a prediction and of a whole frame, beside floors that are measured in the same run.
+"""Microseconds of a prediction and of a whole frame, compared with lower bounds measured in the same run.
 
     python benchmarks/runtime.py [weights.npz or folder] [skeleton.yaml]
 
 Without a file, a random network of the published size (342-512-512-311) is used: the times are the same.
-A prediction of one character stands beside the time it takes to read as many bytes. Cold: the predictions go
-through so many copies of the weights that no cache holds them, and the floor reads them likewise. A crowd
-stands beside onnxruntime with our own export on one thread, where it is installed; times are the processor's.
+A prediction of one character is compared with the time to read as many bytes. "Cold" uses so many copies of
+the weights that no cache holds them, for the prediction and for the lower bound. A crowd is compared with
+onnxruntime (if installed) on one thread, with Hobble's export. Times are processor times.
 
-To see what a processor without AVX-512 does: NUMBA_CPU_NAME=znver3 (onnxruntime still uses what there is).
+NUMBA_CPU_NAME=znver3 simulates a processor without AVX-512 (but not for onnxruntime).
 """
 
 from __future__ import annotations

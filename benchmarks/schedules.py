@@ -1,11 +1,11 @@
-"""How soon one recipe reaches the held-out error at which another ends: both trained here, in one run.
+"""The time until one recipe reaches the final held-out error of another; trains both in one run.
 
     python benchmarks/schedules.py DATABASE [--configurations holden,fast] [--plot curves.png] [--threads 2]
 
 DATABASE is a database folder, such as results/datasets/synthetic/database/plain. Each configuration is
-trained on it from nothing, the first one to its end, the others likewise. The curves are the held-out errors
-of history.csv over its seconds, which count everything from the first batch on, measuring and checkpoints
-too. CPU seconds of the process are given beside wall time: they change less with what else the machine does.
+trained on it from the start to the end. The curves are the held-out errors of history.csv over its seconds,
+which include measuring and checkpoints. CPU seconds of the process are printed too, because they depend less
+on other work on the machine.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
     python benchmarks/soak.py results/injured/network [--characters 200] [--frames 5000] [--seed 1]
 
-Prints the worst that was seen, and ends with status 1 where it is beyond `hobble.evaluation.soak.LIMITS`.
+Prints the worst values, and exits with status 1 if one exceeds `hobble.evaluation.soak.LIMITS`.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
-"""Ten simulated minutes of a network's character: does it fall apart?
+"""Stability of a network's character over ten simulated minutes.
 
     python benchmarks/stability.py results/holden/network [--minutes 10] [--seed 1] [--skeleton FILE]
 
-Prints the worst of each kind of motion, and ends with status 1 where the hips leave 60 to 110 cm, a joint
-turns more than 60 degrees in a frame, feet slide 2 cm a step or more on average, or a number is not finite.
+Prints the worst values of each kind of motion, and exits with status 1 if the hips leave 60 to 110 cm, a
+joint turns more than 60 degrees in a frame, feet slide 2 cm a step or more on average, or a number is not
+finite.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""How well a character goes where it is sent: with the original runtime's steering (0) and with Hobble's (2).
+"""How well a character follows its wish, with the original runtime's steering (0) and Hobble's (2).
 
     python benchmarks/steering.py results/holden/network [--skeleton FILE] [--laps 2]
 
-Centimetres, degrees and frames, the same wishes for both; nothing here depends on the speed of the machine.
+Units are centimetres, degrees and frames; both get the same wishes. The results do not depend on the speed of
+the machine.
 """
 
 from __future__ import annotations

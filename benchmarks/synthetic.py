@@ -1,4 +1,4 @@
-"""How long the walker takes: seconds a clip, and what share of it is writing BVH text.
+"""Speed of the synthetic walker: seconds a clip, and the share of writing BVH text.
 
 Run `python benchmarks/synthetic.py`.
 """

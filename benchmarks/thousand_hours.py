@@ -1,12 +1,12 @@
-"""What more motion would cost: jobs, bytes and hours for each stage, from the rates of a finished run.
+"""Estimate jobs, bytes and hours of each stage for more motion, from the rates of a finished run.
 
     benchmarks/thousand_hours.py [FOLDER] [--configuration holden] [--hours 1000] [--clips 2500] [--nodes 79]
         [--parts 1] [--training-nodes 1] [--batch 0] [--passes 0]
 
-FOLDER is that in which Snakemake ran. Seconds and bytes of what goes over the clips grow with the motion that
-the configuration uses, all else is taken as it was. Clips of a few seconds pay for the start of a job each:
-longer ones take rather fewer hours. Mirrored clips are motion too: with them, twice the hours. Under
-`synthetic` the bytes are those of the BVH files, which are the user's own.
+FOLDER is the folder in which Snakemake ran. Seconds and bytes of jobs over clips are scaled with the amount
+of motion that the configuration uses; all else is unchanged. Each clip pays for the start of its jobs, so
+longer clips take fewer hours than estimated. Mirrored clips count as motion: with them, the hours double.
+Under `synthetic` the bytes are those of the BVH files, which are the user's own.
 
 --parts: jobs that merge the database side by side (`database.parts`). --training-nodes: machines that train
 together, whose network of 10 Gb/s adds to each step what a ring all-reduce of the gradient takes; --batch:

@@ -1,10 +1,10 @@
-"""The most memory that a training holds, on databases smaller and larger than what it may keep of one.
+"""Peak memory of a training, on databases smaller and larger than its `memory_mb`.
 
     python benchmarks/training_memory.py [--sizes-mb 100,1200] [--configuration holden] [--folder DIR]
 
-Each training is a process of its own that goes through three short sections: blocks, windows, measuring and
-checkpoints included, as in a whole run. What counts is the peak of its resident memory as Linux gives it,
-with the same before the first batch: Python, PyTorch and compiled loops.
+Each training is a separate process with three short sections, including blocks, windows, measuring and
+checkpoints, as in a whole run. The script prints the peak resident memory from Linux, and the memory before
+the first batch: Python, PyTorch and compiled loops.
 """
 
 from __future__ import annotations

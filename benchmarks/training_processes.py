@@ -1,11 +1,12 @@
-"""Samples a second that 1, 2, ... processes of one thread train together, and what a network adds to a step.
+"""Samples a second of 1, 2, ... processes that train together, and the cost of a network connection.
 
     python benchmarks/training_processes.py [--processes 1,2] [--batches 32,256,1024] [--turns 3]
         [--sizes 342,512,512,311]
 
-Each process takes its part of a batch, and the gradients are summed over loopback (gloo). The best of the
-turns counts, in each of which every number of processes has a moment of the machine. The second table is on
-paper: a ring all-reduce sends 2 (n - 1) / n of the gradient through the slowest link, in 2 (n - 1) messages.
+Each process has one thread and takes its part of a batch; the gradients are summed over loopback (gloo). In
+each turn, every number of processes is timed; the best turn counts. The second table is computed, not
+measured: a ring all-reduce sends 2 (n - 1) / n of the gradient through the slowest link, in 2 (n - 1)
+messages.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A reader's memory is what the configuration says, on a database ten times that size."""
+"""A reader stays within the configured memory, on a database ten times as large."""
 
 from __future__ import annotations
 

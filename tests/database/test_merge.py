@@ -1,4 +1,4 @@
-"""Building: the same bytes from the same rows, whole or not at all, small, in bounded memory."""
+"""Building: reproducible, atomic, small, in bounded memory."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def test_a_build_killed_at_any_moment_leaves_the_old_database_or_the_new_one(row
     assert contents(path) == contents(tmp_path / "timed")  # and nothing is left lying about
 
 
-def test_a_build_whose_removal_was_killed_half_way_is_made_whole(rows_of, tmp_path):
+def test_a_half_removed_build_is_completed(rows_of, tmp_path):
     rows, splits = {"a": rows_of("a", 60)}, {"a": "train"}
     manifest = write_database(tmp_path / "db", rows, splits, **OPTIONS)
     before = contents(tmp_path / "db")
@@ -184,7 +184,7 @@ def test_a_build_whose_removal_was_killed_half_way_is_made_whole(rows_of, tmp_pa
     assert contents(tmp_path / "db") == before
 
 
-def test_a_full_disk_is_said_and_the_database_before_stays(rows_of, tmp_path, monkeypatch):
+def test_a_full_disk_gives_a_message_and_keeps_the_old_database(rows_of, tmp_path, monkeypatch):
     rows = {"a": rows_of("a", 60)}
     write_database(tmp_path / "db", rows, {"a": "train"}, **OPTIONS)
     before = contents(tmp_path / "db")
@@ -220,7 +220,7 @@ def test_what_cannot_be_merged_is_refused(rows_of, tmp_path):
     assert not any((tmp_path / "db").iterdir())
 
 
-def test_clips_without_rows_are_no_obstacle(rows_of, tmp_path):
+def test_clips_without_rows_are_allowed(rows_of, tmp_path):
     rows = {"a": rows_of("a", 30), "b": rows_of("b", 0), "c": rows_of("c", 0)}
     splits = {"a": "train", "b": "train", "c": "held_out"}
     write_database(tmp_path / "db", rows, splits, **OPTIONS)

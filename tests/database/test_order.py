@@ -1,4 +1,4 @@
-"""The order of a pass: every pair once, sections near equal, nothing shared between passes."""
+"""The order of a pass: every pair once, nearly equal sections, independent passes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A database made by many jobs is the one that one job makes, byte for byte, and no job holds much of it."""
+"""Many jobs build the same database as one, byte for byte, and none needs much memory."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_every_clip_is_in_one_shard():
     assert {len(shard) for shard in found} == {4, 5}
 
 
-def test_what_one_job_refuses_the_first_of_many_refuses(clips, tmp_path, rows_of):
+def test_many_jobs_refuse_what_one_job_refuses(clips, tmp_path, rows_of):
     with pytest.raises(HobbleError, match="nothing to train on"):
         in_parts(tmp_path / "parts", clips, dict.fromkeys(clips, "held_out"), 2, 2)
     data = dict(np.load(clips["c"]))

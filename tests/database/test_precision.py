@@ -1,4 +1,4 @@
-"""Half precision against what defines it: the nearest of the numbers that there are."""
+"""Half precision rounds to the nearest number."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ def test_bfloat16_is_that_of_torch(values):
     np.testing.assert_array_equal(widen(stored), expected.float().numpy())
 
 
-def test_of_two_equally_near_the_even_one_is_taken():
+def test_ties_round_to_even():
     halfway = np.array([1 + 2**-8, 1 + 3 * 2**-8], np.float32)
     np.testing.assert_array_equal(widen(narrow(halfway, "bfloat16")), [1.0, 1 + 2**-6])
 
 
 @pytest.mark.parametrize("precision", ["float32", "float16"])
-def test_other_types_are_numpys_own(precision):
+def test_other_types_equal_numpy(precision):
     values = np.random.default_rng(0).normal(size=99)
     np.testing.assert_array_equal(widen(narrow(values, precision)), values.astype(precision))
 
 
-def test_what_float16_cannot_hold_is_said_and_bfloat16_holds_it():
+def test_values_too_large_for_float16_are_refused():
     with pytest.raises(HobbleError, match=r"7e\+04 does not fit float16.*bfloat16"):
         narrow(np.array([1.0, -7e4]), "float16")
     assert widen(narrow(np.array([-7e4]), "bfloat16"))[0] == pytest.approx(-7e4, rel=2**-8)

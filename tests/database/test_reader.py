@@ -1,4 +1,4 @@
-"""Reading back: the same pairs as were written, each once a pass, well mixed, in bounded memory, checked."""
+"""Reading: each pair once a pass, well mixed, in bounded memory, with checksums."""
 
 from __future__ import annotations
 
@@ -212,7 +212,7 @@ def test_any_byte_of_a_chunk_that_changes_is_noticed(sources, tmp_path):
     assert len(whole_pass(Database.open(tmp_path / "db", DISK), "train", 0, 10).p) == 400
 
 
-def test_a_manifest_that_counts_otherwise_than_its_chunks_is_noticed(sources, tmp_path):
+def test_a_manifest_that_differs_from_its_chunks_is_noticed(sources, tmp_path):
     write_database(tmp_path, {"a": sources["rocky"]}, {"a": "train"}, channels=["injury"], joint_weight=0.1)
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     chunk = manifest["chunks"]["train"][0]
@@ -223,7 +223,7 @@ def test_a_manifest_that_counts_otherwise_than_its_chunks_is_noticed(sources, tm
             whole_pass(Database.open(tmp_path, DISK), "train", 0, 10)
 
 
-def test_half_a_database_is_none(path, tmp_path):
+def test_an_incomplete_database_is_refused(path, tmp_path):
     with pytest.raises(InputError, match="did not finish"):
         Database.open(tmp_path)
     manifest = json.loads((path / "manifest.json").read_text())
@@ -236,7 +236,7 @@ def test_half_a_database_is_none(path, tmp_path):
         Database.open(tmp_path)
 
 
-def test_a_section_that_is_not_there_is_refused(path):
+def test_a_section_that_does_not_exist_is_refused(path):
     with pytest.raises(HobbleError, match="no section 10"):
         Database.open(path).blocks("train", 0, 10, 10, 1)
 

@@ -1,4 +1,4 @@
-"""Sizes: those of the files, and at the released data's size what files of such rows come to."""
+"""Sizes: those of the files, and estimates for the released data."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def test_parts_merge_into_the_whole_in_any_cut(cuts, seed):
     np.testing.assert_allclose(total.squares, whole.squares, rtol=1e-6, atol=1e-9)
 
 
-def test_batches_of_a_long_clip_do_not_show(rows_of, monkeypatch):
+def test_a_long_clip_in_batches_gives_the_same_moments(rows_of, monkeypatch):
     rows = rows_of(rows=60, fits=None)
     whole = clip_moments(rows, rows.layout)
     monkeypatch.setattr("hobble.database.statistics.BATCH", 7)

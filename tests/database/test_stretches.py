@@ -26,7 +26,7 @@ def read(sharing: Sharing) -> list[list[int]]:
 
 @pytest.mark.parametrize("total", [1, 7, 64, 65, 95, 96, 97, 1000])
 @pytest.mark.parametrize(("batch", "most"), [(1, 1), (6, 4), (32, 5)])
-def test_what_a_batch_holds_depends_on_the_stretches_alone(total, batch, most):
+def test_the_content_of_a_batch_depends_only_on_the_stretches(total, batch, most):
     for stretches, processes in product(range(1, most + 1), repeat=2):
         alone = read(Sharing.of(total, batch, stretches))
         assert sorted(chain(*alone)) == list(range(total))

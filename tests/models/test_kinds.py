@@ -1,4 +1,4 @@
-"""What every kind of network that is trained owes: one prediction, whichever way it is asked for."""
+"""Every trained kind: trained, read, compiled, page and ONNX network give the same prediction."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def near(network: Network, y: np.ndarray, expected: np.ndarray, within: float) -
     np.testing.assert_allclose((y - expected) / network.y_std, 0, atol=within)
 
 
-def test_what_was_trained_is_what_is_read(made: Made) -> None:
+def test_the_read_network_equals_the_trained_one(made: Made) -> None:
     trainable, _, network = made
     x, phase = asked(network)
     y = trainable(torch.from_numpy(standardised(network, x)), torch.from_numpy(phase.astype(np.float32)))
@@ -95,7 +95,7 @@ def test_the_predictor_is_the_plain_prediction(made: Made, rows: int) -> None:
         network.predictor(storage="float8")
 
 
-def test_a_network_without_phase_does_not_look_at_it(made: Made) -> None:
+def test_a_network_without_phase_ignores_it(made: Made) -> None:
     network = made[2]
     x, phase = asked(network)
     same = np.array_equal(network.predict(x, phase), network.predict(x, phase + 0.3))

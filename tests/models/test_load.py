@@ -1,4 +1,4 @@
-"""A network's file may come from anywhere: sound, or refused by one message that names it."""
+"""Reading networks: sound files are read, all others are refused with a message that names the file."""
 
 from __future__ import annotations
 
@@ -278,7 +278,7 @@ def test_a_malformed_folder_of_bins_is_refused(name: str, tmp_path: Path, holden
 
 
 @pytest.mark.parametrize("name", ["weights.npz", "Xmean.bin"])
-def test_what_is_no_file_is_refused_and_not_waited_for(name: str, tmp_path: Path, holden31: Skeleton) -> None:
+def test_what_is_not_a_regular_file_is_refused(name: str, tmp_path: Path, holden31: Skeleton) -> None:
     released(tmp_path, content(holden31, links=0))
     (tmp_path / name).unlink(missing_ok=True)
     os.mkfifo(tmp_path / name)

@@ -1,4 +1,4 @@
-"""Products of a few rows: right, and with the same bits for a row whatever stands beside it."""
+"""Products of a few rows are right, and a row has the same bits beside any other rows."""
 
 from __future__ import annotations
 

@@ -117,7 +117,7 @@ def test_no_joint_turns_faster_than_a_joint_can(steady) -> None:
     np.testing.assert_allclose(seen, expected, atol=1e-3)
 
 
-def test_what_the_caller_does_to_a_pose_stays_with_the_caller(network) -> None:
+def test_changing_a_pose_does_not_change_the_state(network) -> None:
     left, right = ProceduralAnimation(network), ProceduralAnimation(network)
     for _ in range(40):
         pose, untouched = left.next_pose((1, 2)), right.next_pose((1, 2))
@@ -127,7 +127,7 @@ def test_what_the_caller_does_to_a_pose_stays_with_the_caller(network) -> None:
 
 
 @pytest.mark.parametrize("count", [2, 5])
-def test_many_characters_are_so_many_single_ones(hurtable, count: int) -> None:
+def test_many_characters_equal_single_characters(hurtable, count: int) -> None:
     rng = np.random.default_rng(3)
     velocity, facing = rng.normal(0, 2, (count, 2)), rng.normal(size=(count, 2))
     gaits = ["walk", "jog", "crouch", "walk", "jog"][:count]
@@ -199,7 +199,7 @@ def test_gait_blends_slowly_into_the_future(network) -> None:
         np.testing.assert_allclose(character.state.gait[0, middle:, 1], walk_share)
 
 
-def test_severities_come_on_at_their_rate_and_are_scaled(hurtable) -> None:
+def test_severities_change_at_their_rate_and_are_scaled(hurtable) -> None:
     character = ProceduralAnimation(hurtable, rates={"injury": 5.0}, scales={"injury": 2.0})
     index = hurtable.channels["injury"].index(KNEE)
     on = [p.told["injury"][index] for p in walk(character, 120, injury={KNEE: 10})]
@@ -218,7 +218,7 @@ def test_a_severity_out_of_range(hurtable, injury) -> None:
         ProceduralAnimation(hurtable).next_pose((0, 1), injury=injury)
 
 
-def test_wishes_that_make_no_sense(network) -> None:
+def test_invalid_wishes_are_refused(network) -> None:
     character = ProceduralAnimation(network, characters=2)
     with pytest.raises(ValueError, match="target_velocity is not a finite vector"):
         character.next_pose((0, np.nan))
@@ -260,7 +260,7 @@ def test_the_ground_may_be_one_height(network) -> None:
     assert a.root[1] == 30.0
 
 
-def test_a_facing_of_no_length_looks_where_it_goes(network) -> None:
+def test_a_zero_facing_looks_where_the_character_goes(network) -> None:
     crowd, one = ProceduralAnimation(network, characters=2), ProceduralAnimation(network)
     for _ in range(20):
         many = crowd.next_pose((1, 2), [(0, 0), (1, 0)])
@@ -525,7 +525,7 @@ def same(a, b) -> bool:
         ({"injury": {KNEE: 10.5}}, "from 0 to"),
     ],
 )
-def test_what_no_body_can_do_is_refused_and_changes_nothing(hurtable, wishes: dict, message: str) -> None:
+def test_impossible_wishes_are_refused_and_change_nothing(hurtable, wishes: dict, message: str) -> None:
     character = ProceduralAnimation(hurtable)
     walk(character, 5, injury={KNEE: 3.0})
     before = copy.deepcopy(character.state)
@@ -535,7 +535,7 @@ def test_what_no_body_can_do_is_refused_and_changes_nothing(hurtable, wishes: di
     assert np.isfinite(character.next_pose((0.5, 2.0)).positions).all()
 
 
-def test_a_start_beyond_the_world_is_refused(network) -> None:
+def test_a_start_too_far_from_the_origin_is_refused(network) -> None:
     with pytest.raises(ValueError, match="100 km"):
         ProceduralAnimation(network, position=(1e30, 0))
 
@@ -562,7 +562,7 @@ def test_a_terrain_that_raises_leaves_the_state_as_it_was(hurtable, call: int) -
     np.testing.assert_array_equal(a.positions, b.positions)
 
 
-def test_a_frame_that_failed_is_as_if_it_had_not_been_asked_for(hurtable) -> None:
+def test_a_failed_frame_leaves_no_trace(hurtable) -> None:
     """Whichever of its two looks at the ground failed, in the first frame too."""
 
     def hills(x, z):
@@ -587,7 +587,7 @@ def test_a_frame_that_failed_is_as_if_it_had_not_been_asked_for(hurtable) -> Non
             np.testing.assert_array_equal(again.root, pose.root)
 
 
-def test_it_starts_on_the_ground_wherever_that_is(steady) -> None:
+def test_a_character_starts_on_the_ground_at_any_height(steady) -> None:
     low, high = ProceduralAnimation(steady), ProceduralAnimation(steady)
     for _ in range(3):
         a = low.next_pose((0, 1.5)).positions

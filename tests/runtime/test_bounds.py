@@ -1,4 +1,4 @@
-"""A character stays whole whatever its network has never seen, and comes back from what is no number."""
+"""Bounds: wild predictions do not break the character, and a state that is not finite restarts."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def run(network: Pfnn, frames: int = 600) -> tuple[np.ndarray, np.ndarray]:
     return positions[:, role("hips"), 1], np.linalg.norm(np.diff(positions, axis=0), axis=-1).max(axis=1)
 
 
-def test_a_network_that_answers_anything_leaves_the_figure_whole(make_network) -> None:
+def test_wild_predictions_do_not_break_the_character(make_network) -> None:
     wild = replace(make_network(scale=60.0), y_std=np.ones_like(make_network().y_std))
     hips, moved = run(replace(wild, seen=walked(wild)))
     standing = wild.y_mean[wild.layout.y_joint_position][1]
@@ -63,7 +63,7 @@ def test_a_network_that_answers_anything_leaves_the_figure_whole(make_network) -
     assert np.ptp(free_hips) > np.ptp(hips)
 
 
-def test_a_sound_network_is_left_alone(make_network) -> None:
+def test_bounds_do_not_change_a_sound_network(make_network) -> None:
     """Bounds that hold nothing back change no bit."""
     network = make_network()
     seen = walked(network)
@@ -76,7 +76,7 @@ def test_a_sound_network_is_left_alone(make_network) -> None:
     np.testing.assert_allclose(ours[0][20:], free[0][20:], atol=0.5)
 
 
-def test_it_starts_in_the_frame_of_the_clips(make_network) -> None:
+def test_a_character_starts_in_the_start_frame(make_network) -> None:
     network = make_network(scale=0.0)
     seen = walked(network)
     character = ProceduralAnimation(
@@ -92,7 +92,7 @@ def test_it_starts_in_the_frame_of_the_clips(make_network) -> None:
     np.testing.assert_allclose(state.joint_position[0], np.stack([z + 100, y, 50 - x], axis=1), atol=1e-4)
 
 
-def test_what_is_kept_within() -> None:
+def test_clip_rows() -> None:
     rows = np.array([[0, 5, -5], [np.nan, 1, np.inf]], np.float32)
     low, high, wild = np.full(3, -1, np.float32), np.full(3, 2, np.float32), np.zeros(2, bool)
     assert clip_rows(rows, low, high, wild)
@@ -100,7 +100,7 @@ def test_what_is_kept_within() -> None:
     np.testing.assert_array_equal(wild, [False, True])
 
 
-def test_bounds_are_what_was_seen_and_a_little_more(hurtable) -> None:
+def test_bounds_are_the_training_range_plus_a_margin(hurtable) -> None:
     seen = walked(hurtable)
     bounds, layout = Bounds.of(replace(hurtable, seen=seen)), hurtable.layout
     place = layout.x_joint_position
@@ -113,7 +113,7 @@ def test_bounds_are_what_was_seen_and_a_little_more(hurtable) -> None:
     "part", ["position", "joint_position", "phase", "told", "foot_lift", "joint_rotation"]
 )
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
-def test_a_state_that_is_no_number_is_made_anew_and_said_once(hurtable, part: str, value: float) -> None:
+def test_a_state_that_is_not_finite_restarts_and_warns_once(hurtable, part: str, value: float) -> None:
     character = ProceduralAnimation(hurtable, characters=2)
     for _ in range(30):
         healthy = character.next_pose((0, 2.0), injury={hurtable.channels["injury"][0]: 4.0})
@@ -130,7 +130,7 @@ def test_a_state_that_is_no_number_is_made_anew_and_said_once(hurtable, part: st
         assert np.isfinite(character.next_pose((0, 2.0)).positions).all()
 
 
-def test_what_was_seen_goes_through_a_file(network, holden31: Skeleton) -> None:
+def test_seen_round_trip(network, holden31: Skeleton) -> None:
     seen, sizes = walked(network), (network.layout.x_size, network.layout.y_size)
     back = Seen.read("x.npz", seen.arrays(), *sizes)
     assert back is not None

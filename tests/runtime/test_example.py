@@ -1,4 +1,4 @@
-"""The example that a game programmer starts from runs as it stands."""
+"""The game loop in examples/ runs."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def test_a_clip_has_the_motion_it_was_made_of(holden31) -> None:
     np.testing.assert_allclose(quat.angle(clip.global_rotations, rotations), 0, atol=1e-6)
 
 
-def test_toes_come_to_where_they_were_predicted(holden31) -> None:
+def test_toes_reach_their_predicted_positions(holden31) -> None:
     positions, rotations = motion(holden31)
     legs = leg_joints(holden31)
     moved = positions.copy()
@@ -88,7 +88,7 @@ def test_bones_are_found_in_a_motion(holden31) -> None:
     np.testing.assert_allclose(found.offsets[1:], holden31.offsets[1:], atol=1e-9)
 
 
-def test_a_bvh_file_says_the_same_when_read_again(tmp_path: Path, holden31) -> None:
+def test_bvh_round_trip(tmp_path: Path, holden31) -> None:
     positions, rotations = motion(holden31)
     export_bvh(tmp_path / "walk.bvh", "walk", holden31, positions, rotations)
     back = read_again(tmp_path / "walk.bvh")

@@ -102,7 +102,7 @@ class Feet:
         return position[0]
 
 
-def test_a_foot_in_contact_stays_and_is_let_go_slowly(holden31: Skeleton) -> None:
+def test_a_foot_in_contact_stays_and_is_released_slowly(holden31: Skeleton) -> None:
     feet = Feet(holden31)
     toe = holden31.role("left_toe")
     step = np.array([0.0, 0, 1.5])
@@ -116,7 +116,7 @@ def test_a_foot_in_contact_stays_and_is_let_go_slowly(holden31: Skeleton) -> Non
     np.testing.assert_allclose(last, free, atol=1e-9)
 
 
-def test_contact_found_again_holds_the_foot_where_it_is_seen(holden31: Skeleton) -> None:
+def test_renewed_contact_holds_the_foot_where_it_is_shown(holden31: Skeleton) -> None:
     feet = Feet(holden31)
     toe = holden31.role("left_toe")
     feet(np.zeros(3), 1.0)
@@ -182,7 +182,7 @@ def test_the_character_stands_on_the_ground_it_is_given(steady, slope: float) ->
     np.testing.assert_allclose(np.diff(heights[120:]).mean(), slope * 1.5, atol=0.01)
 
 
-def test_no_leg_turns_too_fast_wherever_the_foot_is_to_be(holden31: Skeleton) -> None:
+def test_no_leg_turns_too_fast_for_any_foot_target(holden31: Skeleton) -> None:
     """Under hips that leap about thigh and shank keep their lengths and turn by MOST_ADDED at most."""
     rng = np.random.default_rng(3)
     feet = Feet(holden31)
@@ -206,7 +206,7 @@ def test_no_leg_turns_too_fast_wherever_the_foot_is_to_be(holden31: Skeleton) ->
     assert plain > 1.5 * MOST_ADDED, "the feet asked for should need more"
 
 
-def test_the_figure_goes_where_its_standing_feet_say(holden31: Skeleton) -> None:
+def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
     """Up out of the ground and down to it, by the foot in contact; the hips stay within their range."""
     base, _ = crouched(holden31)
     legs, hips, sole = leg_joints(holden31), holden31.role("hips"), np.array([5.0, 4.0])

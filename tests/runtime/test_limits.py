@@ -1,4 +1,4 @@
-"""A hurt body is asked for what it can do: the wish stops at the limit, and who cannot run walks."""
+"""Limits: the wished speed stops at the limit, and a body that cannot jog walks."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_a_slower_wish_is_left_alone(limited: Network) -> None:
     assert asked(limited, (0, 0.0), {KNEE: 10})[0] == 0.0
 
 
-def test_who_cannot_run_any_more_limps_in_a_hurry(limited: Network) -> None:
+def test_a_body_that_cannot_jog_walks_faster(limited: Network) -> None:
     speed, gait = asked(limited, (0, 7.0), {KNEE: 8})
     assert speed == pytest.approx(1.25 * 1.2, abs=1e-6)
     assert gait[WALK] > 0.99

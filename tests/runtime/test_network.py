@@ -83,7 +83,7 @@ def test_cubic_mode_is_exact(make_network, points: int) -> None:
 @pytest.mark.parametrize("storage", STORAGES)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 23])
-def test_a_crowd_is_so_many_single_characters(make_network, mode: str, storage: str, count: int) -> None:
+def test_a_crowd_equals_single_characters(make_network, mode: str, storage: str, count: int) -> None:
     network = make_network(scale=20.0)
     predictor = PfnnPredictor(network, mode, storage)
     x, phase = rows(network, count)
@@ -105,7 +105,7 @@ def test_modes_approach_the_spline(make_network) -> None:
 
 @given(st.floats(-2, 3))
 @settings(max_examples=50, deadline=None)
-def test_no_phase_leaves_the_table(phase: float) -> None:
+def test_every_phase_is_within_the_table(phase: float) -> None:
     from hobble.models.pfnn.predictor import _phase
 
     for kind, points in ((1, 50), (2, 10), (4, 4)):
@@ -171,7 +171,7 @@ def test_weights_file_round_trip(tmp_path: Path, hurtable: Network, holden31) ->
             np.testing.assert_array_equal(a, b)
 
 
-def test_a_file_without_meta_tells_its_layout(tmp_path: Path, hurtable: Network, holden31) -> None:
+def test_the_layout_of_a_file_without_meta(tmp_path: Path, hurtable: Network, holden31) -> None:
     np.savez(tmp_path / "weights.npz", **arrays(hurtable))
     back = load_network(tmp_path, holden31)
     assert back.layout == hurtable.layout
@@ -196,7 +196,7 @@ def test_hurt_links_are_those_of_training(make_network) -> None:
         (lambda a: a.update({k: v[:3] for k, v in a.items() if k[0] in "Wb"}), "3 control points"),
     ],
 )
-def test_what_is_wrong_with_a_file_is_said(tmp_path: Path, network: Network, change, message: str) -> None:
+def test_messages_for_bad_files(tmp_path: Path, network: Network, change, message: str) -> None:
     broken = arrays(network)
     change(broken)
     np.savez(tmp_path / "weights.npz", **broken)
@@ -224,7 +224,7 @@ def test_release_folder_round_trip(tmp_path: Path, network: Network, holden31) -
     )
 
 
-def test_what_is_wrong_with_a_release_folder_is_said(tmp_path: Path, network: Network) -> None:
+def test_messages_for_bad_release_folders(tmp_path: Path, network: Network) -> None:
     with pytest.raises(InputError, match=r"neither weights.npz nor Xmean.bin.* Train one"):
         load_network(tmp_path)
     with pytest.raises(InputError, match="no such file"):

@@ -81,7 +81,7 @@ def test_the_file_says_what_it_is(hurtable, tmp_path: Path) -> None:
     assert (tmp_path / "again.onnx").read_bytes() == (tmp_path / "network.onnx").read_bytes()
 
 
-def test_another_networks_file_is_told(make_network, tmp_path: Path) -> None:
+def test_the_file_of_another_network_is_detected(make_network, tmp_path: Path) -> None:
     network = make_network(scale=20.0)
     export_onnx(tmp_path / "network.onnx", network)
     other = replace(network, biases=tuple(b + np.float32(1e-3) for b in network.biases))

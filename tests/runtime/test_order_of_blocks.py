@@ -1,4 +1,4 @@
-"""Blocks of X are found by name: a channel may stand anywhere, and the character walks the same."""
+"""Blocks of X are found by name, so the order of the channels does not matter."""
 
 from dataclasses import replace
 
@@ -39,9 +39,7 @@ def test_a_row_is_composed_in_any_order(order: tuple[str, ...]) -> None:
 
 
 @pytest.mark.parametrize("order", ORDERS)
-def test_the_character_walks_the_same_wherever_its_severities_stand(
-    hurtable: Pfnn, order: tuple[str, ...]
-) -> None:
+def test_the_order_of_channel_columns_does_not_matter(hurtable: Pfnn, order: tuple[str, ...]) -> None:
     ordered = replace(hurtable.layout, order=order)
     at = columns(hurtable.layout, ordered)
     moved = replace(

@@ -86,7 +86,7 @@ def test_a_standing_figure_is_held() -> None:
     assert phase[0] == pytest.approx(0.1 * 0.02)
 
 
-def test_a_standing_figure_whose_movement_is_of_its_pose_is_not_held() -> None:
+def test_a_rooted_network_is_not_held_while_standing() -> None:
     position, direction, gait = path(stand=1.0)
     phase = move(prediction(speed=2.0, turn=-0.1), position, direction, gait, whole=True)
     np.testing.assert_allclose(position[0, MIDDLE], [0, 2.0], atol=1e-6)
@@ -104,13 +104,13 @@ def test_a_standing_figure_whose_movement_is_of_its_pose_is_not_held() -> None:
         ((-1.0, 0.0), (0.375, 2.0)),
     ],
 )
-def test_movement_that_nobody_asked_for_is_held_back(wish, moved) -> None:
+def test_movement_against_the_wish_is_reduced(wish, moved) -> None:
     position, direction, gait = path()
     move(prediction(speed=2.0, side=0.5), position, direction, gait, wish=wish, held=0.25)
     np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
 
 
-def test_a_wish_that_is_kept_changes_nothing() -> None:
+def test_no_correction_if_the_wish_is_reached() -> None:
     position, direction, gait = path(1.5, 0.4)
     before = position.copy(), direction.copy()
     ahead = direction[:, MIDDLE].copy()
@@ -120,7 +120,9 @@ def test_a_wish_that_is_kept_changes_nothing() -> None:
 
 
 @pytest.mark.parametrize(("strafe", "position_bias", "direction_bias"), [(0.0, 0.5, 2.0), (1.0, 1.0, 0.5)])
-def test_shares_of_the_wish(strafe: float, position_bias: float, direction_bias: float) -> None:
+def test_strafe_share_and_facing_of_the_wish(
+    strafe: float, position_bias: float, direction_bias: float
+) -> None:
     position, direction, gait = path(1.0)
     velocity, target = np.array([[3.0, 1.0]]), np.array([[1.0, 0.0]])
     trajectory.blend_future(velocity, target, np.array([strafe]), position, direction, gait)
@@ -159,7 +161,7 @@ def test_wishes_are_taken_up_at_their_rates() -> None:
         (1.0, (0.0, 0.0), (0.0, 0.0)),
     ],
 )
-def test_steering_asks_for_what_is_missing(steering: float, wish: tuple, asked: tuple) -> None:
+def test_steering_adds_the_error_to_the_wish(steering: float, wish: tuple, asked: tuple) -> None:
     """The figure glides ahead at 1.5 cm a frame."""
     velocity, _, _ = follow(wish, (0.0, 1.0), steering)
     np.testing.assert_allclose(velocity, 0.9 * np.array(asked), atol=1e-9)
@@ -179,7 +181,7 @@ def follow(wish, facing, steering: float, frames: int = 1, speed: float = 1.5, o
     return velocity[0], direction[0], owed[0]
 
 
-def test_what_is_missing_for_long_is_owed_along_and_across_the_wish() -> None:
+def test_a_steady_error_is_integrated_along_and_across_the_wish() -> None:
     for frames in (1, 40, 1000):
         asked, _, owed = follow((0.5, 1.5), (0.0, 1.0), 2.0, frames)
         speed = np.hypot(0.5, 1.5)
@@ -204,14 +206,14 @@ def test_what_is_missing_for_long_is_owed_along_and_across_the_wish() -> None:
         ((0.5, 1.5), 0.0, (0.3, -0.2)),  # the original runtime
     ],
 )
-def test_when_nothing_more_is_owed(wish, steering: float, expected) -> None:
+def test_when_the_error_is_not_integrated(wish, steering: float, expected) -> None:
     _, _, owed = follow(wish, (0.0, 1.0), steering, 30, owed=(0.3, -0.2))
     np.testing.assert_allclose(owed, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(("degrees", "beyond"), [(0, 0), (20, 20), (60, 60), (100, 37), (140, 0), (179, 0)])
-def test_a_turn_is_asked_for_further_than_it_is_to_go(degrees: float, beyond: float, sign: int) -> None:
+def test_steering_asks_for_more_than_the_remaining_turn(degrees: float, beyond: float, sign: int) -> None:
     facing = np.radians(sign * degrees)
     wish = 1.5 * np.array([np.sin(facing), np.cos(facing)])
     for speed, extra in ((1.5, beyond), (0.0, 0)):

@@ -23,7 +23,7 @@ def test_the_published_track() -> None:
     assert [i for i, w in enumerate(TRACK) if w.facing] == [1, 5]
 
 
-def test_a_point_that_obeys_goes_around() -> None:
+def test_a_point_that_follows_the_wish_goes_around() -> None:
     follower = Follower(SQUARE, arrived=20.0)
     place = follower.start[0][None]
     assert follower.start[1] == 0.0
@@ -47,7 +47,7 @@ def test_distance_from_the_path_is_that_from_the_line() -> None:
         assert follower.off_path[0] == pytest.approx(distance)
 
 
-def test_everyone_has_an_own_place_on_the_track() -> None:
+def test_each_character_has_its_own_waypoint() -> None:
     follower = Follower(SQUARE, characters=2, arrived=50.0)
     velocity, heading = follower.lead(np.array([[0.0, 990.0], [0.0, 500.0]]))
     assert follower.reached.tolist() == [1, 0]

@@ -1,4 +1,4 @@
-"""A network that is built instead of trained leaves the same three files behind."""
+"""A network that is built without training writes the same three files."""
 
 from __future__ import annotations
 

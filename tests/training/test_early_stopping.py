@@ -1,4 +1,4 @@
-"""The best weights, and an end where the held-out error falls no more."""
+"""`keep: best` and `patience`."""
 
 from __future__ import annotations
 
@@ -115,14 +115,16 @@ def test_the_best_weights_are_written_and_the_last_go_on(
     assert held[0] == pytest.approx(meta[0]["held_out_mse"], rel=1e-5)
 
 
-def test_neither_makes_it_another_training(data: Database, network: Settings, training: Settings) -> None:
+def test_keep_and_patience_do_not_change_the_recipe_hash(
+    data: Database, network: Settings, training: Settings
+) -> None:
     plain = recipe_hash(network, training, data, None)
     assert recipe_hash(network, training | {"keep": "best", "patience": 4}, data, None) == plain
     assert recipe_hash(network, training | {"seed": 5}, data, None) != plain
 
 
 @pytest.mark.parametrize("changes", [{"keep": "best"}, {"patience": 3}])
-def test_where_no_clip_is_held_out_there_is_no_best(
+def test_keep_best_needs_held_out_clips(
     network: Settings, training: Settings, tmp_path: Path, changes: Settings
 ) -> None:
     write_database(

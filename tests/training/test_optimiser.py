@@ -1,4 +1,4 @@
-"""The optimiser's two ways are one."""
+"""The compiled optimiser equals the plain one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Several processes take the steps of one, on loopback; where one dies, the next run goes on."""
+"""Several processes take the steps of one, on loopback; after one dies, the next run resumes."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def furthest(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> float:
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("processes", [2, 3])
-def test_they_take_the_steps_of_one(ends: Ends, processes: int, way: tuple[bool, int]) -> None:
+def test_several_processes_take_the_steps_of_one(ends: Ends, processes: int, way: tuple[bool, int]) -> None:
     """Of consecutive samples, and of those that come from a stretch for each process."""
     assert furthest(ends[1, 1, way], ends[processes, 1, way]) < 1e-10
     assert furthest(ends[1, processes, way], ends[processes, processes, way]) < 1e-10
@@ -134,7 +134,7 @@ def test_the_same_again_gives_the_same_bits(together: Callable[..., dict[str, An
         np.testing.assert_array_equal(one[name], again[name])
 
 
-def test_where_one_dies_the_others_end_and_another_number_goes_on(
+def test_if_one_process_dies_another_number_can_resume(
     together: Callable[..., dict[str, Any]], tmp_path: Path
 ) -> None:
     import psutil
@@ -161,7 +161,7 @@ def test_where_one_dies_the_others_end_and_another_number_goes_on(
     assert f"after section {reached} of" in (tmp_path / "log").read_text()
 
 
-def test_the_process_that_knows_the_fault_tells_it(
+def test_the_process_with_the_broken_rows_gives_the_message(
     together: Callable[..., dict[str, Any]], database: Path, tmp_path: Path
 ) -> None:
     shutil.copytree(database, tmp_path / "db")
@@ -214,9 +214,7 @@ def test_machines_need_slurm(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
         ({"stretches": 33}, "above `batch`"),
     ],
 )
-def test_machines_that_make_no_sense_are_refused(
-    training: Recipe, changes: dict[str, Any], message: str
-) -> None:
+def test_invalid_machines_are_refused(training: Recipe, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         training | changes
 

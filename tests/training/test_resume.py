@@ -1,4 +1,4 @@
-"""A training that was interrupted, prolonged or handed on ends at the bits of one that never stopped."""
+"""A training that is interrupted, prolonged or continued ends with the bits of an undisturbed one."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def test_killed_between_the_files_at_the_end(
         assert np.array_equal(killed[name], whole[name]), name
 
 
-def test_more_passes_go_on_and_fewer_start_anew(
+def test_more_passes_resume_and_fewer_start_again(
     data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
     def to(passes: int, folder: str) -> torch.Tensor:
@@ -228,7 +228,7 @@ def test_another_start_is_another_run(
         ({"passes": 1}, "has 2 passes, but training.passes is 1"),
     ],
 )
-def test_a_start_that_cannot_be_gone_on_from_is_refused(
+def test_an_unusable_start_is_refused(
     data: Database,
     network: Settings,
     training: Settings,
@@ -317,7 +317,7 @@ def test_a_damaged_checkpoint_is_named(
         train(data, **arguments, checkpoints=tmp_path)
 
 
-def test_the_name_of_a_training_says_what_determines_it(
+def test_the_recipe_hash_has_all_that_determines_a_training(
     data: Database, network: Settings, training: Settings
 ) -> None:
     name = recipe_hash(network, training, data, "code")
@@ -331,7 +331,7 @@ def test_the_name_of_a_training_says_what_determines_it(
     assert len({name, *others}) == 5
 
 
-def test_passes_are_in_the_name_where_the_learning_rate_goes_by_them(
+def test_passes_are_in_the_recipe_hash_if_the_schedule_uses_them(
     data: Database, network: Settings, training: Settings
 ) -> None:
     cosine = training | {"schedule": "cosine"}

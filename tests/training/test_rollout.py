@@ -1,4 +1,4 @@
-"""The poses that the network is given in training are those that a character of its would be in."""
+"""Roll-outs in training: the poses have the errors that a character would have."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_poses_carry_the_errors_of_a_character(data: Database) -> None:
         carried.remember(torch.from_numpy(error / s.y_std).float())
 
 
-def test_each_place_begins_anew_after_its_frames(data: Database) -> None:
+def test_each_place_restarts_after_its_frames(data: Database) -> None:
     """And a fifth of them at every batch, so that ages are mixed; one frame is the recorded pose alone."""
     frames, rows = 5, 10
     for length in (frames, 1):
@@ -111,7 +111,7 @@ def test_sections_do_not_depend_on_each_other_and_a_short_batch_is_one(data: Dat
     assert torch.count_nonzero(x) == 0
 
 
-def test_the_training_goes_by_them(
+def test_training_uses_the_roll_outs(
     data: Database,
     network: Any,
     training: Any,

@@ -1,4 +1,4 @@
-"""The learning rate goes as the configuration says."""
+"""The learning rate follows the configured schedule."""
 
 from __future__ import annotations
 
@@ -100,6 +100,6 @@ def _stopping_at(turn: int) -> Any:
     return stopping
 
 
-def test_a_rate_that_ends_at_nothing_cannot_be_gone_on_from() -> None:
+def test_continues_needs_a_constant_schedule() -> None:
     with pytest.raises(ValueError, match="`continues` needs `schedule: constant`"):
         Training(schedule="cosine", continues="holden")

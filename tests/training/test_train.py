@@ -1,4 +1,4 @@
-"""A training learns, says how, gives the same bits again, and stops where it diverges."""
+"""Training learns, logs, is reproducible, and stops when it diverges."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def poisoned(data: Database, monkeypatch: pytest.MonkeyPatch, turn: int, value: 
     monkeypatch.setattr(Database, "blocks", wrong)
 
 
-def test_no_number_in_a_row_stops_it_and_names_the_row(
+def test_a_row_that_is_not_finite_stops_training_and_is_named(
     run: Run, data: Database, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     clean: Block = next(data.blocks("train", 1, 1, 3, 1))
@@ -178,7 +178,7 @@ def test_no_number_in_a_row_stops_it_and_names_the_row(
     assert np.isfinite(kept["weights"]).all()
 
 
-def test_after_the_cause_is_gone_it_goes_on_as_if_nothing_had_been(
+def test_training_resumes_after_the_broken_row_is_mended(
     run: Run, data: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
@@ -204,7 +204,7 @@ def test_a_full_disk_ends_in_a_message(run: Run, monkeypatch: pytest.MonkeyPatch
         run()
 
 
-def test_cuda_where_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cuda_without_a_gpu_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     assert start.device("auto").type == "cpu"
     with pytest.raises(HobbleError, match=r"training\.device is cuda"):
@@ -242,7 +242,7 @@ def test_bfloat16_is_chosen_where_a_device_has_it(
     assert start.step_for(network, training | {"batch": 256}) is half
 
 
-def test_where_the_rows_lie_does_not_depend_on_what_is_free(
+def test_the_place_of_the_rows_does_not_depend_on_free_memory(
     data: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The order of rows depends on where they lie, and a run may be gone on with beside other work."""

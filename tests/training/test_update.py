@@ -1,4 +1,4 @@
-"""What is captured on CUDA is the plain update, shown with a graph that a CPU has too."""
+"""The captured update equals the plain one, tested with a graph that runs on a CPU."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The file of a trained network: what the network is, what its columns mean, what it saw."""
+"""weights.npz: the network, the meaning of its columns, the ranges of its training data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the gating network sees."""
+"""The inputs of the gating network."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Clips of smooth, made-up motion as files of rows, and what motion matching makes of them."""
+"""Clips of smooth, made-up motion as files of rows, and the tables built from them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is kept of the clips: every frame once, in runs, on the mean of its ground."""
+"""The tables: every frame once, in runs, on the mean of its terrain fits."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_tables_hold_the_clips_in_order(holden31: Skeleton, tmp_path: Path) -> N
     assert set(network.starts) == {*range(1, FRAMES[0] - 20), *range(FRAMES[0] + 1, sum(FRAMES) - 20)}
 
 
-def test_the_features_are_the_columns_that_they_are_called_by(holden31: Skeleton) -> None:
+def test_the_features_are_the_columns_of_their_names(holden31: Skeleton) -> None:
     layout, options = layout_of(holden31), MatchingOptions()
     found = {name: columns for name, columns, _ in groups(layout, holden31, options)}
     # A third, two thirds and the whole of the window ahead: frames 20, 40 and the last sample, 50.
@@ -77,7 +77,7 @@ def test_the_features_are_the_columns_that_they_are_called_by(holden31: Skeleton
     assert len(found["injury"]) == 30
 
 
-def test_a_group_weighs_as_much_as_is_said(holden31: Skeleton, tmp_path: Path) -> None:
+def test_a_group_has_its_configured_weight(holden31: Skeleton, tmp_path: Path) -> None:
     tables, _, _ = built(holden31, tmp_path, path=3.0, channels=20.0, gait=0.0)
     spread = tables.features[:, :6].std(axis=0)
     assert spread.mean() == pytest.approx(3.0, rel=1e-4)

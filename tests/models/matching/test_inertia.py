@@ -1,4 +1,4 @@
-"""A transition moves nothing at once, and after a while nothing is left of it."""
+"""Transitions: no joint jumps, and the offsets decay."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_transitions_on_transitions_add_up() -> None:
 
 
 @pytest.mark.parametrize("off", [0.3, -0.3])
-def test_the_phase_is_led_back_to_that_of_the_clips(off: float) -> None:
+def test_the_phase_is_pulled_to_that_of_the_clips(off: float) -> None:
     frames = two_runs(np.random.default_rng(6))
     memory, phases = np.zeros((1, memory_size(J))), (0.02 * np.arange(120) % 1).astype(np.float32)
     phase = np.array([off % 1.0])

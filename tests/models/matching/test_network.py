@@ -1,4 +1,4 @@
-"""Motion matching at run time: what is shown, when it searches, and that the page does the same."""
+"""Motion matching at run time: frames shown, searches, and that the page does the same."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_a_frame_of_the_clips_finds_itself(made: Made) -> None:
     np.testing.assert_array_equal(network.predict(x, np.zeros(len(x))), network.frames[rows])
 
 
-def test_the_nearest_frame_is_that_of_going_through_all(made: Made) -> None:
+def test_the_nearest_frame_equals_a_search_over_all(made: Made) -> None:
     _, _, network = made
     x = network.x_mean + 10 * np.random.default_rng(1).normal(size=(20, len(network.x_mean)))
     queries = network.queries(standardised(network, x))
@@ -55,7 +55,7 @@ def test_the_nearest_frame_is_that_of_going_through_all(made: Made) -> None:
     np.testing.assert_array_equal(network.nearest(queries), network.starts[apart.argmin(axis=1)])
 
 
-def test_what_the_body_is_told_has_to_agree(made: Made) -> None:
+def test_channel_values_have_to_match(made: Made) -> None:
     """A query that is otherwise a frame of the healthy clip finds one of the hurt clip where it is hurt."""
     _, _, network = made
     x = x_of(network, 10)
@@ -78,7 +78,7 @@ def test_a_character_plays_on_between_searches(made: Made) -> None:
     assert memory[0, SINCE] == 2
 
 
-def test_a_run_that_ends_is_left_at_once(made: Made) -> None:
+def test_the_end_of_a_run_starts_a_search(made: Made) -> None:
     _, _, network = made
     predictor, memory = network.predictor(), np.zeros((1, network.memory))
     memory[0, ROW], last = FRAMES[0], FRAMES[0] - 1  # the last row of the first clip
@@ -87,7 +87,7 @@ def test_a_run_that_ends_is_left_at_once(made: Made) -> None:
     assert memory[0, ROW] - 1 == 40
 
 
-def test_frames_around_are_no_reason_for_a_transition(made: Made) -> None:
+def test_no_transition_to_nearby_frames(made: Made) -> None:
     _, _, network = made
     predictor, memory = network.predictor(), np.zeros((1, network.memory))
     memory[0, ROW], memory[0, SINCE] = 11, 4
@@ -96,7 +96,7 @@ def test_frames_around_are_no_reason_for_a_transition(made: Made) -> None:
 
 
 @pytest.mark.parametrize("wrong", [-3.0, 1e7, np.nan, np.inf])
-def test_a_memory_that_cannot_be_is_forgotten(made: Made, wrong: float) -> None:
+def test_an_invalid_memory_is_reset(made: Made, wrong: float) -> None:
     _, _, network = made
     memory = np.full((1, network.memory), wrong)
     y = network.predictor().predict(x_of(network, 30), np.zeros(1), None, memory)
@@ -111,7 +111,7 @@ def sequence(network: Matching, frames: int = 80) -> tuple[np.ndarray, np.ndarra
     return np.concatenate([x_of(network, row) for row in rows]), rng.random(frames)
 
 
-def test_a_crowd_is_so_many_characters(made: Made) -> None:
+def test_a_crowd_equals_single_characters(made: Made) -> None:
     _, _, network = made
     sequences = [np.roll(sequence(network)[0], 5 * c, axis=0) for c in range(3)]
     together, memory = network.predictor(), np.zeros((3, network.memory))
@@ -136,7 +136,7 @@ def test_integers_halve_the_frames_and_are_near(made: Made) -> None:
         network.predictor(storage="float8")
 
 
-def test_the_page_matches_as_python_does(made: Made, tmp_path: Path) -> None:
+def test_the_page_finds_the_same_frames_as_python(made: Made, tmp_path: Path) -> None:
     """Over searches and transitions; the first input weighs nothing and is not there, outputs are chosen."""
     _, _, network = made
     layout = network.layout
@@ -197,7 +197,7 @@ def test_a_character_goes(made: Made) -> None:
     assert np.isfinite(pose.positions).all()
 
 
-def test_there_is_nothing_for_other_programs(made: Made, tmp_path: Path) -> None:
+def test_there_are_no_export_formats(made: Made, tmp_path: Path) -> None:
     with pytest.raises(HobbleError, match="a matching network cannot be written as onnx"):
         made[2].export("onnx", tmp_path / "network.onnx", "exact")
 

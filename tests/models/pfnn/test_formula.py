@@ -1,4 +1,4 @@
-"""What a file says that it computes is what its layers are."""
+"""The formula in the file describes the layers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The step of the plain network is the gradient of what it computes."""
+"""The step of the plain network gives the gradient of its loss."""
 
 from __future__ import annotations
 
