@@ -91,4 +91,4 @@ def test_feet_that_only_stand_unlike_are_told_of(shared, tmp_path):
     path = shared / "mocap/cmu/03_02.bvh"
     one = outcome(path, 99, tmp_path, 420)
     assert one.how.rest == "twisted"
-    assert "feet stand at unlike angles" in one.said
+    assert "feet stand at different angles" in one.said

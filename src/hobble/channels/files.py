@@ -53,6 +53,6 @@ def write_report(
 ) -> None:
     """Write the JSON beside the values: for each label the time above 0, the highest value, and when."""
     one = channel(name)
-    told = one.summary(values, labels, clip.fps)
-    report = {"clip": clip.name, "channel": name, "title": one.title, "told": told}
+    summary = one.summary(values, labels, clip.fps)
+    report = {"clip": clip.name, "channel": name, "title": one.title, "told": summary}
     write_json(path, {**report, "highest": one.highest, "warnings": list(warnings)})

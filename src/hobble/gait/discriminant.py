@@ -44,7 +44,7 @@ def learn(values: Array, labels: Sequence[str], shrinkage: float = SHRINKAGE) ->
     """
     classes = tuple(sorted(set(labels)))
     if len(classes) < 2:
-        raise ValueError("one class cannot be told from another")
+        raise ValueError("there must be two classes or more")
     which = np.array([classes.index(label) for label in labels])
     count = np.bincount(which)
     means = np.stack([values[which == k].mean(axis=0) for k in range(len(classes))])

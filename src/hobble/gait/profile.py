@@ -9,7 +9,7 @@ import numpy as np
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.gait.cycles import SCALARS, Cycle, Walk
-from hobble.gait.signals import CURVES, TURNS_ROUND
+from hobble.gait.signals import CURVES, SIGN_CHANGES
 
 Profile = Mapping[str, float]
 NO_CYCLE = "there is no whole cycle of straight walking to measure"
@@ -45,7 +45,7 @@ def mirrored(values: Profile) -> dict[str, float]:
         kind, _, curve = name.rpartition(" ")
         if name == "left_strike_phase":
             out[name] = 1 - values[name]
-        elif kind == "mean" and curve in TURNS_ROUND:
+        elif kind == "mean" and curve in SIGN_CHANGES:
             out[name] = -values[name]
         else:
             out[name] = values[_across(name)]

@@ -35,12 +35,8 @@ MIDDLE = (
     "hips_height",
 )
 CURVES = (*(f"{limb}_{side}" for side in SIDES for limb in LIMBS), *MIDDLE)
-TURNS_ROUND = (
-    "trunk_left",
-    "pelvis_left_up",
-    "pelvis_turn_left",
-    "shoulders_turn_left",
-)  # change sign in a mirror
+# Curves that change sign in a mirror.
+SIGN_CHANGES = ("trunk_left", "pelvis_left_up", "pelvis_turn_left", "shoulders_turn_left")
 TRAVEL = 0.5  # seconds: sigma of the smoothing of the hips' velocity, which gives the direction of travel
 
 
@@ -72,7 +68,7 @@ def mirrored(signals: Signals) -> Signals:
     curves = {}
     for name in CURVES:
         other = name[:-1] + {"L": "R", "R": "L"}[name[-1]] if name not in MIDDLE else name
-        curves[name] = -signals.curves[name] if name in TURNS_ROUND else signals.curves[other]
+        curves[name] = -signals.curves[name] if name in SIGN_CHANGES else signals.curves[other]
     speed = {"L": signals.ankle_speed["R"], "R": signals.ankle_speed["L"]}
     across = {"L": -signals.across["R"], "R": -signals.across["L"]}
     hips = signals.hips * [-1.0, 1.0]

@@ -18,9 +18,8 @@ from hobble.hurt.sampling import smoothstep
 from hobble.hurt.source import UP, Source, Stance
 
 SIGN = (1.0, -1.0)  # +X is the figure's left
-LEVEL = np.radians(
-    8.0
-)  # of pitch over which what is left of it goes from the heel strike's share to the push's
+# Radians of pitch over which the ratio changes from that of the heel strike to that of the push-off.
+LEVEL = np.radians(8.0)
 SHORT = 12.0  # cm: progress of a shorter swing is measured by time, not by distance
 CLEARANCE = 1.3  # cm: height of a swinging toe joint above its stance, unless it is lower in the source
 EVEN = 4.0  # cm: with this height between two stances the swing is not lowered

@@ -16,7 +16,7 @@ from hobble.hurt.foot_path import smooth_above
 from hobble.hurt.parts import SIDES
 from hobble.hurt.sampling import at_frames, turns_at
 
-BENT = np.radians([6.0, 18.0])  # knee flexion from which on the bend itself shows where the knee points
+BENT = np.radians([6.0, 18.0])  # radians of knee flexion; above them the bend shows where the knee points
 STRETCH = (0.985, 0.9985)  # leg lengths: limits of the distance hip-ankle
 
 

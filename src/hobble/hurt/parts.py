@@ -8,11 +8,8 @@ from hobble.core.skeleton import Skeleton
 
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
-LEG = (
-    ("hip", "hip"),
-    ("knee", "thigh"),
-    ("heel", "shank"),
-)  # (role, part): joints up to this one, included, belong to the part
+# (role, part): joints up to the one with this role, included, belong to the part.
+LEG = (("hip", "hip"), ("knee", "thigh"), ("heel", "shank"))
 ARM = (("shoulder", "shoulder"), ("elbow", "upper arm"), ("wrist", "forearm"))
 
 

@@ -12,7 +12,7 @@ from hobble.core.section import Positive, PositiveFloat, Section
 class Labels(Section):
     """Contacts, phase and gait. Speeds are in the unit of the facts page: centimetres a frame at 120 Hz."""
 
-    files: bool = Field(True, description="use hand-made label files where they lie beside the clip")
+    files: bool = Field(True, description="use hand-made label files beside the clip")
     contacts: Literal["stance", "original"] = Field(
         "stance",
         description="stance: a heel or toe is down if it is slow and near the height of its stance. "

@@ -31,7 +31,7 @@ NO_POSE = 0.75  # in a frame without a pose, at least this share of the joints h
 
 @dataclass(frozen=True)
 class Repaired:
-    """A clip without its broken frames, where it begins in its source (from 0), and what was done to it."""
+    """A clip without its broken frames, its first frame in the source (from 0), and the repairs."""
 
     clip: Clip
     first: int

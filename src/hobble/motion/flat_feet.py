@@ -63,7 +63,7 @@ def doubt(seen: BodySample) -> str | None:
         )
     if abs(tilts[0] - tilts[1]) > APART:
         return (
-            f"Its feet stand at unlike angles ({tilts[0]:.0f} and {tilts[1]:.0f} degrees), as on uneven "
+            f"Its feet stand at different angles ({tilts[0]:.0f} and {tilts[1]:.0f} degrees), as on uneven "
             "ground, and no zero pose tells how they are turned: the figure may stand 3 cm too high or low."
         )
     return None

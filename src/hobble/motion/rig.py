@@ -21,9 +21,8 @@ from hobble.core.untrusted import printable, read_text, read_yaml
 UNITS = {"cm": 1.0, "inch": 2.54, "m": 100.0, "mm": 0.1, "CMU": 5.6444, "foot": 30.48}
 LEG = 80.0  # cm: thigh and shank of an average adult
 KNOWN = 0.75  # a skeleton is a clip's rig if it has at least this share of the joint names
-NAME = re.compile(
-    r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE
-)  # of a joint in a skeleton file
+# A joint's name in a skeleton file.
+NAME = re.compile(r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE)
 # Degrees that bones may differ in two rest poses that count as equal, by the role at the bone's end.
 LIKE = {"elbow": 20.0, "wrist": 25.0, "knee": 35.0, "heel": 35.0, "toe": 35.0}
 LEG_RANGE = (50.0, 125.0)

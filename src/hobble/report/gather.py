@@ -54,7 +54,7 @@ class Material:
         """The JSON of a measurement; empty if it was not run."""
         return self.measured.get(measure, {})
 
-    def beside(self, what: str) -> Json | None:
+    def published_entry(self, what: str) -> Json | None:
         """The published entry for this configuration under the key `what`, or None."""
         rows = self.published.get(what, ())
         return next((row for row in rows if row["configuration"] == self.name), None)

@@ -17,9 +17,8 @@ FOOT = np.array([0.0, -4.5, 13.5])  # from ankle to toe joint in a flat foot
 STAY = (7.0, np.radians(12.0))  # cm and radians: a standing figure does not take smaller steps
 APART = 8.0  # cm: least sideways distance between the ankles
 STILL = 12.0  # cm/s: a slower figure stands
-SOLE = np.array(
-    [-11.0, -5.0, 0.0, 6.0, 13.5, 20.5, 27.0, 32.0, 37.0]
-)  # along the foot, room before a step too
+# Points along the foot that must be on one step, cm from the ankle, with some room in front of the toes.
+SOLE = np.array([-11.0, -5.0, 0.0, 6.0, 13.5, 20.5, 27.0, 32.0, 37.0])
 SHIFTS = sorted(np.arange(-20.0, 21.0, 2.0), key=abs)  # cm by which a foot may be moved away from an edge
 
 

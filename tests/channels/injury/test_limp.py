@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from hobble.channels.injury.limp import run as module
-from hobble.channels.injury.limp.captured import VERSION, Limp, Told, healthy_of
+from hobble.channels.injury.limp.captured import VERSION, HurtSeconds, Limp, healthy_of
 from hobble.channels.injury.limp.run import SEVERITIES, distance, hurt_side, limp
 from hobble.channels.injury.limp.walks import Shown
 from hobble.gait.cycles import SCALARS, Cycle, Walk
 from hobble.gait.people import NORMAL, people
 from hobble.gait.profile import profile
-from hobble.gait.signals import CURVES, TURNS_ROUND
+from hobble.gait.signals import CURVES, SIGN_CHANGES
 from hobble.runtime.options import Runtime
 
 LEFT_KNEE, RIGHT_KNEE = "LeftUpLeg-LeftLeg", "RightUpLeg-RightLeg"
@@ -30,7 +30,7 @@ def mirrored(cycle: Cycle) -> Cycle:
         return name[:-1] + {"R": "L", "L": "R"}[name[-1]] if name[-2:] in ("_R", "_L") else name
 
     curves = [
-        cycle.curves[CURVES.index(across(name))] * (-1 if name in TURNS_ROUND else 1) for name in CURVES
+        cycle.curves[CURVES.index(across(name))] * (-1 if name in SIGN_CHANGES else 1) for name in CURVES
     ]
     scalars = {name: cycle.scalars[across(name)] for name in cycle.scalars}
     scalars["left_strike_phase"] = 1 - cycle.scalars["left_strike_phase"]
@@ -75,7 +75,7 @@ def measured(hurtable, holden31, monkeypatch):
             "seconds": 8.0,
             "links": [LEFT_KNEE, RIGHT_KNEE],
         }
-        return limp(hurtable, list(every), Told(), splits or {}, **options)
+        return limp(hurtable, list(every), HurtSeconds(), splits or {}, **options)
 
     return run
 

@@ -144,7 +144,7 @@ def way(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
 
 
 def spoken(skeleton: Skeleton, link: str) -> str:
-    """What a link is called: "left thigh"; its own name where the body has no word for it."""
+    """The name of a link for readers, such as "left thigh", or its label if there is none."""
     for label, upper, lower in (*PARTS, *OTHERS):
         if link in way(skeleton, upper, lower):
             return label
@@ -157,7 +157,7 @@ def spoken(skeleton: Skeleton, link: str) -> str:
 
 
 def spoken_links(skeleton: Skeleton, links: Sequence[str]) -> list[str]:
-    """A name for each link; where several have the same one, all but the first keep their own beside it."""
+    """A name for each link. If several have the same name, the later ones add their label."""
     out: list[str] = []
     for link in links:
         word = spoken(skeleton, link)

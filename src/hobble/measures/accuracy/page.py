@@ -63,7 +63,7 @@ def clip_bars(found: Json, material: Material) -> Chart | None:
             }
         )
     shapes, notes = [], []
-    theirs = material.beside("accuracy")
+    theirs = material.published_entry("accuracy")
     if theirs:
         shape, note = mark(100 * theirs["mean"], f"{theirs['label']}, published")
         shapes, notes = [shape], [note]
@@ -225,7 +225,7 @@ def figures(found: Json, material: Material) -> Iterator[Figure]:
         if part and part.get("mean") is not None:
             error = part.get("position_error_cm")
             beside = _centimetres(error, split, material) if error is not None else ""
-            theirs = material.beside("accuracy") if split == "held_out" else None
+            theirs = material.published_entry("accuracy") if split == "held_out" else None
             if theirs:
                 beside += f"; published for {theirs['label']}: {100 * theirs['mean']:.2f} %, on other clips"
             yield Figure(label, f"{100 * part['mean']:.2f}", "%", beside, at)

@@ -1,4 +1,4 @@
-"""Laps of the waypoint track in each phase mode: milliseconds a frame, and how well it is followed."""
+"""Laps of the waypoint track in each phase mode: milliseconds per frame, and distance from the track."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from hobble.runtime.options import Runtime
 class Options(Section):
     """Its keys of the section `evaluation`."""
 
-    laps: Positive = Field(19, description="in the runtime's own phase mode")
+    laps: Positive = Field(19, description="laps in the phase mode of the runtime")
     laps_beside: Positive = Field(
-        3, description="at most, in each other mode: from the second on, a lap repeats the one before"
+        3, description="most laps in each other phase mode, where the second lap and later ones are the same"
     )
     lap_seconds: Annotated[float, Field(ge=1, allow_inf_nan=False)] = Field(
-        400.0, description="a lap that takes longer is ended there"
+        400.0, description="seconds after which a lap is stopped"
     )
     modes: tuple[PhaseMode, ...] = Field(
         ("constant", "linear", "cubic"),
-        description="phase modes that laps are run in, beside the runtime's own",
+        description="phase modes to measure in addition to that of the runtime",
     )
 
 

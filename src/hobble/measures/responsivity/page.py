@@ -56,7 +56,7 @@ def figures(found: Json, material: Material) -> Iterator[Figure]:
     """The time of a frame."""
     milliseconds = frame_milliseconds(found)
     if milliseconds is not None:
-        theirs = material.beside("responsivity")
+        theirs = material.published_entry("responsivity")
         beside = f"median; one core can run {number(FRAME_BUDGET_MS / milliseconds, 3)} characters at 60 Hz"
         if theirs:
             beside += f"; mean {number(frame_mean(found), 2)} ms, published mean {theirs['milliseconds']} ms"
@@ -93,7 +93,7 @@ def lap_chart(found: Json, material: Material) -> Chart | None:
     own = f"{found.get('mode', 'the')} phase"
     options = {name: options[name] for name in sorted(options, key=lambda name: name != own)}
     shapes, notes = [], []
-    theirs = material.beside("responsivity")
+    theirs = material.published_entry("responsivity")
     if theirs:
         shape, note = mark(theirs["milliseconds"], f"{theirs['label']}: published mean", vertical=False)
         shapes, notes = [shape], [note]

@@ -1,4 +1,4 @@
-"""How far the figure strays from every clip when it is fed its own pose."""
+"""Errors of roll-outs, in which the network continues from its own poses."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Options(Joints, Sampling):
     """Its keys of the section `evaluation`."""
 
     rollouts: Annotated[tuple[Positive, ...], AfterValidator(_some)] = Field(
-        (1, 10, 60, 300), description="frames for which the network is fed its own pose"
+        (1, 10, 60, 300), description="lengths of roll-outs, in frames"
     )
 
 

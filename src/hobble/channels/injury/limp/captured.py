@@ -45,7 +45,7 @@ class Limp:
 
 
 @dataclass
-class Told:
+class HurtSeconds:
     """Seconds in which each link hurts in training, in captured motion and in generated hurt versions."""
 
     captured: dict[str, float] = field(default_factory=dict)
@@ -54,9 +54,9 @@ class Told:
 
 def limps(
     files: Iterable[Path], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
-) -> tuple[list[Limp], Told]:
+) -> tuple[list[Limp], HurtSeconds]:
     """The walks of all captured clips, and the seconds for which each link hurts in the training clips."""
-    found, told = [], Told()
+    found, told = [], HurtSeconds()
     for file in sorted(files, key=lambda file: Path(file).stem):
         rows = load_clip_rows(file)
         severity = rows.channels.get(INJURY, np.zeros((len(rows), 0)))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hobble.channels.injury.limp import Options
-from hobble.channels.injury.limp.captured import Limp, Told, healthy_of, limps
+from hobble.channels.injury.limp.captured import HurtSeconds, Limp, healthy_of, limps
 from hobble.channels.injury.limp.walks import Shown, shown
 from hobble.channels.injury.walks import hurt_links
 from hobble.channels.injury.walks import links as links_of
@@ -45,7 +45,7 @@ WINDOW = 4.0  # seconds of a walk that a recogniser judges at once
 def limp(
     network: Network,
     every: Sequence[Limp],
-    told: Told,
+    told: HurtSeconds,
     splits: Mapping[str, str],
     *,
     configuration: str,

@@ -77,14 +77,14 @@ def in_words(found: Json, material: Material) -> dict[str, Any]:
     """The same results with spoken names of links."""
     say = speaker(material.network["skeleton"])
 
-    def told(value: Any, key: str = "") -> Any:
+    def named(value: Any, key: str = "") -> Any:
         if isinstance(value, Mapping):
-            return {k: told(v, k) for k, v in value.items()}
+            return {k: named(v, k) for k, v in value.items()}
         if isinstance(value, list | tuple):
-            return [told(item) for item in value]
+            return [named(item) for item in value]
         return say(value) if key in LINKS and isinstance(value, str) else value
 
-    return {key: told(value) for key, value in found.items()}
+    return {key: named(value) for key, value in found.items()}
 
 
 def _parts(found: Json, name: str) -> list[Part]:

@@ -30,10 +30,8 @@ MOOD = "mood"  # the channel
 WALK = GAITS.index("walk")
 NONE = "none"
 WINDOW, STEP = 60, 15  # frames; a window is about a cycle
-AHEAD, LEAST = (
-    0.9,
-    0.5,
-)  # share of the speed that goes forward in a window; its least, cm a frame
+AHEAD = 0.9  # least share of a window's speed that is forward
+LEAST_SPEED = 0.5  # of a window, cm a frame
 WARM_UP, USED = 4 * FPS, 6 * FPS  # frames of a generated walk that are skipped, and that are used
 PACES = (0.85, 1.0, 1.15)  # of the median speed of captured neutral walks; the same for every mood
 ASKED = 120.0  # cm a second, if there are no captured neutral walks
@@ -120,7 +118,7 @@ def captured_windows(clip: Captured, network: Network) -> list[Window]:
         span = slice(start, start + WINDOW)
         speed = np.hypot(*clip.velocity[span].mean(axis=0))
         moods = [columns[i] for i in np.flatnonzero(clip.told[MOOD][start])]
-        if clip.velocity[span, 1].mean() < AHEAD * speed or speed < LEAST or len(moods) > 1:
+        if clip.velocity[span, 1].mean() < AHEAD * speed or speed < LEAST_SPEED or len(moods) > 1:
             continue
         mood = moods[0] if moods else NONE
         walks = bool(clip.gait[span, WALK].mean() > 0.5)
