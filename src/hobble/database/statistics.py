@@ -152,7 +152,7 @@ def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
 def finish(
     layout: RowLayout, x: Moments, y: Moments, joint_weight: float, unseen: Sequence[int]
 ) -> Statistics:
-    """Group the deviations and weight the joints: block mean / (w joint_weight), w = 1e-10 for unseen joints.
+    """Group the deviations and weight the joints: block mean / (w joint_weight), w = 1e-10 if unseen.
 
     Each channel defines the deviations of its own columns.
     """
