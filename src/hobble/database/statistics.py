@@ -141,7 +141,7 @@ def y_groups(layout: RowLayout) -> list[slice]:
 
 
 def grouped(std: Array, groups: Iterable[slice], constant: float) -> Array:
-    """Replace each column's deviation by the mean of its group, or by `constant` if the group never varies."""
+    """Each column gets the mean deviation of its group, or `constant` if the group never varies."""
     out = np.array(std, np.float64)
     for group in groups:
         mean = float(np.mean(std[group]))
