@@ -31,7 +31,8 @@ from hobble.models.load import load_network
 from hobble.models.network import STORAGES
 from hobble.models.pfnn.network import Pfnn
 from hobble.models.pfnn.predictor import MODES, PfnnPredictor
-from hobble.models.tiles import MANY, SOME
+from hobble.models.tiles import PANELS_FOR_3_ROWS, PANELS_FOR_6_ROWS
+from hobble.report.provenance import processor
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 
@@ -93,9 +94,8 @@ def read(values: Any) -> Any:
 
 def cpu() -> str:
     """The kind of processor, and which of its registers are used."""
-    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return f"{(names or ['unknown processor'])[0]}, {'AVX-512' if SOME == MANY else 'no AVX-512'}"
+    wide = PANELS_FOR_3_ROWS == PANELS_FOR_6_ROWS
+    return f"{processor()}, {'AVX-512' if wide else 'no AVX-512'}"
 
 
 def predictions(network: Pfnn) -> None:
