@@ -11,7 +11,7 @@ from torch import Tensor
 
 from hobble.core.errors import HobbleError
 from hobble.database.reader import Database
-from hobble.database.stretches import Stretch
+from hobble.database.stretches import Sharing, Stretch
 from hobble.training.processes import ALONE, Processes
 
 TRAIN = "train"
@@ -36,8 +36,8 @@ class Batch(NamedTuple):
     whole: int
 
 
-class HostRows:
-    """The training rows of a database, read and composed on the host, then copied to `device`.
+class Rows:
+    """The training rows of a database, as one process reads them.
 
     processes: those that share a batch; stretches: parts of a section from which each batch is taken.
     """
@@ -52,6 +52,15 @@ class HostRows:
         self.database, self.device = database, device
         self.processes, self.stretches = processes, stretches
 
+    def sharing(self, section: int, sections: int, size: int) -> Sharing:
+        """How the processes share a section in batches of `size`."""
+        total = self.database.section_pairs(TRAIN, section, sections)
+        return self.processes.sharing(total, size, self.stretches)
+
+
+class HostRows(Rows):
+    """Rows that are read and composed on the host, then copied to `device`."""
+
     def batches(self, pass_index: int, section: int, sections: int, seed: int, size: int) -> Iterator[Batch]:
         """This process's rows of the section's consecutive batches of `size`.
 
@@ -62,8 +71,7 @@ class HostRows:
         place = (pass_index, section, sections, seed)
         # By the whole batch: the order of the rows depends on it, but must not depend on the processes.
         window = self.database.window(TRAIN, self.database.block_rows(size))
-        total = self.database.section_pairs(TRAIN, section, sections)
-        sharing = self.processes.sharing(total, size, self.stretches)
+        sharing = self.sharing(section, sections, size)
         read = [self._pieces(place, stretch, window) for stretch in sharing.read()]
         for whole, _ in sharing.sizes():
             # A short batch fills its first places only, so later stretches may have no samples for it.

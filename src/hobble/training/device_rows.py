@@ -14,15 +14,15 @@ from hobble.database.reader import Database
 from hobble.database.stretches import Sharing, Stretch
 from hobble.database.window import room
 from hobble.rows.compose import compose, fit_columns, x_columns
-from hobble.training.batches import TRAIN, Batch, HostRows
+from hobble.training.batches import TRAIN, Batch, HostRows, Rows
 from hobble.training.processes import ALONE, Processes
 
 ROWS_AT_ONCE = 4096  # rows composed at a time: few kernel launches, 10 MB
 MEMORY_SHARE = 0.6  # of the device's memory for rows; the rest is for the network and its buffers
 
 
-class DeviceRows:
-    """All training rows of `database` on the device, uploaded chunk by chunk to save host memory.
+class DeviceRows(Rows):
+    """All rows on the device, uploaded chunk by chunk to save host memory.
 
     The batches equal those of the database's reader when it holds all rows in memory. The host computes only
     the order of rows and fits, and sends it once a section.
@@ -35,8 +35,7 @@ class DeviceRows:
         processes: Processes = ALONE,
         stretches: int | None = None,
     ) -> None:
-        self.database, self.device = database, device
-        self.processes, self.stretches = processes, stretches
+        super().__init__(database, device, processes, stretches)
         manifest = database.manifest
         self.chunks = manifest.chunks[TRAIN]
         rows, fits = sum(c.rows for c in self.chunks), sum(c.fits for c in self.chunks)
@@ -70,8 +69,7 @@ class DeviceRows:
 
     def batches(self, pass_index: int, section: int, sections: int, seed: int, size: int) -> Iterator[Batch]:
         """As `hobble.training.batches.HostRows.batches`."""
-        total = self.database.section_pairs(TRAIN, section, sections)
-        sharing = self.processes.sharing(total, size, self.stretches)
+        sharing = self.sharing(section, sections, size)
         rows, fits = self._read(sharing, (pass_index, section, sections, seed))
         sent, fits_sent = (torch.from_numpy(part).to(self.device) for part in (rows, fits))
         own = len(sharing.own)
