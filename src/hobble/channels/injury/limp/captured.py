@@ -84,7 +84,7 @@ def healthy_of(limp: Limp, every: Sequence[Limp]) -> tuple[Profile, str]:
 
 
 def _walked(rows: ClipRows, links: Sequence[str], skeleton: Skeleton) -> list[Limp]:
-    """All stretches of a clip in which it walks with constant severities, or None without a cycle."""
+    """The walking of a clip with constant severities; an empty list if there is no whole cycle of it."""
     severity = rows.channels.get(INJURY, np.zeros((len(rows), len(links))))
     if not len(rows) or np.ptp(severity, axis=0).any():
         return []
@@ -99,8 +99,7 @@ def _walked(rows: ClipRows, links: Sequence[str], skeleton: Skeleton) -> list[Li
     walk = joined(walks) if walks else Walk(FPS, (), ())
     if not len(walk):
         return []
-    # A network without the injury channel has no links, and its clips are healthy.
-    hurt = {link: float(value) for link, value in zip(links, severity[0], strict=False) if value > 0}
+    hurt = {link: float(value) for link, value in zip(links, severity[0], strict=True) if value > 0}
     return [Limp(rows.clip, hurt, walk, float(np.mean(speeds)))]
 
 

@@ -47,13 +47,12 @@ EFFECTS = ("speed", "stride", "trunk", "arms", "head")
 
 @dataclass(frozen=True)
 class Window:
-    """A stretch of straight motion: its clip, its mood (or NONE), its features, and whether it walks."""
+    """A stretch of straight walking: its clip, its mood (or NONE) and its features."""
 
     clip: str
     mood: str
     values: Mapping[str, float] = field(repr=False)
     effects: Mapping[str, float] = field(repr=False)
-    walks: bool = True
 
 
 def response(
@@ -71,10 +70,9 @@ def response(
     if MOOD not in network.channels or network.skeleton is None:
         return {"applies": False, "reason": REASON}
     windows = [w for clip in motion if splits[clip.clip] == "train" for w in captured_windows(clip, network)]
-    known = sorted({w.mood for w in windows if w.walks} - {NONE})
+    known = sorted({w.mood for w in windows} - {NONE})
     if len(known) < 2:
         return {"applies": False, "reason": TOO_FEW}
-    windows = [w for w in windows if w.mood in (*known, NONE) and w.walks]
     judge = learn(_table(windows), [w.mood for w in windows], SHRINKAGE)
     speed = float(np.median([w.values["speed"] for w in windows if w.mood == NONE] or [ASKED])) / FPS
     figures = [
@@ -110,7 +108,7 @@ def response(
 
 
 def captured_windows(clip: Captured, network: Network) -> list[Window]:
-    """The windows of a captured stretch with straight motion and one mood at its highest value, or none."""
+    """The windows of a captured stretch that walks straight in one mood at its highest value, or in none."""
     assert network.skeleton is not None
     columns = network.channels[MOOD]
     out = []
@@ -118,21 +116,11 @@ def captured_windows(clip: Captured, network: Network) -> list[Window]:
         span = slice(start, start + WINDOW)
         speed = np.hypot(*clip.velocity[span].mean(axis=0))
         moods = [columns[i] for i in np.flatnonzero(clip.told[MOOD][start])]
-        if clip.velocity[span, 1].mean() < AHEAD * speed or speed < LEAST_SPEED or len(moods) > 1:
+        straight = clip.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST_SPEED
+        if not straight or len(moods) > 1 or clip.gait[span, WALK].mean() <= 0.5:
             continue
-        mood = moods[0] if moods else NONE
-        walks = bool(clip.gait[span, WALK].mean() > 0.5)
-        out.append(
-            _window(
-                network.skeleton,
-                clip.clip,
-                mood,
-                clip.local[span],
-                clip.contacts[span],
-                clip.root[span],
-                walks,
-            )
-        )
+        parts = clip.local[span], clip.contacts[span], clip.root[span]
+        out.append(_window(network.skeleton, clip.clip, moods[0] if moods else NONE, *parts))
     return out
 
 
@@ -180,9 +168,7 @@ def run(given: Given, options: Section) -> Outcome:
     return Outcome(_plain(result), {"effects": result.get("effects", [])}, says)
 
 
-def _window(
-    skeleton: Skeleton, clip: str, mood: str, local: Array, contacts: Array, root: Array, walks: bool = True
-) -> Window:
+def _window(skeleton: Skeleton, clip: str, mood: str, local: Array, contacts: Array, root: Array) -> Window:
     values = features(skeleton, local, contacts, root)
     head, neck = (local[:, skeleton.role(part)].astype(float) for part in ("head", "neck"))
     up = (head - neck).mean(axis=0)
@@ -193,7 +179,7 @@ def _window(
         "arms": (values["upper_arm_left_sd"] + values["upper_arm_right_sd"]) / 2,
         "head": float(np.degrees(np.arctan2(up[2], up[1]))),
     }
-    return Window(clip, mood, {**values, "head": effects["head"]}, effects, walks)
+    return Window(clip, mood, {**values, "head": effects["head"]}, effects)
 
 
 def _named(judge: Discriminant, figure: Mapping[str, float], windows: Sequence[Window]) -> dict[str, Any]:
