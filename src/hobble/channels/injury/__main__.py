@@ -9,9 +9,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from hobble.channels.injury.table import write_statuses
-from hobble.core.errors import HobbleError, InputError
-from hobble.core.untrusted import read_yaml
+from hobble.channels.injury.table import skeleton_links, write_statuses
+from hobble.core.errors import HobbleError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -24,20 +23,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--skeleton", default="config/skeletons/holden31.yaml", help="defines the links")
     options = parser.parse_args(arguments)
     try:
-        for path in write_statuses(options.table, options.folder, _links(Path(options.skeleton))):
+        for path in write_statuses(options.table, options.folder, skeleton_links(Path(options.skeleton))):
             print(path)
     except HobbleError as error:
         print(error, file=sys.stderr)
         return 1
     return 0
-
-
-def _links(skeleton: Path) -> list[str]:
-    try:
-        links = read_yaml(skeleton)["links"]
-    except (KeyError, TypeError):
-        raise InputError(skeleton, "does not list `links`") from None
-    return [f"{a}-{b}" for a, b in links]
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from pathlib import Path
 from hobble.channels.injury.status import Spell, Status, check_link, check_severity, write_status
 from hobble.core.clip_files import find_clips, only_file
 from hobble.core.errors import InputError
-from hobble.core.untrusted import read_text
+from hobble.core.untrusted import read_text, read_yaml
 
 COUNT = re.compile(r"\d{1,12}")
 COLUMNS = ("clip", "link", "severity", "from", "to")
@@ -36,6 +36,15 @@ class Row:
     first: int | None
     last: int | None
     line: int
+
+
+def skeleton_links(path: Path) -> list[str]:
+    """Names of the links in a skeleton file. Raises InputError if it has no `links`."""
+    try:
+        links = read_yaml(path)["links"]
+    except (KeyError, TypeError):
+        raise InputError(path, "does not list `links`") from None
+    return [f"{a}-{b}" for a, b in links]
 
 
 def read_table(path: str | Path, links: Sequence[str]) -> list[Row]:

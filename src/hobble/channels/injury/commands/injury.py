@@ -11,9 +11,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hobble.channels.injury.table import write_statuses
+from hobble.channels.injury.table import skeleton_links, write_statuses
 from hobble.cli import batch
-from hobble.core.untrusted import read_yaml
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the files and print their names. Returns the exit status."""
-    links = [f"{a}-{b}" for a, b in read_yaml(batch.skeleton_file(options.skeleton)).get("links") or ()]
+    links = skeleton_links(batch.skeleton_file(options.skeleton))
     for path in write_statuses(options.table, options.folder, links):
         print(path)
     return 0
