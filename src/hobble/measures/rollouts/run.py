@@ -1,9 +1,9 @@
 """Errors of roll-outs: the network continues from its own poses, with the path and inputs of a clip.
 
-A roll-out starts at a captured frame and goes on for n frames as the runtime does: the joints of the input
-are those it made itself, positions meet half way between where velocities carry them and where they are
-predicted, and the phase advances by what is predicted. Trajectory, gait, ground and what is told are the
-clip's own. All starts of a stretch go through the network side by side.
+A roll-out starts at a captured frame and continues for n frames like the runtime. Its input has the joints
+that it predicted itself. Each new position is the mean of the predicted position and of the last position
+plus the predicted velocity. The phase advances by its predicted change. Trajectory, gait, ground and channels
+come from the clip. All roll-outs of a stretch are computed together.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ log = logging.getLogger("hobble")
 class Strayed:
     """Relative error and position error (cm) over `frames` frames of roll-outs.
 
-    last: over the last frame of the `ended` that came to their end, position error and how far the phase is
-    off (cycles).
+    last: position error and phase error (cycles) in the last frame, over the `ended` roll-outs that reached
+    their full length.
     """
 
     frames: int = 0
@@ -67,15 +67,15 @@ class Strayed:
         )
 
     def weighing(self, weight: float) -> Strayed:
-        """The same, each frame of which stands for so many."""
+        """The same, with each frame counted `weight` times."""
         if weight == 1:
             return self
         return Strayed(self.frames, self.starts, self.moments * weight, self.last * weight, self.ended)
 
     def to_dict(self, phase: bool = True) -> dict[str, Any]:
-        """Plain data; None where there was no frame, or no roll-out that came to its end.
+        """Plain data, with None if there were no frames, or if no roll-out reached its full length.
 
-        phase: whether the network goes by the phase; of one that does not, how far it is off says nothing.
+        phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
         """
         known, ended = self.frames > 0, self.ended > 0
         return {
@@ -91,11 +91,11 @@ class Strayed:
 
 @dataclass(frozen=True)
 class Inputs:
-    """What a clip asks for in F consecutive frames, on one terrain fit.
+    """The inputs and targets of F consecutive frames of a clip, on one terrain fit.
 
-    x: (F, X) with the captured joints, y: (F, Y) the truth, both in raw units with heights less `mean` (F,);
-    phase: (F,); turn: (F,) and velocity: (F, 2) of the root on the way to the next frame; moving: (F,) the
-    share of its movement that a figure which does not stand keeps.
+    x: (F, X) with the captured joints; y: (F, Y) targets; both in raw units, with heights minus `mean` (F,).
+    phase: (F,). turn: (F,) and velocity: (F, 2) of the root until the next frame. moving: (F,) the share of
+    the predicted movement that is applied, see `hobble.character.rule.moving`.
     """
 
     x: Array
@@ -108,7 +108,7 @@ class Inputs:
 
 
 def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
-    """Of the rows `chosen` (F,), on the first fit of each, laid out as the network's `layout`."""
+    """The inputs of the rows `chosen` (F,), on the first fit of each, in the network's `layout`."""
     fit = rows.first_fit[chosen]
     x, y, *_ = pairs(rows, layout, chosen, fit)
     gait = x[:, layout.x_gait].reshape(len(x), len(GAITS), layout.samples)
@@ -127,11 +127,10 @@ def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
 def roll_out(
     predictor: Predictor, asked: Inputs, starts: np.ndarray, length: int
 ) -> tuple[list[Array], Array]:
-    """Positions that roll-outs from frames `starts` (n,) make, and their phases at last.
+    """The joints of roll-outs that begin at frames `starts` (n,), which rise, and their last phases (n,).
 
-    Returns for each age 1 .. length the joints (n', J, 3) of the n' roll-outs that are still inside the
-    stretch, in the root frame of frame start + age - 1 with heights less that frame's mean, and phases (n,).
-    `starts` rise, so that the first n' are those.
+    For each age from 1 to `length` there is an array (n', J, 3), in the root frame of frame start + age - 1,
+    with heights minus that frame's mean. It holds the first n' roll-outs, those still inside the stretch.
     """
     layout = predictor.network.layout
     joints = (len(starts), layout.joints, 3)
@@ -178,8 +177,8 @@ def clip_roll_outs(
 ) -> dict[int, Strayed]:
     """Length -> errors of roll-outs over every frame of the clip.
 
-    A stretch's first frame has no frame before it that would say how its root came there, and starts none.
-    Roll-outs begin so often that every frame lies in OVERLAP of them (one where they are one frame long).
+    No roll-out begins at the first frame of a stretch, because the movement of the root to it is unknown.
+    Each frame is in OVERLAP roll-outs of a length, or in one if they are one frame long.
     """
     layout = predictor.network.layout
     out = {length: Strayed() for length in lengths}
@@ -226,11 +225,11 @@ def measure_roll_outs(
     mode: str = "cubic",
     sample: Sample | None = None,
 ) -> dict[str, Any]:
-    """rollouts.json: `lengths`, one entry for each, with `train`, `held_out` and `clips` in name order.
+    """The content of rollouts.json: for each of `lengths`, the splits and the clips in name order.
 
     clips: name -> file of rows, one in memory at a time. equivalents: names of the joints to measure. mode:
-    how phase is looked up. sample: the clips that are measured for all of them; then `sample` says how many,
-    and `interval` how sure each mean is. Raises InputError where rows and network differ.
+    how the phase is looked up. sample: measure only these clips; the result then has their number in `sample`
+    and 95 % confidence intervals in `interval`. Raises InputError if rows and network have different layouts.
     """
     network = load_network(weights)
     predictor = network.predictor(mode)
