@@ -87,9 +87,11 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
 
   const limited = spec.channels.filter((one) => one.limits);
   const allowed = (g) => {
-    let most = Infinity;
+    let least = Infinity, both = limited[0].limits.usual[g];
+    const usual = both;
     for (const { first, limits } of limited) {
       const { levels, speeds } = limits;
+      let most = Infinity;
       for (let l = 0; l < speeds[g].length; l++) {
         const v = c.told[first + l];
         if (!(v > 0)) continue;
@@ -98,8 +100,10 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
         const [low, high] = [speeds[g][l][i], speeds[g][l][i + 1]];
         most = min(most, low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low));
       }
+      least = min(least, most);
+      if (usual > 0) both *= min(1, most / usual);
     }
-    return most;
+    return least < usual ? both : least;
   };
   const hold = (velocity, gait) => {
     if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.told[first + l] > 0))) return velocity;
