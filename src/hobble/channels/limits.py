@@ -95,7 +95,9 @@ def together(allowed: Sequence[Array], usual: Array) -> Array:
     shares multiply: whoever is sad and limps is slower than by either. A channel that leaves more than the
     usual speed takes nothing from it.
     """
-    shares = [np.minimum(1.0, np.divide(one, usual, out=np.ones_like(one), where=usual > 0)) for one in allowed]
+    shares = [
+        np.minimum(1.0, np.divide(one, usual, out=np.ones_like(one), where=usual > 0)) for one in allowed
+    ]
     least = np.min(allowed, axis=0)
     return np.where(least < usual, usual * np.prod(shares, axis=0), least)
 
@@ -104,8 +106,8 @@ def together(allowed: Sequence[Array], usual: Array) -> Array:
 class _Cycles:
     """N cycles of one clip.
 
-    gait: (N,). speed, ahead: (N,) cm a frame. values: (N, L). number: (N,). others: (N,) bool, whether another
-    channel has a value above 0.
+    gait: (N,). speed, ahead: (N,) cm a frame. values: (N, L). number: (N,). others: (N,) bool, whether
+    another channel has a value above 0.
     """
 
     gait: np.ndarray
@@ -141,7 +143,8 @@ class Pace:
         """Add a clip's rows.
 
         gait: (R, G) shares. velocity: (R, 2) of the root in its own frame, cm a frame. values: (R, L). cycle:
-        (R,) numbers of the cycles. others: (R,) bool, whether another channel has a value above 0. source: the healthy clip, if this is a hurt version of it.
+        (R,) numbers of the cycles. others: (R,) bool, whether another channel has a value above 0. source:
+        the healthy clip, if this is a hurt version of it.
         """
         numbers, of_row, count = np.unique(cycle, return_inverse=True, return_counts=True)
 
