@@ -92,7 +92,7 @@ class PlainPredictor(StackPredictor):
 
     network: Plain
 
-    def __init__(self, network: Plain, storage: str | None = None) -> None:
+    def __init__(self, network: Plain, storage: str = "float32") -> None:
         super().__init__(network)
         weights, biases = [w[None] for w in network.weights], [b[None] for b in network.biases]
         self._stack = Stack(weights, biases, storage, network.y_mean, network.y_std)
