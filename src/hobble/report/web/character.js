@@ -265,8 +265,11 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       const against = held * min(0, a * wish[0] + b * wish[1]) / squared;
       [a, b] = [a - against * wish[0], b - against * wish[1]];
     }
-    c.px[M] += a;
-    c.pz[M] += b;
+    // The movement of a clip is drawn toward the wish, a little: clips have only some directions and speeds.
+    const drawn = spec.steering > 0 && spec.rooted ? k.drawn : 0, lack = [wish[0] - a, wish[1] - b];
+    const share = min(1, drawn * hypot(a, b) / max(hypot(...lack), 1e-9));
+    c.px[M] += a + share * lack[0];
+    c.pz[M] += b + share * lack[1];
     yaw -= moving * y[Y.turn];
     const si = c.dx[M] = sin(yaw), co = c.dz[M] = cos(yaw);
     for (let i = M + 1; i < T; i++) {
