@@ -25,12 +25,12 @@ import { pathToFileURL } from "url";
 const { createCharacter, createFigure } = await import(pathToFileURL(`${process.argv[1]}/hobble.js`));
 const data = JSON.parse(readFileSync(`${process.argv[1]}/character.json`));
 const c = createCharacter(data), frames = [], said = [];
-const wrongs = [{ Tail: 3 }, { "LeftUpLeg-LeftLeg": 11 }].map((hurt) => () => c.tell("injury", hurt));
+const wrongs = [{ Tail: 3 }, { "LeftUpLeg-LeftLeg": 11 }].map((hurt) => () => c.setChannel("injury", hurt));
 for (const wrong of [...wrongs, () => c.step({ gait: "fly" })]) {
   try { wrong(); } catch (error) { said.push(`${error.name}: ${error.message}`.slice(0, 60)); }
 }
 for (let f = 0; f < 60; f++) {
-  c.tell("injury", f < 20 ? {} : { "LeftUpLeg-LeftLeg": 7 });
+  c.setChannel("injury", f < 20 ? {} : { "LeftUpLeg-LeftLeg": 7 });
   c.step({ velocity: [.02 * f, 2.5], gait: f < 50 ? null : "crouch" });
   frames.push([Array.from(c.places), Array.from(c.turns), c.phase]);
 }
@@ -82,7 +82,7 @@ def test_the_module_moves_as_python_does(
 
 def test_what_is_wrong_is_said(walked: dict[str, Any]) -> None:
     assert [text.split(":")[0] for text in walked["said"]] == ["RangeError"] * 3
-    assert "no Tail that was told in training" in walked["said"][0]
+    assert "no column Tail that was above 0 in training" in walked["said"][0]
     assert "no gait fly" in walked["said"][2]
 
 

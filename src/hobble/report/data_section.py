@@ -159,7 +159,7 @@ def remarks_table(material: Material) -> Table | None:
     for stage, reports, key in (
         ("motion", material.motion, "repairs"),
         ("labels", material.labels, "warnings"),
-        (None, material.told, "warnings"),
+        (None, material.channels, "warnings"),
     ):
         for report in reports:
             rows += [
@@ -173,11 +173,11 @@ def remarks_table(material: Material) -> Table | None:
 
 def strips(material: Material) -> list[dict[str, Any]]:
     """The label strip and channel values of each clip that has them; mirrors are left out."""
-    told: dict[str, dict[str, Any]] = {}
-    for report in material.told:
+    of_clip: dict[str, dict[str, Any]] = {}
+    for report in material.channels:
         highest = {"highest": report.get("highest", 10.0)}
-        found = {label: (value, highest) for label, value in report["told"].items()}
-        told.setdefault(report["clip"], {}).update(found)
+        found = {label: (value, highest) for label, value in report["values"].items()}
+        of_clip.setdefault(report["clip"], {}).update(found)
     say = speaker(material.network["skeleton"])
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
     known = {report["clip"] for report in material.labels}
@@ -190,7 +190,7 @@ def strips(material: Material) -> list[dict[str, Any]]:
         length = lengths.get(clip) or strip["seconds"][-1]
         status = [
             {"name": say(label), "spans": value.get("spells") or [[0, length, value["highest"]]], **highest}
-            for label, (value, highest) in told.get(clip, {}).items()
+            for label, (value, highest) in of_clip.get(clip, {}).items()
         ]
         out.append({**strip, "clip": clip, "length": length, "status": status})
     return out

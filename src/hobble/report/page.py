@@ -107,7 +107,7 @@ def _sections(material: Material, found: Mapping[str, Any]) -> dict[str, dict[st
             "speeds": data.speed_chart(material),
             "turns": coverage.turn_chart(found),
             "both": coverage.both_chart(found),
-            "told": coverage.told_charts(found, speaker(material.network["skeleton"])),
+            "channels": coverage.channel_charts(found, speaker(material.network["skeleton"])),
             "retarget": data.retarget_chart(material),
             "clips": data.clip_table(material),
             "remarks": data.remarks_table(material),

@@ -81,9 +81,9 @@ def clip_rows(rows: Any, low: Any, high: Any, unsound: Any) -> bool:
 
 @njit
 def find_unsound(
-    position: Any, direction: Any, gait: Any, joints: Any, velocities: Any, rotations: Any, told: Any,
-    target: Any, facing: Any, owed: Any, hold: Any, lift: Any, body: Any, added: Any, memory: Any, phase: Any,
-    unsound: Any,
+    position: Any, direction: Any, gait: Any, joints: Any, velocities: Any, rotations: Any,
+    channel_values: Any, target: Any, facing: Any, owed: Any, hold: Any, lift: Any, body: Any, added: Any,
+    memory: Any, phase: Any, unsound: Any,
 ) -> bool:  # fmt: skip
     """Mark in `unsound` (C,) the characters whose state has numbers that are not finite or too large.
 
@@ -93,7 +93,9 @@ def find_unsound(
     for c in range(phase.shape[0]):
         sound = abs(phase[c]) < LARGEST_SOUND and abs(body[c]) < LARGEST_SOUND
         sound &= _sound(position[c]) and _sound(direction[c]) and _sound(gait[c]) and _sound(joints[c])
-        sound &= _sound(velocities[c]) and _sound(rotations[c]) and _sound(told[c]) and _sound(target[c])
+        sound &= (
+            _sound(velocities[c]) and _sound(rotations[c]) and _sound(channel_values[c]) and _sound(target[c])
+        )
         sound &= _sound(facing[c]) and _sound(owed[c]) and _sound(hold[c]) and _sound(lift[c])
         sound &= _sound(added[c]) and _sound(memory[c])
         unsound[c] = not sound

@@ -79,9 +79,9 @@ class Controller:
         blocks = layout.blocks("x")
         self._x_columns = np.array([blocks[name].start for name in BODY], np.int64)
         of_channel = [np.arange(layout.x_size)[layout.x_channel(name)] for name, _ in layout.channels]
-        self._told_columns = np.concatenate([np.zeros(0, np.int64), *of_channel])
+        self._channel_columns = np.concatenate([np.zeros(0, np.int64), *of_channel])
         steps = [np.full(columns, rates[name] / FPS) for name, columns in layout.channels]
-        self._told_step = np.concatenate([np.zeros(0), *steps])
+        self._channel_steps = np.concatenate([np.zeros(0), *steps])
         self._y_columns = trajectory.advance_columns(layout)
         self._y_joints = np.array([layout.y_joint_position.start, layout.y_contacts.start], np.int64)
         assert network.skeleton is not None
@@ -106,7 +106,8 @@ class Controller:
         t0 = clock()
         c = self.character
         if find_unsound(
-            c.position, c.direction, c.gait, c.joint_position, c.joint_velocity, c.joint_rotation, c.told,
+            c.position, c.direction, c.gait, c.joint_position, c.joint_velocity, c.joint_rotation,
+            c.channel_values,
             c.target_velocity, c.target_direction, c.owed, c.foot_hold, c.foot_lift, c.body_lift,
             c.foot_added, c.memory, c.phase, self._unsound,
         ):  # fmt: skip
@@ -134,7 +135,7 @@ class Controller:
         some = np.flatnonzero(self._unsound)
         fresh = start(self.predictor.network, len(some), self.root[some][:, ::2], self.yaw[some])
         for part in fields(fresh):
-            if part.name != "told_target":
+            if part.name != "channel_targets":
                 getattr(self.character, part.name)[some] = getattr(fresh, part.name)
 
     def _warn(self, what: str) -> None:
@@ -153,7 +154,7 @@ class Controller:
         c = self.character
         trajectory.prepare(
             velocity, direction, strafe, gait, self.steering, c.target_velocity, c.target_direction, c.strafe,
-            c.gait, c.position, c.direction, c.owed, c.told, c.told_target, self._told_step,
+            c.gait, c.position, c.direction, c.owed, c.channel_values, c.channel_targets, self._channel_steps,
             self.layout.step, self.side, self._points,
         )  # fmt: skip
         if ground is None:
@@ -172,7 +173,7 @@ class Controller:
         c = self.character
         _fill_input(
             c.position, c.direction, c.gait, c.ground, c.root_height, c.joint_position, c.joint_velocity,
-            c.told, self._x_columns, self._told_columns, self.layout.step, self.x,
+            c.channel_values, self._x_columns, self._channel_columns, self.layout.step, self.x,
         )  # fmt: skip
 
     def _output(self, ground: Ground | None) -> None:
@@ -225,9 +226,10 @@ def _heights(ground: Ground, x: Array, z: Array) -> Array:
 @njit
 def _fill_input(
     position: Any, direction: Any, gait: Any, ground: Any, height: Any, joints: Any, velocities: Any,
-    told: Any, at: Any, told_at: Any, step: int, x: Any,
+    channel_values: Any, at: Any, channel_at: Any, step: int, x: Any,
 ) -> None:  # fmt: skip
-    """Fill rows X. at: first columns of the blocks of BODY; told_at: (K,) columns of the channel values."""
+    """Fill rows X. at: first columns of the blocks of BODY; channel_at: (K,) columns of the
+    channel values."""
     middle, samples = position.shape[1] // 2, ground.shape[1]
     for c in range(x.shape[0]):
         px, pz = position[c, middle]
@@ -256,8 +258,8 @@ def _fill_input(
             dx, dz = velocities[c, j, 0], velocities[c, j, 2]
             k = at[4] + 3 * j
             x[c, k], x[c, k + 1], x[c, k + 2] = dx * cos - dz * sin, velocities[c, j, 1], dx * sin + dz * cos
-        for k in range(told.shape[1]):
-            x[c, told_at[k]] = told[c, k]
+        for k in range(channel_values.shape[1]):
+            x[c, channel_at[k]] = channel_values[c, k]
 
 
 @njit

@@ -181,11 +181,12 @@ def stand_on(ground: Any, height: Any) -> None:
 def prepare(
     wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
     velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
-    owed: Any, told: Any, told_target: Any, told_step: Any, step: int, side: float, points: Any,
+    owed: Any, channel_values: Any, channel_targets: Any, channel_steps: Any, step: int, side: float,
+    points: Any,
 ) -> None:  # fmt: skip
     """`follow_wish`, `blend_future` and `sample_points` in one call.
 
-    Also moves the channel values told (C, K) toward told_target, by told_step (K,) at most. All are in this
+    Also moves channel_values (C, K) toward channel_targets, by channel_steps (K,) at most. All are in this
     file because numba renews cached code only when its own file changes, not when a callee's does.
     """
     follow_wish(
@@ -194,10 +195,10 @@ def prepare(
     )  # fmt: skip
     blend_future(velocity, target, strafe, position, direction, gait)
     sample_points(position, direction, step, side, points)
-    for c in range(told.shape[0]):
-        for k in range(told.shape[1]):
-            change = told_target[c, k] - told[c, k]
-            told[c, k] += min(max(change, -told_step[k]), told_step[k])
+    for c in range(channel_values.shape[0]):
+        for k in range(channel_values.shape[1]):
+            change = channel_targets[c, k] - channel_values[c, k]
+            channel_values[c, k] += min(max(change, -channel_steps[k]), channel_steps[k])
 
 
 @njit

@@ -115,7 +115,7 @@ def captured_windows(clip: Captured, network: Network) -> list[Window]:
     for start in range(0, len(clip) - WINDOW + 1, STEP):
         span = slice(start, start + WINDOW)
         speed = np.hypot(*clip.velocity[span].mean(axis=0))
-        moods = [columns[i] for i in np.flatnonzero(clip.told[MOOD][start])]
+        moods = [columns[i] for i in np.flatnonzero(clip.channels[MOOD][start])]
         straight = clip.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST_SPEED
         if not straight or len(moods) > 1 or clip.gait[span, WALK].mean() <= 0.5:
             continue
