@@ -221,7 +221,7 @@ class ProceduralAnimation:
                 self.state.channel_targets[:, columns] = values
             if self._limited:
                 self._limiter.hold(self.state.channel_values, velocity, shares)
-            made.frame(velocity, direction, strafe, shares, self._terrain[1])
+            made.frame((velocity, direction, strafe, shares), self._terrain[1])
         except BaseException:
             if before is not None:  # on flat ground nothing in a frame can fail
                 before.restore()
