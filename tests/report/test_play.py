@@ -110,8 +110,8 @@ def test_the_page_moves_as_python_does(
       const hills = (x, z) => 14 * Math.sin(x / 170) * Math.cos(z / 140) + 8 * Math.sin((x + z) / 260);
       return {json.dumps([wish(f) for f in range(FRAMES)])}.map(({{ velocity, facing, gait, hurt }}) => {{
         if (hurt) {{
-          c.wished[{links.index("LeftUpLeg-LeftLeg")}] = 7;
-          c.wished[{links.index("Hips-LowerBack")}] = 3;
+          c.channelTargets[{links.index("LeftUpLeg-LeftLeg")}] = 7;
+          c.channelTargets[{links.index("Hips-LowerBack")}] = 3;
         }}
         c.frame(velocity, facing, gait, hills);
         rig.take(c.pose, c.turns);
@@ -202,7 +202,7 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
     apart = f"""(() => {{
       const [{{ spec }}] = Hobble.player.actors;
       const hurt = Hobble.character(spec), healthy = Hobble.character(spec);
-      hurt.wished[{index}] = 2;
+      hurt.channelTargets[{index}] = 2;
       for (let f = 0; f < 60; f++) for (const c of [hurt, healthy]) c.frame([0, 2.5], null, "walk", () => 0);
       return Math.max(...hurt.pose.map((v, i) => Math.abs(v - healthy.pose[i])));
     }})()"""
