@@ -16,7 +16,14 @@ from hobble.core.skeleton import Skeleton
 from hobble.evaluation.tables import read_numbers
 from hobble.measures.accuracy import page as accuracy_page
 from hobble.measures.responsivity import page as responsivity_page
-from hobble.report import cost_section, coverage, data_section, terrain_section, training_section
+from hobble.report import (
+    cost_section,
+    coverage,
+    data_section,
+    shown_clips,
+    terrain_section,
+    training_section,
+)
 from hobble.report.charts import Chart, Family
 from hobble.report.gather import Material, describe_network
 from hobble.report.ground_pictures import ground_pictures
@@ -108,7 +115,7 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
 
 
 def test_strips_carry_what_hurts(material: Material) -> None:
-    strips = {strip["clip"]: strip for strip in data_section.strips(material)}
+    strips = {strip["clip"]: strip for strip in data_section.strips(material, shown_clips.shown(material))}
     assert len(strips) == 8, "a mirror says the same again"
     (row,) = strips["hurt_left_knee"]["status"]
     assert row["name"] == "left thigh"
