@@ -90,7 +90,7 @@ def test_the_pose_is_that_of_the_prediction(network) -> None:
     np.testing.assert_allclose(character.state.joint_position[0], (predicted + carried) / 2, atol=1e-4)
     rotations = quat.mul(turn, quat.exp(joints(layout.y_joint_rotation)))
     np.testing.assert_allclose(character.state.joint_rotation[0], rotations, atol=1e-6)
-    legs = character._controller._legs
+    legs, *_ = character._controller._legs
     others = np.setdiff1d(np.arange(layout.joints), [*legs.ravel(), 4, 5, 9, 10])
     np.testing.assert_array_equal(pose.positions[others], character.state.joint_position[0][others])
     assert pose.positions.shape == (31, 3)
@@ -485,8 +485,8 @@ def test_the_released_network_keeps_its_feet_on_hills(shared: Path, holden31) ->
     """A quarter of a minute in a curve over rolling ground: soles neither in it nor floating, nor sliding."""
     network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
     character = ProceduralAnimation(network)
-    legs = character._controller._legs
-    sole = np.tile(character._controller._sole, 2)
+    legs, _, soles = character._controller._legs
+    sole = np.tile(soles, 2)
 
     def rolling(x: np.ndarray, z: np.ndarray) -> np.ndarray:
         return 14 * np.sin(x / 170) * np.cos(z / 140) + 8 * np.sin((x + z) / 260)
