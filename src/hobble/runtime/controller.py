@@ -216,8 +216,12 @@ class Controller:
 
     def _update(self, velocity: Array) -> None:
         whole = self.predictor.network.rooted
-        held = trajectory.UNWISHED_LOSS if self.steering > 0 and not whole else 0.0
-        trajectory.advance(self.y, self._y_columns, velocity, held, whole, self._path, self.character.phase)
+        steered = self.steering > 0
+        held = trajectory.UNWISHED_LOSS if steered and not whole else 0.0
+        drawn = trajectory.DRAWN if steered and whole else 0.0
+        trajectory.advance(
+            self.y, self._y_columns, velocity, held, whole, drawn, self._path, self.character.phase
+        )
 
 
 def _heights(ground: Ground, x: Array, z: Array) -> Array:

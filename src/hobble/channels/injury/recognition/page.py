@@ -57,8 +57,8 @@ def recognition_chart(found: Json) -> Chart | None:
         return None
     classes = len(found.get("classes") or ())
     people = found.get("people")
-    told = f" People recognised the part {100 * people:.0f} % of the time" if people else ""
-    note = f"{told} (Ferre 2019, on the motion of another network)." if told else ""
+    by_people = f" People recognised the part {100 * people:.0f} % of the time" if people else ""
+    note = f"{by_people} (Ferre 2019, on the motion of another network)." if by_people else ""
     return Chart(
         "recognition",
         "Is the hurt part recognised?",
