@@ -122,7 +122,7 @@ def test_a_manner_of_one_person_is_never_named_without_that_person() -> None:
 def test_each_manner_is_tried_with_each_column_of_another_channel(
     both: Network, motion: list[Captured], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The generated figures are replaced by captured windows: of the mood channels, but of none at one link."""
+    """Captured windows take the place of the generated figures: of the right mood, of none at one link."""
     real = {m: captured_windows(clip(both, f"{m}-9", m, lean=lean), both, "mood") for m, lean in LEANS}
     asked: list[Figure] = []
     broken = both.channels["injury"][3]
