@@ -136,7 +136,7 @@ def test_limits_of_two_channels_are_those_of_python(
             pose = animation.next_pose((0.0, 2.4), **values)
         _, at = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
         assert np.abs(np.reshape(found, (-1, 3)) - at[0])[turning].max() < 1e-2
-        alone = [both.limits[name].allowed(animation.state.told[:, part])[0, 1] for name, part in PARTS]
+        alone = [both.limits[name].allowed(animation.state.channel_values[:, part])[0, 1] for name, part in PARTS]
         assert np.hypot(*animation.state.target_velocity[0]) < min(alone) - 0.01
 
 
