@@ -24,7 +24,7 @@ MOST_ADDED = float(np.radians(28))
 # Share of its length to which foot placement may stretch the leg of a held foot behind the hips, unless the
 # network stretches it further. Beyond that the heel rises. Otherwise a foot that is 5 cm behind the network's
 # straightens a knee that is bent by 26 degrees, and a stiff leg would look as if it bent and stretched.
-STRETCH = 0.98
+STRETCH = 0.99
 BEHIND = 10.0  # cm that the toe is behind the hip from which STRETCH holds; a foot ahead of it stays flat
 BODY_MIX = 0.15  # share of the remaining body lift that is applied each frame
 BODY_FREE = 3.0  # cm that standing feet may be off the ground before the body is raised or lowered
