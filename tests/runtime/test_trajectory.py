@@ -40,11 +40,20 @@ def prediction(
 
 
 def move(
-    y: np.ndarray, position, direction, gait, phase=None, wish=(0.0, 1.0), held: float = 0.0, whole=False
+    y: np.ndarray,
+    position,
+    direction,
+    gait,
+    phase=None,
+    wish=(0.0, 1.0),
+    held: float = 0.0,
+    whole=False,
+    drawn: float = 0.0,
 ) -> np.ndarray:
     phase = np.zeros(1) if phase is None else phase
     columns = trajectory.advance_columns(LAYOUT)
-    trajectory.advance(y, columns, np.array([wish], float), held, whole, position, direction, gait, phase)
+    wishes = np.array([wish], float)
+    trajectory.advance(y, columns, wishes, held, whole, drawn, position, direction, gait, phase)
     return phase
 
 
@@ -107,6 +116,22 @@ def test_a_rooted_network_is_not_held_while_standing() -> None:
 def test_movement_against_the_wish_is_reduced(wish, moved) -> None:
     position, direction, gait = path()
     move(prediction(speed=2.0, side=0.5), position, direction, gait, wish=wish, held=0.25)
+    np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("wish", "moved"),
+    [
+        ((0.0, 2.0), (0.0, 2.0)),  # as wished
+        ((0.0, 2.1), (0.0, 2.1)),  # reached with less than the whole share
+        ((0.0, 9.0), (0.0, 2.2)),  # faster
+        ((0.0, 0.0), (0.0, 1.8)),  # to stop
+        ((5.0, 2.0), (0.2, 2.0)),  # to the left
+    ],
+)
+def test_movement_is_drawn_toward_the_wish_by_a_share_of_itself(wish, moved) -> None:
+    position, direction, gait = path(stand=0.5)
+    move(prediction(speed=2.0), position, direction, gait, wish=wish, whole=True, drawn=0.1)
     np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
 
 

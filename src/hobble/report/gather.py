@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from hobble.core.errors import InputError
 from hobble.core.files import read_json
-from hobble.core.untrusted import read_text, read_yaml
+from hobble.core.untrusted import read_yaml
+from hobble.evaluation.tables import read_numbers
 from hobble.measures.given import Json
 from hobble.models.load import load_network
 
@@ -91,7 +87,7 @@ def gather(
         resolved=read_yaml(configuration) or {},
         measured={Path(path).stem: read_json(path) for path in measured},
         pipeline=read_json(pipeline),
-        history=read_history(history),
+        history=read_numbers(history),
         network=describe_network(weights),
         motion=[read_json(path) for path in motion],
         labels=[read_json(path) for path in labels],
@@ -100,25 +96,6 @@ def gather(
         rows=list(rows),
         published=read_yaml(PUBLISHED),
     )
-
-
-def read_history(path: str | Path) -> dict[str, list[float | None]]:
-    """Columns of a CSV of numbers; an empty cell is None. Raises InputError for anything else."""
-    columns: dict[str, list[float | None]] = {}
-    for row in csv.DictReader(io.StringIO(read_text(path), newline="")):
-        for key, text in row.items():
-            columns.setdefault(key, []).append(_cell(path, key, text))
-    return columns
-
-
-def _cell(path: str | Path, key: str, text: str | None) -> float | None:
-    if text is None or not text.strip():
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        raise InputError(path, f"column {key} holds {text!r}, which is not a number") from None
-    return value if np.isfinite(value) else None
 
 
 def describe_network(path: str | Path) -> dict[str, Any]:

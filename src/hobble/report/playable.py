@@ -167,6 +167,7 @@ def _constants() -> dict[str, float]:
         "owedWithin": trajectory.OWED_WITHIN,
         "mostOwed": trajectory.MOST_OWED,
         "held": trajectory.UNWISHED_LOSS,
+        "drawn": trajectory.DRAWN,
         "furthestTurn": float(trajectory.FURTHEST_TURN),
         "strafeFrom": float(trajectory.STRAFE_FROM),
         "turnInPlace": float(animation.TURN_IN_PLACE),

@@ -63,7 +63,7 @@ class ProceduralAnimation:
         network: Network,
         *,
         mode: str = "cubic",
-        storage: str = "float32",
+        storage: str | None = None,
         characters: int = 1,
         waypoints: Sequence[Waypoint] | None = None,
         rates: Mapping[str, float] | None = None,
@@ -112,7 +112,8 @@ class ProceduralAnimation:
         """Load weights.npz, its folder, or a folder of the original release's .bin files.
 
         skeleton: a Skeleton or a file of config/skeletons, for a file without one.
-        mode: "constant", "linear" or "cubic". storage: "float32" or "int16".
+        mode: "constant", "linear" or "cubic". storage: of the weights, "float32" or "int16"; default: the
+        kind's own.
         characters: how many.
         waypoints: the track to follow when `next_pose` gets no velocity.
         rates: channel -> largest change of its values per second; default: the channel's own rate.

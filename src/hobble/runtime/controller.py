@@ -201,9 +201,11 @@ class Controller:
     def _update(self, velocity: Array) -> None:
         c = self.character
         whole = self.predictor.network.rooted
-        held = trajectory.UNWISHED_LOSS if self.steering > 0 and not whole else 0.0
+        steered = self.steering > 0
+        held = trajectory.UNWISHED_LOSS if steered and not whole else 0.0
+        drawn = trajectory.DRAWN if steered and whole else 0.0
         trajectory.advance(
-            self.y, self._y_columns, velocity, held, whole, c.position, c.direction, c.gait, c.phase
+            self.y, self._y_columns, velocity, held, whole, drawn, c.position, c.direction, c.gait, c.phase
         )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from hobble.channels.limits import together
 from hobble.core.quat import Array
 from hobble.models.network import Network
 
@@ -34,7 +35,7 @@ class SpeedLimiter:
         if self._told is None or not np.array_equal(told, self._told):
             self._told = told.copy()
             each = [limits.allowed(told[:, columns]) for columns, limits in self._tables]
-            self._allowed[:] = np.min(each, axis=0)
+            self._allowed[:] = together(each, self._tables[0][1].usual)
         if not np.isfinite(self._allowed).any():
             return
         walk, jog = self._gaits["walk"], self._gaits["jog"]

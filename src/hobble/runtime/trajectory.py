@@ -27,6 +27,7 @@ OWED_RATE = 0.01  # integral gain a frame: a steady error is corrected within a 
 OWED_WITHIN = 0.8  # share of the wish; with a larger error the character is still turning or starting
 MOST_OWED = 1.0  # largest integral correction, as a share of the wish
 FURTHEST_TURN = np.radians(137)  # largest turn to ask for; beyond it the other way round may be shorter
+DRAWN = 0.1  # with `Network.rooted`: largest change of a frame's movement toward the wish, as a share of it
 UNWISHED_LOSS = 0.5  # share of movement against the wish that is removed; removing all would drag the feet
 STRAFE_FROM = np.radians(45)  # angle between facing and velocity from which the strafe share is 1
 STILL = 0.1  # cm a frame: a slower wish means standing
@@ -202,8 +203,9 @@ def prepare(
 
 @njit
 def advance(
-    y: Any, at: Any, wish: Any, held: float, whole: bool, position: Any, direction: Any, gait: Any, phase: Any
-) -> None:
+    y: Any, at: Any, wish: Any, held: float, whole: bool, drawn: float, position: Any, direction: Any,
+    gait: Any, phase: Any,
+) -> None:  # fmt: skip
     """Advance one frame: shift the past, move and turn the root, take the predicted future and phase change.
 
     y: (C, outputs) prediction. at: columns of y (root velocity, turn, phase change, position, direction),
@@ -211,6 +213,9 @@ def advance(
     Movement is scaled by (1 - stand)^.25, except with `whole` (`Network.rooted`), where movement belongs to
     the pose. held: the share that is removed of movement against the wished velocity `wish` (C, 2), or of all
     movement if the wish is to turn on the spot; 0 is the original runtime.
+    drawn: how far the movement is drawn toward the wish, at most, as a share of its own length (after the
+    adjustment of Holden et al. 2020). Clips have only some directions and speeds, and feet in contact are
+    held.
     The predicted yaw velocity is that of the world seen from the root, so the root turns by its negative.
     """
     length = position.shape[1]
@@ -234,8 +239,11 @@ def advance(
         else:
             against = held * min(0.0, x * wish[c, 0] + z * wish[c, 1]) / speed
             x, z = x - against * wish[c, 0], z - against * wish[c, 1]
-        position[c, middle, 0] += x
-        position[c, middle, 1] += z
+        lack_x, lack_z = wish[c, 0] - x, wish[c, 1] - z
+        lack = np.sqrt(lack_x * lack_x + lack_z * lack_z)
+        share = min(1.0, drawn * np.sqrt(x * x + z * z) / max(lack, 1e-9))
+        position[c, middle, 0] += x + share * lack_x
+        position[c, middle, 1] += z + share * lack_z
         yaw -= moving * y[c, at[1]]
         sin, cos = np.sin(yaw), np.cos(yaw)
         direction[c, middle, 0], direction[c, middle, 1] = sin, cos

@@ -41,7 +41,9 @@ class ChannelSources:
         """The fields of a `Source` for channel `name` and a clip as plain data, without `files`."""
         return {
             "clip": self.clips.original(clip),
-            "entry": self.clips.entry(dataset, clip).model_dump(mode="json", exclude={"channels", "hurt"}),
+            "entry": self.clips.entry(dataset, clip).model_dump(
+                mode="json", exclude={"channels", "hurt", "person"}
+            ),
             "value": self._value(dataset, clip, name),
             "options": self.catalogue.dataset(dataset).channels.get(name, {}),
         }

@@ -87,9 +87,11 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
 
   const limited = spec.channels.filter((one) => one.limits);
   const allowed = (g) => {
-    let most = Infinity;
+    let least = Infinity, both = limited[0].limits.usual[g];
+    const usual = both;
     for (const { first, limits } of limited) {
       const { levels, speeds } = limits;
+      let most = Infinity;
       for (let l = 0; l < speeds[g].length; l++) {
         const v = c.told[first + l];
         if (!(v > 0)) continue;
@@ -98,8 +100,10 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
         const [low, high] = [speeds[g][l][i], speeds[g][l][i + 1]];
         most = min(most, low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low));
       }
+      least = min(least, most);
+      if (usual > 0) both *= min(1, most / usual);
     }
-    return most;
+    return least < usual ? both : least;
   };
   const hold = (velocity, gait) => {
     if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.told[first + l] > 0))) return velocity;
@@ -261,8 +265,11 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       const against = held * min(0, a * wish[0] + b * wish[1]) / squared;
       [a, b] = [a - against * wish[0], b - against * wish[1]];
     }
-    c.px[M] += a;
-    c.pz[M] += b;
+    // The movement of a clip is drawn toward the wish, a little: clips have only some directions and speeds.
+    const drawn = spec.steering > 0 && spec.rooted ? k.drawn : 0, lack = [wish[0] - a, wish[1] - b];
+    const share = min(1, drawn * hypot(a, b) / max(hypot(...lack), 1e-9));
+    c.px[M] += a + share * lack[0];
+    c.pz[M] += b + share * lack[1];
     yaw -= moving * y[Y.turn];
     const si = c.dx[M] = sin(yaw), co = c.dz[M] = cos(yaw);
     for (let i = M + 1; i < T; i++) {

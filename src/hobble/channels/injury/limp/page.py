@@ -43,6 +43,7 @@ def section(found: Json, material: Material) -> Section:
                     "Is the limp of a hurt leg recognised?",
                 ),
             ),
+            Part(5, together_table(name, found["named_together"])),
             Part(4, exam_table(name, found["exam"])),
             Part(80, size_table(name, found["sizes"])),
             Part(81, captured_table(name, found["captured"])),
@@ -149,6 +150,23 @@ def size_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
         return None
     columns = [Column(k) if k in texts else Column.number(k.replace("_", " ")) for k in rows[0]]
     return Table(f"{name}-limp-sizes", columns, [list(row.values()) for row in rows], "Sizes of all effects")
+
+
+def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+    """How limps of hurt legs are recognised while a value of another channel is at its highest."""
+    if not rows:
+        return None
+    columns = [
+        Column("with"),
+        Column.count("walks"),
+        Column.number("speed, share of the same walk without injury"),
+        Column.number("called impaired"),
+        Column.number("recognised"),
+        Column.number("wrong side"),
+    ]
+    keys = ("column", "walks", "speed_share", "impaired", "named", "wrong_side")
+    title = "Is the limp of a hurt leg (severity 10) recognised together with another value?"
+    return Table(f"{name}-limp-together", columns, [[row.get(key) for key in keys] for row in rows], title)
 
 
 def captured_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:

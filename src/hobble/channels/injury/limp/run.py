@@ -14,6 +14,7 @@ import numpy as np
 
 from hobble.channels.injury.limp import Options
 from hobble.channels.injury.limp.captured import HurtSeconds, Limp, healthy_of, limps
+from hobble.channels.injury.limp.together import limps_together, named_together
 from hobble.channels.injury.limp.walks import Shown, shown
 from hobble.channels.injury.walks import hurt_links
 from hobble.channels.injury.walks import links as links_of
@@ -62,6 +63,8 @@ def limp(
     recognised limp. `steady`: Spearman's rho of each effect with severity, and its size at 10. `named`:
     shares of windows by severity, over the links of the legs. `people`: mean and spread of each effect.
     `captured`: effects of captured clips. `exam`: see `examined`. `second`: see `second_injuries`.
+    `together`: effects on hurt legs with a value of another channel, and `named_together`, see
+    `hobble.channels.injury.limp.together`.
     """
     head: dict[str, Any] = {"configuration": configuration}
     if not links_of(network) or network.skeleton is None:
@@ -98,7 +101,23 @@ def limp(
         "captured": [_of_clip(network.skeleton, one, every) for one in every if one.hurt],
         "exam": examined(network, every, splits, seconds, runtime),
         "second": second_injuries(network, links, seconds, runtime),
+        **_together(network, links, seconds, runtime),
     }
+
+
+def _together(
+    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
+) -> dict[str, list[dict[str, Any]]]:
+    """The rows of hurt legs with values of another channel, and their recognition."""
+    assert network.skeleton is not None
+    skeleton = network.skeleton
+    legs = [link for link in links if part_of_link(skeleton, _pair(skeleton, link)).name in LEG]
+
+    def row(link: str, figure: Shown, healthy: Shown) -> dict[str, Any]:
+        return _row(network, "walk", link, SEVERITIES[-1], figure, healthy)
+
+    rows = limps_together(network, legs, SPEEDS["walk"], seconds, runtime, row)
+    return {"together": rows, "named_together": named_together(rows)}
 
 
 def hurt_side(skeleton: Skeleton, link: str) -> str:
@@ -271,7 +290,7 @@ def run(given: Given, options: Options) -> Outcome:
         runtime=given.runtime,
         seconds=options.limp_seconds,
     )
-    tables = {name: result.get(name, []) for name in ("sizes", "steady", "named", "second")}
+    tables = {name: result.get(name, []) for name in ("sizes", "steady", "named", "second", "together")}
     at_10 = next((row for row in result.get("named", []) if row["severity"] == SEVERITIES[-1]), None)
     says = f"legs at 10: called impaired in {at_10['impaired']} of windows" if at_10 else result["reason"]
     return Outcome(result, tables, says)
