@@ -35,7 +35,7 @@ coordinate = st.floats(-25, 25)
 
 
 def crouched(skeleton: Skeleton, thigh: float = 0.5, knee: float = 0.9) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (J, 3) and world rotations (J, 4) of a figure. Radians that thighs are forward, knees bent."""
+    """Positions (J, 3) and world rotations (J, 4) of a figure. Radians: thighs forward, knees bent."""
     local = np.tile([1.0, 0, 0, 0], (1, len(skeleton.joints), 1))
     for side in ("left", "right"):
         local[0, skeleton.role(f"{side}_hip")] = quat.from_axis_angle([1.0, 0, 0], -thigh)
