@@ -98,11 +98,10 @@ class Feet:
         if ground is None:  # just under the feet, neither sunk nor floating
             ground = min(self.base[0][self.legs[0, 2], 1] - 5.0, self.base[0][self.legs[0, 3], 1] - 4.0) - 1.0
         position, rotation = self.base[0][None] + moved, self.base[1][None].copy()
-        place_feet(
-            np.array([[contact, contact, 0, 0]], np.float32), 0, np.full((1, 4), ground), locking, self.legs,
-            self.below,
-            np.array([5.0, 4.0]), self.lock, self.hold, self.lift, self.added, position, rotation,
-        )  # fmt: skip
+        contacts = np.array([[contact, contact, 0, 0]], np.float32)
+        legs = self.legs, self.below, np.array([5.0, 4.0])
+        feet = self.lock, self.hold, self.lift, self.added
+        place_feet(contacts, np.full((1, 4), ground), locking, legs, feet, position, rotation)
         self.rotation = rotation[0]
         return position[0]
 
@@ -269,9 +268,8 @@ def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
         lift = np.zeros(1)
         for _ in range(80):
             position = base[None].copy()
-            carry_body(
-                np.array([contacts], np.float32), 0, ground, hips, low, high, legs, sole, lift, position
-            )
+            both = legs, carried(holden31, legs), sole
+            carry_body(np.array([contacts], np.float32), ground, hips, (low, high), both, lift, position)
         moved = position[0] - base
         np.testing.assert_allclose(moved[:, 1], moved[0, 1], atol=1e-12)
         np.testing.assert_array_equal(moved[:, ::2], 0)

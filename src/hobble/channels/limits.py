@@ -225,17 +225,17 @@ class Pace:
         """
         parts = []
         for source, cycles in self._clips.values():
-            told = cycles.values.any(axis=1)
+            changed = cycles.values.any(axis=1)
             if source is not None and source in self._clips:
                 own = self._clips[source][1]
                 neutral = np.where(own.values.any(axis=1), 0.0, own.speed)
                 speed_of = dict(zip(own.number.tolist(), neutral.tolist(), strict=True))
-                beside = np.array([speed_of.get(n, 0.0) for n in cycles.number.tolist()])
+                healthy_speed = np.array([speed_of.get(n, 0.0) for n in cycles.number.tolist()])
             else:  # captured: only forward cycles can be compared with the usual speed
                 counts = (cycles.ahead >= AHEAD * cycles.speed) & ~cycles.others
-                beside = np.where(counts, usual[cycles.gait], 0.0)
-            on = told & (beside > MOVING)
-            share = np.clip(cycles.speed[on] / beside[on], SLOWEST, 1.0)
+                healthy_speed = np.where(counts, usual[cycles.gait], 0.0)
+            on = changed & (healthy_speed > MOVING)
+            share = np.clip(cycles.speed[on] / healthy_speed[on], SLOWEST, 1.0)
             parts.append((cycles.gait[on], share, cycles.values[on]))
         if not parts:
             return np.zeros(0, int), np.zeros(0), np.zeros((0, len(self.across)))

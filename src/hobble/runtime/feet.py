@@ -34,6 +34,15 @@ SOLE = (5.0, 4.0)  # height of heel and toe joint above the ground in a standing
 FOOT, TOES = 1, 2  # the joints of a foot, see `carried`
 
 
+# Groups of arrays for compiled functions, which unpack them by name.
+#
+# joints (2, 4), see `leg_joints`; carried (2, J), see `carried`; sole (2,), see `sole_heights`.
+Legs = tuple[Any, Any, Any]
+# The state of the feet between frames: lock (C, 2), share of the hold; hold (C, 2, 2), x and z where the toe
+# landed; lift (C, 2), smoothed rise of the heel; added (C, 2, 2, 4), see `bend`.
+Feet = tuple[Any, Any, Any, Any]
+
+
 def leg_joints(skeleton: Skeleton) -> np.ndarray:
     """(2, 4) hip, knee, heel and toe joints of the left leg, then of the right."""
     parts = ("hip", "knee", "heel", "toe")
@@ -240,9 +249,14 @@ def sunk(position: Any, heel: int, toe: int, ground_heel: float, ground_toe: flo
 
 @njit
 def carry_body(
-    y: Any, first: int, ground: Any, hips: int, hips_low: float, hips_high: float, legs: Any, sole: Any,
-    lift: Any, position: Any,
-) -> None:  # fmt: skip
+    contacts: Any,
+    ground: Any,
+    hips: int,
+    hips_range: tuple[float, float],
+    legs: Legs,
+    lift: Any,
+    position: Any,
+) -> None:
     """Raise or lower whole bodies, positions (C, J, 3), so that they stand on the ground under them.
 
     The network gets the ground as the mean height along two seconds of path. On a hill a few metres long this
@@ -250,47 +264,48 @@ def carry_body(
     So the standing feet decide the height of the body, and the hips stay within their height range above the
     ground in training.
 
-    ground: (C, 5) heights under the feet as in `place_feet`, then under the hips; hips_low, hips_high: range
-    of the hips; lift: (C,) cm by which the body is raised, kept between frames; the rest: see `place_feet`.
+    contacts: see `place_feet`. ground: (C, 5) heights under the feet as in `place_feet`, then under the hips.
+    hips: the joint. hips_range: lowest and highest, cm above the ground. lift: (C,) cm by which the body is
+    raised, kept between frames.
     """
+    joints, _, sole = legs
     for c in range(position.shape[0]):
         wanted, weight = 0.0, 0.0
         for f in range(2):
             under = ground[c, 2 * f], ground[c, 2 * f + 1]
-            rise = sunk(position[c], legs[f, 2], legs[f, 3], under[0], under[1], sole)
-            stands = min(max(y[c, first + 2 * f], y[c, first + 2 * f + 1], 0.0), 1.0)
+            rise = sunk(position[c], joints[f, 2], joints[f, 3], under[0], under[1], sole)
+            stands = min(max(contacts[c, 2 * f], contacts[c, 2 * f + 1], 0.0), 1.0)
             wanted += stands * (max(rise - BODY_FREE, 0.0) + min(rise + BODY_FREE, 0.0))
             weight += stands
         if weight > BODY_MIN_CONTACT:
             lift[c] += BODY_MIX * (wanted / weight - lift[c])
         above = position[c, hips, 1] - ground[c, 4]
-        lift[c] = min(max(lift[c], hips_low - above), hips_high - above)
+        lift[c] = min(max(lift[c], hips_range[0] - above), hips_range[1] - above)
         for j in range(position.shape[1]):
             position[c, j, 1] += lift[c]
 
 
 @njit
 def place_feet(
-    y: Any, first: int, ground: Any, locking: bool, legs: Any, below: Any, sole: Any,
-    lock: Any, hold: Any, lift: Any, added: Any, position: Any, rotation: Any,
-) -> None:  # fmt: skip
+    contacts: Any, ground: Any, locking: bool, legs: Legs, feet: Feet, position: Any, rotation: Any
+) -> None:
     """Hold feet in contact and keep feet out of the ground. Changes the pose and the state of the feet.
 
-    y: (C, outputs); from column `first`: contacts of left heel, left toe, right heel, right toe.
-    ground: (C, 4 or more) heights under them. legs: (2, 4), see `leg_joints`; below: (2, J), see
-    `carried`; sole: (2,), see `sole_heights`. lock: (C, 2) share of the hold; hold: (C, 2, 2) x, z where the
-    toe landed; lift: (C, 2) smoothed rise of the heel; added: (C, 2, 2, 4), see `bend`.
+    contacts: (C, 4) of left heel, left toe, right heel, right toe. ground: (C, 4 or more) heights under them.
+    locking: whether feet are held at all. position: (C, J, 3); rotation: (C, J, 4) of the pose.
     """
+    joints, below, sole = legs
+    lock, hold, lift, added = feet
     shift, by = np.zeros(3), np.zeros(4)
     for c in range(position.shape[0]):
         for f in range(2):
-            hip, knee, heel, toe = legs[f, 0], legs[f, 1], legs[f, 2], legs[f, 3]
+            hip, knee, heel, toe = joints[f, 0], joints[f, 1], joints[f, 2], joints[f, 3]
             x, z = position[c, toe, 0], position[c, toe, 2]
             away_x, away_z = hold[c, f, 0] - x, hold[c, f, 1] - z
             far = lock[c, f] * np.sqrt(away_x * away_x + away_z * away_z)
             if not locking:
                 lock[c, f] = 0.0
-            elif y[c, first + 2 * f + 1] >= LOCK_AT and far < TOO_FAR:
+            elif contacts[c, 2 * f + 1] >= LOCK_AT and far < TOO_FAR:
                 if lock[c, f] < 1.0:
                     # Hold the foot where it is shown now, so that renewed contact does not pull it back.
                     away_x, away_z = lock[c, f] * away_x, lock[c, f] * away_z

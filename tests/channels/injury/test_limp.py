@@ -175,12 +175,12 @@ def test_the_exam_is_passed_by_the_right_leg_alone(measured) -> None:
         clip("7_3", {RIGHT_KNEE: 8.0}, {"right": 0.8}),
     )
     splits = {"7_1": "train", "7_2": "held_out", "7_3": "train"}
-    (row,) = measured(lambda s: 0.1 * s, every=every, splits=splits)["exam"]
+    (row,) = measured(lambda s: 0.1 * s, every=every, splits=splits)["held_out_limps"]
     assert row["clip"] == "7_2"
     assert row["nearer"]
     assert row["hurt"] < 0.3 * row["healthy"]
-    assert not measured(lambda s: 0.1 * s, True, every, splits)["exam"][0]["nearer"]
-    assert not measured(lambda s: 0.0, False, every, splits)["exam"][0]["nearer"]
+    assert not measured(lambda s: 0.1 * s, True, every, splits)["held_out_limps"][0]["nearer"]
+    assert not measured(lambda s: 0.0, False, every, splits)["held_out_limps"][0]["nearer"]
 
 
 def test_a_clip_is_set_beside_its_own_performer() -> None:

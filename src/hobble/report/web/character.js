@@ -9,7 +9,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const S = T / step, F = M / step, G = gaits.length, predict = networks[spec.network.kind](spec);
   const { atan2, sin, cos, hypot, floor, min, max, abs, sqrt, PI } = Math;
   const wrap = (angle) => angle - 2 * PI * floor((angle + PI) / (2 * PI));
-  // What the body is told, channel after channel: where each column lies in X, and how far it may go in a frame.
+  // The columns of all channels in order: the place of each in X, and how far its value may change in a frame.
   const columns = spec.channels.flatMap((one) => one.columns.map((_, l) => ({ at: X[one.name] + l, rate: one.rate }))), L = columns.length;
   const x = new Float32Array(X.size);
   const filled = (n, value) => new Float64Array(n).fill(value);
@@ -17,7 +17,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const c = {
     px: filled(T, place[0]), pz: filled(T, place[1]), dx: filled(T, sin(heading)), dz: filled(T, cos(heading)),
     gait: filled(T * G, 0), ground: filled(S * 3, 0), height: 0, phase: 0, joints: filled(3 * J, 0),
-    velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), told: filled(L, 0), wished: filled(L, 0),
+    velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), channelValues: filled(L, 0), channelTargets: filled(L, 0),
     velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, owed: [0, 0], lock: [0, 0],
     hold: [[0, 0], [0, 0]], lift: [0, 0], raised: 0, placed: false, added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
     memory: filled(spec.network.memory ?? 0, 0),
@@ -56,7 +56,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   for (let j = 0; j < J; j++) c.rotations.set(multiply(facing0, at4(rotations, j)), 4 * j);
   settle();
 
-  // What the network is told and answers keeps within what it saw in training.
+  // Inputs and outputs are clipped to the range seen in training.
   const [xLow, xHigh, yLow, yHigh] = ["xLow", "xHigh", "yLow", "yHigh"].map((name) => new Float32Array(bytes(spec.bounds[name])));
   const within = (row, low, high) => { for (let i = 0; i < row.length; i++) row[i] = min(max(row[i], low[i]), high[i]); };
 
@@ -93,7 +93,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       const { levels, speeds } = limits;
       let most = Infinity;
       for (let l = 0; l < speeds[g].length; l++) {
-        const v = c.told[first + l];
+        const v = c.channelValues[first + l];
         if (!(v > 0)) continue;
         let i = 0;
         while (i < levels.length - 2 && levels[i + 1] <= v) i++;
@@ -106,7 +106,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     return least < usual ? both : least;
   };
   const hold = (velocity, gait) => {
-    if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.told[first + l] > 0))) return velocity;
+    if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.channelValues[first + l] > 0))) return velocity;
     const each = gaits.map((_, g) => allowed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");
     let hurry = 1;
     if (each[jog] < k.lameBelow) {
@@ -187,7 +187,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       c.root[1] = c.height;
       c.placed = true;
     }
-    columns.forEach(({ rate }, l) => { c.told[l] += min(max(c.wished[l] - c.told[l], -rate), rate); });
+    columns.forEach(({ rate }, l) => { c.channelValues[l] += min(max(c.channelTargets[l] - c.channelValues[l], -rate), rate); });
   };
   const input = () => {
     let [px, pz, co, si] = [c.px[M], c.pz[M], c.dz[M], c.dx[M]];
@@ -210,7 +210,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       x[v + 1] = c.velocities[j + 1];
       x[v + 2] = c.velocities[j] * si + c.velocities[j + 2] * co;
     }
-    columns.forEach(({ at }, l) => { x[at] = c.told[l]; });
+    columns.forEach(({ at }, l) => { x[at] = c.channelValues[l]; });
   };
   const output = (y, ground) => {
     const si = c.dx[M], co = c.dz[M];
