@@ -326,11 +326,45 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     } else c.lock[f] = max(0, c.lock[f] - k.release);
     const up = sunk(f, ground), rise = max(up, 0) + c.lock[f] * min(up + k.floating, 0);
     c.lift[f] += k.heightMix * (rise - c.lift[f]);
-    away = away.map((v) => v * c.lock[f]);
+    const shift = [c.lock[f] * away[0], c.lift[f], c.lock[f] * away[1]];
+    const by = c.lock[f] > 0 ? raiseHeel(joint(hip), joint(knee), joint(heel), point, shift) : [1, 0, 0, 0];
     const before = Array.from(joint(heel));
-    bend(joint(hip), joint(knee), joint(heel), [away[0], c.lift[f], away[1]], hip, knee, c.added[f]);
-    const moved = joint(heel).map((v, i) => v - before[i]);
-    for (const j of spec.carried[f]) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
+    bend(joint(hip), joint(knee), joint(heel), shift, hip, knee, c.added[f]);
+    carryFoot(f, before, by);
+  };
+  // The heel of a held foot rises where the leg would stretch too far; the turn of the foot about its toe.
+  const raiseHeel = (hip, knee, heel, toe, shift) => {
+    const flat = [1, 0, 0, 0], leg = minus(heel, hip);
+    const whole = k.stretch * (hypot(...minus(knee, hip)) + hypot(...minus(heel, knee)));
+    const aim = leg.map((v, i) => v + shift[i]), needed = dot(aim, aim), least = max(dot(leg, leg), whole * whole);
+    const along = hypot(toe[0] - heel[0], toe[2] - heel[2]), high = heel[1] - toe[1];
+    if (needed <= least || along < 1e-6) return flat;
+    const fx = (toe[0] - heel[0]) / along, fz = (toe[2] - heel[2]) / along;
+    const [wx, up, wz] = minus(toe, hip).map((v, i) => v + shift[i]), ahead = wx * fx + wz * fz;
+    if (ahead >= 0) return flat;
+    const most = least + max(1 + ahead / k.behind, 0) * (needed - least);
+    const cosine = up * high - ahead * along, sine = ahead * high + up * along;
+    const share = .5 * (most - wx * wx - up * up - wz * wz - along * along - high * high) / hypot(cosine, sine);
+    const angle = min(max(atan2(sine, cosine) + Math.acos(min(max(share, -1), 1)), 0), k.mostAdded);
+    const forward = along * (1 - cos(angle)) + high * sin(angle);
+    shift[0] += forward * fx;
+    shift[1] += along * sin(angle) - high * (1 - cos(angle));
+    shift[2] += forward * fz;
+    return [cos(angle / 2), sin(angle / 2) * fz, 0, -sin(angle / 2) * fx];
+  };
+  // The joints below a heel that was at `before`: the foot turns `by`, its toes do not.
+  const carryFoot = (f, before, by) => {
+    const [, , heel, toe] = spec.legs[f], now = joint(heel);
+    const place = (point) => rotate(by, minus(point, before)).map((v, i) => v + now[i]);
+    const moved = minus(place(joint(toe)), joint(toe));
+    c.turns.set(multiply(by, at4(c.turns, heel)), 4 * heel);
+    for (const j of spec.carried[f]) {
+      if (spec.toes[f].includes(j)) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
+      else {
+        c.pose.set(place(joint(j)), 3 * j);
+        c.turns.set(multiply(by, at4(c.turns, j)), 4 * j);
+      }
+    }
   };
   // Turns `held` toward `aim` by at most mostAdded. Returns whether it did not reach it.
   const approach = (held, aim) => {
