@@ -154,10 +154,11 @@ def clip_table(material: Material) -> Table:
 
 
 def remarks_table(material: Material) -> Table | None:
-    """Every repair and warning."""
+    """Every repair, doubt and warning."""
     rows = []
     for stage, reports, key in (
         ("motion", material.motion, "repairs"),
+        ("motion", material.motion, "unsure"),
         ("labels", material.labels, "warnings"),
         (None, material.told, "warnings"),
     ):
