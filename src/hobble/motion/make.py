@@ -152,10 +152,10 @@ def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str)
             own = replace(own, skeleton=target) if same else own
             return Fitted(own, 1.0, [KEPT] if source.moving else [])
     sources, unsure = match.sources, source.unsure
-    if not source.told:
+    if not source.straightened:
         wanted = {clip.skeleton.index(name) for name in sources.values()}
-        told = upright(clip, body_by_roles(clip.skeleton), target, wanted)
-        clip, unsure = told.clip, told.notes
+        standing = upright(clip, body_by_roles(clip.skeleton), target, wanted)
+        clip, unsure = standing.clip, standing.notes
         sources = {mine: theirs for mine, theirs in sources.items() if theirs in clip.skeleton.joints}
     how = plan(clip.skeleton, target, sources)
     repairs = [DROPPED] if source.moving else []
