@@ -4,9 +4,9 @@
 
 DATABASE is results/datasets/<dataset>/database/plain; the `clips` that it was made from have to be in the
 same folder. Frame times are divided by those of the first network. They are measured on one core, with one
-character that walks, jogs, stops and turns, and with CROWD of them. Each kind stores its numbers as it does by
-default. The networks take turns, a stretch of frames each, so that other work on the machine affects all of
-them equally. The script prints the median of the ratios of the stretches' means. A stretch includes frames
+character that walks, jogs, stops and turns, and with CROWD of them. Each kind stores its numbers as it does
+by default. The networks take turns, a stretch of frames each, so that other work on the machine affects all
+of them equally. The script prints the median of the ratios of the stretches' means. A stretch includes frames
 with and without a search of motion matching.
 """
 
