@@ -26,7 +26,7 @@ from hobble.report.playable import playable
 
 @pytest.fixture(scope="module")
 def compared(material: Material) -> dict[str, Any]:
-    """Two configurations: the example, and one of half its error and twice its time."""
+    """Two configurations: the example, and one with half its error and twice its time."""
     resolved = {
         "configuration": {
             "dataset": "made_up",
