@@ -78,6 +78,7 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
         },
         "responsivity": {
             "parameters": counts,
+            "bytes_each": 4,
             "stored": {
                 "constant": 50 * counts["true"],
                 "linear": 10 * counts["true"],

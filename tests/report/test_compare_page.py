@@ -42,6 +42,7 @@ def compared(material: Material) -> dict[str, Any]:
         responsivity = {
             **material.measured["responsivity"],
             "parameters": {k: factor * v for k, v in counts.items()},
+            "bytes_each": 4,
             "stored": {"cubic": 4 * factor * counts["true"]},
             "exact": "cubic",
         }
