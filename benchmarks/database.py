@@ -54,12 +54,12 @@ def made_up(folder: Path, size: int, joints: int) -> dict[str, Path]:
             "mean": (CLIP_ROWS * fits,),
         }
         arrays = {name: rng.standard_normal(shape, np.float32) for name, shape in shapes.items()}
-        told = {"injury": rng.standard_normal((CLIP_ROWS, 30), np.float32)}
+        channels = {"injury": rng.standard_normal((CLIP_ROWS, 30), np.float32)}
         count = np.full(CLIP_ROWS, fits)
         frame = np.arange(CLIP_ROWS)
         name = f"clip{len(files):04d}"
         rows = ClipRows(
-            name, layout, skeleton, frame=frame, cycle=frame // 60, fits=count, channels=told, **arrays
+            name, layout, skeleton, frame=frame, cycle=frame // 60, fits=count, channels=channels, **arrays
         )
         files[name] = folder / f"{name}.npz"
         save_clip_rows(files[name], rows)

@@ -25,7 +25,7 @@ from hobble.report.recogniser import playable_with_recogniser
 from hobble.report.scenes import scenes
 from hobble.runtime.options import Runtime
 
-REPORTS = {"motion": "motion", "labels": "labels", "told": "channels/injury"}
+REPORTS = {"motion": "motion", "labels": "labels", "channels": "channels/injury"}
 TABLES = {"rows": "database/clips", "terrain": "terrain/clips"}
 
 

@@ -1,4 +1,4 @@
-"""Each injury is as large as people's, at every severity, on both sides, on made and on captured clips."""
+"""Each injury has the size measured on people: every severity, both sides, generated and captured clips."""
 
 from __future__ import annotations
 
@@ -63,6 +63,13 @@ def test_at_five_between_one_and_two_thirds_and_at_three_a_quarter_or_more(made,
         assert 1 / 3 <= change[5] / change[10] <= 2 / 3, (name, change)
         assert 0.22 <= change[3] / change[10] <= 0.5, (name, change)
         assert np.all(np.diff(np.abs(list(change.values()))) > 0)
+
+
+@pytest.mark.parametrize("part", ["thigh", "shank"])
+def test_the_knee_at_five_is_between_one_and_two_thirds_of_ten(made, hurting, part) -> None:
+    less = {s: 1 - seen(made("straight"), hurting, LEG[part], float(s))["knee"] for s in (3, 5, 7, 10)}
+    assert 1 / 3 <= less[5] / less[10] <= 0.62, less
+    assert less[3] < less[5] < less[7] < less[10] - 0.1, less
 
 
 def test_links_of_one_leg_can_be_told_apart(made, hurting) -> None:

@@ -46,10 +46,10 @@ def clip(
     local = np.tile(network.y_mean[network.layout.y_joint_position].reshape(-1, 3), (FRAMES, 1, 1))
     local = local + rng.normal(0, 0.3, local.shape)
     local[:, [skeleton.role("neck"), skeleton.role("head")], 2] += lean
-    told = {key: np.zeros((FRAMES, len(columns))) for key, columns in network.channels.items()}
-    told["injury"][150:, 0] = hurt
+    channels = {key: np.zeros((FRAMES, len(columns))) for key, columns in network.channels.items()}
+    channels["injury"][150:, 0] = hurt
     if mood:
-        told["mood"][:, network.channels["mood"].index(mood)] = value
+        channels["mood"][:, network.channels["mood"].index(mood)] = value
     gait = np.zeros((FRAMES, 6))
     gait[:, 1] = 1
     contacts = np.zeros((FRAMES, 4))
@@ -58,7 +58,7 @@ def clip(
     root = np.zeros((FRAMES, 3))
     root[:, 2] = 2.0 * np.arange(FRAMES)
     still, rows = np.zeros(FRAMES), np.arange(FRAMES)
-    return Captured(name, local, contacts, still, told, gait, velocity, root, still, rows)
+    return Captured(name, local, contacts, still, channels, gait, velocity, root, still, rows)
 
 
 @pytest.fixture
@@ -122,15 +122,15 @@ def test_a_manner_of_one_person_is_never_named_without_that_person() -> None:
 def test_each_manner_is_tried_with_each_column_of_another_channel(
     both: Network, motion: list[Captured], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The generated figures are replaced by captured windows: of the mood told, but of none at one link."""
+    """Captured windows take the place of the generated figures: of the right mood, of none at one link."""
     real = {m: captured_windows(clip(both, f"{m}-9", m, lean=lean), both, "mood") for m, lean in LEANS}
     asked: list[Figure] = []
     broken = both.channels["injury"][3]
 
     def generated(network: Network, figures: Sequence[Figure], name: str, runtime: Runtime):
         asked.extend(figures)
-        moods = [next(iter(f.told["mood"]), None) for f in figures]
-        lost = [broken in f.told.get("injury", {}) for f in figures]
+        moods = [next(iter(f.channels["mood"]), None) for f in figures]
+        lost = [broken in f.channels.get("injury", {}) for f in figures]
         return [real[None if gone else mood] for mood, gone in zip(moods, lost, strict=True)]
 
     monkeypatch.setattr(run, "generated", generated)
@@ -143,9 +143,9 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
     assert len(rows) == 3 * 25
     assert {r["column"] for r in rows if r["share"] != 1.0} == {broken}
     assert [r["share"] for r in rows if r["column"] == broken] == [1.0, 0.0, 0.0]
-    told = [f.told for f in asked if "injury" in f.told]
-    assert {value for one in told for value in one["injury"].values()} == {10.0}
-    assert [f.speed for f in asked if "injury" in f.told] == pytest.approx([2.0] * 75, rel=1e-3)
+    channels = [f.channels for f in asked if "injury" in f.channels]
+    assert {value for one in channels for value in one["injury"].values()} == {10.0}
+    assert [f.speed for f in asked if "injury" in f.channels] == pytest.approx([2.0] * 75, rel=1e-3)
     effect = found["effects"][2]
     assert (effect["manner"], effect["effect"]) == ("old", "trunk")
     rest = both.y_mean[both.layout.y_joint_position].reshape(-1, 3)

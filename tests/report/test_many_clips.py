@@ -23,7 +23,7 @@ def of_many(material: Material, copies: int) -> Material:
         return [{**one, "clip": f"{one['clip']}-{i}"} for i in range(copies) for one in reports]
 
     splits = {f"{clip}-{i}": split for clip, split in material.splits.items() for i in range(copies)}
-    many = {key: copied(getattr(material, key)) for key in ("motion", "labels", "told")}
+    many = {key: copied(getattr(material, key)) for key in ("motion", "labels", "channels")}
     return replace(material, splits=splits, **many)
 
 
@@ -36,7 +36,7 @@ def test_every_kind_of_clip_is_shown(material: Material) -> None:
     some = shown_clips.shown(many, most=40)
     assert len(some) == 40
     assert {many.split(clip) for clip in some} == {"train", "held_out"}
-    hurt = {report["clip"] for report in many.told if report["told"]}
+    hurt = {report["clip"] for report in many.channels if report["values"]}
     assert some & hurt
     assert some - hurt
     reordered = replace(many, labels=many.labels[::-1])
@@ -78,7 +78,7 @@ def test_many_remarks_are_told_by_kind(material: Material, monkeypatch: pytest.M
     monkeypatch.setattr(data_section, "MOST_REMARKS", 3)
     sentences = ["frames 1-3 held", "frames 20-31 held", "frames 4-5 held", "no foot down for 2.5 s"]
     motion = [{**material.motion[0], "clip": f"c{i}", "repairs": [s]} for i, s in enumerate(sentences)]
-    table = data_section.remarks_table(replace(material, motion=motion, labels=[], told=[]))
+    table = data_section.remarks_table(replace(material, motion=motion, labels=[], channels=[]))
     assert table is not None
     assert table.title == "4 repairs and warnings, by kind"
     assert table.rows == [

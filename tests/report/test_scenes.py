@@ -35,11 +35,11 @@ def test_every_scenario_is_thinned_to_thirty_hertz(play: dict[str, Any]) -> None
     assert len(unpacked(walk["pose"], "<i2")) == 300 * play["joints"] * 3
     assert play["joints"] < 31, "joints that are not drawn need not lie in the page"
     assert len(unpacked(walk["contacts"], "u1")) == 300
-    assert "told" not in walk
-    told = hurt["told"]
-    assert (told["spoken"], told["highest"], told["placed"]) == ("left thigh", 10, True)
-    assert any(told["column"] in columns for columns in play["regions"])
-    values = unpacked(told["values"], "u1")
+    assert "swept" not in walk
+    swept = hurt["swept"]
+    assert (swept["spoken"], swept["highest"], swept["placed"]) == ("left thigh", 10, True)
+    assert any(swept["column"] in columns for columns in play["regions"])
+    values = unpacked(swept["values"], "u1")
     assert values.shape == (hurt["frames"],)
     assert values[-1] == pytest.approx(249, abs=2)
 
@@ -67,7 +67,7 @@ def test_bones_lie_where_rotations_put_them_and_keep_their_lengths(
 def test_motion_without_rotations_is_fitted(
     inputs: dict[str, Any], material: Any, play: dict[str, Any], tmp_path: Path
 ) -> None:
-    """Files from before rotations were kept: bones lie where they lay, whatever their twist."""
+    """Files without rotations: bones are at the same places, but their twist is unknown."""
     data = {name: value for name, value in np.load(inputs["scenarios"]).items() if "/rotations" not in name}
     np.savez(tmp_path / "old.npz", **data)
     made = scenes(tmp_path / "old.npz", material.network["skeleton"], material.network["channels"])

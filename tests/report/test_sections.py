@@ -107,9 +107,9 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     assert not found["turns"]["train"].any()
     row, column = np.argwhere(found["both"] > 0)[0]
     assert (coverage._middles(coverage.TURNS)[row], coverage._middles(coverage.SPEEDS)[column]) == (30.0, 1.3)
-    assert list(found["told"]["injury"]) == ["LeftUpLeg-LeftLeg"]
-    assert found["told"]["injury"]["LeftUpLeg-LeftLeg"][6] == pytest.approx(hurt, abs=1 / 60 + 1e-9)
-    (chart,) = coverage.told_charts(found)
+    assert list(found["channels"]["injury"]) == ["LeftUpLeg-LeftLeg"]
+    assert found["channels"]["injury"]["LeftUpLeg-LeftLeg"][6] == pytest.approx(hurt, abs=1 / 60 + 1e-9)
+    (chart,) = coverage.channel_charts(found)
     assert chart is not None
     assert chart.traces[0]["z"][0][6] == pytest.approx(hurt, abs=0.02)
 
@@ -124,7 +124,7 @@ def test_strips_carry_what_hurts(material: Material) -> None:
 
 
 def test_stages_beside_the_published(material: Material) -> None:
-    """A published time or size stands beside the configuration that it is of, and no other."""
+    """A published time or size is shown only for the configuration that it belongs to."""
     nothing, patches = [None, None], [1680, 606.0e6]
     known = {
         "holden": {"terrain": patches, "database": [5400, 7.12e9], "training": [43 * 3600, 122.0e6]},
@@ -170,7 +170,7 @@ def test_feet_that_hardly_stood_have_no_slide(material: Material) -> None:
         return next(figure for figure in figures if figure.label == "Foot slide")
 
     assert (slide(4).value, slide(4).unit) == ("–", "")
-    assert "8 steps" in slide(4).beside
+    assert "8 steps" in slide(4).note
     assert (slide(5).value, slide(5).unit) == ("0", "cm")
 
 

@@ -1,4 +1,4 @@
-"""The character for other pages: the module moves as Python does, and says what it is not given rightly."""
+"""The character for other pages: the module moves as Python does and refuses bad arguments."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ import { pathToFileURL } from "url";
 const { createCharacter, createFigure } = await import(pathToFileURL(`${process.argv[1]}/hobble.js`));
 const data = JSON.parse(readFileSync(`${process.argv[1]}/character.json`));
 const c = createCharacter(data), frames = [], said = [];
-const wrongs = [{ Tail: 3 }, { "LeftUpLeg-LeftLeg": 11 }].map((hurt) => () => c.tell("injury", hurt));
+const wrongs = [{ Tail: 3 }, { "LeftUpLeg-LeftLeg": 11 }].map((hurt) => () => c.setChannel("injury", hurt));
 for (const wrong of [...wrongs, () => c.step({ gait: "fly" })]) {
   try { wrong(); } catch (error) { said.push(`${error.name}: ${error.message}`.slice(0, 60)); }
 }
 for (let f = 0; f < 60; f++) {
-  c.tell("injury", f < 20 ? {} : { "LeftUpLeg-LeftLeg": 7 });
+  c.setChannel("injury", f < 20 ? {} : { "LeftUpLeg-LeftLeg": 7 });
   c.step({ velocity: [.02 * f, 2.5], gait: f < 50 ? null : "crouch" });
   frames.push([Array.from(c.places), Array.from(c.turns), c.phase]);
 }
@@ -51,8 +51,8 @@ import { pathToFileURL } from "url";
 const { createCharacter } = await import(pathToFileURL(`${process.argv[1]}/hobble.js`));
 const data = JSON.parse(readFileSync(`${process.argv[1]}/character.json`));
 const c = createCharacter(data);
-const speeds = TOLD.map((told) => {
-  for (const [name, values] of Object.entries(told)) c.tell(name, values);
+const speeds = VALUES.map((wanted) => {
+  for (const [name, values] of Object.entries(wanted)) c.setChannel(name, values);
   for (let f = 0; f < 90; f++) c.step({ velocity: [0, 2.4] });
   return Array.from(c.places);
 });
@@ -124,25 +124,26 @@ def test_limits_of_two_channels_are_those_of_python(
         limits={"injury": limits(25, 10.0), "mood": limits(5, 1.0)},
     )
     export_web(tmp_path / "web", both, examples.RUNTIME, modules)
-    told = [
+    wanted = [
         {"injury": {links[i]: s}, "mood": {mood: m}}
         for i, s, mood, m in ((3, 7.0, "sad", 0.6), (9, 10.0, "old", 1.0), (2, 6.0, "happy", 0.9))
     ]
-    script = SPEEDS.replace("TOLD", json.dumps(told))
+    script = SPEEDS.replace("VALUES", json.dumps(wanted))
     animation = ProceduralAnimation(both, storage="int16", **dict(examples.RUNTIME))
     turning = playable(both, examples.RUNTIME)["turning"]
-    for values, found in zip(told, in_node(script, tmp_path / "web"), strict=True):
+    for values, found in zip(wanted, in_node(script, tmp_path / "web"), strict=True):
         for _ in range(90):
             pose = animation.next_pose((0.0, 2.4), **values)
         _, at = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
         assert np.abs(np.reshape(found, (-1, 3)) - at[0])[turning].max() < 1e-2
-        alone = [both.limits[name].allowed(animation.state.told[:, part])[0, 1] for name, part in PARTS]
+        now = animation.state.channel_values
+        alone = [both.limits[name].allowed(now[:, part])[0, 1] for name, part in PARTS]
         assert np.hypot(*animation.state.target_velocity[0]) < min(alone) - 0.01
 
 
 def test_what_is_wrong_is_said(walked: dict[str, Any]) -> None:
     assert [text.split(":")[0] for text in walked["said"]] == ["RangeError"] * 3
-    assert "no Tail that was told in training" in walked["said"][0]
+    assert "Tail was not trained" in walked["said"][0]
     assert "no gait fly" in walked["said"][2]
 
 

@@ -90,7 +90,7 @@ def test_the_pose_is_that_of_the_prediction(network) -> None:
     np.testing.assert_allclose(character.state.joint_position[0], (predicted + carried) / 2, atol=1e-4)
     rotations = quat.mul(turn, quat.exp(joints(layout.y_joint_rotation)))
     np.testing.assert_allclose(character.state.joint_rotation[0], rotations, atol=1e-6)
-    legs = character._controller._legs
+    legs, *_ = character._controller._legs
     others = np.setdiff1d(np.arange(layout.joints), [*legs.ravel(), 4, 5, 9, 10])
     np.testing.assert_array_equal(pose.positions[others], character.state.joint_position[0][others])
     assert pose.positions.shape == (31, 3)
@@ -98,7 +98,7 @@ def test_the_pose_is_that_of_the_prediction(network) -> None:
 
 
 def test_no_joint_turns_faster_than_a_joint_can(steady) -> None:
-    """A prediction that jumps half a turn is followed at 25 degrees a frame, the shorter way round."""
+    """After a jump of the prediction by half a turn, the pose follows at 25 degrees a frame."""
     character = ProceduralAnimation(steady)
     evaluate, hand = character._predictor.evaluate, steady.skeleton.role("left_wrist")
     first = steady.layout.y_joint_rotation.start + 3 * hand
@@ -122,7 +122,7 @@ def test_changing_a_pose_does_not_change_the_state(network) -> None:
     for _ in range(40):
         pose, untouched = left.next_pose((1, 2)), right.next_pose((1, 2))
         np.testing.assert_array_equal(pose.positions, untouched.positions)
-        for array in (pose.positions, pose.rotations, pose.contacts, pose.root, *pose.told.values()):
+        for array in (pose.positions, pose.rotations, pose.contacts, pose.root, *pose.channels.values()):
             array[...] = 1e6
 
 
@@ -147,7 +147,7 @@ def test_many_characters_equal_single_characters(hurtable, count: int) -> None:
     many = crowd.next_pose(velocity, facing, gaits, injury={KNEE: severity}, terrain=hills)
     np.testing.assert_allclose(many.positions[-1], one.positions, atol=0.02)
     np.testing.assert_allclose(many.phase[-1], one.phase, atol=1e-4)
-    assert single.told["injury"].max() == pytest.approx(min(severity[-1], 7.5))
+    assert single.channels["injury"].max() == pytest.approx(min(severity[-1], 7.5))
 
 
 def test_the_same_calls_give_the_same_motion(network) -> None:
@@ -202,14 +202,14 @@ def test_gait_blends_slowly_into_the_future(network) -> None:
 def test_severities_change_at_their_rate_and_are_scaled(hurtable) -> None:
     character = ProceduralAnimation(hurtable, rates={"injury": 5.0}, scales={"injury": 2.0})
     index = hurtable.channels["injury"].index(KNEE)
-    on = [p.told["injury"][index] for p in walk(character, 120, injury={KNEE: 10})]
+    on = [p.channels["injury"][index] for p in walk(character, 120, injury={KNEE: 10})]
     np.testing.assert_allclose(on[:60], 5.0 / 60 * np.arange(1, 61))
     assert on[-1] == pytest.approx(5.0)
     kept = walk(character, 5)[-1]
-    assert kept.told["injury"][index] == pytest.approx(5.0)
-    assert kept.told["injury"].sum() == pytest.approx(5.0)
+    assert kept.channels["injury"][index] == pytest.approx(5.0)
+    assert kept.channels["injury"].sum() == pytest.approx(5.0)
     healed = walk(character, 120, injury={})[-1]
-    assert healed.told["injury"].sum() == 0
+    assert healed.channels["injury"].sum() == 0
 
 
 @pytest.mark.parametrize("injury", [{"LeftUpLeg-LeftLeg": 11}, {KNEE: -0.1}, {KNEE: np.nan}])
@@ -320,7 +320,7 @@ def test_terrain_as_function_heightmap_and_array(network) -> None:
 @pytest.mark.parametrize("unit", ["cm", "m"])
 @pytest.mark.parametrize(("handed", "up"), MATRICES)
 def test_a_heightmap_is_in_the_callers_axes_and_unit(network, handed: str, up: str, unit: str) -> None:
-    """A map in the caller's coordinates is the same ground as its function, on the same side."""
+    """A heightmap in the caller's coordinates gives the same ground as the function that it was made from."""
     axes = Axes(handed, up, unit)
 
     def terrain(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -353,7 +353,7 @@ def test_heightmap_is_bilinear_and_goes_on_outside() -> None:
 @pytest.mark.parametrize("unit", ["cm", "m"])
 @pytest.mark.parametrize(("handed", "up"), MATRICES)
 def test_the_callers_axes(network, handed: str, up: str, unit: str) -> None:
-    """The same walk over the same hills, in the caller's terms, is the same walk, left and right included."""
+    """A walk over hills in the caller's axes equals the walk in Hobble's axes, left and right included."""
     axes = Axes(handed, up, unit)
     vertical = "XYZ".index(up)
     level = [k for k in range(3) if k != vertical]
@@ -418,7 +418,7 @@ def test_an_asymmetric_pose_is_the_same_in_every_convention(
 
 
 def test_sides_in_unity_and_unreal() -> None:
-    """The left hand of a figure that faces ahead is where those engines have left."""
+    """The left hand of a character that faces ahead is on the left in each engine's axes."""
     left, up, ahead = np.eye(3)
     unity, unreal, blender = Axes("left", "Y"), Axes("left", "Z"), Axes("right", "Z")
     np.testing.assert_array_equal(
@@ -435,7 +435,7 @@ def test_sides_in_unity_and_unreal() -> None:
 
 
 def test_what_a_game_loads(root: Path) -> None:
-    """No torch, and nothing of what only the workflow or an export needs."""
+    """The runtime imports neither torch nor anything that only the workflow or an export needs."""
     heavy = "{'torch', 'snakemake', 'pydantic', 'onnx', 'onnxruntime', 'matplotlib', 'plotly'}"
     code = f"import sys, hobble.runtime; sys.exit({heavy} & set(sys.modules) or 0)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=root)
@@ -482,11 +482,11 @@ def test_the_released_network_does_not_fall_apart(shared: Path, holden31, mode: 
 
 @pytest.mark.shared
 def test_the_released_network_keeps_its_feet_on_hills(shared: Path, holden31) -> None:
-    """A quarter of a minute in a curve over rolling ground: soles neither in it nor floating, nor sliding."""
+    """A quarter of a minute in a curve over rolling ground: soles neither sink nor float nor slide."""
     network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
     character = ProceduralAnimation(network)
-    legs = character._controller._legs
-    sole = np.tile(character._controller._sole, 2)
+    legs, _, soles = character._controller._legs
+    sole = np.tile(soles, 2)
 
     def rolling(x: np.ndarray, z: np.ndarray) -> np.ndarray:
         return 14 * np.sin(x / 170) * np.cos(z / 140) + 8 * np.sin((x + z) / 260)
@@ -542,7 +542,7 @@ def test_a_start_too_far_from_the_origin_is_refused(network) -> None:
 
 @pytest.mark.parametrize("call", range(2))
 def test_a_terrain_that_raises_leaves_the_state_as_it_was(hurtable, call: int) -> None:
-    """At the first question, about the path, or at the second, about the feet, after the prediction."""
+    """The terrain function fails at its first call (for the path) or at its second (for the feet)."""
     calm, troubled = ProceduralAnimation(hurtable), ProceduralAnimation(hurtable)
     calls = []
 
@@ -563,7 +563,7 @@ def test_a_terrain_that_raises_leaves_the_state_as_it_was(hurtable, call: int) -
 
 
 def test_a_failed_frame_leaves_no_trace(hurtable) -> None:
-    """Whichever of its two looks at the ground failed, in the first frame too."""
+    """Both of the calls in a frame are tried, also in the first frame."""
 
     def hills(x, z):
         return 40 + 0.2 * z

@@ -17,5 +17,7 @@ with job(snakemake) as log:
     )
     for sentence in report["repairs"]:
         log.info("%s", sentence)
+    for sentence in report["unsure"]:
+        log.warning("%s: %s", snakemake.params.clip, sentence)
     save_clip(snakemake.output.clip, clip)
     write_json(snakemake.output.report, report)

@@ -20,8 +20,8 @@ LEVELS = 5  # number of values (0 to the highest) with a speed; others are inter
 TOP = 95  # percentile of the speeds of healthy cycles in a gait: the limit of a healthy body
 # Percentile of the same speeds that counts as usual. The median is too low, because clips start and stop.
 USUAL = 65
-# A body with this share of the usual speed, or less, cannot hurry. With all of it, it can go as fast as a
-# healthy one.
+# A body that keeps at most this share of the usual speed cannot hurry. One that keeps all of it can go as
+# fast as a healthy one.
 CANNOT_HURRY = 0.85
 AHEAD = 0.9  # a cycle counts if at least this share of its speed is forward
 STEADY = 0.35  # of the highest value: a cycle in which a value changes by more is left out
@@ -225,17 +225,17 @@ class Pace:
         """
         parts = []
         for source, cycles in self._clips.values():
-            told = cycles.values.any(axis=1)
+            changed = cycles.values.any(axis=1)
             if source is not None and source in self._clips:
                 own = self._clips[source][1]
                 neutral = np.where(own.values.any(axis=1), 0.0, own.speed)
                 speed_of = dict(zip(own.number.tolist(), neutral.tolist(), strict=True))
-                beside = np.array([speed_of.get(n, 0.0) for n in cycles.number.tolist()])
+                healthy_speed = np.array([speed_of.get(n, 0.0) for n in cycles.number.tolist()])
             else:  # captured: only forward cycles can be compared with the usual speed
                 counts = (cycles.ahead >= AHEAD * cycles.speed) & ~cycles.others
-                beside = np.where(counts, usual[cycles.gait], 0.0)
-            on = told & (beside > MOVING)
-            share = np.clip(cycles.speed[on] / beside[on], SLOWEST, 1.0)
+                healthy_speed = np.where(counts, usual[cycles.gait], 0.0)
+            on = changed & (healthy_speed > MOVING)
+            share = np.clip(cycles.speed[on] / healthy_speed[on], SLOWEST, 1.0)
             parts.append((cycles.gait[on], share, cycles.values[on]))
         if not parts:
             return np.zeros(0, int), np.zeros(0), np.zeros((0, len(self.across)))

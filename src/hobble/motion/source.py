@@ -33,7 +33,6 @@ from hobble.motion.rig import (
     missing_bone,
     unit_of,
 )
-from hobble.motion.spine import Spine
 from hobble.motion.stance import upright
 from hobble.motion.standing import stands
 
@@ -60,7 +59,7 @@ class Source:
     notes: list[str]
     stance: str
     moving: bool
-    told: bool
+    straightened: bool
     unsure: list[str] = field(default_factory=list)
 
 
@@ -74,7 +73,7 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion
     repairs = _frame_count(file, options.defects)
     hips = find_hips(clean_names(file.names), target, maps)
     known = match_rig(rig_of(below_hips(file, hips)), target, maps)
-    if known is not None and known.sources:
+    if known is not None and known.alike and known.sources:
         return _known(file, hips, known, repairs, options)
     return _unknown(file, target, known, repairs, options)
 
@@ -124,29 +123,31 @@ def _unknown(
     clip, axes, unsure = straighten(clip, options.up, options.handedness, standing)
     axes = axes if standing else replace(axes, facing="+Z")
     theirs = body_by_roles(target.skeleton)
-    told = upright(clip, body, Spine.of(target.skeleton, theirs))
+    # A rig with the target's own names follows it name by name, and any other rig part by part.
+    named = known.sources if known is not None and known.rig == target.skeleton.name else {}
+    standing_clip = upright(clip, body, target.skeleton, [rig.index(joint) for joint in named.values()])
     match = Match(
         known.rig if known else FOUND,
-        told.clip.skeleton.roles,
+        standing_clip.clip.skeleton.roles,
         False,
-        pairs(told.clip.skeleton, told.body, target.skeleton, theirs),
+        named or pairs(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, theirs),
     )
     notes = decoded.notes + unsure + ([] if known else _said(found, options.handedness))
     moving = _moving(decoded, body, unit)
     source = _mended(
         file,
-        told.clip,
+        standing_clip.clip,
         match,
         (unit, unit_name),
         axes,
         repairs + decoded.repairs,
         notes,
-        told.rest,
+        standing_clip.rest,
         moving,
         True,
         options,
     )
-    return replace(source, unsure=told.notes)
+    return replace(source, unsure=standing_clip.notes)
 
 
 def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: ClipMotion) -> Found:
@@ -191,7 +192,7 @@ def _mended(
     notes: list[str],
     stance: str,
     moving: bool,
-    told: bool,
+    straightened: bool,
     options: ClipMotion,
 ) -> Source:
     """The source with broken frames repaired and its floor at height zero."""
@@ -203,7 +204,9 @@ def _mended(
     if mended and options.defects == "refuse":
         raise InputError(file.path, mended[0], fix="Set motion.defects: repair to repair it this way.")
     notes = notes + uneven + flips(clip, repaired.first)
-    return Source(clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving, told)
+    return Source(
+        clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving, straightened
+    )
 
 
 def raw_clip(file: Bvh) -> Clip:

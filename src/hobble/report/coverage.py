@@ -27,13 +27,14 @@ def counted(paths: Sequence[str | Path], splits: Mapping[str, str], of: int | No
     """Seconds over the rows in `database/clips/<clip>.npz`, each frame counted once.
 
     of: the number of all clips, if `paths` are a random choice of them; seconds are then an estimate for all.
-    `turns`: split -> seconds at each turn. `both`: (turns, speeds), seconds at each turn and speed. `told`:
-    channel -> column -> seconds at each tenth of the highest value. `estimate`: a sentence about the choice.
+    `turns`: split -> seconds at each turn. `both`: (turns, speeds), seconds at each turn and speed.
+    `channels`: channel -> column -> seconds at each tenth of the highest value. `estimate`: a sentence about
+    the choice.
     """
     each = max(of or 0, len(paths)) / max(len(paths), 1) / FPS
     turns = {split: np.zeros(len(TURNS) - 1) for split, *_ in SPLITS}
     both = np.zeros((len(TURNS) - 1, len(SPEEDS) - 1))
-    told: dict[str, dict[str, Array]] = {}
+    channels: dict[str, dict[str, Array]] = {}
     for path in paths:
         rows = load_clip_rows(path)
         once = np.unique(rows.frame, return_index=True)[1]
@@ -47,13 +48,13 @@ def counted(paths: Sequence[str | Path], splits: Mapping[str, str], of: int | No
         both += np.histogram2d(turn, speed, (TURNS, SPEEDS))[0] * each
         skeleton = Skeleton.from_dict(rows.skeleton)
         for name, table in rows.channels.items():
-            one, seconds = channel(name), told.setdefault(name, {})
+            one, seconds = channel(name), channels.setdefault(name, {})
             for column, values in zip(one.columns(skeleton), table[once].T, strict=True):
                 if values.any():
                     found = np.histogram(10 * values / one.highest, np.arange(0.5, 11))[0] * each
                     seconds[column] = seconds.get(column, 0) + found
     estimate = f" Estimated from {len(paths):,} of {of:,} clips." if of and of > len(paths) else ""
-    return {"turns": turns, "both": both, "told": told, "estimate": estimate}
+    return {"turns": turns, "both": both, "channels": channels, "estimate": estimate}
 
 
 def turn_chart(found: Mapping[str, Any]) -> Chart | None:
@@ -106,19 +107,21 @@ def both_chart(found: Mapping[str, Any]) -> Chart | None:
     return Chart("speed-turn", "Speed and turn combined", caption + found["estimate"], [trace], layout, 300)
 
 
-def told_charts(found: Mapping[str, Any], say: Callable[[str], str] = str) -> list[Chart]:
+def channel_charts(found: Mapping[str, Any], say: Callable[[str], str] = str) -> list[Chart]:
     """Seconds at each value of each column: a chart for each channel that has a value above 0 in any clip.
 
     say: column -> its name on the page.
     """
     return [
-        _told_chart(name, seconds, found["estimate"], say)
-        for name, seconds in found["told"].items()
+        _channel_chart(name, seconds, found["estimate"], say)
+        for name, seconds in found["channels"].items()
         if seconds
     ]
 
 
-def _told_chart(name: str, seconds: Mapping[str, Array], estimate: str, say: Callable[[str], str]) -> Chart:
+def _channel_chart(
+    name: str, seconds: Mapping[str, Array], estimate: str, say: Callable[[str], str]
+) -> Chart:
     one, columns = channel(name), list(seconds)[::-1]
     tenth = one.highest / 10
     trace = {

@@ -164,12 +164,13 @@ def clip_table(material: Material, clips: frozenset[str]) -> Table:
 
 
 def remarks_table(material: Material) -> Table | None:
-    """Every repair and warning; of many, each kind with its number and one of its clips."""
+    """Every repair, doubt and warning; of many, each kind with its number and one of its clips."""
     rows = []
     for stage, reports, key in (
         ("motion", material.motion, "repairs"),
+        ("motion", material.motion, "unsure"),
         ("labels", material.labels, "warnings"),
-        (None, material.told, "warnings"),
+        (None, material.channels, "warnings"),
     ):
         for report in reports:
             rows += [
@@ -199,11 +200,11 @@ def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
 
 def strips(material: Material, clips: frozenset[str]) -> list[dict[str, Any]]:
     """The label strip and channel values of those of `clips` that have them; mirrors are left out."""
-    told: dict[str, dict[str, Any]] = {}
-    for report in material.told:
+    of_clip: dict[str, dict[str, Any]] = {}
+    for report in material.channels:
         highest = {"highest": report.get("highest", 10.0)}
-        found = {label: (value, highest) for label, value in report["told"].items()}
-        told.setdefault(report["clip"], {}).update(found)
+        found = {label: (value, highest) for label, value in report["values"].items()}
+        of_clip.setdefault(report["clip"], {}).update(found)
     say = speaker(material.network["skeleton"])
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
     known = {report["clip"] for report in material.labels}
@@ -216,7 +217,7 @@ def strips(material: Material, clips: frozenset[str]) -> list[dict[str, Any]]:
         length = lengths.get(clip) or strip["seconds"][-1]
         status = [
             {"name": say(label), "spans": value.get("spells") or [[0, length, value["highest"]]], **highest}
-            for label, (value, highest) in told.get(clip, {}).items()
+            for label, (value, highest) in of_clip.get(clip, {}).items()
         ]
         out.append({**strip, "clip": clip, "length": length, "status": status})
     return out

@@ -22,7 +22,7 @@ class Material:
     """The results of one configuration.
 
     measured: measurement -> its JSON. history: column -> values, one per section of training, None for an
-    empty cell. motion, labels: reports of the clips, in the same order; told: reports of their channels.
+    empty cell. motion, labels: reports of the clips, in the same order; channels: reports of their channels.
     terrain, rows: paths of the clips' terrain fits and rows. splits: clip -> "train" or "held_out".
     """
 
@@ -37,7 +37,7 @@ class Material:
     network: Mapping[str, Any] = field(repr=False)
     motion: list[dict[str, Any]] = field(repr=False)
     labels: list[dict[str, Any]] = field(repr=False)
-    told: list[dict[str, Any]] = field(repr=False)
+    channels: list[dict[str, Any]] = field(repr=False)
     terrain: list[str] = field(repr=False)
     rows: list[str] = field(repr=False)
     published: Mapping[str, Any] = field(repr=False)
@@ -74,7 +74,7 @@ def gather(
     weights: str,
     motion: Iterable[str],
     labels: Iterable[str],
-    told: Iterable[str],
+    channels: Iterable[str],
     terrain: Iterable[str] = (),
     rows: Iterable[str] = (),
 ) -> Material:
@@ -91,7 +91,7 @@ def gather(
         network=describe_network(weights),
         motion=[read_json(path) for path in motion],
         labels=[read_json(path) for path in labels],
-        told=[read_json(path) for path in told],
+        channels=[read_json(path) for path in channels],
         terrain=list(terrain),
         rows=list(rows),
         published=read_yaml(PUBLISHED),

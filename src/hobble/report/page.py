@@ -117,7 +117,7 @@ def _sections(
             "speeds": data.speed_chart(material),
             "turns": coverage.turn_chart(found),
             "both": coverage.both_chart(found),
-            "told": coverage.told_charts(found, speaker(material.network["skeleton"])),
+            "channels": coverage.channel_charts(found, speaker(material.network["skeleton"])),
             "retarget": data.retarget_chart(material),
             "clips": data.clip_table(material, clips),
             "remarks": data.remarks_table(material),

@@ -18,12 +18,12 @@ def shown(material: Material, most: int = MOST) -> frozenset[str]:
     The clips are put into kinds by split, main gait, and whether a channel has a value in them. One clip of
     each kind is taken in turn, in a random order that depends on the names only.
     """
-    told = {report["clip"] for report in material.told if report.get("told")}
+    changed = {report["clip"] for report in material.channels if report.get("values")}
     kinds: dict[tuple[str, str, bool], list[str]] = {}
     for report in material.labels:
         clip, seconds = report["clip"], report.get("seconds") or {}
         gait = max(seconds, key=lambda name: seconds[name], default="")
-        kinds.setdefault((material.split(clip), gait, clip in told), []).append(clip)
+        kinds.setdefault((material.split(clip), gait, clip in changed), []).append(clip)
     if sum(map(len, kinds.values())) <= most:
         return frozenset(name for names in kinds.values() for name in names)
     turns = [(turn, kind, name) for kind in kinds for turn, name in enumerate(shuffled(kinds[kind]))]

@@ -84,9 +84,9 @@ class ChannelSources:
         return [str(file) for file in files]
 
 
-def database_folder(told: Sequence[str]) -> str:
+def database_folder(channels: Sequence[str]) -> str:
     """The folder name of the database with these channels."""
-    return "+".join(told) or NO_CHANNEL
+    return "+".join(channels) or NO_CHANNEL
 
 
 def channels_of_folder(folder_name: str) -> tuple[str, ...]:

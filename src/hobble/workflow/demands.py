@@ -63,7 +63,7 @@ class Demands:
         return _minutes(each * thousands, attempt, least=5)
 
     def part_memory(self, dataset: str, attempt: int = 1) -> int:
-        """Megabytes for a job that orders its part of a database: what one shard has for it, and buckets."""
+        """MB for a job that orders a part of a database. It holds the rows of one shard for it at a time."""
         parts = self.project.datasets.parts(dataset)
         return _megabytes(400 + ROW_KB * self.all_thousands(dataset) / parts**2, attempt)
 
@@ -167,8 +167,8 @@ class Demands:
         chosen = self.project.catalogue.configuration(configuration)
         skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(chosen.dataset).skeleton)
         of_rows = self.project.datasets.options(chosen.dataset, "database", "window", "step")
-        told = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
-        return RowLayout(joints=len(skeleton.joints), channels=told, **of_rows)
+        channels = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
+        return RowLayout(joints=len(skeleton.joints), channels=channels, **of_rows)
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
     def all_thousands(self, dataset: str) -> float:

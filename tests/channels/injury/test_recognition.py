@@ -23,7 +23,7 @@ KNEE, ARM = "LeftUpLeg-LeftLeg", "RightArm-RightForeArm"
 
 
 def figure(skeleton: Skeleton, frames: int, knee: float, elbow: float, seed: int) -> np.ndarray:
-    """(F, J, 3) a figure that walks with a knee of so many radians less and an elbow of so many more."""
+    """(F, J, 3) a walking figure; its knee bends less and its elbow more by these radians."""
     rng = np.random.default_rng(seed)
     t = 2 * np.pi * np.arange(frames) / 60
     local = np.tile(quat.IDENTITY, (frames, len(skeleton.joints), 1))
@@ -53,8 +53,8 @@ def clip(network, name: str, link: str | None, severity: float, seed: int, frame
     root = np.zeros((frames, 3))
     root[:, 2] = 2.0 * np.arange(frames)
     still = np.zeros(frames)
-    told, rows = {"injury": severities}, np.arange(frames)
-    return Captured(name, local, contacts, still, told, gait, velocity, root, still, rows)
+    channels, rows = {"injury": severities}, np.arange(frames)
+    return Captured(name, local, contacts, still, channels, gait, velocity, root, still, rows)
 
 
 @pytest.fixture
@@ -151,13 +151,13 @@ def test_windows_are_of_one_hurt_walking_ahead(hurtable) -> None:
     assert walking_windows(aside, hurtable) == []
     assert walking_windows(replace(good, velocity=0.1 * good.velocity), hurtable) == []
     assert walking_windows(replace(good, gait=0 * good.gait), hurtable) == []
-    severity = good.told["injury"].copy()
+    severity = good.channels["injury"].copy()
     severity[150:] = 0  # half way through the second part, in which no window is all of a kind
-    healed = walking_windows(replace(good, told={"injury": severity}), hurtable)
+    healed = walking_windows(replace(good, channels={"injury": severity}), hurtable)
     assert [w.hurt for w in healed] == [KNEE] * 3 + [HEALTHY] * 6
-    severity = good.told["injury"].copy()
+    severity = good.channels["injury"].copy()
     severity[:, hurtable.channels["injury"].index(ARM)] = 2
-    both = walking_windows(replace(good, told={"injury": severity}), hurtable)
+    both = walking_windows(replace(good, channels={"injury": severity}), hurtable)
     assert {(w.hurt, w.severity) for w in both} == {(f"{KNEE} and {ARM}", 5.0)}
     assert module.WINDOW == 60
 
@@ -176,7 +176,7 @@ def test_without_side_a_leg_is_not_told_from_the_other(holden31: Skeleton) -> No
 
 
 def test_what_is_judged_was_not_learnt() -> None:
-    """Windows that nothing but their label tells apart are named by chance."""
+    """Windows that differ in nothing but their label are named by chance."""
     rng = np.random.default_rng(6)
     windows = [
         Window("a", f"{n % 2}", 5.0, {f"{d}": float(v) for d, v in enumerate(rng.normal(size=60))}, n // 10)

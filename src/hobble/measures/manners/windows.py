@@ -45,7 +45,7 @@ class Window:
 class Figure:
     """What a generated figure is given: channel -> column -> value, and a speed in cm a frame."""
 
-    told: Mapping[str, Mapping[str, float]]
+    channels: Mapping[str, Mapping[str, float]]
     speed: float
 
 
@@ -56,16 +56,16 @@ def captured_windows(clip: Captured, network: Network, name: str) -> list[Window
     """
     assert network.skeleton is not None
     columns, highest = network.channels[name], channel(name).highest
-    others = [np.any(values > 0, axis=1) for other, values in clip.told.items() if other != name]
+    others = [np.any(table > 0, axis=1) for other, table in clip.channels.items() if other != name]
     out = []
     for start in range(0, len(clip) - WINDOW + 1, STEP):
         span = slice(start, start + WINDOW)
         speed = np.hypot(*clip.velocity[span].mean(axis=0))
-        told = clip.told[name][start]
-        manners = [columns[i] for i in np.flatnonzero(told)]
+        values = clip.channels[name][start]
+        manners = [columns[i] for i in np.flatnonzero(values)]
         straight = clip.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST_SPEED
         walks = clip.gait[span, WALK].mean() > 0.5
-        one = len(manners) < 2 and np.isin(told, (0, highest)).all()
+        one = len(manners) < 2 and np.isin(values, (0, highest)).all()
         if not (straight and walks and one) or any(np.any(other[span]) for other in others):
             continue
         parts = clip.local[span], clip.contacts[span], clip.root[span]
@@ -76,15 +76,15 @@ def captured_windows(clip: Captured, network: Network, name: str) -> list[Window
 def generated(network: Network, figures: Sequence[Figure], name: str, runtime: Runtime) -> list[list[Window]]:
     """The windows of each figure's straight walk. name: the channel whose columns are the manners."""
     assert network.skeleton is not None
-    told: dict[str, Array] = {}
+    channels: dict[str, Array] = {}
     for each in network.channels:
-        told |= channel_values(network, each, [figure.told.get(each, {}) for figure in figures])
+        channels |= channel_values(network, each, [figure.channels.get(each, {}) for figure in figures])
     speeds = [figure.speed for figure in figures]
-    script = Stretch(WARM_UP + USED, ["walk"] * len(figures), told, speeds)
+    script = Stretch(WARM_UP + USED, ["walk"] * len(figures), channels, speeds)
     walks = run_walks(network, [script], runtime)
     out = []
     for i, figure in enumerate(figures):
-        manner = " and ".join(figure.told.get(name, {})) or NONE
+        manner = " and ".join(figure.channels.get(name, {})) or NONE
         spans = [slice(s, s + WINDOW) for s in range(WARM_UP, WARM_UP + USED - WINDOW + 1, STEP)]
         parts = [(walks.local[span, i], walks.contacts[span, i], walks.root[span, i]) for span in spans]
         out.append([_window(network.skeleton, "", manner, *part) for part in parts])

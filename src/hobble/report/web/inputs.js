@@ -2,13 +2,14 @@
 const AHEAD = 8; // frames that a joint would go on for at its velocity
 const LEAST = .15; // cm a frame; slower joints have no line
 
-// The samples of the ground along the path that was and is to come, and to its sides; higher ones than the path are warm.
+// The ground samples of the network's input: along the past and future path and to both sides of it. above: cm above the
+// mean height of the path.
 export const groundSamples = (c, spec) => {
   const { step, constants: { side } } = spec, out = [];
   for (let s = 0; s < c.ground.length / 3; s++) {
     const i = s * step, a = side * c.dz[i], b = side * c.dx[i];
     [[a, -b], [0, 0], [-a, b]].forEach(([x, z], k) => {
-      out.push({ place: [c.px[i] + x, c.ground[3 * s + k], c.pz[i] + z], told: c.ground[3 * s + k] - c.height });
+      out.push({ place: [c.px[i] + x, c.ground[3 * s + k], c.pz[i] + z], above: c.ground[3 * s + k] - c.height });
     });
   }
   return out;
@@ -25,8 +26,8 @@ export const jointVelocities = (c) => {
 };
 
 export const drawInputs = ({ marks, over, paint }, c, spec) => {
-  for (const { place: [x, y, z], told } of groundSamples(c, spec)) {
-    const rgb = Math.abs(told) < 1 ? paint.ink : told > 0 ? paint.high : paint.predicted, r = 3;
+  for (const { place: [x, y, z], above } of groundSamples(c, spec)) {
+    const rgb = Math.abs(above) < 1 ? paint.ink : above > 0 ? paint.high : paint.predicted, r = 3;
     marks.piece([[x - r, y + .6, z - r], [x + r, y + .6, z - r], [x + r, y + .6, z + r], [x - r, y + .6, z + r]], rgb, .8);
   }
   for (const { from, to } of jointVelocities(c)) over.needle(from, to, 1.6, paint.predicted, .9);

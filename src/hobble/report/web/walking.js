@@ -3,7 +3,7 @@ import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
 import { createMotion } from "./motion.js";
 import { bytes } from "./numbers.js";
-import { toldColour } from "./paint.js";
+import { channelColour } from "./paint.js";
 import { createView } from "./view.js";
 
 (() => {
@@ -17,7 +17,7 @@ import { createView } from "./view.js";
       const s = scenes.scenarios[index], octets = (text) => text && new Uint8Array(bytes(text));
       const scene = {
         ...s, motion: createMotion(s, J, scenes.unit),
-        contacts: octets(s.contacts), phase: octets(s.phase), values: octets(s.told?.values),
+        contacts: octets(s.contacts), phase: octets(s.phase), values: octets(s.swept?.values),
       };
       scene.focus = followed(scene);
       scene.prints = footprints(scene);
@@ -26,7 +26,8 @@ import { createView } from "./view.js";
     return unpacked.get(index);
   };
   const joint = (s, frame, b) => s.motion.at(frame, b);
-  // Where the camera looks: the root over the second around a frame, so that it glides and scrubbing is repeatable.
+  // Where the camera looks: the mean position of the root over a second around the frame. So the camera moves smoothly, and
+  // a frame always looks the same.
   const followed = (s) => {
     const half = Math.round(fps / 2), { roots } = s.motion, out = new Float32Array(roots.length);
     for (let f = 0; f < s.frames; f++) {
@@ -39,7 +40,7 @@ import { createView } from "./view.js";
     }
     return out;
   };
-  // {frame, heel, toe}: where a foot stands, every other frame, so that one that slides leaves a smear.
+  // {frame, heel, toe} of each standing foot in every second frame. A sliding foot leaves overlapping prints.
   const footprints = (s) => {
     const out = [];
     if (!s.contacts || !scenes.feet.length) return out;
@@ -51,7 +52,7 @@ import { createView } from "./view.js";
     return out;
   };
   const flat = ([x, , z]) => [x, 0, z];
-  // The share of the highest that a scenario's column has.
+  // The value of the swept column, as a share of its highest.
   const share = (s, frame) => (s.values ? s.values[frame] / 250 : 0);
 
   // Drawing
@@ -84,22 +85,22 @@ import { createView } from "./view.js";
     view.land.around(focus);
     if (trails) { drawPath(s, focus, at); drawPrints(s, focus, at); }
     s.motion.show(figure, at);
-    figure.pose((columns) => toldColour(view.paint, s.told?.placed && columns.includes(s.told.column) ? share(s, frame) : 0));
+    figure.pose((columns) => channelColour(view.paint, s.swept?.placed && columns.includes(s.swept.column) ? share(s, frame) : 0));
     view.land.under(figure.balls(view.balls));
-    tell(s, frame);
+    showReadings(s, frame);
   };
 
   // Readings next to the figure
 
   const FEET = ["left heel", "left toe", "right heel", "right toe"];
-  const tell = (s, frame) => {
+  const showReadings = (s, frame) => {
     const a = Math.max(0, frame - 7), b = Math.min(s.frames - 1, frame + 7), { roots } = s.motion;
     const way = Math.hypot(roots[3 * b] - roots[3 * a], roots[3 * b + 2] - roots[3 * a + 2]);
     const moment = [`${(b > a ? way / 100 * fps / (b - a) : 0).toFixed(2)} m/s`];
     if (s.phase) moment.push(`phase ${(s.phase[frame] / 255).toFixed(2)}`);
     const lines = [moment.join(" · ")];
     if (s.contacts) lines.push(FEET.filter((_, i) => s.contacts[frame] >> i & 1).join(", ") || "no foot on the ground");
-    if (share(s, frame) > 0) lines.push(`${s.told.spoken}: ${(share(s, frame) * s.told.highest).toFixed(s.told.highest < 5 ? 2 : 1)} of ${s.told.highest}`);
+    if (share(s, frame) > 0) lines.push(`${s.swept.spoken}: ${(share(s, frame) * s.swept.highest).toFixed(s.swept.highest < 5 ? 2 : 1)} of ${s.swept.highest}`);
     const title = document.createElement("b");
     title.textContent = s.description || s.name;
     reading.replaceChildren(title, ...lines.flatMap((text) => [document.createElement("br"), text]));
@@ -121,7 +122,7 @@ import { createView } from "./view.js";
     choice.selectedIndex = index;
     time = 0;
     slider.max = scene.frames - 1;
-    find("legend").hidden = !(scene.values && scene.told.placed);
+    find("legend").hidden = !(scene.values && scene.swept.placed);
     view.ask();
   };
   const seek = (to) => { play(false); time = Math.min(scene.frames - 1, Math.max(0, to)); view.ask(); };

@@ -50,13 +50,13 @@ def shown(
     animation = ProceduralAnimation(network, characters=count, **dict(runtime))
     velocity = np.zeros((count, 2))
     velocity[:, 1] = speeds
-    told = severities(network, each)
+    channels = severities(network, each)
     for name, values in (others or {}).items():
-        told |= channel_values(network, name, values)
+        channels |= channel_values(network, name, values)
     shares = np.tile([float(name == gait) for name in network.gaits], (count, 1))
     places = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
     for frame in range(-BEGIN, frames):
-        pose = animation.next_pose(velocity, gait=shares.copy(), **told)
+        pose = animation.next_pose(velocity, gait=shares.copy(), **channels)
         if frame >= 0:
             places[frame] = pose.positions.reshape(count, -1, 3)
     return [_shown(network, places[:, i].astype(float)) for i in range(count)]
