@@ -81,7 +81,7 @@ def render(
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable={material.name: playable} if playable else {},
         hurts=placed(playable or {}) is not None,
-        told=first_shown(playable or {}),
+        shown_channel=first_shown(playable or {}),
         compared=[clip["name"] for clip in (compared or {}).get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],

@@ -3,11 +3,7 @@
 import { createActor } from "./actor.js";
 import { find, material } from "./base.js";
 import { createDial } from "./dial.js";
-<<<<<<< HEAD
-import { firstShown, keyed } from "./told.js";
-=======
-import { keyed, placed } from "./sliders.js";
->>>>>>> main
+import { firstShown, keyed } from "./sliders.js";
 import { createView } from "./view.js";
 
 const GHOST_OFFSET = -84; // cm from the figure to the transparent one, negative: to its left
@@ -20,15 +16,9 @@ const SPEED = 2.5; // target speed, cm per frame
 
 const createHero = (spec, asked) => {
   const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), still = find("hero-walk");
-<<<<<<< HEAD
   const one = firstShown(spec), labels = one ? Object.keys(one.sliders) : [];
-  const told = new Map(), neutral = new Map(), flat = () => 0, hero = { frames: 0 };
+  const values = new Map(), neutralValues = new Map(), flat = () => 0, hero = { frames: 0 };
   let part = labels.includes(asked.part) ? asked.part : labels[0];
-=======
-  const one = placed(spec), labels = one ? Object.keys(one.sliders) : [], hurts = labels.length > 0;
-  const hurtValues = new Map(), healthyValues = new Map(), flat = () => 0, hero = { frames: 0 };
-  let part = hurts ? (labels.includes(asked.part) ? asked.part : labels[0]) : null;
->>>>>>> main
   let last = null, owed = 0, shown = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
   // Both have the same target direction, which turns slowly from side to side.
@@ -45,13 +35,9 @@ const createHero = (spec, asked) => {
 
   const step = () => {
     hero.frames++;
-    main.frame(wish(), hurtValues);
+    main.frame(wish(), values);
     if (!ghost) return;
-<<<<<<< HEAD
-    ghost.frame(wish(), neutral);
-=======
-    ghost.frame(wish(), healthyValues);
->>>>>>> main
+    ghost.frame(wish(), neutralValues);
     const [sin, cos] = [Math.sin(heading()), Math.cos(heading())], [a, b] = [main.character.root, ghost.character.root];
     const [dx, dz] = [b[0] - a[0], b[2] - a[2]], along = dx * sin + dz * cos, across = dx * cos - dz * sin;
     if (!leaving && (Math.abs(along) > MOST_AHEAD || Math.abs(across - GHOST_OFFSET) > 70)) leaving = true;
@@ -110,13 +96,8 @@ const createHero = (spec, asked) => {
       chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
     };
     const hurt = () => {
-<<<<<<< HEAD
-      told.clear();
-      told.set(keyed(one, one.columns[one.sliders[part]]), dial.value / 10 * one.highest);
-=======
-      hurtValues.clear();
-      hurtValues.set(keyed(one, one.columns[one.sliders[part]]), dial.value);
->>>>>>> main
+      values.clear();
+      values.set(keyed(one, one.columns[one.sliders[part]]), dial.value / 10 * one.highest);
       say();
       view.ask();
     };
@@ -144,14 +125,9 @@ const createHero = (spec, asked) => {
   rest();
 
   for (const actor of [main, ghost]) actor?.start(flat);
-<<<<<<< HEAD
-  for (; hero.frames < ALIKE; hero.frames++) main.frame(wish(), neutral);
+  for (; hero.frames < ALIKE; hero.frames++) main.frame(wish(), neutralValues);
   ghost?.character.follow(main.character, [GHOST_OFFSET, 0]);
-  for (; hero.frames < ALIKE + APART; hero.frames++) { main.frame(wish(), told); ghost?.frame(wish(), neutral); }
-=======
-  const warm = new Map(hurtValues);
-  for (let f = 0; f < WARM_UP; f++) { hero.frames++; main.frame(wish(), f > 40 ? warm : healthyValues); ghost?.frame(wish(), healthyValues); }
->>>>>>> main
+  for (; hero.frames < ALIKE + APART; hero.frames++) { main.frame(wish(), values); ghost?.frame(wish(), neutralValues); }
   glide(1);
   showPace();
   section.classList.add("ready");
