@@ -24,7 +24,7 @@ DOUBTFUL = {24: "ankles", 50: "neck", 104: "balls of the feet"}
 @pytest.mark.shared
 @pytest.mark.parametrize("seed", DOUBTFUL)
 def test_what_a_rig_does_not_show_is_told(shared, tmp_path, seed):
-    """Files that come out more than 1 cm off, because nothing in them shows the rest."""
+    """Files that are more than 1 cm off, because they do not contain the missing information."""
     files = sorted((shared / "mocap/cmu").glob("*.bvh"))
     one = outcome(files[seed * 7 % len(files)], seed, tmp_path, 900)
     assert DOUBTFUL[seed] in one.said, one
