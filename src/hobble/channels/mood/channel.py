@@ -72,14 +72,15 @@ class Mood(Channel):
         return np.tile(np.array(row, np.float32), (len(clip), 1)), warnings
 
 
-def _patterns(source: Source) -> Mapping[str, Mapping[str, float]]:
-    return source.options.get("patterns", {})
+def _patterns(source: Source) -> Mapping[str, Mapping[Name, float]]:
+    return source.options.patterns if isinstance(source.options, Patterns) else {}
 
 
 def _moods(source: Source) -> Mapping[str, float]:
     if source.value is not None:
         return source.value
-    return next((m for pattern, m in _patterns(source).items() if fnmatchcase(source.clip, pattern)), {})
+    found = (moods for pattern, moods in _patterns(source).items() if fnmatchcase(source.clip, pattern))
+    return {**next(found, {})}
 
 
 CHANNEL = Mood()
