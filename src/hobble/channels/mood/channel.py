@@ -76,11 +76,13 @@ def _patterns(source: Source) -> Mapping[str, Mapping[Name, float]]:
     return source.options.patterns if isinstance(source.options, Patterns) else {}
 
 
-def _moods(source: Source) -> Mapping[str, float]:
+def _moods(source: Source) -> Mapping[Any, float]:
     if source.value is not None:
         return source.value
-    found = (moods for pattern, moods in _patterns(source).items() if fnmatchcase(source.clip, pattern))
-    return {**next(found, {})}
+    for pattern, moods in _patterns(source).items():
+        if fnmatchcase(source.clip, pattern):
+            return moods
+    return {}
 
 
 CHANNEL = Mood()
