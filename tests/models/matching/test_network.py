@@ -210,9 +210,9 @@ def test_there_are_no_export_formats(made: Made, tmp_path: Path) -> None:
         ("features", lambda a: a[:, 1:]),
         ("phase", lambda a: a + 2),
         ("phase", lambda a: a[1:]),
-        ("left", lambda a: a + 1),  # the last row would be followed by one that is not there
-        ("left", lambda a: a[::-1]),
-        ("left", lambda a: a.astype(float)),
+        ("remaining", lambda a: a + 1),  # the last row would be followed by one that is not there
+        ("remaining", lambda a: a[::-1]),
+        ("remaining", lambda a: a.astype(float)),
         ("columns", lambda a: a + 10_000),
         ("columns", lambda a: a - 100),
         ("feature_weights", lambda a: -a),
