@@ -69,7 +69,7 @@ class HostRows(Rows):
         sections is complete.
         """
         place = (pass_index, section, sections, seed)
-        # From the size of the whole batch and not of this process's part: the order of the rows depends on it,
+        # From the size of the whole batch, not of this process's part: the order of the rows depends on it,
         # and must be the same for any number of processes.
         window = self.database.window(TRAIN, self.database.block_rows(size))
         sharing = self.sharing(section, sections, size)
