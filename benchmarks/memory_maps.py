@@ -89,7 +89,7 @@ class Mapped:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Rows and fits of a group of chunks. own: the group's rows in the tables."""
         rows, count = [n for n, _ in self.pieces(members)], np.asarray(self.count[own])
-        here, fit = order.shown(
+        here, fit = order.rows_and_fits(
             members, rows, count, np.zeros(len(own), np.int64), self.db.manifest.visits, place, part
         )
         return own[here], self.first[own[here]] + fit

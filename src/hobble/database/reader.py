@@ -153,7 +153,7 @@ class Database:
             windows = ahead(self.load(split, some, next(buffers)) for _, some, _, _ in wanted)
         for group, _, low, high in wanted:
             w, part, visits = next(windows), slice(low, high), self.manifest.visits
-            yield w, *order.shown(w.chunks, w.rows, w.count, w.first, visits, (*of, group), part)
+            yield w, *order.rows_and_fits(w.chunks, w.rows, w.count, w.first, visits, (*of, group), part)
 
     def _wanted(
         self, split: str, of: tuple[int, int, int], start: int, stop: int, window: int

@@ -87,7 +87,7 @@ def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, s
     distance = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * 0.999)
     cosine = (upper * upper + distance * distance - lower * lower) / (2 * upper * distance)
     cosine = min(max(cosine, -1.0), 1.0)
-    # Turn the old bend direction with the leg. Computed from the new leg alone, the knee may bend backwards.
+    # Turn the old bend direction with the leg. One from the new leg alone may bend the knee backwards.
     along = tx * ax + ty * ay + tz * az
     ox, oy, oz = tx - along * ax, ty - along * ay, tz - along * az
     turn = (ox * wx + oy * wy + oz * wz) / max(1 + ax * wx + ay * wy + az * wz, 1e-6)

@@ -110,7 +110,9 @@ class DeviceRows(Rows):
         yield nothing, nothing
         for layer, start, stop in order.spans(len(self.count), visits, section, sections, cut):
             place = (seed, pass_index, layer, 0)
-            yield order.shown(every, of_each, self.count, self.first, visits, place, slice(start, stop))
+            yield order.rows_and_fits(
+                every, of_each, self.count, self.first, visits, place, slice(start, stop)
+            )
 
     def _composed(self, rows: Tensor, fits: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """x (n, X), y (n, Y) and p (n,), composed on the device."""
