@@ -1,4 +1,4 @@
-// The top of the page: the walking character with a value of a channel, such as an injury, and next to it a
+// The top of the page: the walking character with a value of a channel, and next to it a
 // transparent one without, with the same controls.
 import { createActor } from "./actor.js";
 import { find, material } from "./base.js";
