@@ -39,8 +39,8 @@ VISIBLE = 0.1  # cm; a loop that is nearer to the neutral one looks the same
 class Loop:
     """A walk that can be repeated.
 
-    positions (F, J, 3), cm; rotations (F, J, 4); travel (3,): translation of one round, cm; gap: mean distance
-    of joints between end and start before blending, cm.
+    positions (F, J, 3), cm; rotations (F, J, 4); travel (3,): translation of one round, cm; gap: mean
+    distance of joints between end and start before blending, cm.
     """
 
     positions: Array
@@ -119,7 +119,7 @@ def trained_columns(network: Network, name: str) -> set[str]:
 def apart(loop: Loop, other: Loop) -> float:
     """Mean distance (cm, over joints and poses) from each pose of `loop` to the nearest pose of `other`.
 
-    Both are moved to the origin and turned the same travel. 0 for the same walk, even if it starts elsewhere.
+    Both are moved to the origin and turned the same way. 0 for the same walk, even if it starts elsewhere.
     """
     ours, theirs = _ahead(loop), _ahead(other)
     return float(np.mean([np.linalg.norm(theirs - pose, axis=-1).mean(axis=1).min() for pose in ours]))
