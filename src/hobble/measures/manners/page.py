@@ -100,4 +100,4 @@ def effect_chart(found: Json, effect: str) -> Chart:
 
 
 def _percent(share: float | None) -> str:
-    return f"{100 * (share or 0):.0f} %"
+    return f"{100 * (share or 0):.0f}\N{NO-BREAK SPACE}%"
