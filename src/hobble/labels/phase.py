@@ -1,6 +1,6 @@
 """Converts footsteps to phase and back, and finds locomotion cycles.
 
-The right foot lands at phase 0 and the left one at .5 (`pfnn-facts`, Labels). `phase_zero="left"` shifts this
+The right foot lands at phase 0 and the left one at .5, as in the original. `phase_zero="left"` shifts this
 by half a cycle.
 """
 
@@ -94,7 +94,7 @@ def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple
     """Cycles (C, 2) between landings of the foot `zero`, both frames included, and the number left out.
 
     Cycles with a marked line are left out, and cycles too near an end of the clip. With `margins` "drop", as
-    in the original (`pfnn-facts`, Labels), these start before frame 60 or end within 61 frames of the clip's
+    in the original, these start before frame 60 or end within 61 frames of the clip's
     end. With "extend", they have no frame before them or less than two after.
     """
     margin = MARGINS[margins]
