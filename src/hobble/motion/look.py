@@ -30,7 +30,7 @@ RATES = (24, 25, 30, 60, 120, 240)  # usual frame rates of files
 STILL = 3.0  # cm a second: slower hips stand
 STANDING = 0.5  # seconds: a shorter rest does not count as standing
 STRIDE = 0.25  # leg lengths: least distance of the ankles in a step
-MANY = 5  # clips with the same warning: it is told once
+MANY = 5  # clips with the same warning, from which on it is printed once for all
 ENOUGH = {"mirrors of each other": "hold both out or neither"}
 
 
