@@ -12,7 +12,7 @@ from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
 from hobble.workflow.measurements import NAMES as MEASURES
 from hobble.workflow.project import Project
-from hobble.workflow.targets import check, notes
+from hobble.workflow.targets import check, needed_datasets, notes
 from hobble.workflow.channel_sources import channels_of_folder
 
 ensure_user_name()
@@ -41,6 +41,16 @@ comparison = project.comparison
 package = project.package
 measurements = project.measurements
 demands = Demands(project)
+
+# Each of these batches has rules of its own. Batches of data sets that no target needs would only cost time.
+needed = needed_datasets(project, sys.argv[1:])
+batches_of_clips = project.batches.needed(project.batches.of, needed, sys.argv[1:])
+batches_of_versions = project.batches.needed(
+    project.batches.hurt_of, needed, sys.argv[1:]
+)
+batches_of_walker = project.batches.needed(
+    project.batches.of, datasets.walkers(needed), sys.argv[1:]
+)
 
 
 # A clip that a data set lists or that is in its folder: no mirror, no hurt version.
@@ -72,6 +82,18 @@ def keep_local(files):
     return many[0] if isinstance(files, str) else many
 
 
+def for_each(batch, files):
+    """The files, from `files(dataset, clip)`, of all clips of a batch."""
+    return keep_local(
+        [file for clip in batch.clips for file in files(batch.dataset, clip)]
+    )
+
+
+def counted(batch, files):
+    """How many files each clip of a batch has."""
+    return [len(files(batch.dataset, clip)) for clip in batch.clips]
+
+
 rule all:
     default_target: True
     input:
@@ -83,11 +105,6 @@ include: "workflow/rules/motion.smk"
 include: "workflow/rules/labels.smk"
 include: "workflow/rules/channels.smk"
 include: "workflow/rules/hurt.smk"
-
-
-ruleorder: hurt_clip > channel_clip
-
-
 include: "workflow/rules/terrain.smk"
 include: "workflow/rules/database.smk"
 include: "workflow/rules/training.smk"

@@ -18,8 +18,8 @@ def benchmark(path: Path, seconds: float, memory: str = "120.5") -> Path:
 
 def test_adds_up_jobs_rules_and_bytes(tmp_path: Path) -> None:
     folder = tmp_path / "benchmarks" / "motion"
-    benchmark(folder / "motion_clip" / "a.tsv", 2.0)
-    benchmark(folder / "motion_clip" / "b.tsv", 3.0, memory="300.25")
+    benchmark(folder / "motion_clips" / "a.tsv", 2.0)
+    benchmark(folder / "motion_clips" / "b.tsv", 3.0, memory="300.25")
     benchmark(folder / "motion_mirror.tsv", 0.5, memory="-")
     (tmp_path / "motion").mkdir()
     (tmp_path / "motion" / "a.npz").write_bytes(b"x" * 100)
@@ -34,7 +34,7 @@ def test_adds_up_jobs_rules_and_bytes(tmp_path: Path) -> None:
     assert (motion["jobs"], motion["seconds"], motion["longest"]) == (3, 5.5, 3.0)
     assert (motion["max_rss_mb"], motion["cpu_seconds"]) == (300.2, 2.75)
     assert (motion["files"], motion["bytes"]) == (2, 105)
-    assert {r["rule"]: r["jobs"] for r in motion["rules"]} == {"motion_clip": 2, "motion_mirror": 1}
+    assert {r["rule"]: r["jobs"] for r in motion["rules"]} == {"motion_clips": 2, "motion_mirror": 1}
     assert (found["total_seconds"], found["total_bytes"], found["missing"]) == (5.5, 105, [])
 
 

@@ -53,7 +53,7 @@ def make(workflow, *targets: str, ok: bool) -> str:
 def refused(workflow, stage: str, *pieces: str) -> None:
     """The job of the bad clip ends with one message that contains `pieces`. The good clip's job succeeds."""
     text = make(workflow, f"{stage}/{workflow.clip}.npz", f"{stage}/{workflow.other}.npz", ok=False)
-    rule = "channel_clip" if stage.startswith("channels/") else f"{stage}_clip"
+    rule = "channel_clips" if stage.startswith("channels/") else f"{stage}_clips"
     message = [line for line in text.splitlines() if line.startswith(f"{rule}: ")]
     assert len(message) == 1, text
     for piece in pieces:
