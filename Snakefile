@@ -3,7 +3,7 @@ import os
 import sys
 from pathlib import Path
 
-from hobble.channels import NAMES, modules_of, shown_modules
+from hobble.channels import modules_of, shown_modules
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import modules
 from hobble.workflow import lifetime
@@ -26,6 +26,15 @@ try:
     if workflow.is_main_process:
         for note in notes(project, targets):
             logger.warning(note)
+    # Each batch has rules of its own. Batches of data sets that no target needs would only cost time.
+    needed = needed_datasets(project, sys.argv[1:])
+    batches_of_clips = project.batches.needed(project.batches.of, needed, sys.argv[1:])
+    batches_of_versions = project.batches.needed(
+        project.batches.hurt_of, needed, sys.argv[1:]
+    )
+    batches_of_walker = project.batches.needed(
+        project.batches.of, project.datasets.walkers(needed), sys.argv[1:]
+    )
 except HobbleError as error:
     raise WorkflowError(str(error)) from None
 
@@ -42,20 +51,6 @@ package = project.package
 measurements = project.measurements
 demands = Demands(project)
 
-# Each of these batches has rules of its own. Batches of data sets that no target needs would only cost time.
-needed = needed_datasets(project, sys.argv[1:])
-batches_of_clips = project.batches.needed(project.batches.of, needed, sys.argv[1:])
-batches_of_versions = project.batches.needed(
-    project.batches.hurt_of, needed, sys.argv[1:]
-)
-batches_of_walker = project.batches.needed(
-    project.batches.of, datasets.walkers(needed), sys.argv[1:]
-)
-
-
-# A clip that a data set lists or that is in its folder: no mirror, no hurt version.
-LISTED_CLIP = r"[^/]+(?<!_mirror)(?<!_hurt[1-9])"
-
 
 onstart:
     if workflow.is_main_process:
@@ -67,8 +62,6 @@ wildcard_constraints:
     configuration="|".join(catalogue.names()),
     dataset=r"[^/]+",
     clip=r"[^/]+(?<!_mirror)",
-    rows=r"[^/]+",
-    channel="|".join(NAMES),
     channels=r"plain|[a-z_+]+(?<!clips)",
     measure="|".join(MEASURES),
 

@@ -178,7 +178,7 @@ def test_a_whole_run_takes_few_lines(workflow) -> None:
     assert re.fullmatch(r"3 of 3 jobs done in .*\.", lines[-1])
     assert len([line for line in lines if not line.startswith(("0/3 ", "1/3 ", "2/3 ", "3/3 "))]) == 2
     assert "Error in rule" not in text
-    assert "rule synthetic_clips:" in workflow.run("-np", "-F", target)
+    assert "rule synthetic_clips__tiny__0:" in workflow.run("-np", "-F", target)
 
 
 @pytest.mark.workflow
