@@ -40,7 +40,9 @@ SECONDS = 6.0  # of reading, per measurement
 def made_up(folder: Path, size: int, joints: int) -> dict[str, Path]:
     """Files of random rows, about `size` bytes in all."""
     layout = RowLayout(joints, channels=(("injury", 30),))
-    skeleton = {"name": "made up", "joints": {f"j{i}": {} for i in range(joints)}}
+    parents = {f"j{i}": f"j{i - 1}" if i else None for i in range(joints)}
+    bones = {name: {"parent": parent, "offset": [0.0, 1.0, 0.0]} for name, parent in parents.items()}
+    skeleton = {"name": "made up", "joints": bones, "roles": {}}
     files, total, rng = {}, 0, np.random.default_rng(0)
     while total < size:
         fits = 1 if len(files) % 2 else 10
@@ -52,12 +54,12 @@ def made_up(folder: Path, size: int, joints: int) -> dict[str, Path]:
             "mean": (CLIP_ROWS * fits,),
         }
         arrays = {name: rng.standard_normal(shape, np.float32) for name, shape in shapes.items()}
-        told = {"injury": rng.standard_normal((CLIP_ROWS, 30), np.float32)}
+        channels = {"injury": rng.standard_normal((CLIP_ROWS, 30), np.float32)}
         count = np.full(CLIP_ROWS, fits)
         frame = np.arange(CLIP_ROWS)
         name = f"clip{len(files):04d}"
         rows = ClipRows(
-            name, layout, skeleton, frame=frame, cycle=frame // 60, fits=count, channels=told, **arrays
+            name, layout, skeleton, frame=frame, cycle=frame // 60, fits=count, channels=channels, **arrays
         )
         files[name] = folder / f"{name}.npz"
         save_clip_rows(files[name], rows)
@@ -138,12 +140,14 @@ def build(args: argparse.Namespace, folder: Path) -> Database:
     return Database.open(folder / "db", args.memory_mb)
 
 
-def child(task: str, folder: Path, argument: str = "", limit_mb: int | None = None) -> list[float]:
-    """Run a task of this file in a new process and return the numbers that it prints.
+def child(
+    task: str, folder: Path, argument: str = "", limit_mb: int | None = None, script: str = __file__
+) -> list[float]:
+    """Run a task of a benchmark's script, by default this one, in a new process; the numbers that it prints.
 
     limit_mb: most memory, the page cache counted in, beyond which the kernel reclaims pages or kills.
     """
-    command = [sys.executable, __file__, "--task", task, "--folder", str(folder), "--argument", argument]
+    command = [sys.executable, script, "--task", task, "--folder", str(folder), "--argument", argument]
     one_arena = {**os.environ, "MALLOC_ARENA_MAX": "1"}  # else each thread reserves 64 MB of address space
     with cgroup(limit_mb) as join:
         done = subprocess.run(

@@ -41,8 +41,8 @@ def sweep(network: Network) -> tuple[float, float]:
     hurt = severities(network, [{link: 5.0} if link else {} for link in links])
 
     def walk(which: slice) -> None:
-        told = {name: rows[which] for name, rows in hurt.items()}
-        run(network, [Stretch(FRAMES, ["walk"] * len(links[which]), told)], RUNTIME)
+        channels = {name: rows[which] for name, rows in hurt.items()}
+        run(network, [Stretch(FRAMES, ["walk"] * len(links[which]), channels)], RUNTIME)
 
     per, alone = 1e6 / FRAMES / len(links), [slice(i, i + 1) for i in range(len(links))]
     return per * seconds(lambda: walk(slice(None))), per * seconds(lambda: [walk(one) for one in alone])

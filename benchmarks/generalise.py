@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import hobble.training  # noqa: F401 - first, since it says how threads wait
@@ -30,6 +31,8 @@ from hobble.measures.responsivity.run import responsivity
 from hobble.measures.rollouts.run import measure_roll_outs
 from hobble.models.load import load_network
 from hobble.models.pfnn.options import PfnnOptions
+from hobble.runtime.options import Runtime
+from hobble.runtime.waypoints import TRACK, Waypoint
 from hobble.training.held_out import HeldOut
 from hobble.training.train import train
 from hobble.training.weights import write_weights
@@ -37,8 +40,15 @@ from hobble.training.weights import write_weights
 LENGTHS = (1, 10, 60)
 
 
-def measured(database: Database, recipe: dict, threads: int) -> str:
-    network = PfnnOptions()
+def measured(
+    database: Database,
+    recipe: dict,
+    threads: int,
+    network: PfnnOptions | None = None,
+    track: Sequence[Waypoint] = TRACK,
+) -> str:
+    """The line of one recipe. network: by default the original one."""
+    network = network or PfnnOptions()
     training = Training(**recipe)
     clips = {c["clip"]: c["split"] for c in database.manifest.clips if c["split"] == "held_out" and c["rows"]}
     files = {name: database.path.parent / "clips" / f"{name}.npz" for name in clips}
@@ -48,7 +58,9 @@ def measured(database: Database, recipe: dict, threads: int) -> str:
         write_weights(weights, state.network, database, "benchmark", {})
         rolled = measure_roll_outs(weights, files, clips, "benchmark", lengths=LENGTHS)
         character = load_network(weights)
-    lap = responsivity(character, configuration="", runtime={}, laps=1, lap_seconds=400, modes=())
+    lap = responsivity(
+        character, configuration="", runtime=Runtime(), laps=1, lap_seconds=400, modes=(), track=track
+    )
     whole = HeldOut(database, torch.device("cpu"), 0).whole(state.network)[0]
     strayed = " ".join(f"{entry['held_out']['position_error_cm']:5.2f}" for entry in rolled["lengths"])
     laps = f"{lap['waypoints_reached']}/{lap['waypoints']} {lap['laps'][0]['seconds']:4.0f}"

@@ -97,11 +97,11 @@ def made(project: Project, job: Job, folder: Path) -> Iterator[tuple[Clip, dict]
         options=ClipMotion(**project.datasets.motion_options(job.dataset, job.clip)),
     )
     options = dataset.labels
-    labels, told = label_clip(clip, files, report, entry.gait, entry.ground, options)
+    labels, labels_report = label_clip(clip, files, report, entry.gait, entry.ground, options)
     yield clip, vars(labels)
     if dataset.mirror:
         mirror = mirror_clip(clip, f"{job.clip}_mirror")
-        yield mirror, vars(mirror_labels(labels, told, mirror)[0])
+        yield mirror, vars(mirror_labels(labels, labels_report, mirror)[0])
 
 
 def found(job: Job) -> list[Found]:

@@ -55,9 +55,9 @@ def made(bvh: Path, ground: str) -> list[Labelled]:
         )
     except HobbleError:
         return []
-    labels, told = label_clip(clip, [], report, "walk", ground, Labels())
+    labels, labels_report = label_clip(clip, [], report, "walk", ground, Labels())
     mirror = mirror_clip(clip, f"{clip.name}_mirror")
-    both = [(clip, labels), (mirror, mirror_labels(labels, told, mirror)[0])]
+    both = [(clip, labels), (mirror, mirror_labels(labels, labels_report, mirror)[0])]
     return [(c, found) for c, found in both if len(found.cycles)]
 
 

@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.channels.limits import CANNOT_HURRY, TOP, UNLIMITED, USUAL, Limits, Pace
+from hobble.channels.limits import CANNOT_HURRY, TOP, UNLIMITED, USUAL, Limits, Pace, together
 
 WALK, JOG, GAITS = 1, 2, 6
-LIMITS = Limits(np.array([0.0, 5.0, 10.0]), np.array([[[4.0, 3.0, 1.0], [4.0, 4.0, 2.0]]]))
+LIMITS = Limits(
+    np.array([0.0, 5.0, 10.0]), np.array([[[4.0, 3.0, 1.0], [4.0, 4.0, 2.0]]]), usual=np.array([3.5])
+)
 
 
-def rows(speeds, values, gait: int = WALK, each: int = 40) -> dict[str, np.ndarray]:
+def rows(speeds, values, gait: int = WALK, each: int = 40, others: bool = False) -> dict[str, np.ndarray]:
     """Rows of cycles of `each` frames, straight ahead at `speeds` (N,), told `values` (N, L)."""
     speed = np.repeat(np.asarray(speeds, float), each)
     return {
@@ -21,6 +23,7 @@ def rows(speeds, values, gait: int = WALK, each: int = 40) -> dict[str, np.ndarr
         "velocity": np.stack([np.zeros_like(speed), speed], axis=1),
         "values": np.repeat(np.asarray(values, float), each, axis=0),
         "cycle": np.repeat(np.arange(len(speeds)), each),
+        "others": np.full(len(speed), others),
     }
 
 
@@ -93,6 +96,35 @@ def test_what_is_learnt_never_rises_and_is_the_same_on_both_sides() -> None:
     np.testing.assert_allclose(again.speeds, limits.speeds, atol=1e-4)
 
 
+def test_channels_multiply_what_they_leave_of_the_usual_speed() -> None:
+    free, half, third, fast = (np.full((1, 2), v) for v in (np.inf, 1.0, 2 / 3, 2.6))
+    usual = np.array([2.0, 0.0])  # no body without values goes in the second gait
+    for one in (free, half, fast):
+        np.testing.assert_array_equal(together([one], usual), one)
+        np.testing.assert_array_equal(together([one, free], usual), one)
+    np.testing.assert_allclose(together([half, third], usual), [[1 / 3, 2 / 3]])
+    np.testing.assert_allclose(together([third, fast, half], usual), [[1 / 3, 2 / 3]])
+    np.testing.assert_allclose(together([fast, fast + 1], usual), [[2.6, 2.6]])
+
+
+def test_a_channel_takes_no_blame_for_another() -> None:
+    """A neutral clip goes at 2, a sad one at 1, and their hurt versions at .6 of that."""
+    mood, injury = pace(), pace()
+    none, sad = np.zeros((60, 2)), np.tile([10.0, 0.0], (60, 1))
+    for name, speed, feels in (("plain", 2.0, none), ("sad", 1.0, sad)):
+        mood.add(name, **rows(np.full(60, speed), feels))
+        injury.add(name, **rows(np.full(60, speed), none, others=bool(feels.any())))
+        mood.add(f"{name}_hurt1", **rows(np.full(60, 0.6 * speed), feels, others=True), source=name)
+        slow = rows(np.full(60, 0.6 * speed), sad, others=bool(feels.any()))
+        injury.add(f"{name}_hurt1", **slow, source=name)
+    mood.add("limps sadly", **rows(np.full(60, 0.2), sad, others=True))
+    found = [one.learn() for one in (mood, injury)]
+    for limits, expected in zip(found, (1.0, 1.2), strict=True):
+        assert limits is not None
+        assert limits.usual[WALK] == 2.0
+        assert limits.speeds[WALK, 0, -1] == pytest.approx(expected, rel=0.02)
+
+
 def test_where_nothing_is_told_nothing_is_limited() -> None:
     found = pace()
     found.add("healthy", **rows(np.full(30, 2.0), np.zeros((30, 2))))
@@ -107,6 +139,8 @@ def test_where_nothing_is_told_nothing_is_limited() -> None:
         ({"speeds": -LIMITS.speeds}, "above 0"),
         ({"speeds": LIMITS.speeds * np.nan}, "above 0"),
         ({"speeds": LIMITS.speeds[..., ::-1]}, "faster"),
+        ({"usual": np.array([3.5, 3.5])}, "for 1 gaits, 2 labels"),
+        ({"usual": np.array([-1.0])}, "usual speeds"),
     ],
 )
 def test_a_strangers_table_is_refused(changes, says: str) -> None:
@@ -115,3 +149,8 @@ def test_a_strangers_table_is_refused(changes, says: str) -> None:
         Limits.from_dict(data, 1, 2, 10.0)
     with pytest.raises(ValueError, match="no table"):
         Limits.from_dict({"levels": "all"}, 1, 2, 10.0)
+
+
+def test_an_older_table_counts_the_highest_speed_as_usual() -> None:
+    data = {"levels": LIMITS.levels.tolist(), "speeds": LIMITS.speeds.tolist()}
+    assert Limits.from_dict(data, 1, 2, 10.0).usual.tolist() == [4.0]

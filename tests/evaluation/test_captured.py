@@ -66,7 +66,7 @@ def test_motion_round_trips(rows, world) -> None:
     assert found.acceleration[0] == 0
     assert (found.gait == np.eye(len(GAITS))[2]).all()
     np.testing.assert_allclose(found.velocity, rows.y[:, LAYOUT.y_root_velocity])
-    np.testing.assert_array_equal(found.told["injury"], rows.channels["injury"])
+    np.testing.assert_array_equal(found.channels["injury"], rows.channels["injury"])
 
 
 def test_a_gap_separates_stretches(rows, tmp_path) -> None:

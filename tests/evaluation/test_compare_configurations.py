@@ -124,13 +124,13 @@ def test_the_counts_are_those_of_table_6_1(compared, published) -> None:
     for row in published["computations"]:
         counts = parameter_counts(row["sizes"])
         assert (counts["true"], counts["table_6_1_as_printed"]) == (row["parameters"], row["table_6_1"])
-    beside = [r for r in compared["beside"] if r["measure"] == "computations of Table 6.1"]
-    assert {r["configuration"]: r["ours"] for r in beside if r["ours"]} == {
+    rows = [r for r in compared["against_published"] if r["measure"] == "computations of Table 6.1"]
+    assert {r["configuration"]: r["ours"] for r in rows if r["ours"]} == {
         "holden": 335_501,
         "holden-xl": 598_157,
         "ava": 1_566_701,
     }
-    assert all(r["ours"] in (None, r["published"]) for r in beside)
+    assert all(r["ours"] in (None, r["published"]) for r in rows)
     holden = compared["configurations"][0]
     assert holden["weights_bytes"] == {"constant": 119_563_000, "linear": 23_912_600, "cubic": 9_565_040}
 
@@ -175,10 +175,12 @@ def test_eq_3_2_divides_by_the_deviations_of_frames_and_of_means(compared) -> No
     assert row["difference_of_means"] == pytest.approx(2 * 0.005 / 0.015)
     assert found["holden", "ava", "train"]["difference_of_means"] is None, "one clip does not spread"
     assert found["holden", "holden-xl", "a"]["difference_of_means"] is None
-    ours = {(r["measure"], r["configuration"]): (r["published"], r["ours"]) for r in compared["beside"]}
+    ours = {
+        (r["measure"], r["configuration"]): (r["published"], r["ours"]) for r in compared["against_published"]
+    }
     what = "standard deviation of the means of train clips"
     assert ours[what, "holden"] == (0.00954, pytest.approx(0.01))
-    laps = [r for r in compared["milliseconds"]["beside"] if r["measure"].startswith("standard")]
+    laps = [r for r in compared["milliseconds"]["against_published"] if r["measure"].startswith("standard")]
     assert [(r["configuration"], r["published"], r["ours"]) for r in laps] == [("holden", 0.0173, None)]
 
 
@@ -190,11 +192,11 @@ def test_a_published_figure_stands_beside_its_own_configuration_only(compared, p
         for value in row.values()
         if isinstance(value, float | int)
     }
-    rows = [*compared["beside"], *compared["milliseconds"]["beside"]]
+    rows = [*compared["against_published"], *compared["milliseconds"]["against_published"]]
     rows = [row for row in rows if not row["measure"].startswith("hurt part")]
     assert [row for row in rows if (row["configuration"], row["published"]) not in of] == []
-    beside = {row["configuration"] for row in rows if row["ours"] is not None}
-    assert beside == set(SIZES)
+    compared_ones = {row["configuration"] for row in rows if row["ours"] is not None}
+    assert compared_ones == set(SIZES)
     predictions = [row for row in rows if row["measure"].startswith("a prediction")]
     assert {(row["configuration"], row["ours"]) for row in predictions} == {("ferre", None)}
 
@@ -239,7 +241,7 @@ def test_tables_hold_the_same_whatever_columns_each_has(compared, tmp_path) -> N
 def test_published_clips_stand_beside_ours_of_the_same_name(tmp_path, published) -> None:
     clips = {"LocomotionFlat04_000": 0.03, "LocomotionFlat04_000_mirror": 0.07, "walk": 0.05}
     found = compare([read_results("a", left_behind(tmp_path, "a", clips, SIZES["holden"]))], published)
-    rows = [r for r in found["beside"] if "LocomotionFlat04" in r["measure"]]
+    rows = [r for r in found["against_published"] if "LocomotionFlat04" in r["measure"]]
     assert [(r["source"], r["published"], r["ours"]) for r in rows] == [
         ("segerstedt", 0.0448, 0.03),
         ("release", 0.0396, 0.03),
@@ -248,10 +250,11 @@ def test_published_clips_stand_beside_ours_of_the_same_name(tmp_path, published)
 
 def test_published_times_and_sizes_stand_beside_what_they_are_of(compared) -> None:
     """The database is what training reads; its stage has the rows of each clip too, and takes time."""
-    ours = {(r["measure"], r["configuration"]): r["ours"] for r in compared["beside"]}
+    ours = {(r["measure"], r["configuration"]): r["ours"] for r in compared["against_published"]}
     assert ours["database", "holden"] == 300
     times = {
-        (r["measure"], r["configuration"]): (r["ours"], r["unit"]) for r in compared["milliseconds"]["beside"]
+        (r["measure"], r["configuration"]): (r["ours"], r["unit"])
+        for r in compared["milliseconds"]["against_published"]
     }
     assert times["database, time", "holden"] == (7.0, "s")
     assert times["training, time", "ava"] == (60.0, "s")

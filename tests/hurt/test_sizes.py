@@ -65,6 +65,13 @@ def test_at_five_between_one_and_two_thirds_and_at_three_a_quarter_or_more(made,
         assert np.all(np.diff(np.abs(list(change.values()))) > 0)
 
 
+@pytest.mark.parametrize("part", ["thigh", "shank"])
+def test_the_knee_at_five_is_between_one_and_two_thirds_of_ten(made, hurting, part) -> None:
+    less = {s: 1 - seen(made("straight"), hurting, LEG[part], float(s))["knee"] for s in (3, 5, 7, 10)}
+    assert 1 / 3 <= less[5] / less[10] <= 0.62, less
+    assert less[3] < less[5] < less[7] < less[10] - 0.1, less
+
+
 def test_links_of_one_leg_can_be_told_apart(made, hurting) -> None:
     thigh, shank, foot, hip = (
         seen(made("straight"), hurting, LEG[p], 10.0) for p in ("thigh", "shank", "foot", "hip")

@@ -52,7 +52,7 @@ def test_asks_for_what_there_is_and_has_the_parts_that_are_called(one: Measure) 
 
 def test_channels_bring_their_own() -> None:
     brought = [one.name for one in MEASURES if one.package.startswith("hobble.channels.")]
-    assert brought == ["injury", "limp", "recognition", "mood"] == [one.name for one in of_channels()]
+    assert brought == ["injury", "limp", "recognition"] == [one.name for one in of_channels()]
 
 
 def test_names_are_unique() -> None:

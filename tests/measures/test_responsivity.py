@@ -62,7 +62,7 @@ def test_what_was_asked_is_what_was_taken_unless_it_was_held_back() -> None:
 
 def test_a_steady_figure_is_asked_for_what_is_drawn(steady) -> None:
     result = run(steady, AHEAD, laps=1)
-    assert result["asked_turn_degrees"] == pytest.approx(result["laps"][0]["asked_turn_degrees"])
+    assert result["predicted_turn_degrees"] == pytest.approx(result["laps"][0]["predicted_turn_degrees"])
     assert result["turns_held_back"] == 0
 
 
@@ -130,12 +130,12 @@ def test_modes_beside_the_own_run_fewer_laps(network) -> None:
         configuration="x",
         runtime=RUNTIME,
         laps=3,
-        laps_beside=1,
+        laps_other_modes=1,
         lap_seconds=2.0,
         modes=("linear",),
         track=AHEAD,
     )
-    assert result["laps_beside"] == 1
+    assert result["laps_other_modes"] == 1
     assert {m["mode"]: len(m["laps"]) for m in result["modes"]} == {"linear": 1, "cubic": 3}
     assert {m["mode"]: m["waypoints"] for m in result["modes"]} == {"linear": 2, "cubic": 6}
     assert len(result["laps"]) == 3

@@ -59,7 +59,7 @@ def test_the_sample_is_as_large_as_asked_and_has_something_of_every_kind():
     by_name = {one.clip: one for one in clips}
     measured = dict.fromkeys(("train", "held_out"), 0)
     for stratum in sample.strata:
-        kinds = {(splits[n], by_name[n].gait, by_name[n].told) for n in stratum.drawn}
+        kinds = {(splits[n], by_name[n].gait, by_name[n].channels) for n in stratum.drawn}
         assert len(kinds) == 1
         assert len(stratum.drawn) >= min(LEAST, stratum.clips)
         measured[stratum.split] += sum(stratum.drawn.values())
@@ -166,7 +166,7 @@ def test_facts_of_a_clip_survive_their_file(tmp_path):
     gait[:, GAITS.index("jog")] = 1
     rows.y[:, rows.layout.y_root_velocity] = [3, 4]
     found = facts(rows)
-    assert (found.clip, found.rows, found.gait, found.told) == ("a", 30, "jog", ("injury",))
+    assert (found.clip, found.rows, found.gait, found.channels) == ("a", 30, "jog", ("injury",))
     assert found.speed == pytest.approx(5)
     save_facts(tmp_path / "a.json", found)
     assert load_facts(tmp_path / "a.json") == found

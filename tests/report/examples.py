@@ -80,7 +80,7 @@ def scenarios(path: Path, skeleton: Skeleton, hurt: bool = True) -> None:
         made = walker(skeleton, frames, speed, 0.8 if link else 0.0)
         for key, value in made.items():
             arrays[f"{name}/{key}"] = value.astype(np.float32)
-        arrays[f"{name}/told"] = (10 * np.arange(frames) / frames * bool(link)).astype(np.float32)
+        arrays[f"{name}/swept_values"] = (10 * np.arange(frames) / frames * bool(link)).astype(np.float32)
         arrays[f"{name}/swept"] = np.array(("injury", link) if link else ("", ""))
         arrays[f"{name}/gait"] = np.array(["walk"] * frames)
     save_npz(
@@ -216,7 +216,7 @@ def strip(seconds: float) -> dict[str, Any]:
 def clip_reports(folder: Path, clips: tuple[str, ...]) -> dict[str, list[str]]:
     """motion/, labels/ and injury/<clip>.json of every clip and its mirror; returns their paths."""
     rng = np.random.default_rng(5)
-    paths: dict[str, list[str]] = {"motion": [], "labels": [], "told": []}
+    paths: dict[str, list[str]] = {"motion": [], "labels": [], "channels": []}
     for clip in clips:
         for i, name in enumerate((clip, f"{clip}_mirror")):
             safe = f"{len(paths['motion']):03d}"
@@ -252,8 +252,8 @@ def clip_reports(folder: Path, clips: tuple[str, ...]) -> dict[str, list[str]]:
                 "hurt_left_knee": {f"{side}UpLeg-{side}Leg": {"seconds": frames / 60, "highest": 7.0}},
                 "hurt_back": {"Hips-LowerBack": {"seconds": frames / 90, "highest": 5.0}},
             }.get(clip, {})
-            injury = {"clip": name, "channel": "injury", "told": hurt, "warnings": []}
-            for key, value in (("motion", motion), ("labels", labels), ("told", injury)):
+            injury = {"clip": name, "channel": "injury", "values": hurt, "warnings": []}
+            for key, value in (("motion", motion), ("labels", labels), ("channels", injury)):
                 path = folder / key / f"{safe}.json"
                 write_json(path, value)
                 paths[key].append(str(path))

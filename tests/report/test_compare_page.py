@@ -131,19 +131,19 @@ def test_every_pair_is_in_the_table_and_the_map(compared: dict[str, Any]) -> Non
 
 
 def test_published_figures_have_ours_beside_them(compared: dict[str, Any]) -> None:
-    rows = {(row[0], row[1]): row[2:4] for row in tables.beside_table(compared).rows}
+    rows = {(row[0], row[1]): row[2:4] for row in tables.published_table(compared).rows}
     assert rows["a frame, mean", "holden"][0] == "0.376 ms"
     assert rows["a frame, mean", "holden"][1].endswith(" ms")
     assert rows["relative error, held_out clips", "holden-xl"] == ["0.0448", ""]
     assert rows["database, on disk", "holden"] == ["7.12 GB", "30 MB"]
     assert rows["database, time", "holden"] == ["1 h 30 min", "21 s"]
-    of_clips = {row[0] for row in tables.beside_table(compared).rows if "80 clips" in row[4]}
+    of_clips = {row[0] for row in tables.published_table(compared).rows if "80 clips" in row[4]}
     assert of_clips == {
         f"{what} {split} clips"
         for what in ("relative error,", "standard deviation of the means of")
         for split in ("train", "held_out")
     }
-    cited = {(row[0], row[1]): row[4] for row in tables.beside_table(compared).rows}
+    cited = {(row[0], row[1]): row[4] for row in tables.published_table(compared).rows}
     assert cited["a frame, mean", "ava"] == "Segerstedt (2021), Table 5.1 (but 1.479 ms in Appendix A.4)"
     assert cited["relative error, train clips", "ava"].endswith(", Table 5.2 (but 0.0311 in Appendix A.5)")
 
@@ -197,7 +197,7 @@ def test_two_figures_take_the_same_wishes(tab: Any) -> None:
     tab.send("Input.dispatchKeyEvent", type="keyUp", key="w", code="KeyW")
     assert first[0] * second[0] + first[1] * second[1] > 0
     tab.run("[...document.querySelectorAll('#play-presets button')][0].click()")
-    hurt = "Math.max(0, ...Hobble.player.actors[{0}].character.told)"
+    hurt = "Math.max(0, ...Hobble.player.actors[{0}].character.channelValues)"
     assert tab.until(f"{hurt.format(0)} > .1")
     assert tab.run(hurt.format(1)) == 0
     assert "holden" in tab.run("document.getElementById('play-panel').textContent")

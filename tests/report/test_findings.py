@@ -114,8 +114,8 @@ def test_the_time_of_a_frame_is_a_median(material: Material) -> None:
     )
     figure = next(f for f in key_figures(slow) if f.label == "Time per frame")
     assert (figure.value, figure.unit) == ("0.025", "ms")
-    assert "667 characters" in figure.beside
-    assert "mean 0.17 ms, published mean 0.376 ms" in figure.beside
+    assert "667 characters" in figure.note
+    assert "mean 0.17 ms, published mean 0.376 ms" in figure.note
     assert (
         next(kind for head, kind in heads(slow).items() if head.startswith("A frame takes 0.1 %")) == "good"
     )
@@ -136,28 +136,28 @@ def test_problems_come_first_and_data_comes_before_training(material: Material) 
 
 def test_a_limited_turn_is_reported(material: Material) -> None:
     lap = material.measured["responsivity"]
-    asked = {**lap, "largest_turn_degrees": 25.0, "asked_turn_degrees": 170.0, "turns_held_back": 3}
+    asked = {**lap, "largest_turn_degrees": 25.0, "predicted_turn_degrees": 170.0, "turns_held_back": 3}
     assert heads(material, responsivity=asked)[
         "The network predicted a turn of a joint by 170 degrees in one frame."
     ]
     figure = next(f for f in track_figures(asked) if f.label == "Largest predicted turn")
     assert figure.value == "170"
-    assert "which changed 3 of" in figure.beside
-    assert "largest turn drawn: 25.0°" in figure.beside
+    assert "which changed 3 of" in figure.note
+    assert "largest turn drawn: 25.0°" in figure.note
 
 
 def test_errors_of_the_prediction_and_of_the_drawn_pose_are_shown(material: Material) -> None:
     one = {"length": 1, "held_out": {"position_error_cm": 0.51}, "train": {"position_error_cm": 0.4}}
     found = changed(material, rollouts={"lengths": [one]})
     figure = next(f for f in key_figures(found) if f.label == "Error on held-out clips")
-    assert "cm per joint for the prediction, 0.510 cm for the drawn pose" in figure.beside
+    assert "cm per joint for the prediction, 0.510 cm for the drawn pose" in figure.note
 
 
 def test_key_figures_show_the_published_values(material: Material) -> None:
     figures = {f.label: f for f in key_figures(changed(material, name="holden"))}
-    assert "published for HOLDEN: 4.39 %" in figures["Error on held-out clips"].beside
-    assert "published mean 0.376 ms" in figures["Time per frame"].beside
-    assert figures["Network"].beside.startswith("parameters per phase; layers of 372–16–16–311")
+    assert "published for HOLDEN: 4.39 %" in figures["Error on held-out clips"].note
+    assert "published mean 0.376 ms" in figures["Time per frame"].note
+    assert figures["Network"].note.startswith("parameters per phase; layers of 372–16–16–311")
 
 
 def test_key_figures_without_results(material: Material) -> None:

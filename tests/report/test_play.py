@@ -102,7 +102,7 @@ def test_the_page_moves_as_python_does(
         )
         world, places = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
         expected.append(
-            (pose.positions, pose.phase, pose.told["injury"], pose.rotations, places[0], world[0])
+            (pose.positions, pose.phase, pose.channels["injury"], pose.rotations, places[0], world[0])
         )
     links = network.channels["injury"]
     script = f"""(() => {{
@@ -110,12 +110,12 @@ def test_the_page_moves_as_python_does(
       const hills = (x, z) => 14 * Math.sin(x / 170) * Math.cos(z / 140) + 8 * Math.sin((x + z) / 260);
       return {json.dumps([wish(f) for f in range(FRAMES)])}.map(({{ velocity, facing, gait, hurt }}) => {{
         if (hurt) {{
-          c.wished[{links.index("LeftUpLeg-LeftLeg")}] = 7;
-          c.wished[{links.index("Hips-LowerBack")}] = 3;
+          c.channelTargets[{links.index("LeftUpLeg-LeftLeg")}] = 7;
+          c.channelTargets[{links.index("Hips-LowerBack")}] = 3;
         }}
         c.frame(velocity, facing, gait, hills);
         rig.take(c.pose, c.turns);
-        const made = [c.pose, c.phase, c.told, c.turns, rig.places, rig.turns];
+        const made = [c.pose, c.phase, c.channelValues, c.turns, rig.places, rig.turns];
         return made.map((v) => (v.length ? Array.from(v) : v));
       }});
     }})()"""
@@ -186,7 +186,7 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
       const [p, q] = [at(knee), at(heel)];
       return [box.x + (p[0] + q[0]) / 2, box.y + (p[1] + q[1]) / 2];
     })()"""
-    shin = "Hobble.player.told.values.get('injury/LeftLeg-LeftFoot')"
+    shin = "Hobble.player.sliders.values.get('injury/LeftLeg-LeftFoot')"
     for modifiers, severity in ((0, 2), (0, 4), (8, 2)):
         tab.run("new Promise(requestAnimationFrame)")
         tab.run("Hobble.player.chase.touch()")
@@ -198,11 +198,11 @@ def test_a_click_on_the_left_shin_hurts_it_and_changes_the_gait(tab: Any) -> Non
             )  # fmt: skip
         assert tab.until(f"{shin} === {severity}"), severity
     index = "Hobble.player.actors[0].spec.channels[0].columns.indexOf('LeftLeg-LeftFoot')"
-    assert tab.until(f"Hobble.player.actors[0].character.told[{index}] > .1")
+    assert tab.until(f"Hobble.player.actors[0].character.channelValues[{index}] > .1")
     apart = f"""(() => {{
       const [{{ spec }}] = Hobble.player.actors;
       const hurt = Hobble.character(spec), healthy = Hobble.character(spec);
-      hurt.wished[{index}] = 2;
+      hurt.channelTargets[{index}] = 2;
       for (let f = 0; f < 60; f++) for (const c of [hurt, healthy]) c.frame([0, 2.5], null, "walk", () => 0);
       return Math.max(...hurt.pose.map((v, i) => Math.abs(v - healthy.pose[i])));
     }})()"""
@@ -215,7 +215,7 @@ def test_presets_sliders_and_the_link_to_them(tab: Any) -> None:
         "Hurt knee", "Sprained ankle", "Bad back", "Knee and back", "Healthy",
     ]  # fmt: skip
     tab.run(f"{buttons}[2].click()")
-    back = "Hobble.player.told.values.get('injury/Hips-LowerBack')"
+    back = "Hobble.player.sliders.values.get('injury/Hips-LowerBack')"
     assert tab.run(back) == 8
     assert "8" in tab.run("[...document.querySelectorAll('#play-sliders output')].map((o) => o.value)")
     tab.run("Hobble.player.steering.toggle('crouch', true)")
@@ -223,7 +223,7 @@ def test_presets_sliders_and_the_link_to_them(tab: Any) -> None:
     tab.run("Object.assign(Hobble.player.view.orbit, { yaw: 1.25, distance: 333 })")
     tab.run("document.getElementById('play-share').click()")
     tab.run(f"{buttons}[4].click()")
-    assert tab.run("Math.max(...Hobble.player.told.values.values())") == 0
+    assert tab.run("Math.max(...Hobble.player.sliders.values.values())") == 0
     tab.send("Page.reload")
     assert tab.until(
         f"typeof Hobble !== 'undefined' && Hobble.player && {back} === 8 && Hobble.player.steering.on.crouch"
@@ -285,11 +285,11 @@ def test_the_view_of_the_inputs_shows_inputs_of_the_network(
       return [Hobble.groundSamples(c, spec), Hobble.jointVelocities(c)];
     })()""")
     places = np.reshape([sample["place"] for sample in samples], (12, 3, 3))
-    told = np.reshape([sample["told"] for sample in samples], (12, 3))
-    assert np.abs(told - (places[..., 1] - places[:, 1, 1].mean())).max() < 1e-9
+    heights = np.reshape([sample["above"] for sample in samples], (12, 3))
+    assert np.abs(heights - (places[..., 1] - places[:, 1, 1].mean())).max() < 1e-9
     aside = np.linalg.norm((places - places[:, 1:2])[..., [0, 2]], axis=-1)
     np.testing.assert_allclose(aside, np.tile([25.0, 0, 25.0], (12, 1)), atol=1e-6)
-    assert np.ptp(told) > 1, "the ground is not flat there"
+    assert np.ptp(heights) > 1, "the ground is not flat there"
     velocity = animation.state.joint_velocity[0]
     moving = np.linalg.norm(velocity, axis=-1) >= 0.15
     start, end = (np.array([needle[key] for needle in needles]) for key in ("from", "to"))
@@ -330,14 +330,14 @@ def test_a_link_pasted_into_the_open_page_is_followed_and_taken_with_care(tab: A
     tab.run(
         f"location.hash = '#play?ground={ground}&camera=,,&hurt=LeftLeg-LeftFoot:3,x:9,Hips-LowerBack:-1'"
     )
-    assert tab.until("Hobble.player.told.values.get('injury/LeftLeg-LeftFoot') === 3")
+    assert tab.until("Hobble.player.sliders.values.get('injury/LeftLeg-LeftFoot') === 3")
     assert tab.run("document.getElementById('play-ground').value") == (
         "boxes" if ground == "boxes" else "slope"
     )
-    assert tab.run("Hobble.player.told.values.get('injury/Hips-LowerBack')") == 0
+    assert tab.run("Hobble.player.sliders.values.get('injury/Hips-LowerBack')") == 0
     assert tab.run("Hobble.player.view.orbit.distance") >= 140
     assert tab.run("Hobble.player.view.orbit.pitch") > 0.02
-    tab.run("Hobble.player.told.set([]); location.hash = ''")
+    tab.run("Hobble.player.sliders.set([]); location.hash = ''")
 
 
 def test_the_camera_comes_round_behind_at_any_rate_of_pictures(tab: Any) -> None:

@@ -52,11 +52,11 @@ def again(tab: Any, forget: bool = False) -> None:
 
 
 def test_what_hurts_is_listed_beside_the_page_and_not_in_it(made: tuple[Path, dict[str, Any]]) -> None:
-    folder, told = made
-    assert json.loads((folder / "films.json").read_text()) == json.loads(json.dumps(told))
-    assert [row["parts"] for row in told["films"]] == [list(film.parts) for film in SHORT]
-    assert told["films"][0]["links"] == ["LeftForeArm-LeftHand"]
-    assert all(row["from_healthy_cm"] > 0 for row in told["films"])
+    folder, written = made
+    assert json.loads((folder / "films.json").read_text()) == json.loads(json.dumps(written))
+    assert [row["parts"] for row in written["films"]] == [list(film.parts) for film in SHORT]
+    assert written["films"][0]["links"] == ["LeftForeArm-LeftHand"]
+    assert all(row["from_healthy_cm"] > 0 for row in written["films"])
     page = (folder / "questionnaire.html").read_text()
     assert not any(kind in page for kind in ("several parts", "LeftForeArm", "change of gait"))
     assert page.count('"webp"') == 4
@@ -122,8 +122,8 @@ def test_orders_differ_and_a_closed_page_goes_on(tab: Any) -> None:
 
 def test_films_in_which_nothing_can_be_seen_are_told() -> None:
     rows = [
-        {"film": 1, "from_healthy_cm": 3.0, "never_told": []},
-        {"film": 2, "from_healthy_cm": 0.01, "never_told": ["A-B"]},
+        {"film": 1, "from_healthy_cm": 3.0, "untrained": []},
+        {"film": 2, "from_healthy_cm": 0.01, "untrained": ["A-B"]},
     ]
     assert doubts({"films": rows[:1]}) == []
     same, never = doubts({"films": rows})

@@ -35,11 +35,11 @@ def test_every_scenario_is_thinned_to_thirty_hertz(play: dict[str, Any]) -> None
     assert len(unpacked(walk["pose"], "<i2")) == 300 * play["joints"] * 3
     assert play["joints"] < 31, "joints that are not drawn need not lie in the page"
     assert len(unpacked(walk["contacts"], "u1")) == 300
-    assert "told" not in walk
-    told = hurt["told"]
-    assert (told["spoken"], told["highest"], told["placed"]) == ("left thigh", 10, True)
-    assert any(told["column"] in columns for columns in play["regions"])
-    values = unpacked(told["values"], "u1")
+    assert "swept" not in walk
+    swept = hurt["swept"]
+    assert (swept["spoken"], swept["highest"], swept["placed"]) == ("left thigh", 10, True)
+    assert any(swept["column"] in columns for columns in play["regions"])
+    values = unpacked(swept["values"], "u1")
     assert values.shape == (hurt["frames"],)
     assert values[-1] == pytest.approx(249, abs=2)
 

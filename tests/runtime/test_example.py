@@ -30,6 +30,6 @@ def test_the_game_loop(
     assert len(lines) == 10
     assert lines[0].startswith(" 0 s at [")
     assert 0.5 < left["pose"].positions[0, 1] < 1.5  # metres
-    assert left["pose"].told["injury"].max() > 4
+    assert left["pose"].channels["injury"].max() > 4
     code = (root / "examples" / "game_loop.py").read_text().split('"""')[2]
     assert len([line for line in code.splitlines() if line.strip()]) <= 20

@@ -110,11 +110,11 @@ def test_scenarios_are_written(tmp_path: Path, hurtable) -> None:
         assert positions.shape == (scenario.frames, 31, 3)
         assert positions.dtype == np.float32
         assert len(data[f"{scenario.name}/gait"]) == scenario.frames
-    knee = data["left_knee/told"]
+    knee = data["left_knee/swept_values"]
     assert (knee[0], knee[-1]) == (0, 10)
     assert np.all(np.diff(knee) > 0)
     assert data["left_knee/swept"].tolist() == ["injury", "LeftUpLeg-LeftLeg"]
-    assert not data["walk/told"].any()
+    assert not data["walk/swept_values"].any()
     assert data["walk/swept"].tolist() == ["", ""]
 
 

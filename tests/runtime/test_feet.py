@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,9 +16,12 @@ from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.feet import (
     BODY_FREE,
     FLOATING,
+    FOOT,
     LOCK_AT,
     MOST_ADDED,
     RELEASE,
+    STRETCH,
+    TOES,
     TOO_FAR,
     bend,
     carried,
@@ -29,12 +34,12 @@ from hobble.runtime.feet import (
 coordinate = st.floats(-25, 25)
 
 
-def crouched(skeleton: Skeleton) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (J, 3) and world rotations (J, 4) of a figure with bent knees, its left toe 6 cm up."""
+def crouched(skeleton: Skeleton, thigh: float = 0.5, knee: float = 0.9) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (J, 3) and world rotations (J, 4) of a figure. Radians: thighs forward, knees bent."""
     local = np.tile([1.0, 0, 0, 0], (1, len(skeleton.joints), 1))
     for side in ("left", "right"):
-        local[0, skeleton.role(f"{side}_hip")] = quat.from_axis_angle([1.0, 0, 0], -0.5)
-        local[0, skeleton.role(f"{side}_knee")] = quat.from_axis_angle([1.0, 0, 0], 0.9)
+        local[0, skeleton.role(f"{side}_hip")] = quat.from_axis_angle([1.0, 0, 0], -thigh)
+        local[0, skeleton.role(f"{side}_knee")] = quat.from_axis_angle([1.0, 0, 0], knee)
     rotations, positions = forward_kinematics(skeleton, local, np.array([[0.0, 90.0, 0.0]]))
     return positions[0], rotations[0]
 
@@ -82,22 +87,21 @@ def test_the_knee_stays_on_its_side(holden31: Skeleton) -> None:
 class Feet:
     """`place_feet` with its state, on one figure."""
 
-    def __init__(self, skeleton: Skeleton) -> None:
+    def __init__(self, skeleton: Skeleton, *bent: float) -> None:
         self.legs = leg_joints(skeleton)
         self.below = carried(skeleton, self.legs)
         self.lock, self.hold, self.lift = np.zeros((1, 2)), np.zeros((1, 2, 2)), np.zeros((1, 2))
         self.added = np.tile([1.0, 0, 0, 0], (1, 2, 2, 1))
-        self.base = crouched(skeleton)
+        self.base = crouched(skeleton, *bent)
 
     def __call__(self, moved: np.ndarray, contact: float, ground: float | None = None, locking: bool = True):
         if ground is None:  # just under the feet, neither sunk nor floating
             ground = min(self.base[0][self.legs[0, 2], 1] - 5.0, self.base[0][self.legs[0, 3], 1] - 4.0) - 1.0
         position, rotation = self.base[0][None] + moved, self.base[1][None].copy()
-        place_feet(
-            np.array([[contact, contact, 0, 0]], np.float32), 0, np.full((1, 4), ground), locking, self.legs,
-            self.below,
-            np.array([5.0, 4.0]), self.lock, self.hold, self.lift, self.added, position, rotation,
-        )  # fmt: skip
+        contacts = np.array([[contact, contact, 0, 0]], np.float32)
+        legs = self.legs, self.below, np.array([5.0, 4.0])
+        feet = self.lock, self.hold, self.lift, self.added
+        place_feet(contacts, np.full((1, 4), ground), locking, legs, feet, position, rotation)
         self.rotation = rotation[0]
         return position[0]
 
@@ -114,6 +118,52 @@ def test_a_foot_in_contact_stays_and_is_released_slowly(holden31: Skeleton) -> N
     for _ in range(20):
         last = feet(8 * step, 0.0)[toe]
     np.testing.assert_allclose(last, free, atol=1e-9)
+
+
+def stretched(position: np.ndarray, legs: np.ndarray) -> float:
+    """Distance from hip to heel joint of the left leg, as a share of its length."""
+    hip, knee, heel, _ = position[legs[0]]
+    return np.linalg.norm(heel - hip) / (np.linalg.norm(knee - hip) + np.linalg.norm(heel - knee))
+
+
+def test_the_heel_of_a_held_foot_rises_before_its_leg_is_straight(holden31: Skeleton) -> None:
+    """As the body goes on, the toe stays, the knee stays bent, and the foot turns about the toe, rigid."""
+    feet = Feet(holden31, 0.05, 0.35)
+    _, _, heel, toe = feet.legs[0]
+    start, turns = feet.base[0], feet.base[1]
+    foot, first = start[toe] - start[heel], start[toe]
+    leg = sum(np.linalg.norm(start[a] - start[b]) for a, b in itertools.pairwise(feet.legs[0][:3]))
+    rolls, lengths = [], []
+    for z in np.arange(0, 16, 0.5):
+        shown = feet(np.array([0.0, 0, z]), 1.0)
+        np.testing.assert_allclose(shown[toe], first, atol=1e-6)
+        turned = quat.mul(feet.rotation[heel], quat.inv(turns[heel]))
+        np.testing.assert_allclose(shown[toe] - shown[heel], quat.rotate(turned, foot), atol=1e-6)
+        np.testing.assert_array_equal(feet.rotation[toe], turns[toe])
+        rolls.append(2 * np.degrees(np.arcsin(np.linalg.norm(turned[1:]))))
+        lengths.append(stretched(shown, feet.legs))
+    assert rolls[0] == 0
+    assert rolls[-1] > 10
+    assert 0 <= np.diff(rolls).min() <= np.diff(rolls).max() < 1.5  # it does not set in at once
+    assert lengths[-1] == pytest.approx(STRETCH, abs=1e-9)
+    without = np.linalg.norm(first - [0, 0, 15.5] - foot - start[feet.legs[0][0]]) / leg
+    assert without > lengths[-1] + 0.005
+
+
+def test_a_held_foot_ahead_of_the_body_stays_flat(holden31: Skeleton) -> None:
+    feet = Feet(holden31, 0.2, 0.35)
+    heel = holden31.role("left_heel")
+    for z in np.arange(0, 19, 0.5):
+        shown = feet(np.array([0.0, 0, -z]), 1.0)
+        np.testing.assert_array_equal(feet.rotation[heel], feet.base[1][heel])
+    assert stretched(shown, feet.legs) > STRETCH
+
+
+def test_what_a_foot_carries(holden31: Skeleton) -> None:
+    below = carried(holden31, leg_joints(holden31))
+    names = [[holden31.joints[j] for j in np.flatnonzero(row == TOES)] for row in below]
+    assert names == [["LeftToeBase"], ["RightToeBase"]]
+    assert not (below == FOOT).any()
 
 
 def test_renewed_contact_holds_the_foot_where_it_is_shown(holden31: Skeleton) -> None:
@@ -218,9 +268,8 @@ def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
         lift = np.zeros(1)
         for _ in range(80):
             position = base[None].copy()
-            carry_body(
-                np.array([contacts], np.float32), 0, ground, hips, low, high, legs, sole, lift, position
-            )
+            both = legs, carried(holden31, legs), sole
+            carry_body(np.array([contacts], np.float32), ground, hips, (low, high), both, lift, position)
         moved = position[0] - base
         np.testing.assert_allclose(moved[:, 1], moved[0, 1], atol=1e-12)
         np.testing.assert_array_equal(moved[:, ::2], 0)

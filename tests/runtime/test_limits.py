@@ -27,7 +27,7 @@ def limited(make_network) -> Network:
     knee, arm = (network.channels["injury"].index(link) for link in (KNEE, ARM))
     speeds[WALK, knee, 1], speeds[JOG, knee, 1] = 1.0, 3.0
     speeds[WALK, arm, 1], speeds[JOG, arm, 1] = 1.8, 6.3
-    return replace(network, limits={"injury": Limits(np.array([0.0, 10.0]), speeds)})
+    return replace(network, limits={"injury": Limits(np.array([0.0, 10.0]), speeds, speeds.max(axis=(1, 2)))})
 
 
 def asked(

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from hobble.core.errors import InputError
 from hobble.models.load import load_network
-from hobble.models.network import Network
+from hobble.models.network import STORAGES, Network
 from hobble.models.pfnn.forward import catmull_rom, weights_at
-from hobble.models.pfnn.predictor import MODES, STORAGES, PfnnPredictor
+from hobble.models.pfnn.predictor import MODES, PfnnPredictor
 from hobble.models.pfnn.release import read_release, write_release
 
 ROWS = 7
@@ -106,15 +106,17 @@ def test_modes_approach_the_spline(make_network) -> None:
 @given(st.floats(-2, 3))
 @settings(max_examples=50, deadline=None)
 def test_every_phase_is_within_the_table(phase: float) -> None:
-    from hobble.models.pfnn.predictor import _phase
+    from hobble.models.pfnn.predictor import _share
 
-    for kind, points in ((1, 50), (2, 10), (4, 4)):
-        index, share = np.zeros(kind, np.int64), np.zeros(kind, np.float32)
+    for blended, points in ((1, 50), (2, 10), (4, 4)):
         for p in (phase, 1.0, np.nextafter(1.0, 0.0), np.float64(np.float32(0.99999999))):
-            _phase(p, kind, points, index, share)
-            assert index.min() >= 0
-            assert index.max() < points
-            assert share.sum() == pytest.approx(1, abs=1e-6)
+            # A number on each side, since compiled code does not check that an index is within the array.
+            around = np.full(points + 2, 7, np.float32)
+            around[1:-1] = 0
+            _share(p, blended, points, around[1:-1])
+            assert around[[0, -1]].tolist() == [7, 7]
+            assert around[1:-1].sum() == pytest.approx(1, abs=1e-6)
+            assert np.count_nonzero(around[1:-1]) <= blended
 
 
 def test_phase_one_is_the_last_entry_of_the_constant_table(make_network) -> None:

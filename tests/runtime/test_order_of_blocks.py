@@ -30,10 +30,10 @@ def test_a_row_is_composed_in_any_order(order: tuple[str, ...]) -> None:
     x, y = np.zeros((2, layout.x_size)), np.zeros((2, layout.y_size))
     other_x, other_y = np.zeros_like(x), np.zeros_like(y)
     body = rng.normal(size=(2, layout.x_size - 3 * layout.samples - 4))
-    told = {"injury": rng.uniform(0, 10, (2, 4))}
+    values = {"injury": rng.uniform(0, 10, (2, 4))}
     ground, lift = rng.normal(size=(2, 3 * layout.samples)), rng.normal(size=(2, 1))
-    compose(layout, frame_inputs(layout, body, told), ground, lift, x, y)
-    compose(ordered, frame_inputs(ordered, body, told), ground, lift, other_x, other_y)
+    compose(layout, frame_inputs(layout, body, values), ground, lift, x, y)
+    compose(ordered, frame_inputs(ordered, body, values), ground, lift, other_x, other_y)
     np.testing.assert_array_equal(other_x, x[:, columns(layout, ordered)])
     np.testing.assert_array_equal(other_y, y)
 

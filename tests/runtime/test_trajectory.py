@@ -40,11 +40,20 @@ def prediction(
 
 
 def move(
-    y: np.ndarray, position, direction, gait, phase=None, wish=(0.0, 1.0), held: float = 0.0, whole=False
+    y: np.ndarray,
+    position,
+    direction,
+    gait,
+    phase=None,
+    wish=(0.0, 1.0),
+    held: float = 0.0,
+    whole=False,
+    drawn: float = 0.0,
 ) -> np.ndarray:
     phase = np.zeros(1) if phase is None else phase
     columns = trajectory.advance_columns(LAYOUT)
-    trajectory.advance(y, columns, np.array([wish], float), held, whole, position, direction, gait, phase)
+    wishes = np.array([wish], float)
+    trajectory.advance(y, columns, wishes, held, whole, drawn, (position, direction, gait), phase)
     return phase
 
 
@@ -110,11 +119,27 @@ def test_movement_against_the_wish_is_reduced(wish, moved) -> None:
     np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("wish", "moved"),
+    [
+        ((0.0, 2.0), (0.0, 2.0)),  # as wished
+        ((0.0, 2.1), (0.0, 2.1)),  # reached with less than the whole share
+        ((0.0, 9.0), (0.0, 2.2)),  # faster
+        ((0.0, 0.0), (0.0, 1.8)),  # to stop
+        ((5.0, 2.0), (0.2, 2.0)),  # to the left
+    ],
+)
+def test_movement_is_drawn_toward_the_wish_by_a_share_of_itself(wish, moved) -> None:
+    position, direction, gait = path(stand=0.5)
+    move(prediction(speed=2.0), position, direction, gait, wish=wish, whole=True, drawn=0.1)
+    np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
+
+
 def test_no_correction_if_the_wish_is_reached() -> None:
     position, direction, gait = path(1.5, 0.4)
     before = position.copy(), direction.copy()
     ahead = direction[:, MIDDLE].copy()
-    trajectory.blend_future(1.5 * ahead, ahead, np.zeros(1), position, direction, gait)
+    trajectory.blend_future((1.5 * ahead, ahead, np.zeros(1), np.zeros((1, 2))), (position, direction, gait))
     np.testing.assert_allclose(position, before[0], atol=1e-9)
     np.testing.assert_allclose(direction, before[1], atol=1e-9)
 
@@ -125,7 +150,8 @@ def test_strafe_share_and_facing_of_the_wish(
 ) -> None:
     position, direction, gait = path(1.0)
     velocity, target = np.array([[3.0, 1.0]]), np.array([[1.0, 0.0]])
-    trajectory.blend_future(velocity, target, np.array([strafe]), position, direction, gait)
+    smoothed = velocity, target, np.array([strafe]), np.zeros((1, 2))
+    trajectory.blend_future(smoothed, (position, direction, gait))
     t = np.arange(1, MIDDLE) / MIDDLE
     share = 1 - (1 - t) ** position_bias
     np.testing.assert_allclose(np.diff(position[0, MIDDLE:], axis=0)[:, 0], 3.0 * share, atol=1e-9)
@@ -140,7 +166,7 @@ def test_wishes_are_taken_up_at_their_rates() -> None:
     shares = np.eye(6)[[1]]
     wish = np.array([[2.0, 0.0]]), np.array([[1.0, 0.0]]), np.ones(1), shares
     owed = np.zeros((1, 2))
-    trajectory.follow_wish(*wish, 0.0, velocity, direction, strafe, gait, position, heading, owed)
+    trajectory.follow_wish(wish, 0.0, (velocity, direction, strafe, owed), (position, heading, gait))
     np.testing.assert_allclose(velocity, [[1.8, 0]])
     np.testing.assert_allclose(np.arctan2(*direction[0]), 0.9 * np.pi / 2)
     np.testing.assert_allclose(strafe, 0.9)
@@ -168,16 +194,15 @@ def test_steering_adds_the_error_to_the_wish(steering: float, wish: tuple, asked
 
 
 def follow(wish, facing, steering: float, frames: int = 1, speed: float = 1.5, owed=None):
-    """Targets (2,) velocity and (2,) direction, and what is owed (2,), of a figure that glides ahead whatever
-    it is told."""
+    """Targets (2,) velocity and (2,) direction, and what is owed (2,), of a figure that glides ahead at any
+    wish."""
     position, heading, gait = path(speed)
     velocity, direction = np.zeros((1, 2)), np.array([[0.0, 1.0]])
     owed = np.zeros((1, 2)) if owed is None else np.array([owed], float)
     for _ in range(frames):
-        trajectory.follow_wish(
-            np.array([wish]), np.array([facing]), np.zeros(1), np.eye(6)[[1]], steering, velocity, direction,
-            np.zeros(1), gait, position, heading, owed,
-        )  # fmt: skip
+        wanted = np.array([wish]), np.array([facing]), np.zeros(1), np.eye(6)[[1]]
+        target = velocity, direction, np.zeros(1), owed
+        trajectory.follow_wish(wanted, steering, target, (position, heading, gait))
     return velocity[0], direction[0], owed[0]
 
 
@@ -223,9 +248,9 @@ def test_steering_asks_for_more_than_the_remaining_turn(degrees: float, beyond: 
 
 
 def test_the_ground_is_looked_up_on_both_sides() -> None:
-    position, direction, _ = path(1.0, yaw=np.pi / 2)
+    position, direction, gait = path(1.0, yaw=np.pi / 2)
     points = np.zeros((1, LAYOUT.samples, 3, 2))
-    trajectory.sample_points(position, direction, LAYOUT.step, 25.0, points)
+    trajectory.sample_points((position, direction, gait), LAYOUT.step, 25.0, points)
     # Facing +X, the left is -Z.
     for s, offset in enumerate(LAYOUT.offsets):
         np.testing.assert_allclose(points[0, s], [[offset, -25], [offset, 0], [offset, 25]], atol=1e-9)
@@ -245,7 +270,8 @@ def test_left_is_the_mirror_of_right(
         mirror = np.array([sign, 1.0])
         for _ in range(3):
             wish = np.array([[sign * x, z]]), np.array([[np.sin(sign * facing), np.cos(facing)]])
-            trajectory.blend_future(*wish, np.array([strafe]), position, direction, gait)
+            smoothed = *wish, np.array([strafe]), np.zeros((1, 2))
+            trajectory.blend_future(smoothed, (position, direction, gait))
             move(prediction(side=sign * side, turn=sign * turn), position, direction, gait)
         results.append((position * mirror, direction * mirror))
     np.testing.assert_allclose(results[0][0], results[1][0], atol=1e-6)

@@ -38,9 +38,9 @@ WALK = """
 import json, sys
 from hobble.runtime import ProceduralAnimation
 character = ProceduralAnimation.load(sys.argv[1])
-told = [character.next_pose((0, 2), toy={"one": 1}).told["toy"].tolist() for _ in range(12)]
+poses = [character.next_pose((0, 2), toy={"one": 1}).channels["toy"].tolist() for _ in range(12)]
 network = character.network
-print(json.dumps([told, network.layout.to_dict()["channels"], list(network.channels["toy"])]))
+print(json.dumps([poses, network.layout.to_dict()["channels"], list(network.channels["toy"])]))
 """
 
 
@@ -54,9 +54,9 @@ def test_a_channel_needs_one_folder_and_one_name_in_the_list(workflow) -> None:
     )
     weights = "results/toy/network/weights.npz"
     workflow.run("-c2", weights)
-    told = workflow.folder / "results/datasets/tiny/channels/toy"
-    assert json.loads((told / "walk-straight-1.json").read_text())["told"].keys() == {"one"}
-    assert json.loads((told / "walk-straight-2.json").read_text())["told"] == {}
+    folder = workflow.folder / "results/datasets/tiny/channels/toy"
+    assert json.loads((folder / "walk-straight-1.json").read_text())["values"].keys() == {"one"}
+    assert json.loads((folder / "walk-straight-2.json").read_text())["values"] == {}
     manifest = json.loads(
         (workflow.folder / "results/datasets/tiny/database/toy+injury/manifest.json").read_text()
     )

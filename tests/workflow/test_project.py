@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from hobble.channels import Source, channel
 from hobble.core.errors import HobbleError
 from hobble.motion.options import ClipMotion
 from hobble.workflow import targets
@@ -48,6 +49,37 @@ def test_mirrors_go_with_their_originals_and_hurt_clips_to_injured_networks(base
     assert project.configurations.splits("hurt") == {**healthy, "c": "train", "c_mirror": "train"}
     assert project.configurations.database("one").endswith("mine/database/plain")
     assert project.configurations.database("hurt").endswith("mine/database/injury")
+
+
+MOODS = """
+hurt: {versions: 1}
+channels:
+  mood: {patterns: {"b*": {sad: 1}}}
+clips: {a: {person: ann}, b: , c: {person: ann}}
+"""
+
+
+def test_a_hurt_version_has_the_mood_of_its_clip(base: Path) -> None:
+    (base / "config/datasets/mine.yaml").write_text(DATASET + MOODS)
+    (base / "config/mood.yaml").write_text("extends: one\nchannels: [mood]\n")
+    (base / "config/both.yaml").write_text("extends: one\nchannels: [mood, injury]\n")
+    project = Project(base, {})
+    values = project.datasets.channel_sources
+    assert [values.neutral("mine", clip, "mood") for clip in ("a_hurt1", "b_hurt1")] == [True, False]
+    source = Source(**values.source("mine", "b_hurt1", "mood"))
+    assert not channel("mood").is_neutral(source)
+    plain, moods = ("a", "a_mirror"), ("a", "a_mirror", "b", "b_mirror")
+    both = {*moods, *(f"{v}{m}" for v in ("a_hurt1", "b_hurt1", "c") for m in ("", "_mirror"))}
+    assert set(project.configurations.splits("one")) == set(plain)
+    assert set(project.configurations.splits("mood")) == set(moods)
+    assert set(project.configurations.splits("hurt")) == {c for c in both if c[0] != "b"}
+    assert set(project.configurations.splits("both")) == both
+    database = project.configurations.database("both")
+    assert database.endswith("mine/database/injury+mood"), "in the order of the list of channels"
+    people = project.measurements.people("both", "manners")
+    assert {clip for clip, person in people.items() if person == "ann"} == {c for c in both if c[0] in "ac"}
+    assert {person for clip, person in people.items() if clip[0] == "b"} == {"b"}
+    assert project.measurements.people("both", "accuracy") == {}
 
 
 def test_files_beside_a_clip_are_found_and_no_others(base: Path) -> None:

@@ -21,6 +21,7 @@ rule measure:
         configuration=lambda w: w.configuration,
         package=lambda w: measurements.package_of(w.measure),
         splits=lambda w: measurements.splits(w.configuration, w.measure),
+        people=lambda w: measurements.people(w.configuration, w.measure),
         runtime=lambda w: measurements.runtime(w.configuration, w.measure),
         options=lambda w: measurements.options(w.configuration, w.measure),
         code=lambda w: measurements.code(

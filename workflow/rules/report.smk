@@ -88,7 +88,7 @@ rule report:
         labels=lambda w: configurations.of_dataset(
             w.configuration, "labels/{clip}.json"
         ),
-        told=lambda w: [
+        channels=lambda w: [
             file
             for channel in datasets.channel_sources.channels(
                 configurations.dataset(w.configuration)

@@ -18,6 +18,7 @@ with job(snakemake) as log:
         files,
         {Path(file).stem: Path(file) for file in snakemake.input.get("clips", ())},
         snakemake.params.splits,
+        snakemake.params.people,
         [Path(file) for file in snakemake.input.get("facts", ())],
         Runtime.model_validate(snakemake.params.runtime),
     )

@@ -6,12 +6,12 @@ from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
-    told = write_questionnaire(
+    solution = write_questionnaire(
         load_network(snakemake.input.weights),
         snakemake.output.folder,
         Runtime.model_validate(snakemake.params.runtime),
         snakemake.params.configuration,
     )
-    for doubt in doubts(told):
+    for doubt in doubts(solution):
         log.warning("%s", doubt)
-    log.info("wrote %d films to %s", len(told["films"]), snakemake.output.folder)
+    log.info("wrote %d films to %s", len(solution["films"]), snakemake.output.folder)

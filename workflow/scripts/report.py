@@ -26,7 +26,7 @@ with job(snakemake):
         weights=given.weights,
         motion=given.motion,
         labels=given.labels,
-        told=given.told,
+        channels=given.channels,
         terrain=given.terrain,
         rows=given.rows,
     )

@@ -49,8 +49,9 @@ class Channel(ABC):
     clip that holds values, or None. former: keys of this channel in older files. Options: model of the data
     set's section `channels.<name>`. If it is None, every data set has the channel; else only those with the
     section. slows: whether values above 0 make the body slower. Then its speed limits are learnt from the
-    rows (see `hobble.channels.limits`). targets: folders of results/<configuration>/ that only a
-    configuration with this channel can have.
+    rows (see `hobble.channels.limits`). manner: whether a column above 0 is a manner in which a whole clip
+    walks, such as a mood. Then `hobble.measures.manners` measures whether a recogniser sees it. targets:
+    folders of results/<configuration>/ that only a configuration with this channel can have.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Channel(ABC):
     former: Sequence[str] = ()
     Options: type[Section] | None = None
     slows: bool = False
+    manner: bool = False
     targets: Sequence[str] = ()
 
     @abstractmethod

@@ -54,5 +54,5 @@ def write_report(
     """Write the JSON beside the values: for each label the time above 0, the highest value, and when."""
     one = channel(name)
     summary = one.summary(values, labels, clip.fps)
-    report = {"clip": clip.name, "channel": name, "title": one.title, "told": summary}
+    report = {"clip": clip.name, "channel": name, "title": one.title, "values": summary}
     write_json(path, {**report, "highest": one.highest, "warnings": list(warnings)})

@@ -36,11 +36,13 @@ class Limits:
     """Speed limits of a channel.
 
     levels: (K,) values from 0 to the channel's highest. speeds: (G, L, K) cm a frame at these values, for
-    each gait and label; they never rise with the value.
+    each gait and label; they never rise with the value. usual: (G,) cm a frame, of a body without values in
+    any channel.
     """
 
     levels: Array = field(repr=False)
     speeds: Array = field(repr=False)
+    usual: Array = field(repr=False)
 
     def allowed(self, values: Array) -> Array:
         """(C, G) highest speed in cm a frame in each gait, for values (C, L).
@@ -57,37 +59,63 @@ class Limits:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for a file."""
-        return {"levels": self.levels.tolist(), "speeds": np.round(self.speeds, 4).tolist()}
+        speeds, usual = (np.round(values, 4).tolist() for values in (self.speeds, self.usual))
+        return {"levels": self.levels.tolist(), "speeds": speeds, "usual": usual}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], gaits: int, labels: int, highest: float) -> Limits:
-        """The inverse of `to_dict`. Raises ValueError for a table of other numbers of gaits and labels."""
+        """The inverse of `to_dict`. In older files nothing is `usual`: then it is the highest speed.
+
+        Raises ValueError for a table of other numbers of gaits and labels.
+        """
         try:
             levels, speeds = (np.array(data[key], float) for key in ("levels", "speeds"))
+            usual = np.array(data.get("usual", np.max(speeds, axis=(1, 2), initial=0.0)), float)
         except (KeyError, TypeError, ValueError, OverflowError):
             raise ValueError("no table of numbers: it has `levels` and `speeds`") from None
-        if levels.ndim != 1 or len(levels) < 2 or speeds.shape != (gaits, labels, len(levels)):
-            raise ValueError(
-                f"levels {levels.shape}, speeds {speeds.shape} for {gaits} gaits, {labels} labels"
-            )
+        shapes = [table.shape for table in (levels, speeds, usual)]
+        if levels.size < 2 or shapes != [(levels.size,), (gaits, labels, levels.size), (gaits,)]:
+            of = "levels {}, speeds {}, usual {}".format(*shapes)
+            raise ValueError(f"{of} for {gaits} gaits, {labels} labels")
         if levels[0] != 0 or levels[-1] != highest or not (np.diff(levels) > 0).all():
             raise ValueError(f"levels do not rise from 0 to {highest:g}")
         if not ((speeds > 0) & (speeds <= UNLIMITED)).all():
             raise ValueError(f"speeds are not all above 0 and at most {UNLIMITED:g}")
         if (np.diff(speeds, axis=2) > 0).any():
             raise ValueError("a higher value goes faster than a lower one")
-        return cls(levels, speeds)
+        if not ((usual >= 0) & (usual <= UNLIMITED)).all():
+            raise ValueError(f"usual speeds are not all from 0 to {UNLIMITED:g}")
+        return cls(levels, speeds, usual)
+
+
+def together(allowed: Sequence[Array], usual: Array) -> Array:
+    """(C, G) highest speeds of bodies with values of several channels.
+
+    allowed: (C, G) for each channel. usual: (G,). Each channel leaves a share of the usual speed, and the
+    shares multiply: whoever is sad and limps is slower than by either. A channel that leaves more than the
+    usual speed takes nothing from it.
+    """
+    shares = [
+        np.minimum(1.0, np.divide(one, usual, out=np.ones_like(one), where=usual > 0)) for one in allowed
+    ]
+    least = np.min(allowed, axis=0)
+    return np.where(least < usual, usual * np.prod(shares, axis=0), least)
 
 
 @dataclass(frozen=True)
 class _Cycles:
-    """N cycles of one clip. gait: (N,); speed, ahead: (N,) cm a frame; values: (N, L); number: (N,)."""
+    """N cycles of one clip.
+
+    gait: (N,). speed, ahead: (N,) cm a frame. values: (N, L). number: (N,). others: (N,) bool, whether
+    another channel has a value above 0.
+    """
 
     gait: np.ndarray
     speed: Array
     ahead: Array
     values: Array
     number: np.ndarray
+    others: np.ndarray
 
 
 class Pace:
@@ -109,12 +137,14 @@ class Pace:
         velocity: Array,
         values: Array,
         cycle: np.ndarray,
+        others: np.ndarray,
         source: str | None = None,
     ) -> None:
         """Add a clip's rows.
 
         gait: (R, G) shares. velocity: (R, 2) of the root in its own frame, cm a frame. values: (R, L). cycle:
-        (R,) numbers of the cycles. source: the healthy clip, if this is a hurt version of it.
+        (R,) numbers of the cycles. others: (R,) bool, whether another channel has a value above 0. source:
+        the healthy clip, if this is a hurt version of it.
         """
         numbers, of_row, count = np.unique(cycle, return_inverse=True, return_counts=True)
 
@@ -133,6 +163,7 @@ class Pace:
             mean(velocity[:, 1]),
             np.where(means < FAINT * self.highest, 0.0, means),
             numbers,
+            mean(others.astype(float)) > 0,
         )
         keep = (shares.max(axis=1) > 0.5) & ((highest - lowest).max(axis=1) <= STEADY * self.highest)
         kept = _Cycles(**{name: getattr(cycles, name)[keep] for name in vars(cycles)})
@@ -175,30 +206,36 @@ class Pace:
                 own = _fitted(levels, s[gaits == k], r[gaits == k], expected)
                 hurries = np.maximum(own - CANNOT_HURRY, 0.0) / (1 - CANNOT_HURRY)
                 speeds[k, label] = usual[k] * own + (top[k] - usual[k]) * hurries
-        return Limits(levels, speeds)
+        return Limits(levels, speeds, usual)
 
     def _healthy(self) -> Array:
-        """(n, 2) gait and speed of the cycles in which all values are 0 and the body goes forward."""
+        """(n, 2) gait and speed of forward cycles in which the values of all channels are 0."""
         found = [np.zeros((0, 2))]
         for _, cycles in self._clips.values():
-            on = ~cycles.values.any(axis=1) & (cycles.ahead >= AHEAD * cycles.speed) & (cycles.speed > MOVING)
+            neutral = ~cycles.values.any(axis=1) & ~cycles.others
+            on = neutral & (cycles.ahead >= AHEAD * cycles.speed) & (cycles.speed > MOVING)
             found.append(np.stack([cycles.gait[on], cycles.speed[on]], axis=1))
         return np.concatenate(found)
 
     def _shares(self, usual: Array) -> tuple[np.ndarray, Array, Array]:
-        """Gait (n,), share of the healthy speed (n,) and values (n, L) of the cycles with a value above 0."""
+        """Gait (n,), share of the healthy speed (n,) and values (n, L) of the cycles with a value above 0.
+
+        A hurt version is compared with the same cycle of its source, which has the same values in the other
+        channels. A cycle of a source that has values of this channel itself says nothing.
+        """
         parts = []
         for source, cycles in self._clips.values():
-            told = cycles.values.any(axis=1)
+            changed = cycles.values.any(axis=1)
             if source is not None and source in self._clips:
                 own = self._clips[source][1]
-                speed_of = dict(zip(own.number.tolist(), own.speed.tolist(), strict=True))
-                beside = np.array([speed_of.get(n, 0.0) for n in cycles.number.tolist()])
+                neutral = np.where(own.values.any(axis=1), 0.0, own.speed)
+                speed_of = dict(zip(own.number.tolist(), neutral.tolist(), strict=True))
+                healthy_speed = np.array([speed_of.get(n, 0.0) for n in cycles.number.tolist()])
             else:  # captured: only forward cycles can be compared with the usual speed
-                ahead = cycles.ahead >= AHEAD * cycles.speed
-                beside = np.where(ahead, usual[cycles.gait], 0.0)
-            on = told & (beside > MOVING)
-            share = np.clip(cycles.speed[on] / beside[on], SLOWEST, 1.0)
+                counts = (cycles.ahead >= AHEAD * cycles.speed) & ~cycles.others
+                healthy_speed = np.where(counts, usual[cycles.gait], 0.0)
+            on = changed & (healthy_speed > MOVING)
+            share = np.clip(cycles.speed[on] / healthy_speed[on], SLOWEST, 1.0)
             parts.append((cycles.gait[on], share, cycles.values[on]))
         if not parts:
             return np.zeros(0, int), np.zeros(0), np.zeros((0, len(self.across)))

@@ -50,10 +50,10 @@ class Shown:
 
 @dataclass(frozen=True)
 class Loop:
-    """A walk to look at. told: column -> value. coloured: whether the values colour the body."""
+    """A walk to look at. values: column -> value. coloured: whether the values colour the body."""
 
     name: str
-    told: Mapping[str, float]
+    values: Mapping[str, float]
     coloured: bool = False
 
 
@@ -88,8 +88,8 @@ def loops(name: str, skeleton: Skeleton, columns: Sequence[str], trained: Collec
     """
     if own := _own(name, "loops"):
         return own(skeleton, columns, trained)
-    told, highest = [column for column in columns if column in trained], channel(name).highest
-    return [Loop(words(name).rest.lower(), {}), *(Loop(c.replace(" ", "-"), {c: highest}) for c in told)]
+    used, highest = [column for column in columns if column in trained], channel(name).highest
+    return [Loop(words(name).rest.lower(), {}), *(Loop(c.replace(" ", "-"), {c: highest}) for c in used)]
 
 
 def speaker(skeleton: Mapping[str, Any]) -> Callable[[str], str]:

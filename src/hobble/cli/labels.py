@@ -70,9 +70,9 @@ def write_labels(
         skeleton_name=SKELETON,
         options=ClipMotion(source_fps=source_fps),
     )
-    labels, told = label_clip(clip, [], report, gait, "rocky", Labels())
+    labels, checked = label_clip(clip, [], report, gait, "rocky", Labels())
     time = SourceTime(report["source_frames"], report["source_fps"], report["source_start"])
     write_label_files(paths[0], paths[1], paths[2], labels, time)
     seconds = np.bincount(labels.gait.argmax(axis=1), minlength=len(GAITS)) / clip.fps
     main = ", ".join(f"{s:.1f} s {g}" for s, g in zip(seconds, GAITS, strict=True) if s > 0)
-    return [f"{len(labels.cycles)} cycles, {main}", *report["repairs"], *told.warnings]
+    return [f"{len(labels.cycles)} cycles, {main}", *report["repairs"], *checked.warnings]

@@ -48,6 +48,9 @@ class ClipEntry(s.Section):
     gait: s.Gait | None = Field(None, description="the main gait of the clip, for automatic labels")
     ground: s.Ground = "flat"
     channels: dict[ChannelName, Any] = Field({}, description="channel -> its value in all frames of the clip")
+    person: Name | None = Field(
+        None, description="who walks; measurements that leave out whole people need it"
+    )
     recipe: str | None = Field(None, description="synthetic: which plan the walker follows")
     share: s.PositiveFloat = Field(1.0, description="synthetic: length relative to the other clips")
     source_fps: s.PositiveFloat | None = Field(None, description="overrides the file's Frame Time")

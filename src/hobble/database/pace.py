@@ -43,12 +43,15 @@ def gather(paces: Mapping[str, Pace], rows: ClipRows, source: str | None) -> Non
         return
     layout = rows.layout
     shares = rows.x[:, body_layout(layout).x_gait].reshape(len(rows), len(GAITS), layout.samples)
+    told = {name: rows.channels[name].any(axis=1) for name, _ in layout.channels}
     for name, pace in paces.items():
+        others = [on for other, on in told.items() if other != name]
         pace.add(
             rows.clip,
             gait=shares[:, :, layout.samples // 2],
             velocity=rows.y[:, layout.y_root_velocity],
             values=rows.channels[name],
             cycle=rows.cycle,
+            others=np.any(others, axis=0) if others else np.zeros(len(rows), bool),
             source=source,
         )

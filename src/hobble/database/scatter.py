@@ -60,8 +60,8 @@ def scatter(
 
 def _tables(clip: ClipRows, part: slice, layout: RowLayout) -> tuple[Array, Array]:
     """The frames and fits of a part of a clip's rows, raw."""
-    told = {name: clip.channels[name][part] for name, _ in layout.channels}
-    frames = np.concatenate([frame_inputs(layout, clip.x[part], told), clip.y[part]], axis=1)
+    values = {name: clip.channels[name][part] for name, _ in layout.channels}
+    frames = np.concatenate([frame_inputs(layout, clip.x[part], values), clip.y[part]], axis=1)
     first = clip.first_fit[part]
     ground = slice(int(first[0]), int(first[-1] + clip.fits[part][-1]))
     return frames, np.concatenate([clip.heights[ground], clip.mean[ground, None]], axis=1)

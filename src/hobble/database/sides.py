@@ -15,18 +15,18 @@ def refuse_both_sides(where: str, pairs: Iterable[tuple[str, str, str]], splits:
     where: the data set's name for messages. pairs: (clip, clip, what they are: "the same file", ...).
     splits: clip -> "train" or "held_out"; other clips are ignored.
     """
-    told, lacking = [], []
+    alike, lacking = [], []
     for a, b, what in pairs:
         if {splits.get(a), splits.get(b)} == {"train", "held_out"}:
             held, trained = (a, b) if splits[a] == "held_out" else (b, a)
-            told.append(f"{held} and {trained} are {what}")
+            alike.append(f"{held} and {trained} are {what}")
             lacking.append(trained)
-    if not told:
+    if not alike:
         return
-    more = f" and {len(told) - MOST_NAMED} more pairs" if len(told) > MOST_NAMED else ""
+    more = f" and {len(alike) - MOST_NAMED} more pairs" if len(alike) > MOST_NAMED else ""
     names = ", ".join(f'"{name}"' for name in dict.fromkeys(lacking))
     raise HobbleError(
-        f"{where}: {'; '.join(told[:MOST_NAMED])}{more}: the first of each pair is held out and the second "
+        f"{where}: {'; '.join(alike[:MOST_NAMED])}{more}: the first of each pair is held out and the second "
         f"is trained on, so what is held out would have been learnt. Add to held_out: [{names}], or take one "
         "of each pair out of the data set."
     )

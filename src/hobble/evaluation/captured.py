@@ -19,7 +19,7 @@ class Captured:
     """F consecutive frames of a clip.
 
     local: (F, J, 3) joint positions in the root frame, heights above the ground, cm. contacts: (F, 4).
-    phase: (F,). told: channel -> (F, columns). gait: (F, 6) shares. velocity: (F, 2) of the root in its own
+    phase: (F,). channels: name -> (F, columns). gait: (F, 6) shares. velocity: (F, 2) of the root in its own
     frame, cm a frame. root: (F, 3) position on the ground, starting at the origin. acceleration: (F,) largest
     of any joint, cm per frame squared, 0 in the first frame. rows: (F,) the clip's row of each frame.
     """
@@ -28,7 +28,7 @@ class Captured:
     local: Array = field(repr=False)
     contacts: Array = field(repr=False)
     phase: Array = field(repr=False)
-    told: Mapping[str, Array] = field(repr=False)
+    channels: Mapping[str, Array] = field(repr=False)
     gait: Array = field(repr=False)
     velocity: Array = field(repr=False)
     root: Array = field(repr=False)

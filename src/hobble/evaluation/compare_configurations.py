@@ -22,12 +22,12 @@ def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> di
     """The content of compare.json. Its lists have entries for each configuration, in their order.
 
     `configurations`: how they differ. `training`: their histories. `stages`: time, memory and size of their
-    stages. The name of each measurement: its results. `difference`: eq. 3.2 for each pair. `beside`:
-    published figures with ours. `published`: all published figures. `milliseconds`: everything that depends
-    on a clock, again with `difference` and `beside`.
+    stages. The name of each measurement: its results. `difference`: eq. 3.2 for each pair.
+    `against_published`: published figures with ours. `published`: all published figures. `milliseconds`:
+    everything that depends on a clock, again with `difference` and `against_published`.
     """
     found = {name: say(all_measured, published) for name, say in each("compared")}
-    times = SideBySide(milliseconds={"beside": stage_times(all_measured, published)})
+    times = SideBySide(milliseconds={"against_published": stage_times(all_measured, published)})
     everything = [*found.values(), times]
     clocked = dict.fromkeys(kind for one in everything for kind in one.milliseconds)
     return {
@@ -40,8 +40,8 @@ def compare(all_measured: Sequence[ConfigurationResults], published: Json) -> di
             for stage in m.pipeline["stages"]
         ],
         "difference": [row for one in found.values() for row in one.differences],
-        "beside": [
-            *(row for one in found.values() for row in one.beside),
+        "against_published": [
+            *(row for one in found.values() for row in one.against_published),
             *stage_sizes(all_measured, published),
         ],
         "milliseconds": {

@@ -25,7 +25,7 @@ def tables(compared: Json) -> dict[str, Sequence[Row]]:
             )
             for row in rows
         ],
-        "published": [*compared["beside"], *compared["milliseconds"]["beside"]],
+        "published": [*compared["against_published"], *compared["milliseconds"]["against_published"]],
     }
 
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import yaml
 
-from hobble.core.errors import InputError
 from hobble.core.files import read_json
+from hobble.evaluation.tables import read_numbers
 from hobble.measures.given import Json
 
 
@@ -49,19 +48,7 @@ def read_results(name: str, files: Mapping[str, str | Path]) -> ConfigurationRes
     """
     paths = dict(files)
     resolved = yaml.safe_load(Path(paths.pop("configuration")).read_text(encoding="utf-8"))
-    history, pipeline = _history(paths.pop("history")), read_json(paths.pop("pipeline"))
+    history, pipeline = read_numbers(paths.pop("history")), read_json(paths.pop("pipeline"))
     return ConfigurationResults(
         name, resolved, {key: read_json(path) for key, path in paths.items()}, pipeline, history
     )
-
-
-def _history(path: str | Path) -> dict[str, list[float | None]]:
-    columns: dict[str, list[float | None]] = {}
-    try:
-        with open(path, encoding="utf-8", newline="") as file:
-            for row in csv.DictReader(file):
-                for key, text in row.items():
-                    columns.setdefault(key, []).append(float(text) if text else None)
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError(path, f"not a training history ({error})", fix="Train again.") from error
-    return columns

@@ -22,12 +22,12 @@ SETTLING_SHARE = 0.25  # share of a stretch, at its beginning, in which channels
 class Stretch:
     """A number of frames with constant wishes for C figures.
 
-    gait: (C,) names. told: channel -> (C, columns). speed: (C,) cm a frame, or None for SPEEDS of the gait.
+    gait: (C,) names. channels: name -> (C, columns). speed: (C,) cm a frame, or None for SPEEDS of the gait.
     """
 
     frames: int
     gait: Sequence[str]
-    told: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    channels: Mapping[str, Array] = field(default_factory=dict, repr=False)
     speed: Sequence[float] | None = None
 
 
@@ -76,7 +76,7 @@ def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
         velocity[:, 1] = [SPEEDS[name] for name in stretch.gait] if stretch.speed is None else stretch.speed
         shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
         for _ in range(stretch.frames):
-            pose = animation.next_pose(velocity, gait=shares, **stretch.told)
+            pose = animation.next_pose(velocity, gait=shares, **stretch.channels)
             # A single figure has no leading axis.
             positions = pose.positions.reshape(count, -1, 3)
             root[f], phase[f], contacts[f] = pose.root, pose.phase, pose.contacts

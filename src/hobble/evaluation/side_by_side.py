@@ -17,14 +17,14 @@ class SideBySide:
     """What one measurement adds to compare.json.
 
     entries: the list under its own name. about: configuration -> entries for its description. differences:
-    rows from `pair`. beside: rows from `published_row`. milliseconds: everything that depends on a clock,
-    with the keys `difference`, `beside` and others.
+    rows from `pair`. against_published: rows from `published_row`. milliseconds: everything that depends on
+    a clock, with the keys `difference`, `against_published` and others.
     """
 
     entries: Sequence[Json] = field(default=(), repr=False)
     about: Mapping[str, Json] = field(default_factory=dict, repr=False)
     differences: Sequence[Row] = field(default=(), repr=False)
-    beside: Sequence[Row] = field(default=(), repr=False)
+    against_published: Sequence[Row] = field(default=(), repr=False)
     milliseconds: Mapping[str, Sequence[Row]] = field(default_factory=dict, repr=False)
 
 

@@ -25,13 +25,13 @@ LIMITS = {"hips_lowest_cm": 60.0, "hips_highest_cm": 110.0, "added_turn_degrees"
 class Wishes:
     """The wishes for C characters in a frame. Each character gets new ones every 1 to 8 seconds.
 
-    velocity, facing: (C, 2). gait: C names. told: channel -> (C, columns). left: (C,) frames that remain.
+    velocity, facing: (C, 2). gait: C names. channels: name -> (C, columns). left: (C,) frames that remain.
     """
 
     velocity: Array
     facing: Array
     gait: list[str]
-    told: dict[str, Array]
+    channels: dict[str, Array]
     left: np.ndarray
 
     @classmethod
@@ -54,7 +54,7 @@ class Wishes:
             self.velocity[c] = speed * np.array([np.sin(going), np.cos(going)])
             self.facing[c] = rng.integers(2) * np.array([np.sin(looking), np.cos(looking)])
             self.gait[c] = GAITS[rng.integers(len(GAITS))]
-            for name, values in self.told.items():
+            for name, values in self.channels.items():
                 some = rng.random(values.shape[1]) < 2 / values.shape[1]
                 values[c] = some * rng.uniform(0, channel(name).highest, values.shape[1])
             self.left[c] = rng.integers(FPS, 8 * FPS)
@@ -128,7 +128,9 @@ def soak(
     finite, wild = True, 0
     for _ in range(frames):
         wishes.renew(rng)
-        pose = animation.next_pose(wishes.velocity, wishes.facing, wishes.gait, terrain=ground, **wishes.told)
+        pose = animation.next_pose(
+            wishes.velocity, wishes.facing, wishes.gait, terrain=ground, **wishes.channels
+        )
         finite = finite and bool(np.isfinite(pose.positions).all() and np.isfinite(pose.rotations).all())
         at = pose.positions[:, hips]
         height = at[:, 1] - ground(at[:, 0], at[:, 2])

@@ -1,26 +1,36 @@
-"""Writes rows as CSV files."""
+"""Tables as CSV files, read and written with pandas."""
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from hobble.core.errors import InputError
 from hobble.core.files import write_text
+from hobble.core.untrusted import read_text
+
+if TYPE_CHECKING:
+    import pandas
+
+
+def frame(rows: Sequence[Mapping[str, Any]]) -> pandas.DataFrame:
+    """A data frame with a row for each mapping. Columns are in the order in which they first occur.
+
+    Values keep their types, so that a count does not become 3.0 where another row has none.
+    """
+    import pandas  # takes .3 s, which only jobs that have a table should pay
+
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    return pandas.DataFrame(
+        [[row.get(key) for key in columns] for row in rows], columns=columns, dtype=object
+    )
 
 
 def write_csv(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows. None, or a key that only other rows have, is an empty field; no rows are an empty file."""
-    out = io.StringIO()
-    if rows:
-        writer = csv.DictWriter(
-            out, fieldnames=list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n"
-        )
-        writer.writeheader()
-        writer.writerows(rows)
-    write_text(path, out.getvalue())
+    """Write rows. None, NaN and keys that only other rows have are empty fields. No rows: an empty file."""
+    write_text(path, frame(rows).to_csv(index=False, lineterminator="\n") if rows else "")
 
 
 def write_tables(folder: str | Path, tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> None:
@@ -28,3 +38,29 @@ def write_tables(folder: str | Path, tables: Mapping[str, Sequence[Mapping[str, 
     Path(folder).mkdir(parents=True, exist_ok=True)
     for name, rows in tables.items():
         write_csv(Path(folder) / f"{name}.csv", rows)
+
+
+def read_numbers(path: str | Path) -> dict[str, list[float | None]]:
+    """Column -> values of a CSV of numbers, such as history.csv; None for an empty or infinite cell.
+
+    Raises InputError for a file that is no such table, naming the column and the cell.
+    """
+    import pandas
+
+    try:
+        table = pandas.read_csv(
+            io.StringIO(read_text(path)), dtype=str, keep_default_na=False, index_col=False
+        )
+    except (pandas.errors.EmptyDataError, pandas.errors.ParserError) as error:
+        raise InputError(path, f"not a table of numbers ({error})", fix="Delete it and run again.") from None
+    return {str(name): [_number(path, str(name), text) for text in table[name]] for name in table.columns}
+
+
+def _number(path: str | Path, column: str, text: Any) -> float | None:
+    if not isinstance(text, str) or not text.strip():
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        raise InputError(path, f"column {column} holds {text!r:.80}, which is not a number") from None
+    return value if abs(value) < float("inf") else None

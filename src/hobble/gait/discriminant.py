@@ -52,9 +52,11 @@ def learn(values: Array, labels: Sequence[str], shrinkage: float = SHRINKAGE) ->
     share = 1 / (len(classes) * count[which])
     overall = values.std(axis=0)
     spread = np.maximum(np.sqrt(share @ rest**2), NARROWEST * overall)
-    told = overall > CONSTANT * (1 + np.abs(values).max(axis=0))
-    scaled = rest[:, told] / spread[told]
-    covariance = (1 - shrinkage) * (scaled * share[:, None]).T @ scaled + shrinkage * np.eye(told.sum())
+    varies = overall > CONSTANT * (1 + np.abs(values).max(axis=0))
+    scaled = rest[:, varies] / spread[varies]
+    covariance = (1 - shrinkage) * (scaled * share[:, None]).T @ scaled + shrinkage * np.eye(varies.sum())
     weights = np.zeros((values.shape[1], len(classes)))
-    weights[told] = np.linalg.solve(covariance, (means[:, told] / spread[told]).T) / spread[told, None]
+    weights[varies] = (
+        np.linalg.solve(covariance, (means[:, varies] / spread[varies]).T) / spread[varies, None]
+    )
     return Discriminant(classes, weights, -0.5 * np.sum(means.T * weights, axis=0))

@@ -46,11 +46,13 @@ OWN: dict[str, dict[str, float]] = {
     "shank": {
         "speed": 0.62,
         "stride": 1.02,
-        "push": 0.25,
-        "lift": 0.08,
+        "push": 0.15,
+        "lift": 0.05,
+        "out": 0.05,
         "strike": 0.0,
-        "crouch": 14.0,
+        "crouch": 6.0,
         "toe_out": 4.0,
+        "list": 4.0,
     },
     "foot": {"speed": 0.66, "stride": 1.03, "push": 0.3, "lift": 0.7, "strike": 0.9, "toe_out": 14.0},
     "back": {

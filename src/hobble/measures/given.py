@@ -23,14 +23,16 @@ class Given:
     """The inputs of a measurement of one configuration. It gets only those listed in its `Measure.inputs`.
 
     clips: clip -> its file of rows. facts: files of `hobble.rows.facts` of the same clips. splits: clip ->
-    "train" or "held_out". runtime: the keys in its `Measure.runtime`, and defaults for the others. files:
-    other inputs by name, such as the JSON of another measurement.
+    "train" or "held_out". people: clip -> the person who walks in it; a clip of which that is not known
+    counts as a person of its own. runtime: the keys in its `Measure.runtime`, and defaults for the others.
+    files: other inputs by name, such as the JSON of another measurement.
     """
 
     configuration: str
     files: Mapping[str, Path] = field(default_factory=dict, repr=False)
     clips: Mapping[str, Path] = field(default_factory=dict, repr=False)
     splits: Mapping[str, str] = field(default_factory=dict, repr=False)
+    people: Mapping[str, str] = field(default_factory=dict, repr=False)
     facts: Sequence[Path] = field(default=(), repr=False)
     runtime: Runtime = field(default_factory=Runtime)
 

@@ -43,7 +43,7 @@ class Measure:
 
     package: where its parts lie (`__name__` of the package). inputs: of INPUTS, or names of other
     measurements. options: its keys of the section `evaluation`. runtime: the keys of the section `runtime`
-    that it depends on.
+    that it depends on. people: whether it has to know who walks in which clip.
     """
 
     name: str
@@ -51,6 +51,7 @@ class Measure:
     inputs: tuple[str, ...]
     options: type[Section] = Section
     runtime: tuple[str, ...] = ()
+    people: bool = False
     cost: Cost = Cost()
 
     def has(self, part: str) -> bool:

@@ -7,7 +7,7 @@ import importlib.util
 from collections.abc import Iterator
 
 from hobble import channels
-from hobble.measures import accuracy, responsivity, rollouts
+from hobble.measures import accuracy, manners, responsivity, rollouts
 from hobble.measures.measure import Measure
 
 
@@ -23,6 +23,7 @@ MEASURES: tuple[Measure, ...] = (
     accuracy.MEASURE,
     rollouts.MEASURE,
     responsivity.MEASURE,
+    manners.MEASURE,
     *of_channels(),
 )
 

@@ -118,7 +118,7 @@ def _kinds(clips: Iterable[Facts], splits: Mapping[str, str]) -> dict[tuple[Any,
     kinds: dict[tuple[Any, ...], list[Facts]] = {}
     for one in sorted(clips, key=lambda one: one.clip):
         speed = int(np.searchsorted(edges[one.gait], one.speed))
-        kinds.setdefault((splits[one.clip], one.gait, speed, one.told), []).append(one)
+        kinds.setdefault((splits[one.clip], one.gait, speed, one.channels), []).append(one)
     return kinds
 
 

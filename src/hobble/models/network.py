@@ -61,6 +61,7 @@ class Network(ABC):
     phase: ClassVar[bool] = True  # whether a prediction depends on the phase
     rooted: ClassVar[bool] = False  # whether root movement belongs to the pose, so that it is never reduced
     modes: ClassVar[tuple[str, ...]] = ("exact",)  # of the predictor; the last one is exact
+    storage: ClassVar[str] = "float32"  # of the predictor's weights by default, one of STORAGES
 
     x_mean: Array = field(repr=False)
     x_std: Array = field(repr=False)
@@ -125,11 +126,11 @@ class Network(ABC):
         """Y (n, Y) float32 of X (n, X) at phases (n,) in 0..1, in raw units. Plain numpy, as a reference."""
 
     @abstractmethod
-    def predictor(self, mode: str | None = None, storage: str = "float32") -> Predictor:
+    def predictor(self, mode: str | None = None, storage: str | None = None) -> Predictor:
         """Prepare it for fast evaluation.
 
-        mode: one of `modes`, by default the exact one. storage: one of STORAGES. Raises ValueError for
-        an unknown mode or storage.
+        mode: one of `modes`, by default the exact one. storage: one of STORAGES, by default the kind's own.
+        Raises ValueError for an unknown mode or storage.
         """
 
     @abstractmethod

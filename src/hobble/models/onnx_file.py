@@ -105,7 +105,7 @@ def check(path: str | Path, network: Network, mode: str) -> float:
     phase[:3] = 0.0, 0.5, 1.0
     x = x.astype(np.float32)
     (y,) = session.run(["y"], {"x": x, "phase": phase})
-    expected = network.predictor(mode).predict(x, phase.astype(float))
+    expected = network.predictor(mode, "float32").predict(x, phase.astype(float))
     difference = float((np.abs(y - expected) / np.maximum(1.0, np.abs(expected))).max())
     if not difference <= TOLERANCE:
         raise InputError(path, f"onnxruntime and the runtime differ by {difference:.2g}")

@@ -150,7 +150,7 @@ def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str)
             own = replace(own, skeleton=target) if same else own
             return Fitted(own, 1.0, [KEPT] if source.moving else [])
     sources = match.sources
-    if not source.told:
+    if not source.straightened:
         wanted = {clip.skeleton.index(name) for name in sources.values()}
         spine = Spine.of(target, body_by_roles(target))
         clip = upright(clip, body_by_roles(clip.skeleton), spine, wanted).clip

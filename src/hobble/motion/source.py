@@ -60,7 +60,7 @@ class Source:
     notes: list[str]
     stance: str
     moving: bool
-    told: bool
+    straightened: bool
     unsure: list[str] = field(default_factory=list)
 
 
@@ -124,29 +124,29 @@ def _unknown(
     clip, axes, unsure = straighten(clip, options.up, options.handedness, standing)
     axes = axes if standing else replace(axes, facing="+Z")
     theirs = body_by_roles(target.skeleton)
-    told = upright(clip, body, Spine.of(target.skeleton, theirs))
+    standing_clip = upright(clip, body, Spine.of(target.skeleton, theirs))
     match = Match(
         known.rig if known else FOUND,
-        told.clip.skeleton.roles,
+        standing_clip.clip.skeleton.roles,
         False,
-        pairs(told.clip.skeleton, told.body, target.skeleton, theirs),
+        pairs(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, theirs),
     )
     notes = decoded.notes + unsure + ([] if known else _said(found, options.handedness))
     moving = _moving(decoded, body, unit)
     source = _mended(
         file,
-        told.clip,
+        standing_clip.clip,
         match,
         (unit, unit_name),
         axes,
         repairs + decoded.repairs,
         notes,
-        told.rest,
+        standing_clip.rest,
         moving,
         True,
         options,
     )
-    return replace(source, unsure=told.notes)
+    return replace(source, unsure=standing_clip.notes)
 
 
 def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: ClipMotion) -> Found:
@@ -191,7 +191,7 @@ def _mended(
     notes: list[str],
     stance: str,
     moving: bool,
-    told: bool,
+    straightened: bool,
     options: ClipMotion,
 ) -> Source:
     """The source with broken frames repaired and its floor at height zero."""
@@ -203,7 +203,9 @@ def _mended(
     if mended and options.defects == "refuse":
         raise InputError(file.path, mended[0], fix="Set motion.defects: repair to repair it this way.")
     notes = notes + uneven + flips(clip, repaired.first)
-    return Source(clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving, told)
+    return Source(
+        clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving, straightened
+    )
 
 
 def raw_clip(file: Bvh) -> Clip:

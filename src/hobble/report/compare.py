@@ -16,8 +16,8 @@ from hobble.models.network import Network
 from hobble.report.scenes import FPS, UNIT, packed_motion
 from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
 
-CLIPS = 6  # shown at least, if there are that many; all held-out clips are shown
-MOST = 40  # clips shown at most
+CLIPS = 6  # shown at least, if there are that many; up to MOST held-out clips are shown
+MOST = 16  # clips shown at most; one takes up to 230 kB
 LONGEST = 12 * 60  # frames shown of a clip
 
 
@@ -34,7 +34,8 @@ def comparisons(network: Network, paths: Iterable[str | Path], splits: Mapping[s
     order = sorted(paths, key=lambda path: (splits.get(Path(path).stem) != "held_out", Path(path).stem))
     clips = []
     held_out = sum(splits.get(Path(path).stem) == "held_out" for path in order)
-    for path in order[: min(max(CLIPS, held_out), MOST)]:
+    # Spread over the names: neighbours are often takes of the same motion.
+    for path in order[: max(CLIPS, held_out)][:: max(1, -(-held_out // MOST))]:
         rows = load_clip_rows(path)
         if rows.layout.joints == network.layout.joints and len(rows):
             clips.append(_compared(network, rows, splits.get(rows.clip, "train"), keep))

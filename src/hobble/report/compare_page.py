@@ -32,7 +32,7 @@ def render_compared(
         "overview": {
             "verdicts": measured.compared_verdicts(compared),
             "table": tables.configuration_table(compared),
-            "beside": tables.beside_table(compared),
+            "published": tables.published_table(compared),
         },
         "training": {"curves": parts.training_curves(compared)},
         "stages": {"charts": parts.stage_dots(compared)},

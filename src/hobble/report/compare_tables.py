@@ -38,10 +38,10 @@ def configuration_table(compared: Compared) -> Table:
     def of(key: str) -> dict[str, Any]:
         return {name: entry[key] for name, entry in entries.items()}
 
-    told = {name: ", ".join(channels) or "none" for name, channels in of("channels").items()}
+    names = {name: ", ".join(channels) or "none" for name, channels in of("channels").items()}
     columns = [
         *compared_columns(compared),
-        Overview(50, Column("channels"), told),
+        Overview(50, Column("channels"), names),
         Overview(60, Column("data set"), of("dataset")),
         Overview(80, Column.count("layers"), of("hidden_layers")),
         Overview(90, Column.count("units"), of("units")),
@@ -71,12 +71,12 @@ def difference_table(compared: Compared) -> Table | None:
     return Table("compare-difference", columns, rows, "Differences between all pairs")
 
 
-def beside_table(compared: Compared) -> Table:
+def published_table(compared: Compared) -> Table:
     """The published results next to ours."""
     sources = compared["published"]["sources"]
     shows = {"bytes": size, "s": duration}
     rows = []
-    found = (*compared["beside"], *compared["milliseconds"]["beside"])
+    found = (*compared["against_published"], *compared["milliseconds"]["against_published"])
     for row in sorted(found, key=lambda row: row["ours"] is None):
         show = shows.get(row["unit"], lambda value: number(value, 3))
         unit = f" {row['unit']}" if row["unit"] and row["unit"] not in shows else ""

@@ -4,7 +4,7 @@ database.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,15 +23,18 @@ LEVELS = np.arange(1, 11)  # tenths of the highest value of a channel
 SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
 
 
-def counted(paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str, Any]:
+def counted(paths: Sequence[str | Path], splits: Mapping[str, str], of: int | None = None) -> dict[str, Any]:
     """Seconds over the rows in `database/clips/<clip>.npz`, each frame counted once.
 
-    `turns`: split -> seconds at each turn. `both`: (turns, speeds), seconds at each turn and speed. `told`:
-    channel -> column -> seconds at each tenth of the highest value.
+    of: the number of all clips, if `paths` are a random choice of them; seconds are then an estimate for all.
+    `turns`: split -> seconds at each turn. `both`: (turns, speeds), seconds at each turn and speed.
+    `channels`: channel -> column -> seconds at each tenth of the highest value. `estimate`: a sentence about
+    the choice.
     """
+    each = max(of or 0, len(paths)) / max(len(paths), 1) / FPS
     turns = {split: np.zeros(len(TURNS) - 1) for split, *_ in SPLITS}
     both = np.zeros((len(TURNS) - 1, len(SPEEDS) - 1))
-    told: dict[str, dict[str, Array]] = {}
+    channels: dict[str, dict[str, Array]] = {}
     for path in paths:
         rows = load_clip_rows(path)
         once = np.unique(rows.frame, return_index=True)[1]
@@ -41,16 +44,17 @@ def counted(paths: Iterable[str | Path], splits: Mapping[str, str]) -> dict[str,
             np.degrees(-y[:, layout.y_turn][:, 0]) * FPS
         )  # the column is the turn of the world relative to the root
         speed, turn = (np.clip(v, e[0], e[-1] - 1e-6) for v, e in ((speed, SPEEDS), (turn, TURNS)))
-        turns[splits.get(rows.clip, "train")] += np.histogram(turn, TURNS)[0] / FPS
-        both += np.histogram2d(turn, speed, (TURNS, SPEEDS))[0] / FPS
+        turns[splits.get(rows.clip, "train")] += np.histogram(turn, TURNS)[0] * each
+        both += np.histogram2d(turn, speed, (TURNS, SPEEDS))[0] * each
         skeleton = Skeleton.from_dict(rows.skeleton)
         for name, table in rows.channels.items():
-            one, seconds = channel(name), told.setdefault(name, {})
+            one, seconds = channel(name), channels.setdefault(name, {})
             for column, values in zip(one.columns(skeleton), table[once].T, strict=True):
                 if values.any():
-                    found = np.histogram(10 * values / one.highest, np.arange(0.5, 11))[0] / FPS
+                    found = np.histogram(10 * values / one.highest, np.arange(0.5, 11))[0] * each
                     seconds[column] = seconds.get(column, 0) + found
-    return {"turns": turns, "both": both, "told": told}
+    estimate = f" Estimated from {len(paths):,} of {of:,} clips." if of and of > len(paths) else ""
+    return {"turns": turns, "both": both, "channels": channels, "estimate": estimate}
 
 
 def turn_chart(found: Mapping[str, Any]) -> Chart | None:
@@ -76,7 +80,7 @@ def turn_chart(found: Mapping[str, Any]) -> Chart | None:
         "yaxis": axis("seconds", rangemode="tozero"),
     }
     caption = "Seconds of data at each turning speed. With mirrored clips, left and right are alike."
-    return Chart("turns", "Turning speed", caption, traces, layout, 300)
+    return Chart("turns", "Turning speed", caption + found["estimate"], traces, layout, 300)
 
 
 def both_chart(found: Mapping[str, Any]) -> Chart | None:
@@ -100,18 +104,24 @@ def both_chart(found: Mapping[str, Any]) -> Chart | None:
     caption = (
         "Seconds of data at each combination of speed and turn. The network was not trained on empty cells."
     )
-    return Chart("speed-turn", "Speed and turn combined", caption, [trace], layout, 300)
+    return Chart("speed-turn", "Speed and turn combined", caption + found["estimate"], [trace], layout, 300)
 
 
-def told_charts(found: Mapping[str, Any], say: Callable[[str], str] = str) -> list[Chart]:
+def channel_charts(found: Mapping[str, Any], say: Callable[[str], str] = str) -> list[Chart]:
     """Seconds at each value of each column: a chart for each channel that has a value above 0 in any clip.
 
     say: column -> its name on the page.
     """
-    return [_told_chart(name, seconds, say) for name, seconds in found["told"].items() if seconds]
+    return [
+        _channel_chart(name, seconds, found["estimate"], say)
+        for name, seconds in found["channels"].items()
+        if seconds
+    ]
 
 
-def _told_chart(name: str, seconds: Mapping[str, Array], say: Callable[[str], str]) -> Chart:
+def _channel_chart(
+    name: str, seconds: Mapping[str, Array], estimate: str, say: Callable[[str], str]
+) -> Chart:
     one, columns = channel(name), list(seconds)[::-1]
     tenth = one.highest / 10
     trace = {
@@ -132,7 +142,7 @@ def _told_chart(name: str, seconds: Mapping[str, Array], say: Callable[[str], st
     )
     title, height = f"{one.title}: amount of data", 120 + 24 * len(columns)
     layout = {"xaxis": across, "yaxis": {"automargin": True}}
-    return Chart(f"{name}-coverage", title, caption, [trace], layout, height)
+    return Chart(f"{name}-coverage", title, caption + estimate, [trace], layout, height)
 
 
 def _middles(edges: Array) -> list[float]:

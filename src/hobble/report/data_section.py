@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from hobble.report.gather import Material
 from hobble.report.tables import Column, Table
 
 GAIT_COLOURS = {"stand": "@g0", "walk": "@g1", "jog": "@g2", "crouch": "@g3", "jump": "@g4", "bump": "@g5"}
+MOST_BARS = 200  # clips with a bar of their own
+MOST_REMARKS = 500  # rows of the table of repairs and warnings
 MOST_NAMED = 30  # bars that are few enough for a name under each
 SPLIT_NAMES = {"train": "training", "held_out": "held out"}
 
@@ -94,6 +97,7 @@ def retarget_chart(material: Material) -> Chart | None:
     if not found:
         return None
     found.sort(key=lambda bar: -bar[1])
+    every, found = len(found), found[:MOST_BARS]
     trace: Trace = {
         "type": "bar",
         "x": [clip for _, _, clip in found],
@@ -113,13 +117,15 @@ def retarget_chart(material: Material) -> Chart | None:
         f"direction differs most from the file, averaged over the clip. Clips with {MOST:.0f} degrees or "
         "more are refused."
     )
+    if every > len(found):
+        caption += f" The {len(found)} clips of {every:,} that differ most."
     return Chart(
         "retarget", "Difference between retargeted clips and their files", caption, [trace], layout, 220
     )
 
 
-def clip_table(material: Material) -> Table:
-    """Every clip: its file, length, split, repairs and checksum."""
+def clip_table(material: Material, clips: frozenset[str]) -> Table:
+    """File, length, split and checksum of these clips."""
     labels = {report["clip"]: report for report in material.labels}
     columns = [
         Column("clip"),
@@ -135,6 +141,8 @@ def clip_table(material: Material) -> Table:
     ]
     rows = []
     for report in material.motion:
+        if report["clip"] not in clips:
+            continue
         label = labels.get(report["clip"], {})
         rows.append(
             [
@@ -150,16 +158,18 @@ def clip_table(material: Material) -> Table:
                 report.get("sha256"),
             ]
         )
-    return Table(f"{material.name}-clips", columns, rows, f"All {len(rows)} clips, with checksums")
+    every = len(material.motion)
+    which = f"All {every} clips" if len(rows) == every else f"{len(rows)} of {every:,} clips"
+    return Table(f"{material.name}-clips", columns, rows, f"{which}, with checksums")
 
 
 def remarks_table(material: Material) -> Table | None:
-    """Every repair and warning."""
+    """Every repair and warning; of many, each kind with its number and one of its clips."""
     rows = []
     for stage, reports, key in (
         ("motion", material.motion, "repairs"),
         ("labels", material.labels, "warnings"),
-        (None, material.told, "warnings"),
+        (None, material.channels, "warnings"),
     ):
         for report in reports:
             rows += [
@@ -168,16 +178,32 @@ def remarks_table(material: Material) -> Table | None:
     if not rows:
         return None
     columns = [Column("clip"), Column("stage"), Column("message", kind="long")]
-    return Table(f"{material.name}-remarks", columns, rows, f"{len(rows)} repairs and warnings")
+    title = f"{len(rows):,} repairs and warnings"
+    if len(rows) <= MOST_REMARKS:
+        return Table(f"{material.name}-remarks", columns, rows, title)
+    columns = [Column.count("clips"), Column("stage"), Column("example"), Column("message", kind="long")]
+    return Table(f"{material.name}-remarks", columns, _by_kind(rows), f"{title}, by kind")
 
 
-def strips(material: Material) -> list[dict[str, Any]]:
-    """The label strip and channel values of each clip that has them; mirrors are left out."""
-    told: dict[str, dict[str, Any]] = {}
-    for report in material.told:
+def _by_kind(rows: list[list[str]]) -> list[list[Any]]:
+    """Remarks whose sentences differ in numbers only, as one row: most frequent first.
+
+    The example is the first clip, whose sentence is shown.
+    """
+    kinds: dict[tuple[str, str], list[list[str]]] = {}
+    for row in rows:
+        kinds.setdefault((row[1], re.sub(r"[0-9][0-9.,:/-]*", "0", row[2])), []).append(row)
+    many = sorted(kinds.values(), key=len, reverse=True)[:MOST_REMARKS]
+    return [[len({row[0] for row in same}), same[0][1], same[0][0], same[0][2]] for same in many]
+
+
+def strips(material: Material, clips: frozenset[str]) -> list[dict[str, Any]]:
+    """The label strip and channel values of those of `clips` that have them; mirrors are left out."""
+    of_clip: dict[str, dict[str, Any]] = {}
+    for report in material.channels:
         highest = {"highest": report.get("highest", 10.0)}
-        found = {label: (value, highest) for label, value in report["told"].items()}
-        told.setdefault(report["clip"], {}).update(found)
+        found = {label: (value, highest) for label, value in report["values"].items()}
+        of_clip.setdefault(report["clip"], {}).update(found)
     say = speaker(material.network["skeleton"])
     lengths = {report["clip"]: report.get("seconds") for report in material.motion}
     known = {report["clip"] for report in material.labels}
@@ -185,12 +211,12 @@ def strips(material: Material) -> list[dict[str, Any]]:
     for report in material.labels:
         strip, clip = report.get("strip"), report["clip"]
         mirrors = clip.endswith("_mirror") and clip.removesuffix("_mirror") in known
-        if mirrors or not strip or not strip.get("seconds"):
+        if clip not in clips or mirrors or not strip or not strip.get("seconds"):
             continue
         length = lengths.get(clip) or strip["seconds"][-1]
         status = [
             {"name": say(label), "spans": value.get("spells") or [[0, length, value["highest"]]], **highest}
-            for label, (value, highest) in told.get(clip, {}).items()
+            for label, (value, highest) in of_clip.get(clip, {}).items()
         ]
         out.append({**strip, "clip": clip, "length": length, "status": status})
     return out

@@ -48,18 +48,18 @@ def key_figures(material: Material) -> list[Figure]:
     seconds = sum(report.get("seconds", 0) for report in material.motion)
     if seconds:
         kept = sum(material.split(report["clip"]) == "held_out" for report in material.motion)
-        beside = f"{len(material.motion)} clips, {kept} of them held out"
+        note = f"{len(material.motion)} clips, {kept} of them held out"
         value, _, unit = duration(seconds).partition(" ")
-        figures.append(Figure("Motion data", value, unit, beside, 30))
+        figures.append(Figure("Motion data", value, unit, note, 30))
     network = material.network
-    beside = f"parameters per phase; layers of {'–'.join(map(str, network['sizes']))}"
-    beside = f"{beside if network['sizes'] else 'numbers in its tables'}; {size(network['bytes'])} on disk"
-    figures.append(Figure("Network", number(network["parameters"] / 1e6, 3), "M", beside, 40))
+    note = f"parameters per phase; layers of {'–'.join(map(str, network['sizes']))}"
+    note = f"{note if network['sizes'] else 'numbers in its tables'}; {size(network['bytes'])} on disk"
+    figures.append(Figure("Network", number(network["parameters"] / 1e6, 3), "M", note, 40))
     total = material.pipeline.get("total_seconds")
     if total:
         value, _, unit = duration(total).partition(" ")
-        beside = f"from clips to measurements, all jobs; {size(material.pipeline.get('total_bytes'))} written"
-        figures.append(Figure("Whole pipeline", value, unit, beside, 50))
+        note = f"from clips to measurements, all jobs; {size(material.pipeline.get('total_bytes'))} written"
+        figures.append(Figure("Whole pipeline", value, unit, note, 50))
     return sorted(figures, key=lambda figure: figure.at)
 
 
@@ -151,7 +151,7 @@ def _turning(turns: Mapping[str, Array]) -> Iterator[Hint]:
 
 def _repairs(material: Material) -> Iterator[Hint]:
     repaired = {report["clip"] for report in material.motion if report.get("repairs")}
-    warned = {r["clip"] for r in (*material.labels, *material.told) if r.get("warnings")}
+    warned = {r["clip"] for r in (*material.labels, *material.channels) if r.get("warnings")}
     if repaired or warned:
         yield Hint(
             "note",

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from hobble.core.errors import InputError
 from hobble.core.files import read_json
-from hobble.core.untrusted import read_text, read_yaml
+from hobble.core.untrusted import read_yaml
+from hobble.evaluation.tables import read_numbers
 from hobble.measures.given import Json
 from hobble.models.load import load_network
 
@@ -26,7 +22,7 @@ class Material:
     """The results of one configuration.
 
     measured: measurement -> its JSON. history: column -> values, one per section of training, None for an
-    empty cell. motion, labels: reports of the clips, in the same order; told: reports of their channels.
+    empty cell. motion, labels: reports of the clips, in the same order; channels: reports of their channels.
     terrain, rows: paths of the clips' terrain fits and rows. splits: clip -> "train" or "held_out".
     """
 
@@ -41,7 +37,7 @@ class Material:
     network: Mapping[str, Any] = field(repr=False)
     motion: list[dict[str, Any]] = field(repr=False)
     labels: list[dict[str, Any]] = field(repr=False)
-    told: list[dict[str, Any]] = field(repr=False)
+    channels: list[dict[str, Any]] = field(repr=False)
     terrain: list[str] = field(repr=False)
     rows: list[str] = field(repr=False)
     published: Mapping[str, Any] = field(repr=False)
@@ -78,7 +74,7 @@ def gather(
     weights: str,
     motion: Iterable[str],
     labels: Iterable[str],
-    told: Iterable[str],
+    channels: Iterable[str],
     terrain: Iterable[str] = (),
     rows: Iterable[str] = (),
 ) -> Material:
@@ -91,34 +87,15 @@ def gather(
         resolved=read_yaml(configuration) or {},
         measured={Path(path).stem: read_json(path) for path in measured},
         pipeline=read_json(pipeline),
-        history=read_history(history),
+        history=read_numbers(history),
         network=describe_network(weights),
         motion=[read_json(path) for path in motion],
         labels=[read_json(path) for path in labels],
-        told=[read_json(path) for path in told],
+        channels=[read_json(path) for path in channels],
         terrain=list(terrain),
         rows=list(rows),
         published=read_yaml(PUBLISHED),
     )
-
-
-def read_history(path: str | Path) -> dict[str, list[float | None]]:
-    """Columns of a CSV of numbers; an empty cell is None. Raises InputError for anything else."""
-    columns: dict[str, list[float | None]] = {}
-    for row in csv.DictReader(io.StringIO(read_text(path), newline="")):
-        for key, text in row.items():
-            columns.setdefault(key, []).append(_cell(path, key, text))
-    return columns
-
-
-def _cell(path: str | Path, key: str, text: str | None) -> float | None:
-    if text is None or not text.strip():
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        raise InputError(path, f"column {key} holds {text!r}, which is not a number") from None
-    return value if np.isfinite(value) else None
 
 
 def describe_network(path: str | Path) -> dict[str, Any]:

@@ -32,6 +32,8 @@ def ground_pictures(paths: Iterable[str | Path], skeleton: Mapping[str, Any]) ->
     figure = Skeleton.from_dict({"name": "", **skeleton})
     keep = body(figure).bones
     for path in paths:
+        if len(pictures) == MOST:
+            break
         data = load_npz(path)
         count = int(data.get("pictures", 0))
         for k in range(min(count, MOST - len(pictures))):

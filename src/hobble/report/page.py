@@ -17,6 +17,7 @@ from hobble.report import (
     data_section,
     findings,
     measured,
+    shown_clips,
     terrain_section,
     training_section,
 )
@@ -42,11 +43,14 @@ def render(
 
     The template escapes every value. Data for the scripts is JSON without any "<".
     """
-    found = coverage.counted(material.rows, material.splits)
-    sections, shown = _sections(material, found), measured.sections(material)
-    strips = data_section.strips(material)
+    clips = shown_clips.shown(material)
+    terrain = shown_clips.only(material.terrain, clips)
+    some = shown_clips.counted(material.rows)
+    found = coverage.counted(some, material.splits, of=len(material.rows))
+    sections, shown = _sections(material, found, clips, terrain), measured.sections(material)
+    strips = data_section.strips(material, clips)
     scenes = dict(scenes or {})
-    grounds = ground_pictures(material.terrain, material.network["skeleton"])
+    grounds = ground_pictures(terrain, material.network["skeleton"])
     figure = (
         Skeleton.from_dict({"name": "", **material.network["skeleton"]})
         if material.network["skeleton"]
@@ -88,8 +92,13 @@ def render(
     )
 
 
-def _sections(material: Material, found: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Charts and tables by section, None if there is nothing to show. found: from `coverage.counted`."""
+def _sections(
+    material: Material, found: Mapping[str, Any], clips: frozenset[str], terrain: list[str]
+) -> dict[str, dict[str, Any]]:
+    """Charts and tables by section, None if there is nothing to show.
+
+    found: from `coverage.counted`. clips: names of the clips that are shown one by one. terrain: their fits.
+    """
     costs, data, training = cost_section, data_section, training_section
     return {
         "training": {
@@ -97,7 +106,7 @@ def _sections(material: Material, found: Mapping[str, Any]) -> dict[str, dict[st
             "blocks": training.block_curves(material),
             "table": training.history_table(material),
         },
-        "terrain": terrain_section.section(material.terrain),
+        "terrain": terrain_section.section(terrain),
         "stages": {
             **dict(zip(("seconds", "bytes"), costs.stage_charts(material), strict=True)),
             "table": costs.stage_table(material),
@@ -107,9 +116,9 @@ def _sections(material: Material, found: Mapping[str, Any]) -> dict[str, dict[st
             "speeds": data.speed_chart(material),
             "turns": coverage.turn_chart(found),
             "both": coverage.both_chart(found),
-            "told": coverage.told_charts(found, speaker(material.network["skeleton"])),
+            "channels": coverage.channel_charts(found, speaker(material.network["skeleton"])),
             "retarget": data.retarget_chart(material),
-            "clips": data.clip_table(material),
+            "clips": data.clip_table(material, clips),
             "remarks": data.remarks_table(material),
         },
     }

@@ -12,7 +12,7 @@ from hobble.core.errors import InputError
 from hobble.database.manifest import FILE as MANIFEST
 from hobble.database.manifest import Manifest
 from hobble.database.sizes import sizes
-from hobble.report.gather import read_history
+from hobble.evaluation.tables import read_numbers
 from hobble.report.provenance import machine, versions
 from hobble.workflow.kept import recorded_seconds
 
@@ -131,7 +131,7 @@ def _trained(paths: Iterable[str]) -> float:
     """Seconds of training over all calls, from the history among the artefacts."""
     for path in map(Path, paths):
         if (path / "history.csv").is_file():
-            seconds = read_history(path / "history.csv").get("seconds", [])
+            seconds = read_numbers(path / "history.csv").get("seconds", [])
             return max((s for s in seconds if s is not None), default=0.0)
     return 0.0
 

@@ -39,6 +39,7 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
     seen = np.flatnonzero(scale > UNSEEN)
     legs = feet.leg_joints(skeleton)
     sole = feet.sole_heights(network, legs).tolist()
+    carried = feet.carried(skeleton, legs)
     return {
         "network": {"kind": network.kind, **network.page(seen, rows)},
         "rooted": network.rooted,
@@ -62,7 +63,8 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "gaits": list(network.gaits),
         "channels": shown_channels(network, runtime),
         "legs": legs.tolist(),
-        "carried": [np.flatnonzero(row).tolist() for row in feet.carried(skeleton, legs)],
+        "carried": [np.flatnonzero(row).tolist() for row in carried],
+        "toes": [np.flatnonzero(row == feet.TOES).tolist() for row in carried],
         "sole": sole,
         "body": key(skeleton),
         "footLocking": runtime.foot_locking,
@@ -165,6 +167,7 @@ def _constants() -> dict[str, float]:
         "owedWithin": trajectory.OWED_WITHIN,
         "mostOwed": trajectory.MOST_OWED,
         "held": trajectory.UNWISHED_LOSS,
+        "drawn": trajectory.DRAWN,
         "furthestTurn": float(trajectory.FURTHEST_TURN),
         "strafeFrom": float(trajectory.STRAFE_FROM),
         "turnInPlace": float(animation.TURN_IN_PLACE),
@@ -181,4 +184,6 @@ def _constants() -> dict[str, float]:
         "bodyFree": feet.BODY_FREE,
         "bodyFrom": feet.BODY_MIN_CONTACT,
         "mostAdded": feet.MOST_ADDED,
+        "stretch": feet.STRETCH,
+        "behind": feet.BEHIND,
     }

@@ -68,10 +68,11 @@ class Studio:
         self._regions = [list(columns) for columns in regions] or [[] for _ in body.bones]
 
     def draw(
-        self, places: Array, turns: Array, camera: Camera, told: Array | None = None
+        self, places: Array, turns: Array, camera: Camera, values: Array | None = None
     ) -> NDArray[np.uint8]:
-        """An RGB picture (size, size, 3). places (B, 3), cm, and turns (B, 4) of the bones. told: (columns,)
-        values from 0 to 1, drawn as colours."""
+        """An RGB picture (size, size, 3). places (B, 3), cm, and turns (B, 4) of the bones.
+
+        values: (columns,) from 0 to 1, drawn as colours."""
         corners = self._body.posed(places, turns)
         key = np.array([0.55 * np.sin(camera.yaw - 0.85), 0.78, 0.55 * np.cos(camera.yaw - 0.85)])
         key /= np.linalg.norm(key)
@@ -88,18 +89,18 @@ class Studio:
             + 0.58 * np.maximum(normals @ key, 0)
             + 0.16 * np.maximum(normals @ rim, 0) ** 2
         )
-        colours = self._colours(told) * tone[:, None]
+        colours = self._colours(values) * tone[:, None]
         picture, depth = np.zeros((fine, fine, 3)), np.full((fine, fine), np.inf)
         _shade(camera.project(corners, SUPERSAMPLING), colours, self._faces, picture, depth)
         share = _coarse(np.isfinite(depth).astype(float))[..., None]
         return np.clip(np.round(255 * (_coarse(picture) + (1 - share) * ground)), 0, 255).astype(np.uint8)
 
-    def _colours(self, told: Array | None) -> Array:
+    def _colours(self, values: Array | None) -> Array:
         """RGB of every corner: grey for value 0, then amber, then red for value 1."""
         bones = np.tile(BODY, (len(self._body.bones), 1))
-        if told is not None:
+        if values is not None:
             for i, columns in enumerate(self._regions):
-                t = max((float(told[column]) for column in columns), default=0.0)
+                t = max((float(values[column]) for column in columns), default=0.0)
                 if t:
                     low = BODY + (HURT_LOW - BODY) * min(1.0, 0.35 + 1.3 * t)
                     bones[i] = low if t < 0.5 else HURT_LOW + (HURT_HIGH - HURT_LOW) * (2 * t - 1)

@@ -92,8 +92,8 @@ def _scenario(
     one, column = (str(v) for v in data.get(f"{name}/swept", ("", "")))
     if column in channels.get(one, ()):
         at, highest = list(channels[one]).index(column), channel(one).highest
-        share = np.asarray(data[f"{name}/told"])[::stride] / highest
-        out["told"] = {
+        share = np.asarray(data[f"{name}/swept_values"])[::stride] / highest
+        out["swept"] = {
             "column": at,
             "spoken": faces[one].spoken[at],
             "highest": highest,

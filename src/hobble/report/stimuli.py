@@ -68,25 +68,25 @@ def write_stimuli(
     skeleton = network.skeleton
     plain, rows = walk(network, {}, runtime), []
     for name, one, wanted in all_loops(network):
-        columns, trained = network.channels[one], told_in_training(network, one)
+        columns, trained = network.channels[one], trained_columns(network, one)
         studio = Studio(body(skeleton), shown(one, skeleton, columns, trained).regions)
-        loop = walk(network, {one: dict(wanted.told)}, runtime) if wanted.told else plain
+        loop = walk(network, {one: dict(wanted.values)}, runtime) if wanted.values else plain
         own = skeleton
         if "skeleton" not in network.meta:
             own = fitted_skeleton(skeleton, loop.positions, loop.rotations)
         export_bvh(folder / f"{name}.bvh", name, own, loop.positions, loop.rotations)
         colours = None
         if wanted.coloured:
-            colours = np.array([wanted.told.get(column, 0.0) for column in columns]) / channel(one).highest
+            colours = np.array([wanted.values.get(column, 0.0) for column in columns]) / channel(one).highest
         save_loop(folder / f"{name}.webp", frames(studio, skeleton, loop, colours, size))
         seconds = len(loop.positions) / 60
         rows.append(
             {
                 "name": name,
                 "channel": one,
-                "told": dict(wanted.told),
+                "values": dict(wanted.values),
                 "coloured": wanted.coloured,
-                "never_told": [column for column in wanted.told if column not in trained],
+                "untrained": [column for column in wanted.values if column not in trained],
                 "from_plain_cm": round(apart(loop, plain), 2),
                 "seconds": seconds,
                 "metres_a_second": round(float(np.linalg.norm(loop.way)) / 100 / seconds, 3),
@@ -105,12 +105,12 @@ def all_loops(network: Network) -> list[tuple[str, str, Wanted]]:
         for loop in loops(one, network.skeleton, columns, network.trained(one)):
             if not out or out[0][1] == one:
                 out.append((loop.name, one, loop))
-            elif loop.told:
+            elif loop.values:
                 out.append((f"{one}-{loop.name}", one, loop))
     return out
 
 
-def told_in_training(network: Network, name: str) -> set[str]:
+def trained_columns(network: Network, name: str) -> set[str]:
     """Columns of a channel that were above 0 somewhere in training: the mean of their input is above 0."""
     means = network.x_mean[network.layout.x_channel(name)]
     return {column for column, mean in zip(network.channels[name], means, strict=True) if mean > 0}
@@ -127,8 +127,8 @@ def apart(loop: Loop, other: Loop) -> float:
 
 def doubts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Warnings about loops that look like the neutral walk. rows: from `write_stimuli`."""
-    same = [row for row in rows if row["told"] and row["from_plain_cm"] < VISIBLE]
-    part = [row for row in rows if row["never_told"] and row not in same]
+    same = [row for row in rows if row["values"] and row["from_plain_cm"] < VISIBLE]
+    part = [row for row in rows if row["untrained"] and row not in same]
     out = []
     if same:
         names = ", ".join(row["name"] for row in same)
@@ -138,16 +138,18 @@ def doubts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         )
     if part:
         out.append(f"{', '.join(row['name'] for row in part)}: some of their values have no effect.")
-    if never := sorted({column for row in [*same, *part] for column in row["never_told"]}):
+    if never := sorted({column for row in [*same, *part] for column in row["untrained"]}):
         out.append(f"Never above 0 in training: {', '.join(never)}. Train on clips with such values.")
     return out
 
 
-def walk(network: Network, told: Mapping[str, Mapping[str, float]], runtime: Runtime) -> Loop:
+def walk(network: Network, values: Mapping[str, Mapping[str, float]], runtime: Runtime) -> Loop:
     """A loop of the character walking straight on, cut between the two most similar poses."""
     animation = ProceduralAnimation(network, **dict(runtime))
     ahead = np.array([0.0, SPEED])
-    poses = [animation.next_pose(ahead, None, "walk", **told) for _ in range(SETTLED + 60 + LONGEST + BLEND)]
+    poses = [
+        animation.next_pose(ahead, None, "walk", **values) for _ in range(SETTLED + 60 + LONGEST + BLEND)
+    ]
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
     first, last, gap = cut(positions)
     kept, turned = positions[first:last].copy(), rotations[first:last].copy()
@@ -180,7 +182,7 @@ def cut(positions: Array) -> tuple[int, int, float]:
 
 
 def frames(
-    studio: Studio, skeleton: Skeleton, loop: Loop, told: Array | None, size: int
+    studio: Studio, skeleton: Skeleton, loop: Loop, values: Array | None, size: int
 ) -> list[NDArray[np.uint8]]:
     """The pictures of a loop.
 
@@ -201,7 +203,7 @@ def frames(
         points[:, 1] = places[f, keep, 1]
         travelled = np.array([0.0, 0.0, length * f / count * even])
         camera = Camera(np.array([0.0, 82.0, 0.0]) + travelled, size=size)
-        out.append(studio.draw(points + travelled, turns[f], camera, told))
+        out.append(studio.draw(points + travelled, turns[f], camera, values))
     return out
 
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Figure:
-    """A key figure. beside: the smaller text under it. at: figures are sorted by it."""
+    """A key figure. note: the smaller text under it. at: figures are sorted by it."""
 
     label: str
     value: str
     unit: str = ""
-    beside: str = ""
+    note: str = ""
     at: int = 50
 
 

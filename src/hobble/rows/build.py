@@ -39,8 +39,8 @@ def clip_rows(
     after a cycle.
     """
     skeleton = clip.skeleton
-    told = tuple((name, values.shape[1]) for name, values in channels.items())
-    layout = RowLayout(len(skeleton.joints), window, step, told)
+    columns = tuple((name, values.shape[1]) for name, values in channels.items())
+    layout = RowLayout(len(skeleton.joints), window, step, columns)
     frame, cycle = cycle_frames(labels["cycles"])
     _check(name, clip, labels, channels, terrain, frame)
     root = root_frames(clip, facing_sigma)

@@ -120,8 +120,8 @@ def pairs(rows: ClipRows, layout: RowLayout, row: np.ndarray, fit: np.ndarray) -
     """The pairs of row[i] and fit[i], in raw units. row: (n,) indices of rows. fit: (n,) indices of fits."""
     x = np.empty((len(row), layout.x_size), np.float32)
     y = rows.y[row].astype(np.float32)
-    told = {name: rows.channels[name][row] for name, _ in layout.channels}
-    compose(layout, frame_inputs(layout, rows.x[row], told), rows.heights[fit], rows.mean[fit, None], x, y)
+    values = {name: rows.channels[name][row] for name, _ in layout.channels}
+    compose(layout, frame_inputs(layout, rows.x[row], values), rows.heights[fit], rows.mean[fit, None], x, y)
     return Pairs(x, y, rows.p[row], row, 1.0 / rows.fits[row])
 
 

@@ -19,25 +19,25 @@ from hobble.rows.layout import GAITS
 @dataclass(frozen=True)
 class Facts:
     """rows: how many. gait: the one with the largest share. speed: of the root, mean over the rows, cm a
-    frame. told: names of the channels that tell the body something in some row."""
+    frame. channels: names of those with a value above 0 in some row."""
 
     clip: str
     rows: int
     gait: str
     speed: float
-    told: tuple[str, ...]
+    channels: tuple[str, ...]
 
 
 def facts(rows: ClipRows) -> Facts:
     """Of the rows of one clip."""
     layout = rows.layout
-    told = tuple(name for name, values in rows.channels.items() if np.any(values != 0))
+    channels = tuple(name for name, values in rows.channels.items() if np.any(values != 0))
     if not len(rows):
-        return Facts(rows.clip, 0, GAITS[0], 0.0, told)
+        return Facts(rows.clip, 0, GAITS[0], 0.0, channels)
     shares = rows.x[:, body_layout(layout).x_gait].reshape(len(rows), len(GAITS), layout.samples)
     gait = GAITS[int(shares[:, :, layout.samples // 2].mean(axis=0).argmax())]
     speed = np.hypot(*rows.y[:, layout.y_root_velocity].astype(float).T).mean()
-    return Facts(rows.clip, len(rows), gait, float(speed), told)
+    return Facts(rows.clip, len(rows), gait, float(speed), channels)
 
 
 def save_facts(path: str | Path, found: Facts) -> None:
@@ -49,6 +49,6 @@ def load_facts(path: str | Path) -> Facts:
     """Read them. Raises InputError where the file holds something else."""
     values: Mapping[str, Any] = read_json(Path(path))
     try:
-        return Facts(**{**values, "told": tuple(values["told"])})
+        return Facts(**{**values, "channels": tuple(values["channels"])})
     except (KeyError, TypeError) as error:
         raise InputError(path, f"not the facts of a clip ({error})", fix=DELETE_IT) from error

@@ -37,7 +37,8 @@ class Pose:
 
     positions: (C, J, 3); rotations: (C, J, 4) world, w first; contacts: (C, 4) left heel, left toe, right
     heel, right toe, 0..1; phase: (C,) in cycles; root: (C, 3) on the trajectory; yaw: (C,) radians of the
-    root's facing, 0 for +Z, growing to the left; told: channel -> (C, columns), the network's inputs.
+    root's facing, 0 for +Z, growing to the left; channels: name -> (C, columns), the values that
+    the network got.
     """
 
     positions: Array = field(repr=False)
@@ -46,7 +47,7 @@ class Pose:
     phase: Any
     root: Array
     yaw: Any
-    told: Mapping[str, Array] = field(repr=False)
+    channels: Mapping[str, Array] = field(repr=False)
 
 
 class ProceduralAnimation:
@@ -63,7 +64,7 @@ class ProceduralAnimation:
         network: Network,
         *,
         mode: str = "cubic",
-        storage: str = "float32",
+        storage: str | None = None,
         characters: int = 1,
         waypoints: Sequence[Waypoint] | None = None,
         rates: Mapping[str, float] | None = None,
@@ -112,7 +113,8 @@ class ProceduralAnimation:
         """Load weights.npz, its folder, or a folder of the original release's .bin files.
 
         skeleton: a Skeleton or a file of config/skeletons, for a file without one.
-        mode: "constant", "linear" or "cubic". storage: "float32" or "int16".
+        mode: "constant", "linear" or "cubic". storage: of the weights, "float32" or "int16"; default: the
+        kind's own.
         characters: how many.
         waypoints: the track to follow when `next_pose` gets no velocity.
         rates: channel -> largest change of its values per second; default: the channel's own rate.
@@ -180,7 +182,7 @@ class ProceduralAnimation:
         gait: str | Sequence[str] | Array | None = None,
         *,
         terrain: Any = None,
-        **told: Mapping[str, Any] | Array | None,
+        **channels: Mapping[str, Any] | Array | None,
     ) -> Pose:
         """Advance by one 60 Hz frame and return the pose.
 
@@ -192,7 +194,7 @@ class ProceduralAnimation:
         terrain: None for flat ground at 0; a function of two ground coordinates (arrays) that returns
         heights; a `ground.Heightmap`; or a 2D array around the origin. All in your axes and unit. Pass the
         same object every frame.
-        told: keywords named after channels, such as injury={"LeftUpLeg-LeftLeg": 7}. The value is
+        channels: keywords named after channels, such as injury={"LeftUpLeg-LeftLeg": 7}. The value is
         label -> value (or (C,) values), or an array (L,) or (C, L). Labels that are not named go back to 0.
         None, or no keyword, leaves the channel unchanged.
 
@@ -210,17 +212,17 @@ class ProceduralAnimation:
             self._terrain = (terrain, as_ground(terrain, self.axes))
         targets = [
             self._channel_values.values(name, given, self.characters)
-            for name, given in told.items()
+            for name, given in channels.items()
             if given is not None
         ]
         made = self._controller
         before = None if self._terrain[1] is None else Snapshot(self.state, made.root, made.yaw)
         try:
             for columns, values in targets:
-                self.state.told_target[:, columns] = values
+                self.state.channel_targets[:, columns] = values
             if self._limited:
-                self._limiter.hold(self.state.told, velocity, shares)
-            made.frame(velocity, direction, strafe, shares, self._terrain[1])
+                self._limiter.hold(self.state.channel_values, velocity, shares)
+            made.frame((velocity, direction, strafe, shares), self._terrain[1])
         except BaseException:
             if before is not None:  # on flat ground nothing in a frame can fail
                 before.restore()
@@ -319,9 +321,12 @@ class ProceduralAnimation:
             positions[:], root[:] = self.axes.points_out(positions), self.axes.points_out(root)
             rotations = self.axes.rotations_out(rotations)
         contacts = np.minimum(np.maximum(c.y[:, self._contacts], 0), 1)
-        told = {name: state.told[:, columns].copy() for name, columns in self._channel_values.columns.items()}
+        channels = {
+            name: state.channel_values[:, columns].copy()
+            for name, columns in self._channel_values.columns.items()
+        }
         if self.characters > 1:
-            return Pose(positions, rotations, contacts, state.phase.copy(), root, c.yaw.copy(), told)
+            return Pose(positions, rotations, contacts, state.phase.copy(), root, c.yaw.copy(), channels)
         return Pose(
             positions[0],
             rotations[0],
@@ -329,5 +334,5 @@ class ProceduralAnimation:
             float(state.phase[0]),
             root[0],
             float(c.yaw[0]),
-            {name: values[0] for name, values in told.items()},
+            {name: values[0] for name, values in channels.items()},
         )

@@ -80,30 +80,19 @@ def clip_rows(rows: Any, low: Any, high: Any, unsound: Any) -> bool:
 
 
 @njit
-def find_unsound(
-    position: Any, direction: Any, gait: Any, joints: Any, velocities: Any, rotations: Any, told: Any,
-    target: Any, facing: Any, owed: Any, hold: Any, lift: Any, body: Any, added: Any, memory: Any, phase: Any,
-    unsound: Any,
-) -> bool:  # fmt: skip
+def find_unsound(state: tuple[Any, ...], unsound: Any) -> bool:
     """Mark in `unsound` (C,) the characters whose state has numbers that are not finite or too large.
 
-    Returns whether any is marked.
+    state: arrays (C, n), each with its own n. Returns whether any character is marked.
     """
     any_unsound = False
-    for c in range(phase.shape[0]):
-        sound = abs(phase[c]) < LARGEST_SOUND and abs(body[c]) < LARGEST_SOUND
-        sound &= _sound(position[c]) and _sound(direction[c]) and _sound(gait[c]) and _sound(joints[c])
-        sound &= _sound(velocities[c]) and _sound(rotations[c]) and _sound(told[c]) and _sound(target[c])
-        sound &= _sound(facing[c]) and _sound(owed[c]) and _sound(hold[c]) and _sound(lift[c])
-        sound &= _sound(added[c]) and _sound(memory[c])
+    for c in range(unsound.shape[0]):
+        sound = True
+        for part in state:
+            total = 0.0
+            for value in part[c]:
+                total += abs(value)
+            sound &= total <= LARGEST_SOUND * part.shape[1]  # False for a sum that is not finite
         unsound[c] = not sound
         any_unsound |= not sound
     return any_unsound
-
-
-@njit
-def _sound(array: Any) -> bool:
-    total = 0.0
-    for value in array.flat:
-        total += abs(value)
-    return total <= LARGEST_SOUND * array.size  # False for a sum that is not finite

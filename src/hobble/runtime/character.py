@@ -18,7 +18,7 @@ class Character:
     position, direction: (C, T, 2) trajectory; gait: (C, T, 6).
     ground: (C, samples, 3) heights at left, path, right; root_height: (C,) mean of the heights on the path.
     joint_position, joint_velocity: (C, J, 3); joint_rotation: (C, J, 4) world. This is the network's copy.
-    phase: (C,). told, told_target: (C, K) present and wanted values of all channels' columns.
+    phase: (C,). channel_values, channel_targets: (C, K) present and wanted values of all channels' columns.
     target_velocity, target_direction: (C, 2); strafe: (C,); owed: (C, 2): see `trajectory.follow_wish`.
     foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2), foot_added (C, 2, 2, 4), body_lift (C,): see
     `feet`.
@@ -35,8 +35,8 @@ class Character:
     joint_velocity: Array
     joint_rotation: Array
     phase: Array
-    told: Array
-    told_target: Array
+    channel_values: Array
+    channel_targets: Array
     target_velocity: Array
     target_direction: Array
     strafe: Array
@@ -91,8 +91,8 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         joint_velocity=np.ascontiguousarray(_turned(moving, sin, cos)),
         joint_rotation=quat.mul(quat.yaw(yaw)[:, None], quat.exp(turns)),
         phase=np.full(count, 0.0 if seen is None else seen.start_phase),
-        told=np.zeros((count, columns)),
-        told_target=np.zeros((count, columns)),
+        channel_values=np.zeros((count, columns)),
+        channel_targets=np.zeros((count, columns)),
         target_velocity=np.zeros((count, 2)),
         target_direction=facing.copy(),
         strafe=np.zeros(count),

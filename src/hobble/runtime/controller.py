@@ -37,7 +37,30 @@ HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; beyo
 # the next pose at once.
 FASTEST_TURN = np.radians(25)
 
+# Parts of the state that have to be finite. The others are checked at the call or computed in each frame.
+CHECKED = (
+    *("position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation", "phase"),
+    *(
+        "channel_values",
+        "target_velocity",
+        "target_direction",
+        "owed",
+        "foot_hold",
+        "foot_lift",
+        "foot_added",
+    ),
+    *("body_lift", "memory"),
+)
+
 Ground = Callable[[Array, Array], Array]
+
+
+# Groups of arrays for compiled functions, which unpack them by name.
+#
+# The pose that the network predicted last: position, velocity (C, J, 3); rotation (C, J, 4), world.
+Joints = tuple[Any, Any, Any]
+# The caller's copy of the pose: root (C, 3), yaw (C,), position (C, J, 3), rotation (C, J, 4).
+Drawn = tuple[Any, Any, Any, Any]
 
 
 class Controller:
@@ -77,41 +100,41 @@ class Controller:
         self.pose_rotation = character.joint_rotation.copy()
         self._points = np.zeros((count, layout.samples, 3, 2))
         blocks = layout.blocks("x")
-        self._x_columns = np.array([blocks[name].start for name in BODY], np.int64)
+        of_body = np.array([blocks[name].start for name in BODY], np.int64)
         of_channel = [np.arange(layout.x_size)[layout.x_channel(name)] for name, _ in layout.channels]
-        self._told_columns = np.concatenate([np.zeros(0, np.int64), *of_channel])
+        self._x_columns = (of_body, np.concatenate([np.zeros(0, np.int64), *of_channel]))
         steps = [np.full(columns, rates[name] / FPS) for name, columns in layout.channels]
-        self._told_step = np.concatenate([np.zeros(0), *steps])
+        self._channel_steps = np.concatenate([np.zeros(0), *steps])
         self._y_columns = trajectory.advance_columns(layout)
-        self._y_joints = np.array([layout.y_joint_position.start, layout.y_contacts.start], np.int64)
+        self._y_joints = layout.y_joint_position.start
         assert network.skeleton is not None
-        self._legs = feet.leg_joints(network.skeleton)
-        self._carried = feet.carried(network.skeleton, self._legs)
-        self._sole = feet.sole_heights(network, self._legs)
+        legs = feet.leg_joints(network.skeleton)
+        self._legs = (legs, feet.carried(network.skeleton, legs), feet.sole_heights(network, legs))
         self._hips = network.skeleton.role("hips")
-        self._standing = np.append(self._legs[:, 2:].reshape(-1), self._hips)
+        self._standing = np.append(legs[:, 2:].reshape(-1), self._hips)
         self._under = np.zeros((count, len(self._standing)))
         self._warned = False
+        self._group(character)
 
-    def frame(
-        self,
-        wish_velocity: Array,
-        wish_direction: Array,
-        wish_strafe: Array,
-        wish_gait: Array,
-        ground: Ground | None,
-    ) -> None:
-        """Run one frame. Wishes: see `trajectory.follow_wish`. ground returns heights (N,) at x, z (N,)."""
+    def _group(self, c: Character) -> None:
+        """Group the arrays for the compiled functions. They only change in place, so this is done once."""
+        self._path = (c.position, c.direction, c.gait)
+        self._target = (c.target_velocity, c.target_direction, c.strafe, c.owed)
+        self._channels = (c.channel_values, c.channel_targets, self._channel_steps)
+        self._joints = (c.joint_position, c.joint_velocity, c.joint_rotation)
+        self._drawn = (self.root, self.yaw, self.pose_position, self.pose_rotation)
+        self._feet = (c.foot_lock, c.foot_hold, c.foot_lift, c.foot_added)
+        self._contacts = self.y[:, self.layout.y_contacts]
+        self._checked = tuple(getattr(c, name).reshape(len(c.phase), -1) for name in CHECKED)
+
+    def frame(self, wish: trajectory.Wish, ground: Ground | None) -> None:
+        """Run one frame. ground returns heights (N,) at x, z (N,)."""
         clock = perf_counter
         t0 = clock()
         c = self.character
-        if find_unsound(
-            c.position, c.direction, c.gait, c.joint_position, c.joint_velocity, c.joint_rotation, c.told,
-            c.target_velocity, c.target_direction, c.owed, c.foot_hold, c.foot_lift, c.body_lift,
-            c.foot_added, c.memory, c.phase, self._unsound,
-        ):  # fmt: skip
+        if find_unsound(self._checked, self._unsound):
             self._restore("the state")
-        self._prepare(wish_velocity, wish_direction, wish_strafe, wish_gait, ground)
+        self._prepare(wish, ground)
         t1 = clock()
         self._input()
         clip_rows(self.x, self.bounds.x_low, self.bounds.x_high, self._unsound)
@@ -124,7 +147,7 @@ class Controller:
         t4 = clock()
         self._output(ground)
         t5 = clock()
-        self._update(wish_velocity)
+        self._update(wish[0])
         t6 = clock()
         self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
 
@@ -134,7 +157,7 @@ class Controller:
         some = np.flatnonzero(self._unsound)
         fresh = start(self.predictor.network, len(some), self.root[some][:, ::2], self.yaw[some])
         for part in fields(fresh):
-            if part.name != "told_target":
+            if part.name != "channel_targets":
                 getattr(self.character, part.name)[some] = getattr(fresh, part.name)
 
     def _warn(self, what: str) -> None:
@@ -147,14 +170,11 @@ class Controller:
             )
         self._warned = True
 
-    def _prepare(
-        self, velocity: Array, direction: Array, strafe: Array, gait: Array, ground: Ground | None
-    ) -> None:
+    def _prepare(self, wish: trajectory.Wish, ground: Ground | None) -> None:
         c = self.character
         trajectory.prepare(
-            velocity, direction, strafe, gait, self.steering, c.target_velocity, c.target_direction, c.strafe,
-            c.gait, c.position, c.direction, c.owed, c.told, c.told_target, self._told_step,
-            self.layout.step, self.side, self._points,
+            wish, self.steering, self._target, self._path, self._channels, self.layout.step, self.side,
+            self._points,
         )  # fmt: skip
         if ground is None:
             c.ground.fill(0.0)
@@ -171,40 +191,37 @@ class Controller:
     def _input(self) -> None:
         c = self.character
         _fill_input(
-            c.position, c.direction, c.gait, c.ground, c.root_height, c.joint_position, c.joint_velocity,
-            c.told, self._x_columns, self._told_columns, self.layout.step, self.x,
+            self._path, c.ground, c.root_height, self._joints, c.channel_values, self._x_columns,
+            self.layout.step, self.x,
         )  # fmt: skip
 
     def _output(self, ground: Ground | None) -> None:
         c = self.character
         _take_output(
-            self.y, self._y_joints, c.position, c.direction, c.root_height, c.joint_position,
-            c.joint_velocity, c.joint_rotation, self.bounds.fastest, self.root, self.yaw,
-            self.pose_position, self.pose_rotation,
-        )  # fmt: skip
+            self.y, self._y_joints, self._path, c.root_height, self._joints, self.bounds.fastest, self._drawn
+        )
         if ground is not None:
             at = np.ascontiguousarray(self.pose_position[:, self._standing]).reshape(-1, 3)
             self._under[:] = _heights(ground, at[:, 0], at[:, 2]).reshape(self._under.shape)
         else:
             self._under[:] = 0.0
-        contacts = self.layout.y_contacts.start
         feet.carry_body(
-            self.y, contacts, self._under, self._hips, *self.bounds.hips, self._legs, self._sole,
-            c.body_lift, self.pose_position,
+            self._contacts, self._under, self._hips, self.bounds.hips, self._legs, c.body_lift,
+            self.pose_position,
         )  # fmt: skip
         feet.place_feet(
-            self.y, contacts, self._under, self.foot_locking, self._legs,
-            self._carried, self._sole, c.foot_lock, c.foot_hold, c.foot_lift, c.foot_added,
+            self._contacts, self._under, self.foot_locking, self._legs, self._feet,
             self.pose_position, self.pose_rotation,
         )  # fmt: skip
 
     def _update(self, velocity: Array) -> None:
-        c = self.character
         whole = self.predictor.network.rooted
-        held = trajectory.UNWISHED_LOSS if self.steering > 0 and not whole else 0.0
+        steered = self.steering > 0
+        held = trajectory.UNWISHED_LOSS if steered and not whole else 0.0
+        drawn = trajectory.DRAWN if steered and whole else 0.0
         trajectory.advance(
-            self.y, self._y_columns, velocity, held, whole, c.position, c.direction, c.gait, c.phase
-        )  # fmt: skip
+            self.y, self._y_columns, velocity, held, whole, drawn, self._path, self.character.phase
+        )
 
 
 def _heights(ground: Ground, x: Array, z: Array) -> Array:
@@ -224,10 +241,23 @@ def _heights(ground: Ground, x: Array, z: Array) -> Array:
 
 @njit
 def _fill_input(
-    position: Any, direction: Any, gait: Any, ground: Any, height: Any, joints: Any, velocities: Any,
-    told: Any, at: Any, told_at: Any, step: int, x: Any,
-) -> None:  # fmt: skip
-    """Fill rows X. at: first columns of the blocks of BODY; told_at: (K,) columns of the channel values."""
+    path: trajectory.Trajectory,
+    ground: Any,
+    height: Any,
+    pose: Joints,
+    channel_values: Any,
+    columns: tuple[Any, Any],
+    step: int,
+    x: Any,
+) -> None:
+    """Fill rows x (C, X).
+
+    columns: the first column of each block of BODY, and the column of each of channel_values (C, K). ground:
+    (C, samples, 3) heights. height: (C,) of the ground under the root.
+    """
+    position, direction, gait = path
+    joints, velocities, _ = pose
+    at, channel_at = columns
     middle, samples = position.shape[1] // 2, ground.shape[1]
     for c in range(x.shape[0]):
         px, pz = position[c, middle]
@@ -256,21 +286,24 @@ def _fill_input(
             dx, dz = velocities[c, j, 0], velocities[c, j, 2]
             k = at[4] + 3 * j
             x[c, k], x[c, k + 1], x[c, k + 2] = dx * cos - dz * sin, velocities[c, j, 1], dx * sin + dz * cos
-        for k in range(told.shape[1]):
-            x[c, told_at[k]] = told[c, k]
+        for k in range(channel_values.shape[1]):
+            x[c, channel_at[k]] = channel_values[c, k]
 
 
 @njit
 def _take_output(
-    y: Any, at: Any, position: Any, direction: Any, height: Any, joints: Any, velocities: Any, rotations: Any,
-    fastest: float, root: Any, yaw: Any, pose_position: Any, pose_rotation: Any,
-) -> None:  # fmt: skip
-    """Turn the prediction into a world pose.
+    y: Any, first: int, path: trajectory.Trajectory, height: Any, pose: Joints, fastest: float, drawn: Drawn
+) -> None:
+    """Turn the prediction y (C, Y), whose joints begin in column `first`, into the world poses of `pose` and
+    `drawn`.
 
     A joint's position is the mean of the predicted one and the old one plus velocity. No joint moves further
     than `fastest` (not counting the change of the ground's height), and no joint turns by more than
     FASTEST_TURN from the last frame.
     """
+    position, direction, _ = path
+    joints, velocities, rotations = pose
+    root, yaw, pose_position, pose_rotation = drawn
     slowest = np.cos(FASTEST_TURN / 2)
     middle, count = position.shape[1] // 2, joints.shape[1]
     for c in range(y.shape[0]):
@@ -280,7 +313,7 @@ def _take_output(
         yaw[c] = np.arctan2(sin, cos)
         half_cos, half_sin = np.cos(yaw[c] / 2), np.sin(yaw[c] / 2)
         for j in range(count):
-            p = at[0] + 3 * j
+            p = first + 3 * j
             v, r = p + 3 * count, p + 6 * count
             velocities[c, j, 0] = y[c, v] * cos + y[c, v + 2] * sin
             velocities[c, j, 1] = y[c, v + 1]

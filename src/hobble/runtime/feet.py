@@ -21,11 +21,26 @@ HEIGHT_MIX = 0.5  # share of the remaining foot lift that is applied each frame
 # 2,000 needs more; then the foot arrives some frames later. Without the limit, legs snapped by up to 148
 # degrees.
 MOST_ADDED = float(np.radians(28))
+# Share of its length to which foot placement may stretch the leg of a held foot behind the hips, unless the
+# network stretches it further. Beyond that the heel rises. Otherwise a foot that is 5 cm behind the network's
+# straightens a knee that is bent by 26 degrees, and a stiff leg would look as if it bent and stretched.
+STRETCH = 0.99
+BEHIND = 10.0  # cm that the toe is behind the hip from which STRETCH holds; a foot ahead of it stays flat
 BODY_MIX = 0.15  # share of the remaining body lift that is applied each frame
 BODY_FREE = 3.0  # cm that standing feet may be off the ground before the body is raised or lowered
 BODY_MIN_CONTACT = 0.3  # sum of both feet's contacts below which the feet say nothing about the ground
 FLOATING = 3.0  # cm that a standing foot may be above SOLE, since rigs differ
 SOLE = (5.0, 4.0)  # height of heel and toe joint above the ground in a standing foot, cm
+FOOT, TOES = 1, 2  # the joints of a foot, see `carried`
+
+
+# Groups of arrays for compiled functions, which unpack them by name.
+#
+# joints (2, 4), see `leg_joints`; carried (2, J), see `carried`; sole (2,), see `sole_heights`.
+Legs = tuple[Any, Any, Any]
+# The state of the feet between frames: lock (C, 2), share of the hold; hold (C, 2, 2), x and z where the toe
+# landed; lift (C, 2), smoothed rise of the heel; added (C, 2, 2, 4), see `bend`.
+Feet = tuple[Any, Any, Any, Any]
 
 
 def leg_joints(skeleton: Skeleton) -> np.ndarray:
@@ -165,6 +180,66 @@ def bend(position: Any, rotation: Any, hip: int, knee: int, heel: int, shift: An
 
 
 @njit
+def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: Any, by: Any) -> None:
+    """Raise the heel of a foot that `shift` (3,) moves back, so that the leg stretches to STRETCH at most.
+
+    by: (4,) is set to the foot's rotation, about the toe and by MOST_ADDED at most; the heel's movement is
+    added to `shift`. A foot ahead of the hip stays flat.
+    """
+    by[0], by[1], by[2], by[3] = 1.0, 0.0, 0.0, 0.0
+    upper, lower, before, needed = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        upper += (position[knee, i] - position[hip, i]) ** 2
+        lower += (position[heel, i] - position[knee, i]) ** 2
+        before += (position[heel, i] - position[hip, i]) ** 2
+        needed += (position[heel, i] + shift[i] - position[hip, i]) ** 2
+    most = max(before, (STRETCH * (np.sqrt(upper) + np.sqrt(lower))) ** 2)
+    fx, fz = position[toe, 0] - position[heel, 0], position[toe, 2] - position[heel, 2]
+    along, high = np.sqrt(fx * fx + fz * fz), position[heel, 1] - position[toe, 1]
+    if needed <= most or along < 1e-6:
+        return
+    fx, fz = fx / along, fz / along
+    wx, wz = position[toe, 0] + shift[0] - position[hip, 0], position[toe, 2] + shift[2] - position[hip, 2]
+    ahead, up = wx * fx + wz * fz, position[toe, 1] + shift[1] - position[hip, 1]
+    if ahead >= 0.0:
+        return
+    most += max(1.0 + ahead / BEHIND, 0.0) * (needed - most)
+    # From the toe the heel is at (-along, high); turned by an angle, it is `most` away from the hip, squared.
+    cosine, sine = up * high - ahead * along, ahead * high + up * along
+    share = 0.5 * (most - wx * wx - up * up - wz * wz - along * along - high * high)
+    share = min(max(share / np.sqrt(cosine * cosine + sine * sine), -1.0), 1.0)
+    angle = min(max(np.arctan2(sine, cosine) + np.arccos(share), 0.0), MOST_ADDED)
+    forward = along * (1 - np.cos(angle)) + high * np.sin(angle)
+    shift[0] += forward * fx
+    shift[1] += along * np.sin(angle) - high * (1 - np.cos(angle))
+    shift[2] += forward * fz
+    by[0], by[1], by[3] = np.cos(angle / 2), np.sin(angle / 2) * fz, -np.sin(angle / 2) * fx
+
+
+@njit
+def carry_foot(
+    position: Any, rotation: Any, below: Any, heel: int, toe: int, x: float, y: float, z: float, by: Any
+) -> None:
+    """Move the joints `below` (J,) a heel that was at x, y, z. The foot turns `by` (4,), its toes do not."""
+    tx, ty, tz = turned(by, position[toe, 0] - x, position[toe, 1] - y, position[toe, 2] - z)
+    tx += position[heel, 0] - position[toe, 0]
+    ty += position[heel, 1] - position[toe, 1]
+    tz += position[heel, 2] - position[toe, 2]
+    turn(by, rotation[heel])
+    for j in range(position.shape[0]):
+        if below[j] == TOES:
+            position[j, 0] += tx
+            position[j, 1] += ty
+            position[j, 2] += tz
+        elif below[j] == FOOT:
+            px, py, pz = turned(by, position[j, 0] - x, position[j, 1] - y, position[j, 2] - z)
+            position[j, 0] = position[heel, 0] + px
+            position[j, 1] = position[heel, 1] + py
+            position[j, 2] = position[heel, 2] + pz
+            turn(by, rotation[j])
+
+
+@njit
 def sunk(position: Any, heel: int, toe: int, ground_heel: float, ground_toe: float, sole: Any) -> float:
     """How deep a foot of a pose (J, 3) is in the ground, cm; negative if it is above."""
     heel_sunk = ground_heel + sole[0] - position[heel, 1]
@@ -174,9 +249,14 @@ def sunk(position: Any, heel: int, toe: int, ground_heel: float, ground_toe: flo
 
 @njit
 def carry_body(
-    y: Any, first: int, ground: Any, hips: int, hips_low: float, hips_high: float, legs: Any, sole: Any,
-    lift: Any, position: Any,
-) -> None:  # fmt: skip
+    contacts: Any,
+    ground: Any,
+    hips: int,
+    hips_range: tuple[float, float],
+    legs: Legs,
+    lift: Any,
+    position: Any,
+) -> None:
     """Raise or lower whole bodies, positions (C, J, 3), so that they stand on the ground under them.
 
     The network gets the ground as the mean height along two seconds of path. On a hill a few metres long this
@@ -184,47 +264,48 @@ def carry_body(
     So the standing feet decide the height of the body, and the hips stay within their height range above the
     ground in training.
 
-    ground: (C, 5) heights under the feet as in `place_feet`, then under the hips; hips_low, hips_high: range
-    of the hips; lift: (C,) cm by which the body is raised, kept between frames; the rest: see `place_feet`.
+    contacts: see `place_feet`. ground: (C, 5) heights under the feet as in `place_feet`, then under the hips.
+    hips: the joint. hips_range: lowest and highest, cm above the ground. lift: (C,) cm by which the body is
+    raised, kept between frames.
     """
+    joints, _, sole = legs
     for c in range(position.shape[0]):
         wanted, weight = 0.0, 0.0
         for f in range(2):
             under = ground[c, 2 * f], ground[c, 2 * f + 1]
-            rise = sunk(position[c], legs[f, 2], legs[f, 3], under[0], under[1], sole)
-            stands = min(max(y[c, first + 2 * f], y[c, first + 2 * f + 1], 0.0), 1.0)
+            rise = sunk(position[c], joints[f, 2], joints[f, 3], under[0], under[1], sole)
+            stands = min(max(contacts[c, 2 * f], contacts[c, 2 * f + 1], 0.0), 1.0)
             wanted += stands * (max(rise - BODY_FREE, 0.0) + min(rise + BODY_FREE, 0.0))
             weight += stands
         if weight > BODY_MIN_CONTACT:
             lift[c] += BODY_MIX * (wanted / weight - lift[c])
         above = position[c, hips, 1] - ground[c, 4]
-        lift[c] = min(max(lift[c], hips_low - above), hips_high - above)
+        lift[c] = min(max(lift[c], hips_range[0] - above), hips_range[1] - above)
         for j in range(position.shape[1]):
             position[c, j, 1] += lift[c]
 
 
 @njit
 def place_feet(
-    y: Any, first: int, ground: Any, locking: bool, legs: Any, below: Any, sole: Any,
-    lock: Any, hold: Any, lift: Any, added: Any, position: Any, rotation: Any,
-) -> None:  # fmt: skip
+    contacts: Any, ground: Any, locking: bool, legs: Legs, feet: Feet, position: Any, rotation: Any
+) -> None:
     """Hold feet in contact and keep feet out of the ground. Changes the pose and the state of the feet.
 
-    y: (C, outputs); from column `first`: contacts of left heel, left toe, right heel, right toe.
-    ground: (C, 4 or more) heights under them. legs: (2, 4), see `leg_joints`; below: (2, J) bool, see
-    `carried`; sole: (2,), see `sole_heights`. lock: (C, 2) share of the hold; hold: (C, 2, 2) x, z where the
-    toe landed; lift: (C, 2) smoothed rise of the heel; added: (C, 2, 2, 4), see `bend`.
+    contacts: (C, 4) of left heel, left toe, right heel, right toe. ground: (C, 4 or more) heights under them.
+    locking: whether feet are held at all. position: (C, J, 3); rotation: (C, J, 4) of the pose.
     """
-    shift = np.zeros(3)
+    joints, below, sole = legs
+    lock, hold, lift, added = feet
+    shift, by = np.zeros(3), np.zeros(4)
     for c in range(position.shape[0]):
         for f in range(2):
-            hip, knee, heel, toe = legs[f, 0], legs[f, 1], legs[f, 2], legs[f, 3]
+            hip, knee, heel, toe = joints[f, 0], joints[f, 1], joints[f, 2], joints[f, 3]
             x, z = position[c, toe, 0], position[c, toe, 2]
             away_x, away_z = hold[c, f, 0] - x, hold[c, f, 1] - z
             far = lock[c, f] * np.sqrt(away_x * away_x + away_z * away_z)
             if not locking:
                 lock[c, f] = 0.0
-            elif y[c, first + 2 * f + 1] >= LOCK_AT and far < TOO_FAR:
+            elif contacts[c, 2 * f + 1] >= LOCK_AT and far < TOO_FAR:
                 if lock[c, f] < 1.0:
                     # Hold the foot where it is shown now, so that renewed contact does not pull it back.
                     away_x, away_z = lock[c, f] * away_x, lock[c, f] * away_z
@@ -237,20 +318,22 @@ def place_feet(
             rise = max(rise, 0.0) + lock[c, f] * min(rise + FLOATING, 0.0)
             lift[c, f] += HEIGHT_MIX * (rise - lift[c, f])
             shift[0], shift[1], shift[2] = lock[c, f] * away_x, lift[c, f], lock[c, f] * away_z
+            if lock[c, f] > 0.0:
+                raise_heel(position[c], hip, knee, heel, toe, shift, by)
+            else:
+                by[0], by[1], by[2], by[3] = 1.0, 0.0, 0.0, 0.0
             x, up, z = position[c, heel, 0], position[c, heel, 1], position[c, heel, 2]
             bend(position[c], rotation[c], hip, knee, heel, shift, added[c, f])
-            x, up, z = position[c, heel, 0] - x, position[c, heel, 1] - up, position[c, heel, 2] - z
-            for j in range(position.shape[1]):
-                if below[f, j]:
-                    position[c, j, 0] += x
-                    position[c, j, 1] += up
-                    position[c, j, 2] += z
+            carry_foot(position[c], rotation[c], below[f], heel, toe, x, up, z, by)
 
 
 def carried(skeleton: Skeleton, legs: np.ndarray) -> np.ndarray:
-    """(2, J) bool: the joints below each heel, which move with it."""
-    out = np.zeros((2, len(skeleton.joints)), bool)
+    """(2, J) for the joints below each heel: TOES from the toe joint on, FOOT for the rest; else 0."""
+    out = np.zeros((2, len(skeleton.joints)), np.int8)
     for f in range(2):
         for j, p in enumerate(skeleton.parents):
-            out[f, j] = p == legs[f, 2] or (p >= 0 and out[f, p])
+            if j == legs[f, 3] or (p >= 0 and out[f, p] == TOES):
+                out[f, j] = TOES
+            elif p == legs[f, 2] or (p >= 0 and out[f, p]):
+                out[f, j] = FOOT
     return out

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from hobble.channels.limits import together
 from hobble.core.quat import Array
 from hobble.models.network import Network
 
@@ -21,20 +22,20 @@ class SpeedLimiter:
         self._tables = [(columns[name], limits) for name, limits in network.limits.items()]
         self._gaits = {name: network.gaits.index(name) for name in ("stand", "walk", "jog")}
         self._allowed = np.full((characters, len(network.gaits)), np.inf)
-        self._told: Array | None = None
+        self._values: Array | None = None
 
-    def hold(self, told: Array, velocity: Array, shares: Array) -> None:
-        """Shorten velocities (C, 2) to the limits of bodies with channel values `told` (C, K).
+    def hold(self, values: Array, velocity: Array, shares: Array) -> None:
+        """Shorten velocities (C, 2) to the limits of bodies with channel values `values` (C, K).
 
         shares: (C, G) of the gaits. Both are changed in place: a body whose jog would be slower than
         LAME_BELOW gets a hurried walk instead.
         """
         if not self._tables:
             return
-        if self._told is None or not np.array_equal(told, self._told):
-            self._told = told.copy()
-            each = [limits.allowed(told[:, columns]) for columns, limits in self._tables]
-            self._allowed[:] = np.min(each, axis=0)
+        if self._values is None or not np.array_equal(values, self._values):
+            self._values = values.copy()
+            each = [limits.allowed(values[:, columns]) for columns, limits in self._tables]
+            self._allowed[:] = together(each, self._tables[0][1].usual)
         if not np.isfinite(self._allowed).any():
             return
         walk, jog = self._gaits["walk"], self._gaits["jog"]

@@ -37,7 +37,7 @@ class Scenario:
 @dataclass(frozen=True)
 class Track:
     """The motion of a scenario: positions (F, J, 3), rotations (F, J, 4), contacts (F, 4), phase (F,),
-    target (F, 2) wished velocity, root (F, 3), gait (F,) names, told (F,) values of the swept column."""
+    target (F, 2) wished velocity, root (F, 3), gait (F,) names, swept_values (F,) of the swept column."""
 
     scenario: Scenario
     positions: Array
@@ -47,7 +47,7 @@ class Track:
     target: Array
     root: Array
     gait: Array
-    told: Array
+    swept_values: Array
 
 
 def _ahead(speed: float, degrees: float = 0.0) -> Array:
@@ -90,12 +90,12 @@ def run_scenario(network: Network, scenario: Scenario, options: Runtime) -> Trac
     poses, targets, gaits, values = [], [], [], np.zeros(scenario.frames, np.float32)
     for f in range(scenario.frames):
         velocity, facing, gait = scenario.wish(f)
-        told = {}
+        channels = {}
         if scenario.swept:
             name, column = scenario.swept
             values[f] = channel(name).highest * f / max(1, scenario.frames - 1)
-            told = {name: {column: float(values[f])}}
-        poses.append(animation.next_pose(velocity, facing, gait, **told))
+            channels = {name: {column: float(values[f])}}
+        poses.append(animation.next_pose(velocity, facing, gait, **channels))
         targets.append(velocity)
         gaits.append(gait)
     return Track(
@@ -129,7 +129,7 @@ def generate(network: Network, npz: str | Path, bvh: str | Path, options: Runtim
 
     npz: names (N,), joints (J,), parents (J,), fps; for each scenario <name>: <name>/positions (F, J, 3)
     float32 cm, <name>/rotations (F, J, 4) world, w first, <name>/contacts (F, 4), <name>/phase (F,),
-    <name>/gait (F,) str, <name>/target (F, 2), <name>/root (F, 3), <name>/told (F,) float32 values of the
+    <name>/gait (F,) str, <name>/target (F, 2), <name>/root (F, 3), <name>/swept_values (F,) float32 of the
     swept column, <name>/swept (2,) channel and column, both "" if nothing is swept.
     """
     assert network.skeleton is not None
@@ -138,7 +138,7 @@ def generate(network: Network, npz: str | Path, bvh: str | Path, options: Runtim
     for track in write_motions(network, bvh, options):
         name = track.scenario.name
         names.append(name)
-        for key in ("positions", "rotations", "contacts", "phase", "target", "root", "told"):
+        for key in ("positions", "rotations", "contacts", "phase", "target", "root", "swept_values"):
             arrays[f"{name}/{key}"] = getattr(track, key).astype(np.float32)
         arrays[f"{name}/gait"] = track.gait
         arrays[f"{name}/swept"] = np.array(track.scenario.swept or ("", ""))

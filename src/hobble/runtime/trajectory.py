@@ -1,8 +1,7 @@
 """The character's trajectory on the ground: one entry per frame, half past, half future.
 
-The first axis is the characters: position and direction (C, T, 2) hold world x and z, gait (C, T, 6). T is
-twice the window (120); entry T/2 is the present frame. Angles are yaw: 0 faces +Z, growing toward +X (left).
-The formulas are those of the runtime of Holden et al. 2017.
+The first axis of every array is the C characters. Angles are yaw: 0 faces +Z, growing toward +X (left). The
+formulas are those of the runtime of Holden et al. 2017.
 """
 
 from __future__ import annotations
@@ -27,9 +26,25 @@ OWED_RATE = 0.01  # integral gain a frame: a steady error is corrected within a 
 OWED_WITHIN = 0.8  # share of the wish; with a larger error the character is still turning or starting
 MOST_OWED = 1.0  # largest integral correction, as a share of the wish
 FURTHEST_TURN = np.radians(137)  # largest turn to ask for; beyond it the other way round may be shorter
+DRAWN = 0.1  # with `Network.rooted`: largest change of a frame's movement toward the wish, as a share of it
 UNWISHED_LOSS = 0.5  # share of movement against the wish that is removed; removing all would drag the feet
 STRAFE_FROM = np.radians(45)  # angle between facing and velocity from which the strafe share is 1
 STILL = 0.1  # cm a frame: a slower wish means standing
+
+
+# Groups of arrays for compiled functions, which unpack them by name. They are plain tuples, because a named
+# tuple as an argument costs a microsecond.
+#
+# position, direction (C, T, 2): world x and z. gait (C, T, 6): shares. T is twice the window (120); entry T/2
+# is the present frame.
+Trajectory = tuple[Any, Any, Any]
+# What the caller wants: velocity, direction (C, 2); strafe (C,) share; gait (C, 6) shares.
+Wish = tuple[Any, Any, Any, Any]
+# The smoothed wish: velocity, direction (C, 2); strafe (C,); owed (C, 2), steady error of the velocity along
+# the wish and across it, see `_ask_velocity`.
+Target = tuple[Any, Any, Any, Any]
+# values, targets (C, K) of all channels' columns; steps (K,), largest change of a value in a frame.
+Channels = tuple[Any, Any, Any]
 
 
 @njit
@@ -59,16 +74,15 @@ def facing_wish(velocity: Any, ahead: Any, direction: Any, strafe: Any, look: An
 
 
 @njit
-def follow_wish(
-    wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
-    velocity: Any, direction: Any, strafe: Any, gait: Any, position: Any, heading: Any, owed: Any,
-) -> None:  # fmt: skip
-    """Move the smoothed targets toward the caller's wish; the gait of the present frame blends slowly.
+def follow_wish(wish: Wish, steering: float, target: Target, path: Trajectory) -> None:
+    """Move `target` toward the caller's wish; the gait of the present frame blends slowly.
 
-    wish_velocity, wish_direction, velocity, direction, owed: (C, 2); wish_strafe, strafe: (C,); wish_gait:
-    (C, 6); position, heading: (C, T, 2) of the trajectory. `_ask_velocity` and `_ask_turn` correct the wish;
-    with `steering` 0 there is no correction, as in the original runtime.
+    `_ask_velocity` and `_ask_turn` correct the wish; with `steering` 0 there is no correction, as in the
+    original runtime.
     """
+    wish_velocity, wish_direction, wish_strafe, wish_gait = wish
+    velocity, direction, strafe, owed = target
+    position, heading, gait = path
     middle = gait.shape[1] // 2
     for c in range(velocity.shape[0]):
         x, z = wish_velocity[c, 0], wish_velocity[c, 1]
@@ -127,18 +141,20 @@ def _ask_turn(gain: float, turn: float) -> float:
 
 
 @njit
-def blend_future(velocity: Any, target: Any, strafe: Any, position: Any, direction: Any, gait: Any) -> None:
-    """Bend the predicted future toward the wished velocity and facing; the bend grows with time.
+def blend_future(target: Target, path: Trajectory) -> None:
+    """Bend the predicted future toward the target velocity and facing; the bend grows with time.
 
-    At t in 0..1 of the future, the share of the wish is 1 - (1 - t)^b, with b = .5 for the position (1 when
-    strafing) and 2 for the direction (.5 when strafing). velocity, target: (C, 2) smoothed wishes.
+    At t in 0..1 of the future, the share of the target is 1 - (1 - t)^b, with b = .5 for the position (1 when
+    strafing) and 2 for the direction (.5 when strafing).
     """
+    velocity, facing, strafe, _ = target
+    position, direction, gait = path
     length = position.shape[1]
     middle = length // 2
     for c in range(position.shape[0]):
         bias_position = 0.5 + 0.5 * strafe[c]
         bias_direction = 2.0 - 1.5 * strafe[c]
-        goal = np.arctan2(target[c, 0], target[c, 1])
+        goal = np.arctan2(facing[c, 0], facing[c, 1])
         old_x, old_z = position[c, middle]
         for i in range(middle + 1, length):
             left = 1.0 - (i - middle) / middle
@@ -156,8 +172,9 @@ def blend_future(velocity: Any, target: Any, strafe: Any, position: Any, directi
 
 
 @njit
-def sample_points(position: Any, direction: Any, step: int, side: float, points: Any) -> None:
+def sample_points(path: Trajectory, step: int, side: float, points: Any) -> None:
     """Write the points (C, samples, 3, 2) where the ground is looked up: left, on the path, right."""
+    position, direction, _ = path
     for c in range(points.shape[0]):
         for s in range(points.shape[1]):
             x, z = position[c, s * step]
@@ -179,30 +196,33 @@ def stand_on(ground: Any, height: Any) -> None:
 
 @njit
 def prepare(
-    wish_velocity: Any, wish_direction: Any, wish_strafe: Any, wish_gait: Any, steering: float,
-    velocity: Any, target: Any, strafe: Any, gait: Any, position: Any, direction: Any,
-    owed: Any, told: Any, told_target: Any, told_step: Any, step: int, side: float, points: Any,
-) -> None:  # fmt: skip
+    wish: Wish,
+    steering: float,
+    target: Target,
+    path: Trajectory,
+    channels: Channels,
+    step: int,
+    side: float,
+    points: Any,
+) -> None:
     """`follow_wish`, `blend_future` and `sample_points` in one call.
 
-    Also moves the channel values told (C, K) toward told_target, by told_step (K,) at most. All are in this
-    file because numba renews cached code only when its own file changes, not when a callee's does.
+    Also moves the channel values toward their targets. All are in this file because numba renews cached code
+    only when its own file changes, not when a callee's does.
     """
-    follow_wish(
-        wish_velocity, wish_direction, wish_strafe, wish_gait, steering, velocity, target, strafe, gait,
-        position, direction, owed,
-    )  # fmt: skip
-    blend_future(velocity, target, strafe, position, direction, gait)
-    sample_points(position, direction, step, side, points)
-    for c in range(told.shape[0]):
-        for k in range(told.shape[1]):
-            change = told_target[c, k] - told[c, k]
-            told[c, k] += min(max(change, -told_step[k]), told_step[k])
+    follow_wish(wish, steering, target, path)
+    blend_future(target, path)
+    sample_points(path, step, side, points)
+    values, targets, steps = channels
+    for c in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            change = targets[c, k] - values[c, k]
+            values[c, k] += min(max(change, -steps[k]), steps[k])
 
 
 @njit
 def advance(
-    y: Any, at: Any, wish: Any, held: float, whole: bool, position: Any, direction: Any, gait: Any, phase: Any
+    y: Any, at: Any, wish: Any, held: float, whole: bool, drawn: float, path: Trajectory, phase: Any
 ) -> None:
     """Advance one frame: shift the past, move and turn the root, take the predicted future and phase change.
 
@@ -211,8 +231,12 @@ def advance(
     Movement is scaled by (1 - stand)^.25, except with `whole` (`Network.rooted`), where movement belongs to
     the pose. held: the share that is removed of movement against the wished velocity `wish` (C, 2), or of all
     movement if the wish is to turn on the spot; 0 is the original runtime.
+    drawn: how far the movement is drawn toward the wish, at most, as a share of its own length (after the
+    adjustment of Holden et al. 2020). Clips have only some directions and speeds, and feet in contact are
+    held.
     The predicted yaw velocity is that of the world seen from the root, so the root turns by its negative.
     """
+    position, direction, gait = path
     length = position.shape[1]
     middle = length // 2
     future, step = at[5], at[6]
@@ -234,8 +258,11 @@ def advance(
         else:
             against = held * min(0.0, x * wish[c, 0] + z * wish[c, 1]) / speed
             x, z = x - against * wish[c, 0], z - against * wish[c, 1]
-        position[c, middle, 0] += x
-        position[c, middle, 1] += z
+        lack_x, lack_z = wish[c, 0] - x, wish[c, 1] - z
+        lack = np.sqrt(lack_x * lack_x + lack_z * lack_z)
+        share = min(1.0, drawn * np.sqrt(x * x + z * z) / max(lack, 1e-9))
+        position[c, middle, 0] += x + share * lack_x
+        position[c, middle, 1] += z + share * lack_z
         yaw -= moving * y[c, at[1]]
         sin, cos = np.sin(yaw), np.cos(yaw)
         direction[c, middle, 0], direction[c, middle, 1] = sin, cos

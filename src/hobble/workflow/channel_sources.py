@@ -41,7 +41,9 @@ class ChannelSources:
         """The fields of a `Source` for channel `name` and a clip as plain data, without `files`."""
         return {
             "clip": self.clips.original(clip),
-            "entry": self.clips.entry(dataset, clip).model_dump(mode="json", exclude={"channels", "hurt"}),
+            "entry": self.clips.entry(dataset, clip).model_dump(
+                mode="json", exclude={"channels", "hurt", "person"}
+            ),
             "value": self._value(dataset, clip, name),
             "options": self.catalogue.dataset(dataset).channels.get(name, {}),
         }
@@ -82,9 +84,9 @@ class ChannelSources:
         return [str(file) for file in files]
 
 
-def database_folder(told: Sequence[str]) -> str:
+def database_folder(channels: Sequence[str]) -> str:
     """The folder name of the database with these channels."""
-    return "+".join(told) or NO_CHANNEL
+    return "+".join(channels) or NO_CHANNEL
 
 
 def channels_of_folder(folder_name: str) -> tuple[str, ...]:

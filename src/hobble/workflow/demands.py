@@ -172,8 +172,8 @@ class Demands:
         chosen = self.project.catalogue.configuration(configuration)
         skeleton = self.project.catalogue.skeleton(self.project.catalogue.dataset(chosen.dataset).skeleton)
         of_rows = self.project.datasets.options(chosen.dataset, "database", "window", "step")
-        told = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
-        return RowLayout(joints=len(skeleton.joints), channels=told, **of_rows)
+        channels = tuple((name, len(channel(name).columns(skeleton))) for name in chosen.channels)
+        return RowLayout(joints=len(skeleton.joints), channels=channels, **of_rows)
 
     @functools.cache  # noqa: B019 - one for as long as the process lives
     def all_thousands(self, dataset: str) -> float:

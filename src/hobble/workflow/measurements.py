@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hobble.measures.registry import MEASURES, measure
-from hobble.workflow.clips import Clips
+from hobble.workflow.clips import Clips, original
 from hobble.workflow.configurations import Configurations
 from hobble.workflow.package import Package
 
@@ -44,6 +44,18 @@ class Measurements:
     def splits(self, configuration: str, name: str) -> dict[str, str]:
         """Clip -> "train" or "held_out", if the measurement reads clips, else {}."""
         return self.configurations.splits(configuration) if "clips" in measure(name).inputs else {}
+
+    def people(self, configuration: str, name: str) -> dict[str, str]:
+        """Clip -> the person who walks in it, if the measurement has to know, else {}.
+
+        A clip whose entry names nobody counts as a person of its own, together with its mirror and its hurt
+        versions.
+        """
+        if not measure(name).people:
+            return {}
+        dataset = self.configurations.dataset(configuration)
+        splits = self.configurations.splits(configuration)
+        return {clip: self.clips.entry(dataset, clip).person or original(clip) for clip in splits}
 
     def options(self, configuration: str, name: str) -> dict[str, Any]:
         """The measurement's keys of the section `evaluation`."""

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from hobble.channels import channel
+from hobble.channels.injury.limp import page, together
 from hobble.channels.injury.limp import run as module
 from hobble.channels.injury.limp.captured import VERSION, HurtSeconds, Limp, healthy_of
 from hobble.channels.injury.limp.run import SEVERITIES, distance, hurt_side, limp
@@ -122,6 +125,45 @@ def test_a_limp_of_the_other_leg_is_seen(measured) -> None:
     assert last["wrong_side"] == 1
 
 
+def test_a_limp_is_measured_beside_the_walk_of_the_same_mood(
+    hurtable, holden31, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sad is half as fast and changes no limp; with old nobody limps; with tired there is no cycle."""
+    layout = replace(hurtable.layout, channels=(("injury", 25), ("mood", 5)))
+    moods = channel("mood").columns(holden31)
+    links = hurtable.channels["injury"][:25]
+    network = replace(hurtable, layout=layout, channels={"injury": links, "mood": moods})
+
+    def shown(network, each, speeds, gait, seconds, runtime, others):
+        out = []
+        for hurt, felt in zip(each, others["mood"], strict=True):
+            assert set(felt.values()) == {1.0}
+            amount = {hurt_side(holden31, link): 0.1 * s for link, s in hurt.items()}
+            speed = speeds * (0.5 if "sad" in felt else 1.0) * (0.6 if hurt else 1.0)
+            figure = walking({} if "old" in felt else amount, speed)
+            out.append(replace(figure, profile=None) if "tired" in felt else figure)
+        return out
+
+    def row(link: str, figure: Shown, healthy: Shown) -> dict[str, Any]:
+        return module._row(network, "walk", link, 10.0, figure, healthy)
+
+    monkeypatch.setattr(together, "shown", shown)
+    rows = together.limps_together(network, [LEFT_KNEE, RIGHT_KNEE], 2.0, 8.0, Runtime(), row)
+    assert [r["column"] for r in rows] == [m for m in moods if m != "tired" for _ in range(2)]
+    assert {r["speed_share"] for r in rows} == {0.6}
+    found = {r["column"]: r for r in together.named_together(rows)}
+    assert {name: r["named"] for name, r in found.items()} == {
+        "old": 0.0,
+        "happy": 1.0,
+        "sad": 1.0,
+        "angry": 1.0,
+    }
+    assert [r["wrong_side"] for r in found.values()] == [0.0] * 4
+    table = page.together_table("x", list(found.values()))
+    assert [line[0] for line in table.rows] == list(found)
+    assert together.limps_together(hurtable, [LEFT_KNEE], 2.0, 8.0, Runtime(), row) == []
+
+
 def clip(name: str, hurt: dict[str, float], limp: dict[str, float]) -> Limp:
     return Limp(name, hurt, walking(limp, 2.0).walk, 2.0)
 
@@ -133,12 +175,12 @@ def test_the_exam_is_passed_by_the_right_leg_alone(measured) -> None:
         clip("7_3", {RIGHT_KNEE: 8.0}, {"right": 0.8}),
     )
     splits = {"7_1": "train", "7_2": "held_out", "7_3": "train"}
-    (row,) = measured(lambda s: 0.1 * s, every=every, splits=splits)["exam"]
+    (row,) = measured(lambda s: 0.1 * s, every=every, splits=splits)["held_out_limps"]
     assert row["clip"] == "7_2"
     assert row["nearer"]
     assert row["hurt"] < 0.3 * row["healthy"]
-    assert not measured(lambda s: 0.1 * s, True, every, splits)["exam"][0]["nearer"]
-    assert not measured(lambda s: 0.0, False, every, splits)["exam"][0]["nearer"]
+    assert not measured(lambda s: 0.1 * s, True, every, splits)["held_out_limps"][0]["nearer"]
+    assert not measured(lambda s: 0.0, False, every, splits)["held_out_limps"][0]["nearer"]
 
 
 def test_a_clip_is_set_beside_its_own_performer() -> None:

@@ -53,8 +53,8 @@ def clip(network, name: str, link: str | None, severity: float, seed: int, frame
     root = np.zeros((frames, 3))
     root[:, 2] = 2.0 * np.arange(frames)
     still = np.zeros(frames)
-    told, rows = {"injury": severities}, np.arange(frames)
-    return Captured(name, local, contacts, still, told, gait, velocity, root, still, rows)
+    channels, rows = {"injury": severities}, np.arange(frames)
+    return Captured(name, local, contacts, still, channels, gait, velocity, root, still, rows)
 
 
 @pytest.fixture
@@ -151,13 +151,13 @@ def test_windows_are_of_one_hurt_walking_ahead(hurtable) -> None:
     assert walking_windows(aside, hurtable) == []
     assert walking_windows(replace(good, velocity=0.1 * good.velocity), hurtable) == []
     assert walking_windows(replace(good, gait=0 * good.gait), hurtable) == []
-    severity = good.told["injury"].copy()
+    severity = good.channels["injury"].copy()
     severity[150:] = 0  # half way through the second part, in which no window is all of a kind
-    healed = walking_windows(replace(good, told={"injury": severity}), hurtable)
+    healed = walking_windows(replace(good, channels={"injury": severity}), hurtable)
     assert [w.hurt for w in healed] == [KNEE] * 3 + [HEALTHY] * 6
-    severity = good.told["injury"].copy()
+    severity = good.channels["injury"].copy()
     severity[:, hurtable.channels["injury"].index(ARM)] = 2
-    both = walking_windows(replace(good, told={"injury": severity}), hurtable)
+    both = walking_windows(replace(good, channels={"injury": severity}), hurtable)
     assert {(w.hurt, w.severity) for w in both} == {(f"{KNEE} and {ARM}", 5.0)}
     assert module.WINDOW == 60
 

@@ -195,8 +195,8 @@ def test_files_keep_columns_and_report_says_what_hurts(clip, tmp_path):
     assert links == clip.skeleton.link_names
     write_report(tmp_path / "a.json", "injury", clip, severity, links, ["odd"])
     report = json.loads((tmp_path / "a.json").read_text())
-    told = {"clip": "walk", "channel": "injury", "title": "Injury", "told": {THIGH: hurt}}
-    assert report == {**told, "highest": 10.0, "warnings": ["odd"]}
+    written = {"clip": "walk", "channel": "injury", "title": "Injury", "values": {THIGH: hurt}}
+    assert report == {**written, "highest": 10.0, "warnings": ["odd"]}
 
 
 @pytest.mark.shared

@@ -43,6 +43,7 @@ class Diagnosis(Channel):
     highest = 1.0
     rate = 1.0
     slows = True
+    manner = True
     Options = Table
 
     def columns(self, rig: Rig) -> tuple[str, ...]:

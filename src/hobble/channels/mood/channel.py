@@ -36,6 +36,7 @@ class Mood(Channel):
     highest = 1.0
     rate = 1.0
     slows = True  # sad people walk at half the usual speed
+    manner = True
     Options = Patterns
 
     def columns(self, rig: Rig) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
         entries=[{"dataset": m.dataset, **m.found(NAME), "configuration": m.name} for m in all_measured],
         about={m.name: {"joints": m.found(NAME)["joints"]} for m in all_measured},
         differences=accuracy_differences(all_measured),
-        beside=[*_splits(all_measured, published), *_published_clips(all_measured, published)],
+        against_published=[*_splits(all_measured, published), *_published_clips(all_measured, published)],
     )
 
 

@@ -159,7 +159,7 @@ def accuracy_table(found: Json, name: str) -> Table:
     return Table(f"{name}-accuracy", columns, rows)
 
 
-def beside_published(found: Json, material: Material) -> Table:
+def published_table(found: Json, material: Material) -> Table:
     """The errors of our two splits, followed by the published means."""
     rows: list[list[Any]] = []
     for split in ("held_out", "train"):
@@ -186,7 +186,7 @@ def section(found: Json, material: Material) -> Section:
         "accuracy",
         [
             Part(0, Words(INTRODUCTION + sampled(found))),
-            Part(10, beside_published(found, material), open=True, short=True),
+            Part(10, published_table(found, material), open=True, short=True),
             Part(20, clip_bars(found, material), tall=True),
             Part(30, clip_boxes(found), tall=True),
             Part(60, accuracy_table(found, material.name)),
@@ -224,11 +224,11 @@ def figures(found: Json, material: Material) -> Iterator[Figure]:
         part = found.get(split)
         if part and part.get("mean") is not None:
             error = part.get("position_error_cm")
-            beside = _centimetres(error, split, material) if error is not None else ""
+            note = _centimetres(error, split, material) if error is not None else ""
             theirs = material.published_entry("accuracy") if split == "held_out" else None
             if theirs:
-                beside += f"; published for {theirs['label']}: {100 * theirs['mean']:.2f} %, on other clips"
-            yield Figure(label, f"{100 * part['mean']:.2f}", "%", beside, at)
+                note += f"; published for {theirs['label']}: {100 * theirs['mean']:.2f} %, on other clips"
+            yield Figure(label, f"{100 * part['mean']:.2f}", "%", note, at)
 
 
 def _centimetres(error: float, split: str, material: Material) -> str:

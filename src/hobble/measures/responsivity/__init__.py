@@ -15,7 +15,7 @@ class Options(Section):
     """Its keys of the section `evaluation`."""
 
     laps: Positive = Field(19, description="laps in the phase mode of the runtime")
-    laps_beside: Positive = Field(
+    laps_other_modes: Positive = Field(
         3, description="most laps in each other phase mode, where the second lap and later ones are the same"
     )
     lap_seconds: Annotated[float, Field(ge=1, allow_inf_nan=False)] = Field(

@@ -26,11 +26,11 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
     return SideBySide(
         entries=[entry for m in all_measured for entry in by_mode(m)],
         about=about,
-        beside=_published_sizes(about, published),
+        against_published=_published_sizes(about, published),
         milliseconds={
             "difference": time_differences(all_measured),
             "fit": fits(all_measured, published),
-            "beside": _published_times(all_measured, published),
+            "against_published": _published_times(all_measured, published),
         },
     )
 

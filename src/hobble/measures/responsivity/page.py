@@ -57,10 +57,10 @@ def figures(found: Json, material: Material) -> Iterator[Figure]:
     milliseconds = frame_milliseconds(found)
     if milliseconds is not None:
         theirs = material.published_entry("responsivity")
-        beside = f"median; one core can run {number(FRAME_BUDGET_MS / milliseconds, 3)} characters at 60 Hz"
+        note = f"median; one core can run {number(FRAME_BUDGET_MS / milliseconds, 3)} characters at 60 Hz"
         if theirs:
-            beside += f"; mean {number(frame_mean(found), 2)} ms, published mean {theirs['milliseconds']} ms"
-        yield Figure("Time per frame", number(milliseconds, 2), "ms", beside, 20)
+            note += f"; mean {number(frame_mean(found), 2)} ms, published mean {theirs['milliseconds']} ms"
+        yield Figure("Time per frame", number(milliseconds, 2), "ms", note, 20)
 
 
 def hints(found: Json, material: Material) -> Iterator[Hint]:
@@ -272,14 +272,14 @@ def track_figures(found: Json) -> list[Figure]:
 
 def _turn(found: Json) -> Figure:
     """The largest turn of a joint in one frame: as predicted, and as drawn after the runtime's limit."""
-    drawn, asked = (number(found.get(key)) for key in ("largest_turn_degrees", "asked_turn_degrees"))
+    drawn, asked = (number(found.get(key)) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
     allowed = f"the runtime limits it to {np.degrees(FASTEST_TURN):.0f}°"
-    if found.get("asked_turn_degrees") is None:
+    if found.get("predicted_turn_degrees") is None:
         return Figure("Largest turn of a joint", drawn, "°", f"in one frame, as drawn; {allowed}")
     frames = sum(lap.get("frames") or 0 for lap in found["laps"])
     held = f"{found['turns_held_back']:,} of {frames:,} frames"
-    beside = f"of a joint in one frame; {allowed}, which changed {held}; largest turn drawn: {drawn}°"
-    return Figure("Largest predicted turn", asked, "°", beside)
+    note = f"of a joint in one frame; {allowed}, which changed {held}; largest turn drawn: {drawn}°"
+    return Figure("Largest predicted turn", asked, "°", note)
 
 
 def speed_published(found: Json, material: Material) -> Table | None:
@@ -368,7 +368,7 @@ def _track(found: Json) -> Iterator[Hint]:
             "It circles or stops before a waypoint that it does not reach. See the laps under Speed and "
             "response.",
         )
-    drawn, asked = (found.get(key) for key in ("largest_turn_degrees", "asked_turn_degrees"))
+    drawn, asked = (found.get(key) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
     if drawn is not None and drawn > 60:
         yield Hint(
             "warn",

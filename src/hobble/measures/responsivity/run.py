@@ -32,30 +32,31 @@ def responsivity(
     runtime: Runtime,
     laps: int,
     lap_seconds: float,
-    laps_beside: int | None = None,
+    laps_other_modes: int | None = None,
     modes: Sequence[str] | None = None,
     track: Sequence[Waypoint] = TRACK,
 ) -> dict[str, Any]:
     """Run the track of Segerstedt 2021, `laps` laps in the runtime's own mode and fewer in other `modes`.
 
-    laps_beside: laps in those; by default, and at most, `laps`. modes: by default all that the network has. A
-    lap that takes longer than `lap_seconds` of simulated time is ended there, its remaining waypoints not
-    reached, and the next one starts from the beginning of the track. `modes` holds the laps of each mode and
-    what they come to; those of the runtime's own mode stand at the top too. Measured times stand under
-    "milliseconds" only, each with the steps' means, their `total`, and `spread`: sd, median and 99th
-    percentile of the total, and the mean of a whole call.
-    `largest_turn_degrees` is of the pose as drawn, `asked_turn_degrees` of what the network predicted, both
-    from a frame to the next; in `turns_held_back` frames the runtime let a joint turn less than was asked.
-    `runs`: where the first RUNS laps of the runtime's own mode led.
+    laps_other_modes: laps in those; by default, and at most, `laps`. modes: by default all that the network
+    has. A lap that takes longer than `lap_seconds` of simulated time ends without its remaining waypoints,
+    and the next lap starts from the beginning of the track.
+
+    The result is described in docs/artefacts.md. `modes` has the laps and the summary of each mode; those of
+    the runtime's own mode are also at the top level. Only the values under "milliseconds" depend on the
+    clock: means of the steps, their `total`, and its `spread` (sd, median, 99th percentile, mean of a whole
+    call). `largest_turn_degrees` is the largest turn of a joint from one frame to the next as drawn,
+    `predicted_turn_degrees` as predicted by the network; in `turns_held_back` frames the runtime let a joint
+    turn less than predicted. `runs`: the paths of the first RUNS laps in the runtime's own mode.
     """
     own = network.mode(runtime.mode)
-    beside = min(laps, laps_beside or laps)
+    fewer = min(laps, laps_other_modes or laps)
     found = {
         mode: _laps(
             network,
             runtime.model_copy(update={"mode": mode}),
             track,
-            laps if mode == own else beside,
+            laps if mode == own else fewer,
             lap_seconds,
         )
         for mode in dict.fromkeys((*map(network.mode, network.modes if modes is None else modes), own))
@@ -76,7 +77,7 @@ def responsivity(
         "parameters": parameter_counts(network.sizes) if network.sizes else None,
         "stored": {mode: network.stored(mode) for mode in network.modes},
         "exact": network.mode(None),
-        "laps_beside": beside,
+        "laps_other_modes": fewer,
         **found[own],
         "modes": list(found.values()),
     }
@@ -108,7 +109,7 @@ def _laps(
         "path_overshoot_cm": max(lap["path_overshoot_cm"] for lap in results),
         "foot_slide_cm": _mean([lap["foot_slide_cm"] for lap in results]),
         "largest_turn_degrees": max(lap["largest_turn_degrees"] for lap in results),
-        "asked_turn_degrees": max(lap["asked_turn_degrees"] for lap in results),
+        "predicted_turn_degrees": max(lap["predicted_turn_degrees"] for lap in results),
         "turns_held_back": sum(lap["turns_held_back"] for lap in results),
         "milliseconds": _milliseconds(np.concatenate(times)),
         "runs": runs[:RUNS],
@@ -133,7 +134,8 @@ def parameter_counts(sizes: Sequence[int]) -> dict[str, int]:
 
 
 def lap_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The laps of every mode as flat rows for a CSV file; the times at the end, a step's `_sd` beside it."""
+    """The laps of every mode as flat rows for a CSV file; the times are the last columns, with the
+    standard deviation of each step."""
     rows = []
     for entry in result["modes"]:
         for lap in entry["laps"]:
@@ -153,7 +155,7 @@ def run(given: Given, options: Options) -> Outcome:
         runtime=given.runtime,
         laps=options.laps,
         lap_seconds=options.lap_seconds,
-        laps_beside=options.laps_beside,
+        laps_other_modes=options.laps_other_modes,
         modes=options.modes,
     )
     says = [f"{m['mode']}: {m['waypoints_reached']} of {m['waypoints']} waypoints" for m in result["modes"]]
@@ -197,7 +199,7 @@ def _lap(
         "foot_slide_cm": round(float(slide.mean()), 4) if len(slide) else None,
         "steps": len(slide),
         "largest_turn_degrees": round(largest_turn(np.array(rotations)), 3),
-        "asked_turn_degrees": round(largest_turn(np.array(asked)), 3),
+        "predicted_turn_degrees": round(largest_turn(np.array(asked)), 3),
         "turns_held_back": _held_back(np.array(asked), np.array(taken)),
         "milliseconds": _milliseconds(seconds),
     }

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.models.checks import stacked
-from hobble.models.mann.forward import forward, softmax
+from hobble.models.mann.forward import forward
+from hobble.models.mann.predictor import MannPredictor
 from hobble.models.network import Export, Network, standardised
 from hobble.models.packing import packed_rows
-from hobble.models.stack import Stack, StackPredictor
 
 MOST_EXPERTS = 64
 
@@ -29,6 +29,7 @@ class Mann(Network):
 
     kind: ClassVar[str] = "mann"
     phase: ClassVar[bool] = False
+    storage: ClassVar[str] = "int16"  # reading eight experts from memory takes most of the time of a frame
 
     weights: tuple[Array, ...] = field(repr=False)
     biases: tuple[Array, ...] = field(repr=False)
@@ -85,10 +86,10 @@ class Mann(Network):
         y = forward(self.weights, self.biases, self.gate_weights, self.gate_biases, self.columns, z)
         return y * self.y_std + self.y_mean
 
-    def predictor(self, mode: str | None = None, storage: str = "float32") -> MannPredictor:
+    def predictor(self, mode: str | None = None, storage: str | None = None) -> MannPredictor:
         """As in `Network`; there is one mode."""
         self.mode(mode)
-        return MannPredictor(self, storage)
+        return MannPredictor(self, storage or self.storage)
 
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`. Weights are integers with a factor for each row; `gate` holds the positions in
@@ -117,29 +118,6 @@ class Mann(Network):
             return f"{target}: within {write_checked(target, self):.1g} of the runtime"
 
         return {"onnx": onnx}
-
-
-class MannPredictor(StackPredictor):
-    """The network prepared to run, with the experts' weights stored as float32 or int16."""
-
-    network: Mann
-
-    def __init__(self, network: Mann, storage: str = "float32") -> None:
-        super().__init__(network)
-        self._experts = Stack(network.weights, network.biases, storage)
-        # Always float32: it is small, and its rounding error would affect every expert.
-        self._gate = Stack([w[None] for w in network.gate_weights], [b[None] for b in network.gate_biases])
-
-    def evaluate(self, z: Array, phase: Array, out: Array) -> None:
-        """As in `Predictor`; the phase is ignored."""
-        self._experts.run(z, self.shares(z), out)
-        self.restore(out)
-
-    def shares(self, z: Array) -> Array:
-        """(C, K) float32: the share of each expert for standardised inputs z (C, X)."""
-        logits = np.empty((len(z), self.network.experts), np.float32)
-        self._gate.run(z[:, self.network.columns], np.ones((len(z), 1), np.float32), logits)
-        return softmax(logits)
 
 
 def _columns(path: str | Path, arrays: Mapping[str, Any], inputs: int) -> NDArray[np.int64]:

@@ -111,8 +111,8 @@ def on_mean_ground(rows: ClipRows, layout: RowLayout) -> tuple[Array, Array]:
     count = rows.fits[:, None]
     ground = np.add.reduceat(rows.heights, rows.first_fit, axis=0) / count
     lift = np.add.reduceat(rows.mean, rows.first_fit)[:, None] / count
-    told = {name: rows.channels[name] for name, _ in layout.channels}
-    compose(layout, frame_inputs(layout, rows.x, told), ground, lift, x, y)
+    values = {name: rows.channels[name] for name, _ in layout.channels}
+    compose(layout, frame_inputs(layout, rows.x, values), ground, lift, x, y)
     return x, y
 
 

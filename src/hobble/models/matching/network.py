@@ -154,10 +154,10 @@ class Matching(Network):
         """
         return self.frames[self.nearest(self.queries(standardised(self, x)))]
 
-    def predictor(self, mode: str | None = None, storage: str = "float32") -> MatchingPredictor:
+    def predictor(self, mode: str | None = None, storage: str | None = None) -> MatchingPredictor:
         """As in `Network`; there is one mode. int16 halves the memory of the frames."""
         self.mode(mode)
-        return MatchingPredictor(self, storage)
+        return MatchingPredictor(self, storage or self.storage)
 
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`. Frames are integers with a factor for each column. Features stay float32, so that

@@ -82,9 +82,9 @@ class Pfnn(Network):
         y = forward(self.weights, self.biases, z, binned(phase) if constant else phase)
         return y * self.y_std + self.y_mean
 
-    def predictor(self, mode: str | None = None, storage: str = "float32") -> PfnnPredictor:
+    def predictor(self, mode: str | None = None, storage: str | None = None) -> PfnnPredictor:
         """As in `Network`: mode "constant" (50 phases), "linear" (10, blended) or "cubic" (exact)."""
-        return PfnnPredictor(self, mode or "cubic", storage)
+        return PfnnPredictor(self, mode or "cubic", storage or self.storage)
 
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`: control points as integers with a factor for each row."""

@@ -11,11 +11,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from hobble.core.compiled import njit
 from hobble.core.quat import Array
 from hobble.models.checks import stacked
 from hobble.models.network import Export, Network, standardised
 from hobble.models.packing import packed_rows
-from hobble.models.stack import Stack, StackPredictor
+from hobble.models.stack import Stack, StackPredictor, blend_layers
 
 PHASE_COLUMNS = 2  # inputs after the columns of X: sine and cosine of the phase
 
@@ -61,10 +62,10 @@ class Plain(Network):
                 h = np.where(h > 0, h, np.expm1(np.minimum(h, 0)))
         return h * self.y_std + self.y_mean
 
-    def predictor(self, mode: str | None = None, storage: str = "float32") -> PlainPredictor:
+    def predictor(self, mode: str | None = None, storage: str | None = None) -> PlainPredictor:
         """As in `Network`; there is one mode."""
         self.mode(mode)
-        return PlainPredictor(self, storage)
+        return PlainPredictor(self, storage or self.storage)
 
     def page(self, inputs: NDArray[np.int64], outputs: NDArray[np.int64]) -> dict[str, Any]:
         """As in `Network`: weights as integers with a factor for each row."""
@@ -93,13 +94,25 @@ class PlainPredictor(StackPredictor):
 
     def __init__(self, network: Plain, storage: str = "float32") -> None:
         super().__init__(network)
-        self._stack = Stack([w[None] for w in network.weights], [b[None] for b in network.biases], storage)
+        weights, biases = [w[None] for w in network.weights], [b[None] for b in network.biases]
+        self._stack = Stack(weights, biases, storage, network.y_mean, network.y_std)
 
     def evaluate(self, z: Array, phase: Array, out: Array) -> None:
         """As in `Predictor`."""
-        inputs = np.concatenate([z, phase_columns(phase)], axis=1)
-        self._stack.run(inputs, np.ones((len(z), 1), np.float32), out)
-        self.restore(out)
+        stack = self._stack
+        _evaluate(stack.weights, stack.numbers, stack.plan, z, phase_columns(phase), out)
+
+
+@njit(error_model="numpy")
+def _evaluate(weights: Any, numbers: Any, plan: Any, z: Any, phase: Any, out: Any) -> None:
+    """phase: the columns (C, PHASE_COLUMNS) after those of z."""
+    inputs = np.empty((z.shape[0], z.shape[1] + phase.shape[1]), np.float32)
+    for c in range(z.shape[0]):
+        for i in range(z.shape[1]):
+            inputs[c, i] = z[c, i]
+        for i in range(phase.shape[1]):
+            inputs[c, z.shape[1] + i] = phase[c, i]
+    blend_layers(weights, numbers, plan, np.ones((z.shape[0], 1), np.float32), inputs, out)
 
 
 def phase_columns(phase: Array) -> Array:

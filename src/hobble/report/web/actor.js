@@ -3,9 +3,9 @@ import { createCharacter } from "./character.js";
 import { createFigure } from "./figure.js";
 import { drawInputs } from "./inputs.js";
 import { createLab } from "./lab.js";
-import { toldColour } from "./paint.js";
+import { channelColour } from "./paint.js";
 import { createRig } from "./rig.js";
-import { keyed, placed } from "./told.js";
+import { keyed, placed } from "./sliders.js";
 
 const KEPT = 1200; // frames that can be saved as motion
 
@@ -24,10 +24,10 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
   };
   const sole = (j) => { const [x, z] = [rig.places[3 * j], rig.places[3 * j + 2]]; return [x, floor(x, z), z]; };
 
-  // told: a value for each column of a channel, by `keyed`; what is not there is 0.
-  actor.frame = ({ velocity, ahead, gait }, told) => {
+  // values: a value for each column of a channel, by `keyed`; what is not there is 0.
+  actor.frame = ({ velocity, ahead, gait }, values) => {
     const c = actor.character, before = performance.now();
-    spec.channels.forEach((one) => one.columns.forEach((column, l) => { c.wished[one.first + l] = (told.get(keyed(one, column)) || 0) / one.scale; }));
+    spec.channels.forEach((one) => one.columns.forEach((column, l) => { c.channelTargets[one.first + l] = (values.get(keyed(one, column)) || 0) / one.scale; }));
     c.frame(velocity, ahead, gait, floor);
     rig.take(c.pose, c.turns);
     actor.milliseconds += .05 * (performance.now() - before - actor.milliseconds);
@@ -61,8 +61,8 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
     if (view.inputs) drawInputs(view, c, spec);
     figure.take(rig);
     figure.pose((columns) => {
-      const most = one ? Math.max(0, ...columns.map((l) => c.told[one.first + l])) * one.scale / one.highest : 0;
-      return toldColour(paint, most, plain);
+      const most = one ? Math.max(0, ...columns.map((l) => c.channelValues[one.first + l])) * one.scale / one.highest : 0;
+      return channelColour(paint, most, plain);
     });
   };
   // What is under a point of the screen: {columns, by name, of the channel that lies in the body; deep}; null where nothing is.

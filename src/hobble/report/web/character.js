@@ -9,7 +9,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const S = T / step, F = M / step, G = gaits.length, predict = networks[spec.network.kind](spec);
   const { atan2, sin, cos, hypot, floor, min, max, abs, sqrt, PI } = Math;
   const wrap = (angle) => angle - 2 * PI * floor((angle + PI) / (2 * PI));
-  // What the body is told, channel after channel: where each column lies in X, and how far it may go in a frame.
+  // The columns of all channels in order: the place of each in X, and how far its value may change in a frame.
   const columns = spec.channels.flatMap((one) => one.columns.map((_, l) => ({ at: X[one.name] + l, rate: one.rate }))), L = columns.length;
   const x = new Float32Array(X.size);
   const filled = (n, value) => new Float64Array(n).fill(value);
@@ -17,7 +17,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const c = {
     px: filled(T, place[0]), pz: filled(T, place[1]), dx: filled(T, sin(heading)), dz: filled(T, cos(heading)),
     gait: filled(T * G, 0), ground: filled(S * 3, 0), height: 0, phase: 0, joints: filled(3 * J, 0),
-    velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), told: filled(L, 0), wished: filled(L, 0),
+    velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), channelValues: filled(L, 0), channelTargets: filled(L, 0),
     velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, owed: [0, 0], lock: [0, 0],
     hold: [[0, 0], [0, 0]], lift: [0, 0], raised: 0, placed: false, added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
     memory: filled(spec.network.memory ?? 0, 0),
@@ -56,7 +56,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   for (let j = 0; j < J; j++) c.rotations.set(multiply(facing0, at4(rotations, j)), 4 * j);
   settle();
 
-  // What the network is told and answers keeps within what it saw in training.
+  // Inputs and outputs are clipped to the range seen in training.
   const [xLow, xHigh, yLow, yHigh] = ["xLow", "xHigh", "yLow", "yHigh"].map((name) => new Float32Array(bytes(spec.bounds[name])));
   const within = (row, low, high) => { for (let i = 0; i < row.length; i++) row[i] = min(max(row[i], low[i]), high[i]); };
 
@@ -87,22 +87,26 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
 
   const limited = spec.channels.filter((one) => one.limits);
   const allowed = (g) => {
-    let most = Infinity;
+    let least = Infinity, both = limited[0].limits.usual[g];
+    const usual = both;
     for (const { first, limits } of limited) {
       const { levels, speeds } = limits;
+      let most = Infinity;
       for (let l = 0; l < speeds[g].length; l++) {
-        const v = c.told[first + l];
+        const v = c.channelValues[first + l];
         if (!(v > 0)) continue;
         let i = 0;
         while (i < levels.length - 2 && levels[i + 1] <= v) i++;
         const [low, high] = [speeds[g][l][i], speeds[g][l][i + 1]];
         most = min(most, low + (v - levels[i]) / (levels[i + 1] - levels[i]) * (high - low));
       }
+      least = min(least, most);
+      if (usual > 0) both *= min(1, most / usual);
     }
-    return most;
+    return least < usual ? both : least;
   };
   const hold = (velocity, gait) => {
-    if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.told[first + l] > 0))) return velocity;
+    if (!limited.some(({ first, columns: own }) => own.some((_, l) => c.channelValues[first + l] > 0))) return velocity;
     const each = gaits.map((_, g) => allowed(g)), walk = gaits.indexOf("walk"), jog = gaits.indexOf("jog");
     let hurry = 1;
     if (each[jog] < k.lameBelow) {
@@ -183,7 +187,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       c.root[1] = c.height;
       c.placed = true;
     }
-    columns.forEach(({ rate }, l) => { c.told[l] += min(max(c.wished[l] - c.told[l], -rate), rate); });
+    columns.forEach(({ rate }, l) => { c.channelValues[l] += min(max(c.channelTargets[l] - c.channelValues[l], -rate), rate); });
   };
   const input = () => {
     let [px, pz, co, si] = [c.px[M], c.pz[M], c.dz[M], c.dx[M]];
@@ -206,7 +210,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       x[v + 1] = c.velocities[j + 1];
       x[v + 2] = c.velocities[j] * si + c.velocities[j + 2] * co;
     }
-    columns.forEach(({ at }, l) => { x[at] = c.told[l]; });
+    columns.forEach(({ at }, l) => { x[at] = c.channelValues[l]; });
   };
   const output = (y, ground) => {
     const si = c.dx[M], co = c.dz[M];
@@ -261,8 +265,11 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       const against = held * min(0, a * wish[0] + b * wish[1]) / squared;
       [a, b] = [a - against * wish[0], b - against * wish[1]];
     }
-    c.px[M] += a;
-    c.pz[M] += b;
+    // The movement of a clip is drawn toward the wish, a little: clips have only some directions and speeds.
+    const drawn = spec.steering > 0 && spec.rooted ? k.drawn : 0, lack = [wish[0] - a, wish[1] - b];
+    const share = min(1, drawn * hypot(a, b) / max(hypot(...lack), 1e-9));
+    c.px[M] += a + share * lack[0];
+    c.pz[M] += b + share * lack[1];
     yaw -= moving * y[Y.turn];
     const si = c.dx[M] = sin(yaw), co = c.dz[M] = cos(yaw);
     for (let i = M + 1; i < T; i++) {
@@ -318,11 +325,45 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     } else c.lock[f] = max(0, c.lock[f] - k.release);
     const up = sunk(f, ground), rise = max(up, 0) + c.lock[f] * min(up + k.floating, 0);
     c.lift[f] += k.heightMix * (rise - c.lift[f]);
-    away = away.map((v) => v * c.lock[f]);
+    const shift = [c.lock[f] * away[0], c.lift[f], c.lock[f] * away[1]];
+    const by = c.lock[f] > 0 ? raiseHeel(joint(hip), joint(knee), joint(heel), point, shift) : [1, 0, 0, 0];
     const before = Array.from(joint(heel));
-    bend(joint(hip), joint(knee), joint(heel), [away[0], c.lift[f], away[1]], hip, knee, c.added[f]);
-    const moved = joint(heel).map((v, i) => v - before[i]);
-    for (const j of spec.carried[f]) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
+    bend(joint(hip), joint(knee), joint(heel), shift, hip, knee, c.added[f]);
+    carryFoot(f, before, by);
+  };
+  // The heel of a held foot rises where the leg would stretch too far; the turn of the foot about its toe.
+  const raiseHeel = (hip, knee, heel, toe, shift) => {
+    const flat = [1, 0, 0, 0], leg = minus(heel, hip);
+    const whole = k.stretch * (hypot(...minus(knee, hip)) + hypot(...minus(heel, knee)));
+    const aim = leg.map((v, i) => v + shift[i]), needed = dot(aim, aim), least = max(dot(leg, leg), whole * whole);
+    const along = hypot(toe[0] - heel[0], toe[2] - heel[2]), high = heel[1] - toe[1];
+    if (needed <= least || along < 1e-6) return flat;
+    const fx = (toe[0] - heel[0]) / along, fz = (toe[2] - heel[2]) / along;
+    const [wx, up, wz] = minus(toe, hip).map((v, i) => v + shift[i]), ahead = wx * fx + wz * fz;
+    if (ahead >= 0) return flat;
+    const most = least + max(1 + ahead / k.behind, 0) * (needed - least);
+    const cosine = up * high - ahead * along, sine = ahead * high + up * along;
+    const share = .5 * (most - wx * wx - up * up - wz * wz - along * along - high * high) / hypot(cosine, sine);
+    const angle = min(max(atan2(sine, cosine) + Math.acos(min(max(share, -1), 1)), 0), k.mostAdded);
+    const forward = along * (1 - cos(angle)) + high * sin(angle);
+    shift[0] += forward * fx;
+    shift[1] += along * sin(angle) - high * (1 - cos(angle));
+    shift[2] += forward * fz;
+    return [cos(angle / 2), sin(angle / 2) * fz, 0, -sin(angle / 2) * fx];
+  };
+  // The joints below a heel that was at `before`: the foot turns `by`, its toes do not.
+  const carryFoot = (f, before, by) => {
+    const [, , heel, toe] = spec.legs[f], now = joint(heel);
+    const place = (point) => rotate(by, minus(point, before)).map((v, i) => v + now[i]);
+    const moved = minus(place(joint(toe)), joint(toe));
+    c.turns.set(multiply(by, at4(c.turns, heel)), 4 * heel);
+    for (const j of spec.carried[f]) {
+      if (spec.toes[f].includes(j)) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
+      else {
+        c.pose.set(place(joint(j)), 3 * j);
+        c.turns.set(multiply(by, at4(c.turns, j)), 4 * j);
+      }
+    }
   };
   // `held` turned to `aim`, by mostAdded at most; whether that was too little.
   const approach = (held, aim) => {

@@ -2,7 +2,7 @@
 import { createActor } from "./actor.js";
 import { find, material } from "./base.js";
 import { createDial } from "./dial.js";
-import { keyed, placed } from "./told.js";
+import { keyed, placed } from "./sliders.js";
 import { createView } from "./view.js";
 
 const GHOST_OFFSET = -84; // cm from the hurt figure to the healthy one, negative: to its left
@@ -14,7 +14,7 @@ const SPEED = 2.5; // target speed, cm per frame
 const createHero = (spec, asked) => {
   const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), still = find("hero-walk");
   const one = placed(spec), labels = one ? Object.keys(one.sliders) : [], hurts = labels.length > 0;
-  const told = new Map(), healthy = new Map(), flat = () => 0, hero = { frames: 0 };
+  const hurtValues = new Map(), healthyValues = new Map(), flat = () => 0, hero = { frames: 0 };
   let part = hurts ? (labels.includes(asked.part) ? asked.part : labels[0]) : null;
   let last = null, owed = 0, shown = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
@@ -32,9 +32,9 @@ const createHero = (spec, asked) => {
 
   const step = () => {
     hero.frames++;
-    main.frame(wish(), told);
+    main.frame(wish(), hurtValues);
     if (!ghost) return;
-    ghost.frame(wish(), healthy);
+    ghost.frame(wish(), healthyValues);
     const [sin, cos] = [Math.sin(heading()), Math.cos(heading())], [a, b] = [main.character.root, ghost.character.root];
     const [dx, dz] = [b[0] - a[0], b[2] - a[2]], along = dx * sin + dz * cos, across = dx * cos - dz * sin;
     if (!leaving && (Math.abs(along) > MOST_AHEAD || Math.abs(across - GHOST_OFFSET) > 70)) leaving = true;
@@ -69,13 +69,13 @@ const createHero = (spec, asked) => {
     main.draw(false);
     if (ghost) { ghost.draw(null); ghost.figure.show(fade > .01, fade); }
     view.land.under(main.figure.balls(view.balls));
-    if (now - shown > 250) { shown = now; tell(); }
+    if (now - shown > 250) { shown = now; showPace(); }
   };
   const pace = ({ character: c }) => {
     const M = spec.window;
     return Math.hypot(c.px[M] - c.px[M - 50], c.pz[M] - c.pz[M - 50]) * 60 / 50 / 100;
   };
-  const tell = () => {
+  const showPace = () => {
     find("hero-pace").textContent = `${pace(main).toFixed(2)} m/s`;
     if (ghost) find("hero-ghost").textContent = `${pace(ghost).toFixed(2)} m/s`;
   };
@@ -90,8 +90,8 @@ const createHero = (spec, asked) => {
       chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
     };
     const hurt = () => {
-      told.clear();
-      told.set(keyed(one, one.columns[one.sliders[part]]), dial.value);
+      hurtValues.clear();
+      hurtValues.set(keyed(one, one.columns[one.sliders[part]]), dial.value);
       say();
       view.ask();
     };
@@ -119,10 +119,10 @@ const createHero = (spec, asked) => {
   rest();
 
   for (const actor of [main, ghost]) actor?.start(flat);
-  const warm = new Map(told);
-  for (let f = 0; f < WARM_UP; f++) { hero.frames++; main.frame(wish(), f > 40 ? warm : healthy); ghost?.frame(wish(), healthy); }
+  const warm = new Map(hurtValues);
+  for (let f = 0; f < WARM_UP; f++) { hero.frames++; main.frame(wish(), f > 40 ? warm : healthyValues); ghost?.frame(wish(), healthyValues); }
   glide(1);
-  tell();
+  showPace();
   section.classList.add("ready");
   return Object.assign(hero, { main, ghost, view, step });
 };

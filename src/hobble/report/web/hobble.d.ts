@@ -18,9 +18,9 @@ export interface Wish {
 export interface Character {
   readonly joints: string[];
   readonly gaits: string[];
-  /** What it can be told: columns by channel, and the highest value of each; 0 tells nothing. */
+  /** By name of a channel: its columns, and their highest value. 0 has no effect. */
   readonly channels: Record<string, { columns: string[]; highest: number }>;
-  /** What a reader calls a column ("left thigh") to where it is told. */
+  /** By name for people ("left thigh"): the channel and its column. */
   readonly parts: Record<string, { channel: string; column: string }>;
   /** Where all joints are, three numbers each, and their rotations in the world, four each; the next step writes over them. */
   readonly places: Float64Array;
@@ -29,8 +29,8 @@ export interface Character {
   readonly contacts: number[];
   readonly phase: number;
   readonly root: [number, number, number];
-  /** Values by column of a channel; columns that are not named go back to 0. Throws RangeError for what is wrong. */
-  tell(channel: string, values?: Record<string, number>): void;
+  /** Sets values of a channel, by column. Columns that are not named go back to 0. Throws RangeError for an unknown name or a bad value. */
+  setChannel(channel: string, values?: Record<string, number>): void;
   /** One frame of a sixtieth of a second. */
   step(wish?: Wish): Character;
 }

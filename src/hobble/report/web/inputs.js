@@ -8,7 +8,7 @@ export const groundSamples = (c, spec) => {
   for (let s = 0; s < c.ground.length / 3; s++) {
     const i = s * step, a = side * c.dz[i], b = side * c.dx[i];
     [[a, -b], [0, 0], [-a, b]].forEach(([x, z], k) => {
-      out.push({ place: [c.px[i] + x, c.ground[3 * s + k], c.pz[i] + z], told: c.ground[3 * s + k] - c.height });
+      out.push({ place: [c.px[i] + x, c.ground[3 * s + k], c.pz[i] + z], above: c.ground[3 * s + k] - c.height });
     });
   }
   return out;
@@ -25,8 +25,8 @@ export const jointVelocities = (c) => {
 };
 
 export const drawInputs = ({ marks, over, paint }, c, spec) => {
-  for (const { place: [x, y, z], told } of groundSamples(c, spec)) {
-    const rgb = Math.abs(told) < 1 ? paint.ink : told > 0 ? paint.high : paint.predicted, r = 3;
+  for (const { place: [x, y, z], above } of groundSamples(c, spec)) {
+    const rgb = Math.abs(above) < 1 ? paint.ink : above > 0 ? paint.high : paint.predicted, r = 3;
     marks.piece([[x - r, y + .6, z - r], [x + r, y + .6, z - r], [x + r, y + .6, z + r], [x - r, y + .6, z + r]], rgb, .8);
   }
   for (const { from, to } of jointVelocities(c)) over.needle(from, to, 1.6, paint.predicted, .9);

@@ -18,14 +18,14 @@ export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
   read();
 
   // Values by column of a channel; columns that are not named go back to 0.
-  character.tell = (name, values = {}) => {
+  character.setChannel = (name, values = {}) => {
     const one = spec.channels.find((channel) => channel.name === name);
     if (!one) throw new RangeError(`no channel ${name}; there are: ${spec.channels.map((channel) => channel.name).join(", ") || "none"}`);
     for (const [column, much] of Object.entries(values)) {
-      if (!one.trained.includes(column)) throw new RangeError(`${name}: no ${column} that was told in training; there are: ${one.trained.join(", ")}`);
+      if (!one.trained.includes(column)) throw new RangeError(`${name}: ${column} was not trained; there are: ${one.trained.join(", ")}`);
       if (!(much >= 0 && much <= one.highest)) throw new RangeError(`${name}: ${column} is ${much}, but it is a number from 0 to ${one.highest}`);
     }
-    one.columns.forEach((column, l) => { c.wished[one.first + l] = (values[column] || 0) / one.scale; });
+    one.columns.forEach((column, l) => { c.channelTargets[one.first + l] = (values[column] || 0) / one.scale; });
   };
   // One frame of a sixtieth of a second.
   character.step = ({ velocity = [0, 0], facing = null, gait = null, ground = FLAT } = {}) => {

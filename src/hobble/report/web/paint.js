@@ -13,8 +13,8 @@ export const palette = () => {
   };
 };
 
-// Body: grey where it is told nothing, over amber to red where it is told the most; t: 0 to 1.
-export const toldColour = (paint, t, plain = paint.body) => {
+// Colour of a part of the body: grey for a channel value of 0, then amber, then red for the highest value. t: 0 to 1.
+export const channelColour = (paint, t, plain = paint.body) => {
   if (!t) return plain;
   return t < .5 ? mix(plain, paint.low, .35 + 1.3 * t) : mix(paint.low, paint.high, 2 * t - 1);
 };

@@ -56,7 +56,7 @@ export const createPanel = (host, actor, title = "") => {
 
   return {
     box,
-    tell(drawing) {
+    update(drawing) {
       const c = actor.character, M = spec.window, G = spec.gaits.length;
       number.textContent = `${(Math.hypot(c.px[M] - c.px[M - 10], c.pz[M] - c.pz[M - 10]) * 6 / 100).toFixed(2)} m/s`;
       hand.setAttribute("stroke-dasharray", `${c.phase.toFixed(3)} 1`);

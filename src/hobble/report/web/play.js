@@ -8,7 +8,7 @@ import { film } from "./film.js";
 import { GROUNDS } from "./grounds.js";
 import { createPanel } from "./panel.js";
 import { createSteering } from "./steering.js";
-import { createTold, placed } from "./told.js";
+import { createSliders, placed } from "./sliders.js";
 import { createView } from "./view.js";
 
 const START = { yaw: 3.9, pitch: .2, distance: 430 };
@@ -17,7 +17,7 @@ const SIDE = 95; // cm between two figures
 const createPlay = (stage, playables) => {
   const canvas = find("play-view"), ground = find("play-ground"), chosen = [find("play-first"), find("play-second")];
   const names = Object.keys(playables), player = { actors: [] };
-  let panels = [], told, last = null, owed = 0, shown = 0, ready = false, wish = null;
+  let panels = [], sliders, last = null, owed = 0, shown = 0, ready = false, wish = null;
   const land = () => GROUNDS.get(ground.value), floor = (x, z) => land().height(x, z);
 
   const view = createView(canvas, START, (now) => {
@@ -29,7 +29,7 @@ const createPlay = (stage, playables) => {
     view.land.around(eye, land(), ground.value);
     player.actors.forEach((actor) => actor.draw());
     view.land.under(player.actors.flatMap(({ figure }) => figure.balls(view.balls / player.actors.length)));
-    if (now - shown > 100) { shown = now; panels.forEach((panel) => panel.tell(view.milliseconds)); }
+    if (now - shown > 100) { shown = now; panels.forEach((panel) => panel.update(view.milliseconds)); }
     view.ask();
   });
   const steering = createSteering(stage, view.orbit), chase = createChase(view.orbit, canvas);
@@ -38,7 +38,7 @@ const createPlay = (stage, playables) => {
     last = now;
     for (; owed >= 1; owed--) {
       wish = steering.wish();
-      player.actors.forEach((actor) => actor.frame(wish, told.values));
+      player.actors.forEach((actor) => actor.frame(wish, sliders.values));
     }
   };
   view.onHidden = () => { last = null; chase.rest(); steering.release(); };
@@ -63,7 +63,7 @@ const createPlay = (stage, playables) => {
 
   const address = () => {
     const { yaw, pitch, distance } = view.orbit, state = { ground: ground.value };
-    Object.assign(state, told.state());
+    Object.assign(state, sliders.state());
     for (const name of ["crouch", "jog", "strafe"]) if (steering.on[name]) state[name] = 1;
     if (chosen[0]) state.of = chosen.map((select) => select.value).join(",");
     state.camera = [yaw.toFixed(2), pitch.toFixed(2), Math.round(distance)].join(",");
@@ -79,7 +79,7 @@ const createPlay = (stage, playables) => {
     for (const name of ["crouch", "jog", "strafe"]) steering.toggle(name, state.get(name) === "1");
     const eye = camera(state.get("camera"));
     if (eye) { Object.assign(view.orbit, eye); chase.touch(); }
-    told.set(told.channels.flatMap((one) => pairs(state.get(one.key), one.highest).map(([column, value]) => [one, column, value])));
+    sliders.set(sliders.channels.flatMap((one) => pairs(state.get(one.key), one.highest).map(([column, value]) => [one, column, value])));
     return true;
   };
 
@@ -99,8 +99,8 @@ const createPlay = (stage, playables) => {
     const one = placed(actor.spec);
     if (!one) return;
     const felt = found.columns.filter((column) => one.trained.includes(column)); // others have no effect
-    if (felt.length) told.more(one, felt.at(-1), event.shiftKey || heals ? -1 : 1);
-    else told.say(`${found.columns.length ? told.word(one, found.columns.at(-1)) : "this part"}: ${one.never}`);
+    if (felt.length) sliders.more(one, felt.at(-1), event.shiftKey || heals ? -1 : 1);
+    else sliders.say(`${found.columns.length ? sliders.word(one, found.columns.at(-1)) : "this part"}: ${one.never}`);
   });
 
   // Buttons
@@ -108,7 +108,7 @@ const createPlay = (stage, playables) => {
   find("play-inputs").addEventListener("click", (event) => {
     view.inputs = !view.inputs;
     event.currentTarget.setAttribute("aria-pressed", String(view.inputs));
-    told.say(view.inputs ? "These are inputs of the network. Squares: ground heights, red above the path, blue below it. Needles: joint velocities." : "");
+    sliders.say(view.inputs ? "These are inputs of the network. Squares: ground heights, red above the path, blue below it. Needles: joint velocities." : "");
   });
   find("play-reset").addEventListener("click", () => { start(); view.orbit.reset(); });
   ground.addEventListener("change", start);
@@ -116,7 +116,7 @@ const createPlay = (stage, playables) => {
   find("play-share").addEventListener("click", () => {
     history.replaceState(null, "", address());
     if (navigator.clipboard) navigator.clipboard.writeText(location.href).catch(() => {});
-    told.say("Link copied. It has the ground, the sliders and the camera. It is also in the address bar.");
+    sliders.say("Link copied. It has the ground, the sliders and the camera. It is also in the address bar.");
   });
   const named = (i) => `${names.length > 1 ? chosen[i].value : material.name}-played`;
   player.motion = (i = 0) => bvh(player.actors[i].spec, player.actors[i].frames);
@@ -125,8 +125,8 @@ const createPlay = (stage, playables) => {
   find("play-picture").addEventListener("click", () => canvas.toBlob((blob) => save(blob, `${named(0)}.png`)));
   film(find("play-film"), canvas, () => named(0));
 
-  steering.listen((event) => told.key(event));
-  told = createTold(Object.values(playables), () => { if (ready) view.ask(); });
+  steering.listen((event) => sliders.key(event));
+  sliders = createSliders(Object.values(playables), () => { if (ready) view.ask(); });
   const asked = restore();
   ready = true;
   cast();
@@ -136,7 +136,7 @@ const createPlay = (stage, playables) => {
     cast();
     find("play").scrollIntoView();
   });
-  return Object.assign(player, { chase, told, steering, view, start });
+  return Object.assign(player, { chase, sliders, steering, view, start });
 };
 
 const stage = find("play-stage");

@@ -3,7 +3,7 @@ import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
 import { createMotion } from "./motion.js";
 import { bytes } from "./numbers.js";
-import { toldColour } from "./paint.js";
+import { channelColour } from "./paint.js";
 import { createView } from "./view.js";
 
 (() => {
@@ -17,7 +17,7 @@ import { createView } from "./view.js";
       const s = scenes.scenarios[index], octets = (text) => text && new Uint8Array(bytes(text));
       const scene = {
         ...s, motion: createMotion(s, J, scenes.unit),
-        contacts: octets(s.contacts), phase: octets(s.phase), values: octets(s.told?.values),
+        contacts: octets(s.contacts), phase: octets(s.phase), values: octets(s.swept?.values),
       };
       scene.focus = followed(scene);
       scene.prints = footprints(scene);
@@ -84,22 +84,22 @@ import { createView } from "./view.js";
     view.land.around(focus);
     if (trails) { drawPath(s, focus, at); drawPrints(s, focus, at); }
     s.motion.show(figure, at);
-    figure.pose((columns) => toldColour(view.paint, s.told?.placed && columns.includes(s.told.column) ? share(s, frame) : 0));
+    figure.pose((columns) => channelColour(view.paint, s.swept?.placed && columns.includes(s.swept.column) ? share(s, frame) : 0));
     view.land.under(figure.balls(view.balls));
-    tell(s, frame);
+    showReadings(s, frame);
   };
 
   // Readings next to the figure
 
   const FEET = ["left heel", "left toe", "right heel", "right toe"];
-  const tell = (s, frame) => {
+  const showReadings = (s, frame) => {
     const a = Math.max(0, frame - 7), b = Math.min(s.frames - 1, frame + 7), { roots } = s.motion;
     const way = Math.hypot(roots[3 * b] - roots[3 * a], roots[3 * b + 2] - roots[3 * a + 2]);
     const moment = [`${(b > a ? way / 100 * fps / (b - a) : 0).toFixed(2)} m/s`];
     if (s.phase) moment.push(`phase ${(s.phase[frame] / 255).toFixed(2)}`);
     const lines = [moment.join(" · ")];
     if (s.contacts) lines.push(FEET.filter((_, i) => s.contacts[frame] >> i & 1).join(", ") || "no foot on the ground");
-    if (share(s, frame) > 0) lines.push(`${s.told.spoken}: ${(share(s, frame) * s.told.highest).toFixed(s.told.highest < 5 ? 2 : 1)} of ${s.told.highest}`);
+    if (share(s, frame) > 0) lines.push(`${s.swept.spoken}: ${(share(s, frame) * s.swept.highest).toFixed(s.swept.highest < 5 ? 2 : 1)} of ${s.swept.highest}`);
     const title = document.createElement("b");
     title.textContent = s.description || s.name;
     reading.replaceChildren(title, ...lines.flatMap((text) => [document.createElement("br"), text]));
@@ -121,7 +121,7 @@ import { createView } from "./view.js";
     choice.selectedIndex = index;
     time = 0;
     slider.max = scene.frames - 1;
-    find("legend").hidden = !(scene.values && scene.told.placed);
+    find("legend").hidden = !(scene.values && scene.swept.placed);
     view.ask();
   };
   const seek = (to) => { play(false); time = Math.min(scene.frames - 1, Math.max(0, to)); view.ask(); };

@@ -56,19 +56,19 @@ def limps(
     files: Iterable[Path], splits: Mapping[str, str], links: Sequence[str], skeleton: Skeleton
 ) -> tuple[list[Limp], HurtSeconds]:
     """The walks of all captured clips, and the seconds for which each link hurts in the training clips."""
-    found, told = [], HurtSeconds()
+    found, hurt_seconds = [], HurtSeconds()
     for file in sorted(files, key=lambda file: Path(file).stem):
         rows = load_clip_rows(file)
         severity = rows.channels.get(INJURY, np.zeros((len(rows), 0)))
         is_made = VERSION.search(rows.clip) is not None
         if splits.get(rows.clip) == "train":
-            kept = told.made if is_made else told.captured
+            kept = hurt_seconds.made if is_made else hurt_seconds.captured
             for link, column in zip(links, severity.T, strict=False):
                 if column.any():
                     kept[link] = round(kept.get(link, 0.0) + float(np.sum(column > 0)) / FPS, 2)
         if not is_made:
             found += _walked(rows, links, skeleton)
-    return found, told
+    return found, hurt_seconds
 
 
 def healthy_of(limp: Limp, every: Sequence[Limp]) -> tuple[Profile, str]:

@@ -33,7 +33,7 @@ def section(found: Json, material: Material) -> Section:
     return Section(
         "injury",
         [
-            Part(1, Words(provenance(found["told_seconds"]))),
+            Part(1, Words(provenance(found["hurt_seconds"]))),
             Part(2, size_chart(found)),
             Part(
                 3,
@@ -43,7 +43,8 @@ def section(found: Json, material: Material) -> Section:
                     "Is the limp of a hurt leg recognised?",
                 ),
             ),
-            Part(4, exam_table(name, found["exam"])),
+            Part(5, together_table(name, found["named_together"])),
+            Part(4, held_out_table(name, found["held_out_limps"])),
             Part(80, size_table(name, found["sizes"])),
             Part(81, captured_table(name, found["captured"])),
             Part(82, second_table(name, found["second"])),
@@ -51,11 +52,11 @@ def section(found: Json, material: Material) -> Section:
     )
 
 
-def provenance(told: Mapping[str, Mapping[str, float]]) -> str:
+def provenance(hurt_seconds: Mapping[str, Mapping[str, float]]) -> str:
     """Which injuries of the training data were captured and which were generated from healthy clips."""
     parts = []
     for kind, words in (("captured", "were captured"), ("made", "were generated from healthy clips")):
-        if some := told[kind]:
+        if some := hurt_seconds[kind]:
             seconds = sum(some.values())
             parts.append(f"{len(some)} links {words} ({number(seconds, 3)} s: {', '.join(sorted(some))})")
     return f"Of the injuries in training, {'; '.join(parts)}." if parts else "No link was hurt in training."
@@ -111,7 +112,7 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Column], list[list[A
     return columns, [[r["severity"], r["walks"], r["impaired"], r["named"], r["wrong_side"]] for r in rows]
 
 
-def exam_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+def held_out_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
     """Captured limps that were held out of training, compared with the character."""
     if not rows:
         return None
@@ -127,7 +128,7 @@ def exam_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
         [
             r["clip"],
             ", ".join(f"{k} {v:g}" for k, v in r["hurt_links"].items()),
-            r["beside"],
+            r["compared_with"],
             r["healthy"],
             r["hurt"],
             r["nearer"],
@@ -149,6 +150,23 @@ def size_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
         return None
     columns = [Column(k) if k in texts else Column.number(k.replace("_", " ")) for k in rows[0]]
     return Table(f"{name}-limp-sizes", columns, [list(row.values()) for row in rows], "Sizes of all effects")
+
+
+def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+    """How limps of hurt legs are recognised while a value of another channel is at its highest."""
+    if not rows:
+        return None
+    columns = [
+        Column("with"),
+        Column.count("walks"),
+        Column.number("speed, share of the same walk without injury"),
+        Column.number("called impaired"),
+        Column.number("recognised"),
+        Column.number("wrong side"),
+    ]
+    keys = ("column", "walks", "speed_share", "impaired", "named", "wrong_side")
+    title = "Is the limp of a hurt leg (severity 10) recognised together with another value?"
+    return Table(f"{name}-limp-together", columns, [[row.get(key) for key in keys] for row in rows], title)
 
 
 def captured_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:

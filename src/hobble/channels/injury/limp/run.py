@@ -14,6 +14,7 @@ import numpy as np
 
 from hobble.channels.injury.limp import Options
 from hobble.channels.injury.limp.captured import HurtSeconds, Limp, healthy_of, limps
+from hobble.channels.injury.limp.together import limps_together, named_together
 from hobble.channels.injury.limp.walks import Shown, shown
 from hobble.channels.injury.walks import hurt_links
 from hobble.channels.injury.walks import links as links_of
@@ -45,7 +46,7 @@ WINDOW = 4.0  # seconds of a walk that a recogniser judges at once
 def limp(
     network: Network,
     every: Sequence[Limp],
-    told: HurtSeconds,
+    hurt_seconds: HurtSeconds,
     splits: Mapping[str, str],
     *,
     configuration: str,
@@ -55,13 +56,16 @@ def limp(
 ) -> dict[str, Any]:
     """The content of limp.json. If nothing can be measured, `applies` is false and `reason` says why.
 
-    every: the walks of the data set's captured clips. told: seconds for which each link hurts in training.
+    every: the walks of the data set's captured clips. hurt_seconds: for which each link hurts in training.
     links: links to hurt, by default all.
 
     `sizes`: a row for each gait, link and severity with EFFECTS, as if the link's side were hurt, and the
     recognised limp. `steady`: Spearman's rho of each effect with severity, and its size at 10. `named`:
     shares of windows by severity, over the links of the legs. `people`: mean and spread of each effect.
-    `captured`: effects of captured clips. `exam`: see `examined`. `second`: see `second_injuries`.
+    `captured`: effects of captured clips. `held_out_limps`: see `compare_held_out`. `second`: see
+    `second_injuries`.
+    `together`: effects on hurt legs with a value of another channel, and `named_together`, see
+    `hobble.channels.injury.limp.together`.
     """
     head: dict[str, Any] = {"configuration": configuration}
     if not links_of(network) or network.skeleton is None:
@@ -87,7 +91,7 @@ def limp(
         "seconds": seconds,
         "effects": EFFECTS,
         "trained": [link for link in links if link in hurt_links(network)],
-        "told_seconds": {"captured": told.captured, "made": told.made},
+        "hurt_seconds": {"captured": hurt_seconds.captured, "made": hurt_seconds.made},
         "sizes": rows,
         "steady": _steady(rows),
         "named": _named(rows),
@@ -96,9 +100,25 @@ def limp(
             for gait, found in effects_of_people(people()).items()
         },
         "captured": [_of_clip(network.skeleton, one, every) for one in every if one.hurt],
-        "exam": examined(network, every, splits, seconds, runtime),
+        "held_out_limps": compare_held_out(network, every, splits, seconds, runtime),
         "second": second_injuries(network, links, seconds, runtime),
+        **_together(network, links, seconds, runtime),
     }
+
+
+def _together(
+    network: Network, links: Sequence[str], seconds: float, runtime: Runtime
+) -> dict[str, list[dict[str, Any]]]:
+    """The rows of hurt legs with values of another channel, and their recognition."""
+    assert network.skeleton is not None
+    skeleton = network.skeleton
+    legs = [link for link in links if part_of_link(skeleton, _pair(skeleton, link)).name in LEG]
+
+    def row(link: str, figure: Shown, healthy: Shown) -> dict[str, Any]:
+        return _row(network, "walk", link, SEVERITIES[-1], figure, healthy)
+
+    rows = limps_together(network, legs, SPEEDS["walk"], seconds, runtime, row)
+    return {"together": rows, "named_together": named_together(rows)}
 
 
 def hurt_side(skeleton: Skeleton, link: str) -> str:
@@ -192,7 +212,7 @@ def distance(walk: Profile, healthy: Profile, other: Profile, other_healthy: Pro
     return float(np.sqrt(np.mean(((a - b) / spread) ** 2)))
 
 
-def examined(
+def compare_held_out(
     network: Network, every: Sequence[Limp], splits: Mapping[str, str], seconds: float, runtime: Runtime
 ) -> list[dict[str, Any]]:
     """Whether the hurt character comes nearer to captured limps that were held out of training.
@@ -209,7 +229,7 @@ def examined(
     out = []
     for one, figure in zip(asked, figures[1:], strict=True):
         healthy, whose = healthy_of(one, every)
-        row: dict[str, Any] = {"clip": one.clip, "hurt_links": dict(one.hurt), "beside": whose}
+        row: dict[str, Any] = {"clip": one.clip, "hurt_links": dict(one.hurt), "compared_with": whose}
         if own is None or figure.profile is None:
             out.append({**row, "healthy": None, "hurt": None, "nearer": False})
             continue
@@ -261,17 +281,17 @@ def run(given: Given, options: Options) -> Outcome:
         raise HobbleError(f"{given.weights} has no skeleton")
     # Without severities there is nothing to measure.
     files = given.clips.values() if links_of(network) else ()
-    every, told = limps(files, given.splits, links_of(network), network.skeleton)
+    every, hurt_seconds = limps(files, given.splits, links_of(network), network.skeleton)
     result = limp(
         network,
         every,
-        told,
+        hurt_seconds,
         given.splits,
         configuration=given.configuration,
         runtime=given.runtime,
         seconds=options.limp_seconds,
     )
-    tables = {name: result.get(name, []) for name in ("sizes", "steady", "named", "second")}
+    tables = {name: result.get(name, []) for name in ("sizes", "steady", "named", "second", "together")}
     at_10 = next((row for row in result.get("named", []) if row["severity"] == SEVERITIES[-1]), None)
     says = f"legs at 10: called impaired in {at_10['impaired']} of windows" if at_10 else result["reason"]
     return Outcome(result, tables, says)

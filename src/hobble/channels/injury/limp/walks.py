@@ -9,7 +9,7 @@ import numpy as np
 
 from hobble.channels.injury.walks import severities
 from hobble.core.quat import Array
-from hobble.evaluation.crowd import FPS
+from hobble.evaluation.crowd import FPS, channel_values
 from hobble.gait.cycles import Walk, measure
 from hobble.gait.profile import Profile, profile
 from hobble.models.network import Network
@@ -39,18 +39,24 @@ def shown(
     gait: str,
     seconds: float,
     runtime: Runtime,
+    others: Mapping[str, Sequence[Mapping[str, float]]] | None = None,
 ) -> list[Shown]:
-    """Let figures walk straight ahead. each: link -> severity of each figure. speeds: wanted, cm a frame."""
+    """Let figures walk straight ahead. each: link -> severity of each figure. speeds: wanted, cm a frame.
+
+    others: other channel -> column -> value of each figure.
+    """
     assert network.skeleton is not None
     count, frames = len(each), max(4, round(seconds * FPS))
     animation = ProceduralAnimation(network, characters=count, **dict(runtime))
     velocity = np.zeros((count, 2))
     velocity[:, 1] = speeds
-    told = severities(network, each)
+    channels = severities(network, each)
+    for name, values in (others or {}).items():
+        channels |= channel_values(network, name, values)
     shares = np.tile([float(name == gait) for name in network.gaits], (count, 1))
     places = np.zeros((frames, count, len(network.skeleton.joints), 3), np.float32)
     for frame in range(-BEGIN, frames):
-        pose = animation.next_pose(velocity, gait=shares.copy(), **told)
+        pose = animation.next_pose(velocity, gait=shares.copy(), **channels)
         if frame >= 0:
             places[frame] = pose.positions.reshape(count, -1, 3)
     return [_shown(network, places[:, i].astype(float)) for i in range(count)]

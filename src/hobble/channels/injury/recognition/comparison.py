@@ -17,7 +17,7 @@ def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> S
     """The result of each configuration, and the share that people recognised."""
     return SideBySide(
         entries=[{**m.found(NAME), "configuration": m.name} for m in all_measured],
-        beside=[row for m in all_measured for row in _beside_people(m, published["recognition"])],
+        against_published=[row for m in all_measured for row in _against_people(m, published["recognition"])],
     )
 
 
@@ -27,7 +27,7 @@ def tables(compared: Json) -> dict[str, list[dict[str, Any]]]:
     return {NAME: [{"configuration": name, **row} for name, row in found]}
 
 
-def _beside_people(measured: ConfigurationResults, people: Json) -> list[dict[str, Any]]:
+def _against_people(measured: ConfigurationResults, people: Json) -> list[dict[str, Any]]:
     found = measured.found(NAME)
     if not found["applies"]:
         return []

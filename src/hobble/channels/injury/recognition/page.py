@@ -57,14 +57,14 @@ def recognition_chart(found: Json) -> Chart | None:
         return None
     classes = len(found.get("classes") or ())
     people = found.get("people")
-    told = f" People recognised the part {100 * people:.0f} % of the time" if people else ""
-    beside = f"{told} (Ferre 2019, on the motion of another network)." if told else ""
+    by_people = f" People recognised the part {100 * people:.0f} % of the time" if people else ""
+    note = f"{by_people} (Ferre 2019, on the motion of another network)." if by_people else ""
     return Chart(
         "recognition",
         "Is the hurt part recognised?",
         "A classifier trained on captured clips says which part hurts. Rows: the part that hurts. Columns: "
         "the answer of the classifier. The diagonal is right. A random guess is right "
-        f"{100 * (found.get('chance') or 0):.0f} % of the time.{beside}",
+        f"{100 * (found.get('chance') or 0):.0f} % of the time.{note}",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},

@@ -108,7 +108,7 @@ def walking_windows(clip: Captured, network: Network) -> list[Window]:
     """The windows of a captured stretch that walk straight ahead with constant severities."""
     assert network.skeleton is not None
     walk = clip.gait[:, network.gaits.index("walk")]
-    hurts = clip.told[INJURY] > 0
+    hurts = clip.channels[INJURY] > 0
     out = []
     for part, start in product(range(FOLDS), range(0, len(clip), STEP)):
         first = part * len(clip) // FOLDS + start
@@ -121,7 +121,7 @@ def walking_windows(clip: Captured, network: Network) -> list[Window]:
         if walk[span].mean() > 0.5 and ahead and same:
             names = [links_of(network)[i] for i in np.flatnonzero(hurts[first])]
             values = _values(network.skeleton, clip.local, clip.contacts, clip.root, span)
-            severity = float(clip.told[INJURY][span].max())
+            severity = float(clip.channels[INJURY][span].max())
             out.append(Window(clip.clip, " and ".join(names) or HEALTHY, severity, values, part))
     return out
 

@@ -112,7 +112,7 @@ def largest_accelerations(
             going = clip.gait[:, network.gaits.index(gait)] > 0.5
             hurt: list[tuple[str | None, Any]] = [(None, going)]
             hurt += [
-                (link, going & (clip.told[INJURY][:, i] > 0)) for i, link in enumerate(links_of(network))
+                (link, going & (clip.channels[INJURY][:, i] > 0)) for i, link in enumerate(links_of(network))
             ]
             for link, chosen in hurt:
                 if np.any(chosen):

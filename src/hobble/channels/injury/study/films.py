@@ -108,8 +108,8 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
 
 def act(network: Network, film: Film, runtime: Runtime) -> Motion:
     """The character in a film. It walks straight ahead. The injury begins after HEALTHY seconds."""
-    told = dict.fromkeys(part_links(network, film.parts), SEVERITY)
-    hurt, well = _walked(network, film, told, runtime), _walked(network, film, {}, runtime)
+    severities = dict.fromkeys(part_links(network, film.parts), SEVERITY)
+    hurt, well = _walked(network, film, severities, runtime), _walked(network, film, {}, runtime)
     begun = round(HEALTHY * FPS)
     apart = np.linalg.norm(_local(hurt[0]) - _local(well[0]), axis=-1)[begun:].mean()
     return Motion(*hurt, float(apart))
@@ -122,14 +122,16 @@ def wish(film: Film, frame: int) -> tuple[bool, str]:
     return hurts, film.gaits[1] if changed else film.gaits[0]
 
 
-def _walked(network: Network, film: Film, told: dict[str, float], runtime: Runtime) -> tuple[Array, Array]:
+def _walked(
+    network: Network, film: Film, severities: dict[str, float], runtime: Runtime
+) -> tuple[Array, Array]:
     animation = ProceduralAnimation(network, **dict(runtime))
     before, frames = round(WARM_UP * FPS), round(film.seconds * FPS)
     positions, rotations = [], []
     for frame in range(-before, frames):
         hurts, gait = wish(film, frame)
         pose = animation.next_pose(
-            np.array([0.0, SPEEDS[gait]]), None, gait, **{INJURY: told if hurts else {}}
+            np.array([0.0, SPEEDS[gait]]), None, gait, **{INJURY: severities if hurts else {}}
         )
         if frame >= 0:
             positions.append(pose.positions)

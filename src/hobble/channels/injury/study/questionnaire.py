@@ -59,7 +59,7 @@ def write_questionnaire(
         shown.append({"film": film.number, "webp": base64.b64encode(data).decode("ascii")})
         rows.append(_row(network, film, motion))
     study = hashlib.sha256(json.dumps([rows, shown]).encode()).hexdigest()[:12]
-    told = {
+    solution = {
         "study": study,
         "configuration": configuration,
         "severity": SEVERITY,
@@ -73,8 +73,8 @@ def write_questionnaire(
         count=len(films),
     )
     write_text(folder / "questionnaire.html", page)
-    write_json(folder / "films.json", told)
-    return told
+    write_json(folder / "films.json", solution)
+    return solution
 
 
 def _row(network: Network, film: Film, motion: Motion) -> dict[str, Any]:
@@ -85,16 +85,16 @@ def _row(network: Network, film: Film, motion: Motion) -> dict[str, Any]:
         "parts": list(film.parts),
         "gaits": list(dict.fromkeys(film.gaits)),
         "links": links,
-        "never_told": [link for link in links if link not in hurt_links(network)],
+        "untrained": [link for link in links if link not in hurt_links(network)],
         "seconds": film.seconds,
         "from_healthy_cm": round(motion.from_healthy, 2),
     }
 
 
-def doubts(told: dict[str, Any]) -> list[str]:
+def doubts(solution: dict[str, Any]) -> list[str]:
     """Warnings about films in which nobody can see the injury."""
-    same = [str(row["film"]) for row in told["films"] if row["from_healthy_cm"] < VISIBLE]
-    never = sorted({link for row in told["films"] for link in row["never_told"]})
+    same = [str(row["film"]) for row in solution["films"] if row["from_healthy_cm"] < VISIBLE]
+    never = sorted({link for row in solution["films"] for link in row["untrained"]})
     out = [f"film {', '.join(same)}: nobody can see the injury (less than {VISIBLE} cm)."] if same else []
     return out + ([f"Never hurt in training: {', '.join(never)}."] if never else [])
 

@@ -6,7 +6,7 @@ export const keyed = (one, column) => `${one.name}/${column}`;
 export const placed = (spec) => spec.channels.find((one) => one.regions.length);
 
 // specs: of the played characters, which may have different channels. changed(): called after every change.
-export const createTold = (specs, changed) => {
+export const createSliders = (specs, changed) => {
   const channels = [];
   for (const one of specs.flatMap((spec) => spec.channels)) { // of channels with the same name, the one with most trained columns
     const at = channels.findIndex(({ name }) => name === one.name);
@@ -16,14 +16,14 @@ export const createTold = (specs, changed) => {
   // Columns that were always 0 in training have no effect, so they are left out.
   const known = (name) => specs.flatMap((spec) => spec.channels.filter((one) => one.name === name).flatMap((one) => one.trained));
   const values = new Map(channels.flatMap((one) => known(one.name).map((column) => [keyed(one, column), 0])));
-  const sliders = [], told = { values, channels }, columns = (one) => [...new Set(known(one.name))];
-  told.word = ({ name }, column) => specs.flatMap((spec) => spec.channels.filter((one) => one.name === name))
+  const rows = [], panel = { values, channels }, columns = (one) => [...new Set(known(one.name))];
+  panel.word = ({ name }, column) => specs.flatMap((spec) => spec.channels.filter((one) => one.name === name))
     .map((one) => one.spoken[one.columns.indexOf(column)]).find(Boolean) || column;
-  told.say = (text) => { const note = find("play-note"); if (note) note.textContent = text; };
+  panel.say = (text) => { const note = find("play-note"); if (note) note.textContent = text; };
 
   const add = (one, column, label) => {
     const row = document.createElement("label"), name = document.createElement("span");
-    const input = document.createElement("input"), output = document.createElement("output"), number = sliders.length + 1;
+    const input = document.createElement("input"), output = document.createElement("output"), number = rows.length + 1;
     name.textContent = label;
     if (number < 10) {
       const key = document.createElement("kbd");
@@ -35,16 +35,16 @@ export const createTold = (specs, changed) => {
     input.addEventListener("input", () => { values.set(keyed(one, column), Number(input.value)); show(); });
     row.append(name, input, output);
     find("play-sliders").append(row);
-    sliders.push({ input, output, one, column });
+    rows.push({ input, output, one, column });
   };
-  const there = (one, column) => sliders.some((slider) => slider.one.name === one.name && slider.column === column);
+  const there = (one, column) => rows.some((row) => row.one.name === one.name && row.column === column);
   const put = (one, column, value) => {
-    if (!there(one, column)) add(one, column, told.word(one, column));
+    if (!there(one, column)) add(one, column, panel.word(one, column));
     values.set(keyed(one, column), Math.min(one.highest, Math.max(0, value)));
   };
   const show = () => {
-    told.say("");
-    sliders.forEach(({ input, output, one, column }) => {
+    panel.say("");
+    rows.forEach(({ input, output, one, column }) => {
       const value = values.get(keyed(one, column));
       input.value = value;
       output.value = one.highest < 5 ? value.toFixed(2) : value;
@@ -52,25 +52,25 @@ export const createTold = (specs, changed) => {
     changed();
   };
   // Sets triples of a channel, a column and its value, and all others to 0; with `only`, all others of that channel.
-  told.set = (triples, only = null) => {
+  panel.set = (triples, only = null) => {
     channels.filter((one) => !only || one === only).forEach((one) => columns(one).forEach((column) => values.set(keyed(one, column), 0)));
     triples.forEach(([one, column, value]) => { if (values.has(keyed(one, column)) && value) put(one, column, value); });
     show();
   };
   // A click or a key adds or subtracts a fifth of the highest value.
-  told.more = (one, column, by) => {
+  panel.more = (one, column, by) => {
     if (!values.has(keyed(one, column))) return;
     put(one, column, Math.round(1e6 * (values.get(keyed(one, column)) + by * one.highest / 5)) / 1e6);
     show();
   };
   // The keys 1 to 9. Returns true if the key has a slider.
-  told.key = (event) => {
-    const digit = event.code.match(/^Digit([1-9])$/), slider = digit && sliders[digit[1] - 1];
-    if (slider) told.more(slider.one, slider.column, event.shiftKey ? -1 : 1);
+  panel.key = (event) => {
+    const digit = event.code.match(/^Digit([1-9])$/), slider = digit && rows[digit[1] - 1];
+    if (slider) panel.more(slider.one, slider.column, event.shiftKey ? -1 : 1);
     return Boolean(slider);
   };
   // The state in a link: "column:value,column:value" for each channel.
-  told.state = () => Object.fromEntries(channels.flatMap((one) => {
+  panel.state = () => Object.fromEntries(channels.flatMap((one) => {
     const some = columns(one).map((column) => [column, values.get(keyed(one, column))]).filter(([, value]) => value > 0);
     return some.length ? [[one.key, some.map(([column, value]) => `${column}:${value}`).join(",")]] : [];
   }));
@@ -85,9 +85,9 @@ export const createTold = (specs, changed) => {
   for (const one of channels) {
     Object.entries(one.sliders).forEach(([label, index]) => add(one, one.columns[index], label));
     one.presets.forEach(({ name, values: some }) => button(name, () => (
-      told.set(some.map(([index, value]) => [one, one.columns[index], value]), one))));
-    if (columns(one).length) button(one.rest, () => told.set([], one));
+      panel.set(some.map(([index, value]) => [one, one.columns[index], value]), one))));
+    if (columns(one).length) button(one.rest, () => panel.set([], one));
   }
   show();
-  return told;
+  return panel;
 };

@@ -1,0 +1,58 @@
+"""The limp of hurt legs while the values of another channel, such as a mood, are at their highest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from hobble.channels import channel
+from hobble.channels.injury.limp.walks import Shown, shown
+from hobble.channels.injury.walks import INJURY
+from hobble.models.network import Network
+from hobble.runtime.options import Runtime
+
+SEVERITY = 10.0
+RowOf = Callable[[str, Shown, Shown], dict[str, Any]]  # link, hurt walk, healthy walk -> its effects
+
+
+def limps_together(
+    network: Network, legs: Sequence[str], speed: float, seconds: float, runtime: Runtime, row_of: RowOf
+) -> list[dict[str, Any]]:
+    """A row for each trained column of another channel and each of the links `legs` at severity 10.
+
+    The effects are relative to the walk with the same column and no injury. speed: asked for, cm a frame.
+    Columns with which the character does not walk a whole cycle are left out.
+    """
+    names = [name for name in network.channels if name != INJURY]
+    found = [(name, column) for name in names for column in network.trained(name)]
+    if not found:
+        return []
+    cases = [(other, column, link) for other, column in found for link in (None, *legs)]
+    others = {
+        name: [{column: channel(name).highest} if other == name else {} for other, column, _ in cases]
+        for name in names
+    }
+    each = [{} if link is None else {link: SEVERITY} for *_, link in cases]
+    figures = dict(zip(cases, shown(network, each, speed, "walk", seconds, runtime, others), strict=True))
+    return [
+        {"channel": other, "column": column, **row_of(link, figures[other, column, link], healthy)}
+        for other, column in found
+        if (healthy := figures[other, column, None]).profile is not None
+        for link in legs
+    ]
+
+
+def named_together(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """For each column the shares of windows that are called impaired, and recognised with the right side."""
+    out = []
+    for other, column in dict.fromkeys((row["channel"], row["column"]) for row in rows):
+        some = [row for row in rows if (row["channel"], row["column"]) == (other, column)]
+        shares = {
+            key: round(float(np.mean(known)), 5)
+            for key in ("impaired", "named", "wrong_side", "speed_share")
+            if (known := [row[key] for row in some if row[key] is not None])
+        }
+        out.append({"channel": other, "column": column, "walks": len(some), **shares})
+    return out

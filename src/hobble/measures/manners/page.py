@@ -1,0 +1,102 @@
+"""Shows whether moods and diagnoses can be seen."""
+
+from __future__ import annotations
+
+from hobble.measures.given import Json
+from hobble.measures.manners.windows import EFFECTS, NONE
+from hobble.report.charts import Chart
+from hobble.report.gather import Material
+from hobble.report.parts import Part, Section, Words
+
+UNITS = {"speed": "m/s", "stride": "cm", "trunk": "° forward", "arms": "° of swing", "head": "° forward"}
+AMOUNTS = (
+    ("captured", "captured", "@muted"),
+    ("generated", "generated at 1", "@accent"),
+    ("generated_at_half", "generated at .5", "@predicted"),
+)
+
+
+def section(found: Json, material: Material) -> Section:
+    """For each channel how often its manners are recognised and how much they change the walk.
+
+    Empty for a network without such a channel.
+    """
+    if not found.get("applies"):
+        return Section("manners", [])
+    parts = []
+    for i, one in enumerate(found["channels"]):
+        charts = [together_chart(one), *(effect_chart(one, effect) for effect in EFFECTS)]
+        parts += [Part(10 * i, Words(summary(one))), *(Part(10 * i + 1 + k, c) for k, c in enumerate(charts))]
+    title = " and ".join(one["title"] for one in found["channels"])
+    return Section("manners", parts, title=title, at=21)
+
+
+def summary(found: Json) -> str:
+    """What the classifier recognises, in generated walks and in captured ones of others."""
+    captured = found["captured"]
+    text = (
+        f"A classifier trained on captured clips finds the right {found['title'].lower()} in "
+        f"{_percent(found['right_at_1'])} of the windows of generated walks with a value of 1, and in "
+        f"{_percent(captured['right'])} of the windows of captured clips of which it saw no other part "
+        f"({captured['people']} clips or people, each left out in turn). All generated walks had the same "
+        f"three target speeds around {found['speed_asked']:.2f} m/s."
+    )
+    if alone := [m for m, count in captured["people_of"].items() if count < 2]:
+        text += f" Only one clip or person shows {', '.join(alone)}, so nothing is left to learn that from."
+    return text
+
+
+def together_chart(found: Json) -> Chart | None:
+    """The share of windows in which each manner is named while a column of another channel is highest."""
+    rows = found["together"]
+    if not rows:
+        return None
+    manners, columns = (list(dict.fromkeys(row[key] for row in rows)) for key in ("manner", "column"))
+    shares = {(row["manner"], row["column"]): row["share"] for row in rows}
+    trace = {
+        "type": "heatmap",
+        "x": columns,
+        "y": manners,
+        "z": [[shares[m, c] for c in columns] for m in manners],
+        "colorscale": [[0, "@sunken"], [1, "@accent"]],
+        "zmin": 0,
+        "zmax": 1,
+        "xgap": 2,
+        "ygap": 2,
+        "hovertemplate": "%{y} with %{x}: %{z:.0%}<extra></extra>",
+    }
+    manner = sum(row["share"] * row["windows"] for row in rows if row["manner"] != NONE)
+    whole = sum(row["windows"] for row in rows if row["manner"] != NONE)
+    layout = {
+        "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
+        "yaxis": {"type": "category", "automargin": True},
+    }
+    words = (
+        f"The share of windows in which the classifier names the right {found['title'].lower()} while "
+        f"another value, below, is at its highest: {_percent(manner / whole)} over all with a manner."
+    )
+    return Chart(f"{found['channel']}-together", "Two at once", words, [trace], layout, 340)
+
+
+def effect_chart(found: Json, effect: str) -> Chart:
+    """One effect of all manners, captured and generated."""
+    rows = [row for row in found["effects"] if row["effect"] == effect]
+    traces = [
+        {
+            "type": "bar",
+            "name": label,
+            "x": [row["manner"] for row in rows],
+            "y": [row[key] for row in rows],
+            "marker": {"color": colour},
+        }
+        for key, label, colour in AMOUNTS
+    ]
+    words = f"Change of {effect} ({UNITS[effect]}) from the neutral walk."
+    title = effect.capitalize()
+    return Chart(
+        f"{found['channel']}-{effect}", title, words, traces, {"yaxis": {"title": UNITS[effect]}}, 260
+    )
+
+
+def _percent(share: float | None) -> str:
+    return f"{100 * (share or 0):.0f} %"

@@ -1,0 +1,115 @@
+"""Windows of straight walking: of captured clips in one manner, and of generated walks in any."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hobble.channels import channel
+from hobble.core.quat import Array
+from hobble.core.skeleton import Skeleton
+from hobble.evaluation.captured import Captured
+from hobble.evaluation.crowd import FPS, Stretch, channel_values
+from hobble.evaluation.crowd import run as run_walks
+from hobble.evaluation.gait_features import features
+from hobble.models.network import Network
+from hobble.rows.layout import GAITS
+from hobble.runtime.options import Runtime
+
+NONE = "none"  # the manner of a clip whose values are all 0
+WALK = GAITS.index("walk")
+WINDOW, STEP = 60, 15  # frames; a window is about a cycle
+AHEAD = 0.9  # least share of a window's speed that is forward
+LEAST_SPEED = 0.5  # of a window, cm a frame
+WARM_UP, USED = 4 * FPS, 6 * FPS  # frames of a generated walk that are skipped, and that are used
+EFFECTS = ("speed", "stride", "trunk", "arms", "head")
+
+
+@dataclass(frozen=True)
+class Window:
+    """A stretch of straight walking. manner: a column of the channel, or NONE. values: its features.
+
+    effects: speed (m/s), stride (cm), trunk and head (degrees forward), arms (degrees of swing, standard
+    deviation).
+    """
+
+    clip: str
+    manner: str
+    values: Mapping[str, float] = field(repr=False)
+    effects: Mapping[str, float] = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """What a generated figure is given: channel -> column -> value, and a speed in cm a frame."""
+
+    channels: Mapping[str, Mapping[str, float]]
+    speed: float
+
+
+def captured_windows(clip: Captured, network: Network, name: str) -> list[Window]:
+    """The windows of a captured stretch that walks straight in one manner at its highest value, or in none.
+
+    name: the channel. Windows with values of another channel are left out.
+    """
+    assert network.skeleton is not None
+    columns, highest = network.channels[name], channel(name).highest
+    others = [np.any(table > 0, axis=1) for other, table in clip.channels.items() if other != name]
+    out = []
+    for start in range(0, len(clip) - WINDOW + 1, STEP):
+        span = slice(start, start + WINDOW)
+        speed = np.hypot(*clip.velocity[span].mean(axis=0))
+        values = clip.channels[name][start]
+        manners = [columns[i] for i in np.flatnonzero(values)]
+        straight = clip.velocity[span, 1].mean() >= AHEAD * speed and speed >= LEAST_SPEED
+        walks = clip.gait[span, WALK].mean() > 0.5
+        one = len(manners) < 2 and np.isin(values, (0, highest)).all()
+        if not (straight and walks and one) or any(np.any(other[span]) for other in others):
+            continue
+        parts = clip.local[span], clip.contacts[span], clip.root[span]
+        out.append(_window(network.skeleton, clip.clip, manners[0] if manners else NONE, *parts))
+    return out
+
+
+def generated(network: Network, figures: Sequence[Figure], name: str, runtime: Runtime) -> list[list[Window]]:
+    """The windows of each figure's straight walk. name: the channel whose columns are the manners."""
+    assert network.skeleton is not None
+    channels: dict[str, Array] = {}
+    for each in network.channels:
+        channels |= channel_values(network, each, [figure.channels.get(each, {}) for figure in figures])
+    speeds = [figure.speed for figure in figures]
+    script = Stretch(WARM_UP + USED, ["walk"] * len(figures), channels, speeds)
+    walks = run_walks(network, [script], runtime)
+    out = []
+    for i, figure in enumerate(figures):
+        manner = " and ".join(figure.channels.get(name, {})) or NONE
+        spans = [slice(s, s + WINDOW) for s in range(WARM_UP, WARM_UP + USED - WINDOW + 1, STEP)]
+        parts = [(walks.local[span, i], walks.contacts[span, i], walks.root[span, i]) for span in spans]
+        out.append([_window(network.skeleton, "", manner, *part) for part in parts])
+    return out
+
+
+def table(windows: Sequence[Window]) -> Array:
+    """(n, D) features."""
+    return np.array([list(w.values.values()) for w in windows])
+
+
+def mean_effect(windows: Iterable[Window], effect: str) -> float:
+    """The mean of one of EFFECTS."""
+    return float(np.mean([w.effects[effect] for w in windows]))
+
+
+def _window(skeleton: Skeleton, clip: str, manner: str, local: Array, contacts: Array, root: Array) -> Window:
+    values = features(skeleton, local, contacts, root)
+    head, neck = (local[:, skeleton.role(part)].astype(float) for part in ("head", "neck"))
+    up = (head - neck).mean(axis=0)
+    effects = {
+        "speed": values["speed"] / 100,
+        "stride": values["step_left"] + values["step_right"],
+        "trunk": -values["trunk_forward_mean"],  # that one is of the way down
+        "arms": (values["upper_arm_left_sd"] + values["upper_arm_right_sd"]) / 2,
+        "head": float(np.degrees(np.arctan2(up[2], up[1]))),
+    }
+    return Window(clip, manner, {**values, "head": effects["head"]}, effects)

@@ -1,0 +1,65 @@
+"""The mode-adaptive network prepared to run: gate, shares and experts in one compiled call."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hobble.core.compiled import njit
+from hobble.core.quat import Array
+from hobble.models.stack import Stack, StackPredictor, blend_layers, exp_below_0
+
+if TYPE_CHECKING:
+    from hobble.models.mann.network import Mann
+
+NEGLIGIBLE = 1e-7  # smaller shares are below single precision next to a share near 1
+
+
+class MannPredictor(StackPredictor):
+    """The network prepared to run, with the experts' weights stored as float32 or int16."""
+
+    network: Mann
+
+    def __init__(self, network: Mann, storage: str = "float32") -> None:
+        super().__init__(network)
+        self._experts = Stack(network.weights, network.biases, storage, network.y_mean, network.y_std)
+        # Always float32: it is small, and its rounding error would affect every expert.
+        self._gate = Stack([w[None] for w in network.gate_weights], [b[None] for b in network.gate_biases])
+
+    def evaluate(self, z: Array, phase: Array, out: Array) -> None:
+        """As in `Predictor`; the phase is ignored."""
+        gate, experts = self._gate, self._experts
+        _evaluate(
+            gate.weights, gate.numbers, gate.plan, self.network.columns,
+            experts.weights, experts.numbers, experts.plan, experts.sets, z, out,
+        )  # fmt: skip
+
+
+@njit(error_model="numpy")
+def _evaluate(
+    gate_weights: Any, gate_numbers: Any, gate_plan: Any, columns: Any,
+    weights: Any, numbers: Any, plan: Any, experts: int, z: Any, out: Any,
+) -> None:  # fmt: skip
+    seen = np.empty((z.shape[0], len(columns)), np.float32)
+    for c in range(z.shape[0]):
+        for i in range(len(columns)):
+            seen[c, i] = z[c, columns[i]]
+    shares = np.empty((z.shape[0], experts), np.float32)
+    blend_layers(gate_weights, gate_numbers, gate_plan, np.ones((z.shape[0], 1), np.float32), seen, shares)
+    for c in range(z.shape[0]):
+        _softmax(shares[c])
+    blend_layers(weights, numbers, plan, shares, z, out)
+
+
+@njit(forceinline=True, cache=False)
+def _softmax(logits: Any) -> None:
+    """Turn logits (K,) into shares in place; a share below NEGLIGIBLE becomes 0."""
+    most = logits.max()
+    total = np.float32(0)
+    for k in range(len(logits)):
+        logits[k] = exp_below_0(logits[k] - most)
+        total += logits[k]
+    for k in range(len(logits)):
+        share = logits[k] / total
+        logits[k] = share if share > NEGLIGIBLE else np.float32(0)

@@ -1,0 +1,48 @@
+"""Which clips of a large data set the page shows one by one, so that its size does not grow with the data."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from hobble.report.gather import Material
+
+MOST = 150  # clips with a strip, a row of the table and ground of their own
+MOST_COUNTED = 600  # clips whose rows are counted, frame by frame
+
+
+def shown(material: Material, most: int = MOST) -> frozenset[str]:
+    """Names of at most `most` clips, or of all clips if there are no more.
+
+    The clips are put into kinds by split, main gait, and whether a channel has a value in them. One clip of
+    each kind is taken in turn, in a random order that depends on the names only.
+    """
+    changed = {report["clip"] for report in material.channels if report.get("values")}
+    kinds: dict[tuple[str, str, bool], list[str]] = {}
+    for report in material.labels:
+        clip, seconds = report["clip"], report.get("seconds") or {}
+        gait = max(seconds, key=lambda name: seconds[name], default="")
+        kinds.setdefault((material.split(clip), gait, clip in changed), []).append(clip)
+    if sum(map(len, kinds.values())) <= most:
+        return frozenset(name for names in kinds.values() for name in names)
+    turns = [(turn, kind, name) for kind in kinds for turn, name in enumerate(shuffled(kinds[kind]))]
+    return frozenset(name for *_, name in sorted(turns)[:most])
+
+
+def shuffled(names: Iterable[str]) -> list[str]:
+    """The names in an order that looks random, is always the same, and stays as it is if one is added."""
+    return sorted(names, key=lambda name: hashlib.sha256(name.encode()).digest())
+
+
+def counted(paths: Sequence[str], most: int = MOST_COUNTED) -> list[str]:
+    """At most `most` of the clips' files: each clip is as likely as any other."""
+    if len(paths) <= most:
+        return list(paths)
+    chosen = set(shuffled(Path(path).stem for path in paths)[:most])
+    return [path for path in paths if Path(path).stem in chosen]
+
+
+def only(paths: Iterable[str], names: frozenset[str]) -> list[str]:
+    """The files of these clips."""
+    return [path for path in paths if Path(path).stem in names]

@@ -1,0 +1,179 @@
+"""Recognising moods and diagnoses: whole people left out, values of two channels at once, what is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.channels import channel
+from hobble.evaluation.captured import Captured
+from hobble.measures.manners import page, run
+from hobble.measures.manners.windows import (
+    EFFECTS,
+    NONE,
+    STEP,
+    USED,
+    WINDOW,
+    Figure,
+    Window,
+    captured_windows,
+)
+from hobble.models.network import Network
+from hobble.report.parts import Words
+from hobble.runtime.options import Runtime
+
+FRAMES = 300
+
+
+@pytest.fixture
+def both(hurtable) -> Network:
+    """A network of random weights with 25 severities and five moods, all of which were seen in training."""
+    links = hurtable.channels["injury"][:25]
+    layout = replace(hurtable.layout, channels=(("injury", 25), ("mood", 5)))
+    moods = channel("mood").columns(hurtable.skeleton)
+    return replace(hurtable, layout=layout, channels={"injury": links, "mood": moods})
+
+
+def clip(
+    network: Network, name: str, mood: str | None, *, lean: float, hurt: float = 0.0, value: float = 1.0
+):
+    """A captured clip of a figure that glides straight ahead; its trunk leans forward by `lean` cm."""
+    skeleton, rng = network.skeleton, np.random.default_rng(sum(map(ord, name)))
+    local = np.tile(network.y_mean[network.layout.y_joint_position].reshape(-1, 3), (FRAMES, 1, 1))
+    local = local + rng.normal(0, 0.3, local.shape)
+    local[:, [skeleton.role("neck"), skeleton.role("head")], 2] += lean
+    channels = {key: np.zeros((FRAMES, len(columns))) for key, columns in network.channels.items()}
+    channels["injury"][150:, 0] = hurt
+    if mood:
+        channels["mood"][:, network.channels["mood"].index(mood)] = value
+    gait = np.zeros((FRAMES, 6))
+    gait[:, 1] = 1
+    contacts = np.zeros((FRAMES, 4))
+    contacts[:, 0] = contacts[:, 3] = np.sin(2 * np.pi * np.arange(FRAMES) / 60) > 0
+    velocity = np.tile([0.0, 2.0], (FRAMES, 1))
+    root = np.zeros((FRAMES, 3))
+    root[:, 2] = 2.0 * np.arange(FRAMES)
+    still, rows = np.zeros(FRAMES), np.arange(FRAMES)
+    return Captured(name, local, contacts, still, channels, gait, velocity, root, still, rows)
+
+
+@pytest.fixture
+def motion(both: Network) -> list[Captured]:
+    leans = {None: 0.0, "sad": 12.0, "old": 30.0}
+    return [clip(both, f"{m}-{n}", m, lean=lean + n) for m, lean in leans.items() for n in (1, 2, 3)]
+
+
+def measured(network: Network, motion: Sequence[Captured], people: Mapping[str, str] | None = None) -> Any:
+    splits = {one.clip: "train" for one in motion}
+    who = people or {one.clip: one.clip for one in motion}
+    return run.manners(network, motion, splits, who, Runtime())
+
+
+def test_windows_with_an_injury_or_half_a_mood_are_left_out(both: Network) -> None:
+    whole = (FRAMES - WINDOW) // STEP + 1
+    found = captured_windows(clip(both, "a", "sad", lean=0), both, "mood")
+    assert [w.manner for w in found] == ["sad"] * whole
+    found = captured_windows(clip(both, "a", "sad", lean=0, hurt=3.0), both, "mood")
+    assert len(found) == (150 - WINDOW) // STEP + 1
+    assert captured_windows(clip(both, "a", "sad", lean=0, value=0.5), both, "mood") == []
+
+
+def window(who: str, manner: str, *values: float) -> Window:
+    return Window(who, manner, dict(enumerate(map(float, values))), dict.fromkeys(EFFECTS, 0.0))
+
+
+def test_whole_people_are_left_out() -> None:
+    """Each clip looks like its person, and nothing else. The person's other clip gives its manner away."""
+    rng = np.random.default_rng(2)
+    windows, people = [], {}
+    for person in range(12):
+        own, manner = rng.normal(0, 1, 6), "sad" if person % 2 else NONE
+        for take in (1, 2):
+            name = f"{person}-{take}"
+            people[name] = str(person)
+            windows += [window(name, manner, *(own + rng.normal(0, 0.02, 6))) for _ in range(20)]
+    by_clip = run.left_out(windows, {name: name for name in people})
+    by_person = run.left_out(windows, people)
+    assert by_clip["people"] == 24
+    assert by_person["people"] == 12
+    assert by_person["people_of"] == {NONE: 6, "sad": 6}
+    assert by_clip["windows"] == by_person["windows"] == 480
+    assert by_clip["right"] > by_person["right"] + 0.2
+
+
+def test_a_manner_of_one_person_is_never_named_without_that_person() -> None:
+    rng = np.random.default_rng(3)
+    windows = [
+        window(f"{m}{n}", m, *(place + rng.normal(0, 0.1, 2)))
+        for m, place in ((NONE, (0, 0)), ("old", (4, 0)), ("sad", (5, 2)))
+        for n in range(1 if m == "sad" else 3)
+        for _ in range(10)
+    ]
+    found = run.left_out(windows, {w.clip: w.clip for w in windows})
+    assert found["by_manner"] == {NONE: 1.0, "old": 1.0, "sad": 0.0}
+    assert found["right"] == round(60 / 70, 5)
+    assert found["none_or_not"] == 1.0, "but that it is not the neutral walk is seen"
+
+
+def test_each_manner_is_tried_with_each_column_of_another_channel(
+    both: Network, motion: list[Captured], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Captured windows take the place of the generated figures: of the right mood, of none at one link."""
+    real = {m: captured_windows(clip(both, f"{m}-9", m, lean=lean), both, "mood") for m, lean in LEANS}
+    asked: list[Figure] = []
+    broken = both.channels["injury"][3]
+
+    def generated(network: Network, figures: Sequence[Figure], name: str, runtime: Runtime):
+        asked.extend(figures)
+        moods = [next(iter(f.channels["mood"]), None) for f in figures]
+        lost = [broken in f.channels.get("injury", {}) for f in figures]
+        return [real[None if gone else mood] for mood, gone in zip(moods, lost, strict=True)]
+
+    monkeypatch.setattr(run, "generated", generated)
+    [found] = measured(both, motion)["channels"]
+    assert found["manners"] == ["old", "sad"]
+    assert found["captured"]["right"] == 1.0
+    assert found["right_at_1"] == 1.0
+    rows = found["together"]
+    assert len(rows) == 3 * 25
+    assert {r["column"] for r in rows if r["share"] != 1.0} == {broken}
+    assert [r["share"] for r in rows if r["column"] == broken] == [1.0, 0.0, 0.0]
+    channels = [f.channels for f in asked if "injury" in f.channels]
+    assert {value for one in channels for value in one["injury"].values()} == {10.0}
+    assert [f.speed for f in asked if "injury" in f.channels] == pytest.approx([2.0] * 75, rel=1e-3)
+    effect = found["effects"][2]
+    assert (effect["manner"], effect["effect"]) == ("old", "trunk")
+    rest = both.y_mean[both.layout.y_joint_position].reshape(-1, 3)
+    neck, hips = (rest[both.skeleton.role(part)] for part in ("neck", "hips"))
+
+    def lean(cm: float) -> float:
+        return float(np.degrees(np.arctan2(neck[2] + cm - hips[2], neck[1] - hips[1])))
+
+    assert effect["captured"] == pytest.approx(lean(32) - lean(2), abs=0.2)
+    assert effect["generated"] == effect["generated_at_half"] == pytest.approx(lean(31) - lean(1), abs=0.2)
+
+
+LEANS = ((None, 1.0), ("sad", 13.0), ("old", 31.0))
+
+
+def test_a_network_walks_all_that_is_asked(both: Network, motion: list[Captured]) -> None:
+    [found] = measured(both, motion)["channels"]
+    per = (USED - WINDOW) // STEP + 1
+    assert [row["windows"] for row in found["generated"]] == [3 * per] * 6
+    assert [row["manners"] for row in found["generated"]] == [
+        [], ["old"], ["sad"], ["old"], ["sad"], ["old", "sad"],
+    ]  # fmt: skip
+    assert "between" in found["generated"][-1]
+    shown = page.section({"applies": True, "channels": [found]}, None)
+    assert shown.title == "Mood"
+    assert len({part.content.name for part in shown.parts if not isinstance(part.content, Words)}) == 6
+
+
+def test_says_why_there_is_nothing(hurtable, both: Network, motion: list[Captured]) -> None:
+    assert measured(hurtable, [])["reason"] == run.REASON
+    assert measured(both, motion[:6:2])["reason"] == run.TOO_FEW
+    assert page.section(measured(hurtable, []), None).parts == []

@@ -1,0 +1,87 @@
+"""A data set of many clips: the page shows some of them, counts some, and says so."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from hobble.core.skeleton import Skeleton
+from hobble.report import coverage, data_section, shown_clips
+from hobble.report.gather import Material
+from hobble.report.page import render
+
+
+def of_many(material: Material, copies: int) -> Material:
+    """The same data set with `copies` copies of each clip under other names."""
+
+    def copied(reports: list[dict]) -> list[dict]:
+        return [{**one, "clip": f"{one['clip']}-{i}"} for i in range(copies) for one in reports]
+
+    splits = {f"{clip}-{i}": split for clip, split in material.splits.items() for i in range(copies)}
+    many = {key: copied(getattr(material, key)) for key in ("motion", "labels", "channels")}
+    return replace(material, splits=splits, **many)
+
+
+def test_few_clips_are_all_shown(material: Material) -> None:
+    assert shown_clips.shown(material) == {report["clip"] for report in material.labels}
+
+
+def test_every_kind_of_clip_is_shown(material: Material) -> None:
+    many = of_many(material, 50)
+    some = shown_clips.shown(many, most=40)
+    assert len(some) == 40
+    assert {many.split(clip) for clip in some} == {"train", "held_out"}
+    hurt = {report["clip"] for report in many.channels if report["values"]}
+    assert some & hurt
+    assert some - hurt
+    reordered = replace(many, labels=many.labels[::-1])
+    assert shown_clips.shown(reordered, most=40) == some
+    more = {**many.labels[0], "clip": "another"}
+    assert len(shown_clips.shown(replace(many, labels=[*many.labels, more]), most=40) - some) <= 1
+
+
+def test_the_page_does_not_grow_with_the_clips(material: Material, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With smaller limits, so that a test need not make hundreds of clips."""
+    choose = shown_clips.shown
+    monkeypatch.setattr(data_section, "MOST_BARS", 20)
+    monkeypatch.setattr(data_section, "MOST_REMARKS", 20)
+    monkeypatch.setattr(shown_clips, "shown", lambda material: choose(material, 12))
+    sizes = [len(render(of_many(material, copies))) for copies in (20, 100)]
+    assert sizes[1] < 1.01 * sizes[0]
+
+
+def test_seconds_are_estimated_from_a_random_choice_of_clips(
+    examples: ModuleType, holden31: Skeleton, tmp_path: Path
+) -> None:
+    examples.rows(tmp_path / "walk.npz", holden31)
+    paths = [str(tmp_path / f"walk-{i}.npz") for i in range(30)]
+    for path in paths:
+        shutil.copy(tmp_path / "walk.npz", path)
+    some = shown_clips.counted(paths, most=10)
+    assert len(some) == 10
+    assert some != paths[:10]
+    every, few = coverage.counted(paths, {}), coverage.counted(some, {}, of=30)
+    np.testing.assert_allclose(few["both"], every["both"])
+    np.testing.assert_allclose(few["turns"]["train"], every["turns"]["train"])
+    assert every["estimate"] == ""
+    chart = coverage.turn_chart(few)
+    assert chart is not None
+    assert chart.caption.endswith("Estimated from 10 of 30 clips.")
+
+
+def test_many_remarks_are_told_by_kind(material: Material, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(data_section, "MOST_REMARKS", 3)
+    sentences = ["frames 1-3 held", "frames 20-31 held", "frames 4-5 held", "no foot down for 2.5 s"]
+    motion = [{**material.motion[0], "clip": f"c{i}", "repairs": [s]} for i, s in enumerate(sentences)]
+    table = data_section.remarks_table(replace(material, motion=motion, labels=[], channels=[]))
+    assert table is not None
+    assert table.title == "4 repairs and warnings, by kind"
+    assert table.rows == [
+        [3, "motion", "c0", "frames 1-3 held"],
+        [1, "motion", "c3", "no foot down for 2.5 s"],
+    ]

