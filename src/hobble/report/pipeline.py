@@ -23,13 +23,12 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
     stages: in the order of the pipeline, stage -> {"benchmarks": tsv files or folders of them, "files":
     artefacts or folders of them}. For the stages of a data set also "made": folders, each called as a rule,
     with the records of its finished clips; and "batches": of these rules only the benchmarks with these names
-    count. A missing file is listed under `missing` and is no error: a stage may have
-    been copied from another machine without its benchmarks. The time of training comes from its history, and
-    that of clips from their records if these say more, because Snakemake measures only the last of several
-    calls. Returns `stages` (one entry each:
-    jobs, seconds and longest in seconds, max_rss_mb, cpu_seconds, files, bytes, and the same for each rule),
-    `total_seconds`, `total_bytes`, `database` (see `hobble.database.sizes`; None without a database),
-    `missing`, `machine`, `versions`. Raises InputError for a malformed benchmark or history.
+    count. A missing file is listed under `missing` and is no error: a stage may have been copied from another
+    machine without its benchmarks. The time of training comes from its history, and that of clips from their
+    records if these say more, because Snakemake measures only the last of several calls. Returns `stages`
+    (one entry each: jobs, seconds and longest in seconds, max_rss_mb, cpu_seconds, files, bytes, and the same
+    for each rule), `total_seconds`, `total_bytes`, `database` (see `hobble.database.sizes`;
+    None without a database), `missing`, `machine`, `versions`. Raises InputError for a malformed benchmark or history.
     """
     missing: list[str] = []
     entries = []
@@ -43,18 +42,15 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
             if rule == "training":
                 row["s"] = max(row.get("s", 0.0), trained)
             by_rule[rule].append(row)
-        for rule, rows in by_rule.items():
-            last = sum(row.get("s", 0.0) for row in rows)
-            if made.get(rule, 0.0) > last > 0:  # some clips were made by earlier calls
-                for row in rows:
-                    row["s"] = row.get("s", 0.0) * made[rule] / last
+        for rule, seconds in made.items():
+            _add_earlier_calls(by_rule[rule], seconds)
         entries.append(
             {
                 "stage": stage,
                 **_total([row for _, row in jobs]),
                 "files": len(sizes),
                 "bytes": sum(sizes),
-                "rules": [{"rule": rule, **_total(rows)} for rule, rows in sorted(by_rule.items())],
+                "rules": [{"rule": rule, **_total(rows)} for rule, rows in sorted(by_rule.items()) if rows],
             }
         )
     return {
@@ -111,6 +107,17 @@ def _jobs(
         files = [(rule, path) for rule, path in files if rule not in made or path.stem in batches]
         found += [(rule, row) for rule, path in files for row in read_benchmark(path)]
     return found
+
+
+def _add_earlier_calls(rows: list[dict[str, float]], seconds: float) -> None:
+    """Scale the times of a rule's jobs to the seconds that all its clips took.
+
+    They are less where clips were made by earlier calls of the jobs.
+    """
+    last = sum(row.get("s", 0.0) for row in rows)
+    if seconds > last > 0:
+        for row in rows:
+            row["s"] = row.get("s", 0.0) * seconds / last
 
 
 def _sizes(paths: Iterable[str], missing: list[str]) -> list[int]:
