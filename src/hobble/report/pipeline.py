@@ -27,8 +27,8 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
     machine without its benchmarks. The time of training comes from its history, and that of clips from their
     records if these say more, because Snakemake measures only the last of several calls. Returns `stages`
     (one entry each: jobs, seconds and longest in seconds, max_rss_mb, cpu_seconds, files, bytes, and the same
-    for each rule), `total_seconds`, `total_bytes`, `database` (see `hobble.database.sizes`;
-    None without a database), `missing`, `machine`, `versions`. Raises InputError for a malformed benchmark or history.
+    for each rule), `total_seconds`, `total_bytes`, `database` (see `hobble.database.sizes`; None without a
+    database), `missing`, `machine`, `versions`. Raises InputError for a malformed benchmark or history.
     """
     missing: list[str] = []
     entries = []
