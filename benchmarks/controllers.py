@@ -4,9 +4,10 @@
 
 DATABASE is results/datasets/<dataset>/database/plain; the `clips` that it was made from have to be in the
 same folder. Frame times are divided by those of the first network. They are measured on one core, with one
-character that walks, jogs, stops and turns. The networks take turns, a stretch of frames each, so that other
-work on the machine affects all of them equally. The script prints the median of the ratios of the stretches'
-means. A stretch includes frames with and without a search of motion matching.
+character that walks, jogs, stops and turns, and with CROWD of them. Each kind stores its numbers as it does
+by default. The networks take turns, a stretch of frames each, so that other work on the machine affects all
+of them equally. The script prints the median of the ratios of the stretches' means. A stretch includes frames
+with and without a search of motion matching.
 """
 
 from __future__ import annotations
@@ -77,8 +78,9 @@ def main() -> None:
         for name, (us, ratio) in frame_ratios(networks, count, turns).items():
             print(f"{name}: {count} characters, {us:,.0f} us a frame, {ratio:.2f} times", flush=True)
     for name, network in networks.items():
-        size, kept = paths[name].stat().st_size / 1e6, 4e-6 * network.stored(network.mode(None))
-        print(f"{name}: {size:.1f} MB file, {kept:.1f} MB in memory", flush=True)
+        size, number = paths[name].stat().st_size / 1e6, np.dtype(network.storage).itemsize
+        kept = 1e-6 * number * network.stored(network.mode(None))
+        print(f"{name}: {size:.1f} MB file, {kept:.1f} MB in memory as {network.storage}", flush=True)
         if options.laps:
             lap = responsivity(
                 network, configuration="", runtime=Runtime(), laps=options.laps, lap_seconds=400, modes=()

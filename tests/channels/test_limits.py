@@ -1,4 +1,4 @@
-"""How fast a body goes that is told something: interpolated, the worst counts, learnt from made-up cycles."""
+"""Speed limits: interpolation, several values at once, and learning from made-up cycles."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LIMITS = Limits(
 
 
 def rows(speeds, values, gait: int = WALK, each: int = 40, others: bool = False) -> dict[str, np.ndarray]:
-    """Rows of cycles of `each` frames, straight ahead at `speeds` (N,), told `values` (N, L)."""
+    """Rows of cycles of `each` frames, straight ahead at `speeds` (N,), with `values` (N, L)."""
     speed = np.repeat(np.asarray(speeds, float), each)
     return {
         "gait": np.eye(GAITS)[np.full(len(speed), gait)],
@@ -47,7 +47,10 @@ def test_two_are_as_slow_as_the_worse_one() -> None:
 
 
 def test_a_version_is_set_beside_its_own_source() -> None:
-    """The slow source is hurt: beside all that is healthy, it would look slower than it is."""
+    """The source of the hurt version is slow.
+
+    Compared with all healthy clips the version would seem slower than it is.
+    """
     found = pace()
     speeds = np.linspace(1.0, 3.0, 41)
     found.add("healthy", **rows(speeds, np.zeros((41, 2))))

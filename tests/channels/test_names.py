@@ -1,4 +1,4 @@
-"""A channel is known by its name in its own folder, and nowhere else."""
+"""The name of a channel occurs only in its own folder."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ALLOWED = ("channels/__init__.py", "hurt/", "synthetic/")
 
 
 def words(path: Path) -> Iterator[str]:
-    """All text of a script or template; of Python names and strings, but for docstrings (examples)."""
+    """All text of a script or template; for Python only names and strings, without docstrings."""
     text = path.read_text(encoding="utf-8")
     if path.suffix != ".py":
         yield text

@@ -78,6 +78,7 @@ def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[i
         },
         "responsivity": {
             "parameters": counts,
+            "bytes_each": 4,
             "stored": {
                 "constant": 50 * counts["true"],
                 "linear": 10 * counts["true"],
@@ -249,7 +250,7 @@ def test_published_clips_stand_beside_ours_of_the_same_name(tmp_path, published)
 
 
 def test_published_times_and_sizes_stand_beside_what_they_are_of(compared) -> None:
-    """The database is what training reads; its stage has the rows of each clip too, and takes time."""
+    """Sizes are compared with the database that training reads; its stage writes more, and has the times."""
     ours = {(r["measure"], r["configuration"]): r["ours"] for r in compared["against_published"]}
     assert ours["database", "holden"] == 300
     times = {

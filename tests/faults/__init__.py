@@ -1,1 +1,1 @@
-"""Faults thrown at the workflow, and what a stranger's files may not do: `make faults N=200` throws more."""
+"""Faults in the workflow, and hostile files. `make faults N=200` makes more of them."""

@@ -42,7 +42,7 @@ BEGIN, END = "<!-- what was thrown -->", "<!-- end of what was thrown -->"
 
 
 def main() -> int:
-    """Throw, tell, and write the table; status 1 where there was a fault."""
+    """Make the faults, print the results, write the table. Exit status 1 if Hobble did wrong."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], prog="python -m tests.faults")
     parser.add_argument("--rounds", type=int, default=100)
     parser.add_argument("--seed", type=int, default=secrets.randbelow(10**6))

@@ -55,7 +55,7 @@ class Mutation:
 
 @dataclass(frozen=True)
 class Case:
-    """A mutated file: what was done to it, and what must become of it."""
+    """A mutated file: its mutations, and whether it must be refused or read."""
 
     names: tuple[str, ...]
     text: str

@@ -79,7 +79,7 @@ def reachable() -> Iterator[Path]:
 
 
 def as_nobody(read: Callable[[], object]) -> str:
-    """What `read` says when it may read what everybody may."""
+    """The message of `read` if it runs as a user without special permissions."""
     read_end, write_end = os.pipe()
     pid = os.fork()
     if not pid:

@@ -27,7 +27,7 @@ REFUSED, UNHARMED, REMADE, SKIPPED, FAULT = "refused", "unharmed", "made again",
 
 @dataclass(frozen=True)
 class Throw:
-    """What was thrown at what, and what happened; `detail` tells more where that is a fault."""
+    """A fault that was made, and what happened. detail: more about it if Hobble did wrong."""
 
     what: str
     at: str
@@ -45,7 +45,7 @@ def kind(path: str) -> str:
 
 
 def refusal(end: End, job: Job, *pieces: str) -> str:
-    """What is wrong with a refusal; "" where it is one message that holds the pieces, and no traceback."""
+    """What is wrong with a refusal, or "" if it is one message with the expected pieces and no traceback."""
     if end.status != 1:
         return f"status {end.status}"
     messages = [line for line in end.said.splitlines() if line.startswith(f"{job.rule}: ")]
@@ -56,7 +56,7 @@ def refusal(end: End, job: Job, *pieces: str) -> str:
 
 
 def kill(lab: Lab, rng: Random) -> Throw:
-    """Killed at a random moment, or in the midst of writing.
+    """Kill a job at a random moment, or while it writes.
 
     Older artefacts, there half the time, stay or are replaced whole.
     """
@@ -164,7 +164,7 @@ def gone(lab: Lab, rng: Random) -> Throw:
 
 
 def _some_file(bench: Bench, rng: Random) -> Path:
-    """A file among the inputs, a small one as likely as a large; of a folder, any in it."""
+    """A random input file. Small and large files are equally likely; of a folder, any file in it."""
     path = bench.folder / rng.choice(bench.artefacts)
     if path.is_dir():
         return rng.choice(sorted(p for p in path.rglob("*") if p.is_file() and not p.name.startswith(".")))
@@ -172,7 +172,7 @@ def _some_file(bench: Bench, rng: Random) -> Path:
 
 
 def _judged(bench: Bench, what: str, target: Path, rng: Random) -> Throw:
-    """A damaged input is refused by name, or the result is that of the whole one."""
+    """A damaged input is refused with its name, or the result is the same as with the undamaged one."""
     at = kind(str(target)) if target.is_file() else "any file"
     what = f"bytes {group_of(what)}" if what in DAMAGES else what
     end = bench.run()

@@ -14,7 +14,7 @@ from hobble.report.bundle import WEB, install
 
 @pytest.fixture(scope="session")
 def page_modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of the packages, fetched once for all workers; skips where they cannot be had."""
+    """The folder of the packages, fetched once for all workers; skips if they cannot be fetched."""
     lock = (WEB / "package-lock.json").read_bytes()
     shared = tmp_path_factory.getbasetemp().parent / f"page-{hashlib.sha256(lock).hexdigest()[:12]}"
     shared.mkdir(exist_ok=True)

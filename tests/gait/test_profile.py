@@ -16,7 +16,7 @@ from hobble.gait.recogniser import recognise, windows
 
 @pytest.fixture(scope="module")
 def uneven(holden31, swinger):
-    """A limp of the right leg, with every joint shaken a little, so that nothing is even by chance."""
+    """A limp of the right leg with a little noise in every joint, so that no two values are equal."""
     made = swinger(
         hip={"right": (-6.0, 11.0), "left": (5.0, 20.0)},
         knee={"right": 14.0, "left": 40.0},

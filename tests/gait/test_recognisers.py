@@ -92,7 +92,7 @@ def test_strength_grows_with_the_limp():
 
 
 def test_shuffled_labels_cannot_be_learnt():
-    """What is measured above would show if people's walks told nothing."""
+    """With scrambled labels the measurements above give chance level."""
     values, classes = examples(people(), range(people().count))
     order = np.random.default_rng(3).permutation(len(classes))
     judge = learn(values[::2], [classes[i] for i in order[::2]], shrinkage=SHRINKAGE)

@@ -1,4 +1,4 @@
-"""Each injury is as large as people's, at every severity, on both sides, on made and on captured clips."""
+"""Each injury has the size measured on people: every severity, both sides, generated and captured clips."""
 
 from __future__ import annotations
 

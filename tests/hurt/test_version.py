@@ -20,7 +20,7 @@ THIGH = "RightUpLeg-RightLeg"
 
 @pytest.fixture(scope="module")
 def changing(made, hurting):
-    """A walk of 20 s whose thigh hurts at 10 from 5 s on and at 3 from 12 s on: what is asked, the result."""
+    """A walk of 20 s whose thigh hurts at 10 from 5 s on and at 3 from 12 s on: the request, the result."""
     clip, labels, flat = made("straight")
     asked = hurting(len(clip), {THIGH: 10.0})
     asked[:300] = 0.0

@@ -1,4 +1,4 @@
-"""Automatic labels against those that people made, and file labels against the original's own rows."""
+"""Automatic labels compared with hand-made ones, and file labels with the original's own rows."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_gaits_agree_with_a_person_s_on_95_of_100_frames(shared: Path, read, opt
     ["07_01", "07_12", "08_05", "08_08", "09_12", "16_25", "105_10", "105_16", "105_25", "105_26", "03_02"],
 )
 def test_a_walk_has_a_foot_down(shared: Path, read, name):
-    """Nobody is told the gait: walks, brisk ones, limps and one on rough ground."""
+    """Without a given gait: walks, brisk walks, limps, and a walk on rough ground."""
     clip, motion = read(shared / "mocap/cmu" / f"{name}.bvh")
     labels, _ = label_clip(clip, [], motion, None, "rocky", Options())
     walking = labels.gait.argmax(axis=1) == WALK

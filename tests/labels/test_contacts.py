@@ -43,7 +43,7 @@ def test_no_floor_is_needed(walker, height):
 
 
 def test_a_foot_that_slides_still_stands(walker):
-    """On a treadmill, say, by half a centimetre a frame; the original's rule takes that for a swing."""
+    """As on a treadmill, the foot moves half a centimetre a frame; the original's rule calls that a swing."""
     clip = walker()
     sliding = replace(clip, root=clip.root + np.outer(np.arange(len(clip)), [0.0, 0.0, 0.5]))
     assert (stance(sliding, Labels()) == stance(clip, Labels()))[:, [0, 2]].mean() > 0.95

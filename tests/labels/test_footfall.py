@@ -1,4 +1,4 @@
-"""Landings found from the motion alone: on made walks exactly, on limps and pauses without one too many."""
+"""Landings from the motion alone: exact on generated walks, and none too many on limps and pauses."""
 
 from __future__ import annotations
 

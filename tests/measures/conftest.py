@@ -1,4 +1,4 @@
-"""The small networks of the runtime's tests serve here too."""
+"""Uses the small networks of the runtime's tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Accuracy: the published network on the published rows, and the formula on rows where it is known."""
+"""Accuracy of the published network on the published rows, and of the formula on made-up rows."""
 
 from __future__ import annotations
 

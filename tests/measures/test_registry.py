@@ -1,4 +1,4 @@
-"""What every measurement has to say of itself, and how the options of all become one section."""
+"""The descriptions of all measurements, and how their options become one section."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_names_are_unique() -> None:
 
 
 def test_the_list_and_the_options_are_read_without_what_measures() -> None:
-    """They are read before anything is planned, and again in every job of a cluster."""
+    """Descriptions are read at planning and in every job of a cluster, so their imports must be fast."""
     code = "import sys, hobble.measures.registry, hobble.config.sections; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = done.stdout.split()

@@ -1,4 +1,4 @@
-"""Laps: ended by arriving or by the clock, and the same numbers each time but for the times."""
+"""Laps end at the last waypoint or after `lap_seconds`. Only the measured times differ from run to run."""
 
 from __future__ import annotations
 

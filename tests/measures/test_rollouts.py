@@ -1,4 +1,4 @@
-"""Roll-outs: the runtime's own frames come out of them, every frame is reached, errors are what they say."""
+"""Roll-outs: they give the runtime's own frames, cover every frame, and compute the errors that they name."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def recorded(network: Network, frames: int, ground: Any) -> tuple[Inputs, np.ndarray]:
-    """What a figure of the runtime was asked in each frame, and its joints (F, J, 3) in the root frame."""
+    """The inputs of a running character in each frame, and its joints (F, J, 3) in the root frame."""
     figure = ProceduralAnimation(network, foot_locking=False)
     figure.next_pose((0.0, 2.0))
     rows: dict[str, list[Any]] = {
@@ -72,7 +72,7 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[Inputs, np.nda
 
 @pytest.mark.parametrize("ground", [None, hills])
 def test_a_roll_out_is_what_the_runtime_does(hurtable: Network, ground: Any) -> None:
-    """Fed what the runtime was asked, the joints and the phase go where they went there."""
+    """With the runtime's inputs, joints and phase are those of the runtime."""
     scale = hurtable.x_std.copy()  # one that feels its own velocities and its phase
     scale[hurtable.layout.x_joint_velocity] = 1.0
     hurtable = replace(hurtable, x_std=scale, y_std=np.full_like(hurtable.y_std, 0.2))
@@ -95,7 +95,7 @@ LAYOUT = RowLayout(31, channels=(("injury", 30),))
 
 
 def clip_rows(network: Network, rows: int, seed: int, gap: int | None = None) -> ClipRows:
-    """Rows as random as may be; with a `gap`, frames of another stretch from there on."""
+    """Random rows; with a `gap`, a new stretch begins there."""
     rng = np.random.default_rng(seed)
     assert network.skeleton is not None
     frame = np.arange(rows) + 7
@@ -205,7 +205,7 @@ def test_rows_of_another_layout_are_refused(hurtable: Network, network: Network,
 def test_a_channel_s_measure_does_not_apply_to_a_network_without_it(
     measure: Measure, make_network, tmp_path: Path
 ) -> None:
-    """`holden` is measured on clips that carry severities; what these say is nothing to it, and not read."""
+    """`holden` is measured on clips with severities, and ignores them."""
     save(tmp_path / "weights.npz", make_network())
     files = {"weights": tmp_path / "weights.npz", "published": ROOT / "src/hobble/evaluation/published.yaml"}
     given = Given("plain", files, {"a": tmp_path / "unread.npz"}, {"a": "train"})

@@ -1,4 +1,4 @@
-"""A sample of clips stands for all of them, and says how sure that is."""
+"""Estimates from a sample of clips, and their confidence intervals."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_one_clip_more_changes_little():
 
 @pytest.mark.parametrize("split", ["train", "held_out"])
 def test_the_interval_holds_the_truth_nearly_as_often_as_it_says(split):
-    """95 %, a little less since strata are small; without strata or weights it is far from that."""
+    """The intervals hold in nearly 95 % of samples. Without strata or weights they hold far less often."""
     inside, off = [], []
     for seed in range(300):
         clips, splits, values = population(seed)

@@ -495,7 +495,7 @@ def outcome(file: Path, seed: int, folder: Path, frames: int | None = None) -> O
 def floor_of(report: Mapping[str, Any]) -> float:
     """The height at which a clip's floor was found, if it was put at 0."""
     found = (
-        re.match(r"The floor lies at (-?\d+) cm; the clip was moved", text) for text in report["repairs"]
+        re.match(r"The floor lies at (-?[\d.]+) cm; the clip was moved", text) for text in report["repairs"]
     )
     return next((float(match[1]) for match in found if match), 0.0)
 

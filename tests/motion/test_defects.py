@@ -1,4 +1,4 @@
-"""Broken frames are found where they were put in, named, and mended; sound clips come back untouched."""
+"""Broken frames are found, named and repaired; clips without defects stay the same."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Clips that are one motion are found under any name, and never on both sides of the split."""
+"""Clips with the same motion are found under any name, and cannot be both trained on and held out."""
 
 from __future__ import annotations
 

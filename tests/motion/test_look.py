@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from hobble.motion.look import look, table
+from hobble.motion.look import Look, look, shared_warnings, table
 
 
 @pytest.fixture
@@ -50,6 +50,15 @@ def test_files_that_are_there_twice_and_files_of_no_clip_are_told(root, folder):
 def test_a_refused_file_has_its_line(root, folder):
     (folder / "broken.bvh").write_text("HIERARCHY\n")
     assert "broken  REFUSED" in table(seen(root, folder))
+
+
+def test_a_warning_of_many_clips_is_told_once():
+    rare, common = "one of its own", "the same for all"
+    clips = [Look(str(i), warnings=(common, rare) if i == 2 else (common,)) for i in range(6)]
+    short, notes = shared_warnings(clips)
+    assert notes == [f"6 of 6 clips: {common}"]
+    assert [clip.warnings for clip in short] == [(), (), (rare,), (), (), ()]
+    assert shared_warnings(clips[:4]) == (clips[:4], [])
 
 
 def test_a_draft_of_a_rig_file_is_printed(root, folder):

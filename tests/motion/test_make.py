@@ -172,7 +172,7 @@ def test_a_floor_that_is_not_at_zero_is_put_there_and_said(walker, bvh, make, ro
     moved, report = make(path)
     np.testing.assert_allclose(moved.positions, make(bvh(clip, name="level"))[0].positions, atol=1.5)
     assert [s for s in report["repairs"] if "The floor lies at" in s and s.endswith("so that it lies at 0.")]
-    with pytest.raises(InputError, match=r"walk.bvh: The floor lies at -?\d+ cm.*defects: repair"):
+    with pytest.raises(InputError, match=r"walk.bvh: The floor lies at -?[\d.]+ cm.*defects: repair"):
         make(path, defects="refuse")
 
 

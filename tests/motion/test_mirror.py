@@ -1,4 +1,4 @@
-"""The mirror: what is left becomes right, and twice is the same again."""
+"""The mirror swaps left and right; mirrored twice, a clip is the same again."""
 
 from __future__ import annotations
 

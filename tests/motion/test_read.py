@@ -1,4 +1,4 @@
-"""Reading BVH: what the wild holds is read, what is broken is refused with its place."""
+"""Reading BVH: files of many programs are read; broken files are refused with file and line."""
 
 from __future__ import annotations
 

@@ -105,7 +105,7 @@ def test_joints_without_motion_follow_their_parents_rigidly(walk, rigs):
 
 @pytest.mark.parametrize("end", ["ava191", "mixamo55", "rig22"])
 def test_a_pose_at_run_time_drives_another_figure(walk, rigs, end):
-    """Frame by frame as a network gives them, all at once, and as a clip: one and the same motion."""
+    """Retargeting frame by frame, all frames at once, and as a clip gives the same motion."""
     how = plan(walk.skeleton, rigs[end].skeleton, joint_pairs(rigs["holden31"], rigs[end]))
     positions, rotations = retarget_pose(how, walk.positions, walk.global_rotations)
     one = retarget_pose(how, walk.positions[7], walk.global_rotations[7])
@@ -140,7 +140,7 @@ def test_a_leg_without_length_can_neither_lead_nor_follow(walk, rigs):
 
 
 def test_there_and_back_again(walk, rigs):
-    """By way of the larger rig and back: the same walk but for what the legs' proportions cost."""
+    """Retargeting to the larger rig and back gives the same walk, except for the legs' proportions."""
     back = onto(onto(walk, rigs["holden31"], rigs["mixamo55"]), rigs["mixamo55"], rigs["holden31"])
     apart = np.linalg.norm(back.positions - walk.positions, axis=-1)
     assert apart.mean() < 2.0

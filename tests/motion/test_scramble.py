@@ -16,3 +16,15 @@ def test_a_clip_comes_out_of_another_rig_as_it_is(shared, tmp_path, seed):
     one = outcome(shared / f"mocap/cmu/{FILES[seed % len(FILES)]}.bvh", seed, tmp_path, 420)
     assert one.off is not None, one
     assert one.off.mean() < MOST, one
+
+
+DOUBTFUL = {24: "ankles", 50: "neck", 104: "balls of the feet"}
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("seed", DOUBTFUL)
+def test_what_a_rig_does_not_show_is_told(shared, tmp_path, seed):
+    """Files that are more than 1 cm off, because they do not contain the missing information."""
+    files = sorted((shared / "mocap/cmu").glob("*.bvh"))
+    one = outcome(files[seed * 7 % len(files)], seed, tmp_path, 900)
+    assert DOUBTFUL[seed] in one.said, one

@@ -1,4 +1,4 @@
-"""Left from right: names tell, and where they do not, it is asked for."""
+"""Left and right are found from joint names; if names do not say, the user has to."""
 
 from __future__ import annotations
 

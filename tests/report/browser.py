@@ -39,7 +39,7 @@ def executable() -> str | None:
 
 
 class Browser:
-    """One tab. `console` has what the page said, `requests` every address it asked for."""
+    """One tab. `console`: the page's messages. `requests`: the addresses that it requested."""
 
     def __init__(self, path: str, profile: Path, width: int = 1280, height: int = 900) -> None:
         (read_there, self._write), (self._read, write_there) = os.pipe(), os.pipe()
@@ -70,7 +70,7 @@ class Browser:
             self.send(f"{domain}.enable")
 
     def send(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """Give one command and return its result; events that come meanwhile are kept."""
+        """Send a command and return its result; events that arrive in between are kept."""
         self._last += 1
         message: dict[str, Any] = {"id": self._last, "method": method, "params": parameters}
         if self._session:
@@ -90,7 +90,7 @@ class Browser:
             time.sleep(0.05)
 
     def run(self, expression: str) -> Any:
-        """The value of a JavaScript expression, awaited where it is a promise. Raises where it throws."""
+        """The value of a JavaScript expression, awaited if it is a promise. Raises if it throws."""
         answer = self.send("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
@@ -103,7 +103,7 @@ class Browser:
         return value
 
     def press(self, key: str, code: str | None = None) -> None:
-        """Press a key, as a keyboard does it."""
+        """Press and release a key."""
         for kind in ("keyDown", "keyUp"):
             text = {"text": key} if len(key) == 1 and kind == "keyDown" else {}
             self.send("Input.dispatchKeyEvent", type=kind, key=key, code=code or key, **text)
@@ -119,7 +119,7 @@ class Browser:
         )
 
     def picture(self, path: Path, selector: str | None = None) -> None:
-        """Save what is seen, or all of one element, as PNG."""
+        """Save the visible page, or the whole of one element, as PNG."""
         clip = {}
         if selector:
             box = (
@@ -160,7 +160,7 @@ class Browser:
 
 
 def opened(page: str, folder: Path) -> Iterator[Browser]:
-    """A browser that has opened the page, for a fixture; the tests are skipped where there is none."""
+    """A browser that has opened the page, for a fixture. Without a browser the tests are skipped."""
     path = executable()
     if path is None:
         pytest.skip(f"no browser here ({', '.join(BROWSERS)}): the page was not opened in one")

@@ -25,7 +25,7 @@ from hobble.report.scenes import scenes
 
 
 def beside(name: str) -> ModuleType:
-    """A module of this folder, which is no package."""
+    """Imports a module of this folder, which is not a package."""
     path = Path(__file__).with_name(f"{name}.py")
     spec = importlib.util.spec_from_file_location(f"report_{name}", path)
     assert spec is not None
@@ -60,7 +60,7 @@ def pictures(root: Path) -> Path:
 def inputs(
     examples: ModuleType, holden31: Skeleton, tmp_path_factory: pytest.TempPathFactory
 ) -> dict[str, Any]:
-    """Paths of a whole set of inputs; `scenarios` beside those that `gather` takes."""
+    """Paths of a whole set of inputs: those of `gather`, and `scenarios`."""
     folder = tmp_path_factory.mktemp("inputs")
     arguments = examples.write_all(folder, holden31)
     return {"gather": arguments, "scenarios": folder / "scenarios.npz", "folder": folder}
@@ -98,7 +98,7 @@ def compared(
 
 @pytest.fixture(scope="session")
 def modules(tmp_path_factory: pytest.TempPathFactory) -> Path | None:
-    """The page's npm packages, fetched once for all workers; None where they cannot be had."""
+    """The page's npm packages, fetched once for all workers; None if they cannot be fetched."""
     lock = (WEB / "package-lock.json").read_bytes()
     shared = tmp_path_factory.getbasetemp().parent / f"page-{hashlib.sha256(lock).hexdigest()[:12]}"
     shared.mkdir(exist_ok=True)
@@ -115,7 +115,7 @@ def modules(tmp_path_factory: pytest.TempPathFactory) -> Path | None:
 
 @pytest.fixture(scope="session")
 def script(modules: Path | None, tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The page's scripts, bundled; "" where the packages cannot be had (no browser opens that page)."""
+    """The page's scripts, bundled; "" if the packages cannot be fetched (then no browser opens the page)."""
     if modules is None:
         return ""
     target = tmp_path_factory.mktemp("bundle") / "bundle.js"

@@ -1,4 +1,4 @@
-"""The page in a real browser: what a reader does with it, and what it does on its own."""
+"""The page in a real browser: what a reader can do, and what happens without a click."""
 
 from __future__ import annotations
 
@@ -240,14 +240,14 @@ def test_prints_every_chart_in_light(tab: Any) -> None:
 
 
 def test_says_nothing_and_asks_for_nothing(tab: Any) -> None:
-    """Last, after everything above was done to the page."""
+    """Runs last, after all tests above have used the page."""
     assert tab.console == []
     assert [url for url in tab.requests if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
     assert len([url for url in tab.requests if url.startswith("file:")]) == 1
 
 
 def test_sections_as_pictures(tab: Any, pictures: Path) -> None:
-    """For a person to look at: one PNG a section, two as on a phone, where `pictures` says."""
+    """Saves a PNG of each section, two of them as on a phone, in `pictures` for people to look at."""
     tab.run("Hobble.drawAll()")
     sections = tab.run("[...document.querySelectorAll('main section')].map(({ id }) => id)")
     for width, suffix, some in ((1280, "", sections), (390, "-phone", ["summary", "play"])):

@@ -26,7 +26,7 @@ from hobble.report.playable import playable
 
 @pytest.fixture(scope="module")
 def compared(material: Material) -> dict[str, Any]:
-    """Two configurations: the example, and one of half its error and twice its time."""
+    """Two configurations: the example, and one with half its error and twice its time."""
     resolved = {
         "configuration": {
             "dataset": "made_up",
@@ -42,6 +42,7 @@ def compared(material: Material) -> dict[str, Any]:
         responsivity = {
             **material.measured["responsivity"],
             "parameters": {k: factor * v for k, v in counts.items()},
+            "bytes_each": 4,
             "stored": {"cubic": 4 * factor * counts["true"]},
             "exact": "cubic",
         }

@@ -70,7 +70,10 @@ def test_curve_that_rises_falls_or_rests(material: Material) -> None:
 
 @pytest.mark.parametrize("losses", [[0.3] * 8, [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3]])
 def test_only_one_hint_advises_on_more_passes(material: Material, losses: list[float]) -> None:
-    """It follows from the curve. A small gap to the held-out clips only concerns the size of the network."""
+    """The advice to train longer depends on the curve.
+
+    A small gap to the held-out clips is about the network's size.
+    """
     found = hints(changed(material, accuracy=accuracy(material, 0.041), history=history(losses)))
     said = [hint.text for hint in found if "passes" in hint.text]
     assert len(said) == 1
@@ -169,7 +172,7 @@ def test_key_figures_without_results(material: Material) -> None:
 
 
 def test_missing_data_comes_before_longer_training(material: Material) -> None:
-    """Nobody stands, and the error still falls: the clips are named first."""
+    """If nobody stands in the clips and the error still falls, the hint on the clips comes first."""
     labels = [{"clip": "a", "seconds": {"walk": 30.0}, "strip": {}}]
     falling = history([0.5 * 0.9**k for k in range(20)])
     found = list(heads(material, labels=labels, history=falling))

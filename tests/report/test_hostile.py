@@ -1,4 +1,4 @@
-"""Names and messages that are markup do nothing in the page, in a real browser."""
+"""Markup in names and messages has no effect in the page, in a real browser."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def hostile(
     script: str,
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Iterator[Any]:
-    """The page of a data set in which everything that has a name has that one, opened."""
+    """The opened page of a data set in which every name is hostile markup."""
     folder = tmp_path_factory.mktemp("hostile")
     clips = (HOSTILE, *examples.CLIPS[1:])
     given = examples.write_all(folder, holden31, clips, terrain_names=[f"c{i}" for i in range(len(clips))])

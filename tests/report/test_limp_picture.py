@@ -1,4 +1,4 @@
-"""The README's picture: both walks go round, and the file stays small."""
+"""The README's picture: both walks are seamless loops, and the file stays small."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hobble.channels.injury.limp_picture import side_by_side
 
 
 def loop(length: int, shade: int) -> list[np.ndarray]:
-    """Pictures whose first pixel tells their number."""
+    """Pictures with their number in the first pixel."""
     out = []
     for number in range(length):
         picture = np.full((40, 40, 3), shade, np.uint8)

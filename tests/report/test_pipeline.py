@@ -41,7 +41,7 @@ def test_adds_up_jobs_rules_and_bytes(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("seen", "took"), [(3.3, 733.6), (750.0, 750.0)])
 def test_a_resumed_training_took_all_its_calls(tmp_path: Path, seen: float, took: float) -> None:
-    """Snakemake's benchmark is of the last call, which may have found nothing left to train."""
+    """Snakemake's benchmark has only the last run, which may have had nothing left to train."""
     benchmark(tmp_path / "benchmarks" / "training.tsv", seen)
     benchmark(tmp_path / "other" / "accuracy.tsv", 10.0)
     (tmp_path / "network").mkdir()

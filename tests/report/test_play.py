@@ -1,4 +1,4 @@
-"""The network in the page: the same numbers as in Python, and a character that answers to its keys."""
+"""The network in the page: the same numbers as in Python, and keys, clicks and buttons that work."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_inputs_that_weigh_nothing_are_left_out(
 
 
 def wish(frame: int) -> dict[str, Any]:
-    """Ahead, then a turn, sideways, a stop with a turn on the spot, crouching, hurt from a third on."""
+    """Walk ahead, turn, strafe, stop and turn on the spot, crouch; hurt from the second third on."""
     angle = 0.03 * max(0, frame - 20)
     velocity, facing, gait = [2.5 * np.sin(angle), 2.5 * np.cos(angle)], None, "walk"
     if 40 <= frame < 60:
@@ -234,7 +234,10 @@ def test_presets_sliders_and_the_link_to_them(tab: Any) -> None:
 
 
 def test_the_page_moves_the_body_as_python_does(tab: Any, holden31: Skeleton) -> None:
-    """Where the corners of the figure are, for bones turned anyhow: integers in the page, so to a tenth."""
+    """Corners of the body for random rotations of the bones.
+
+    The page stores integers, so they agree to a tenth.
+    """
     mesh, rng = body(holden31), np.random.default_rng(3)
     places = mesh.positions + rng.normal(0, 2, mesh.positions.shape)
     turns = quat.normalize(mesh.rotations + rng.normal(0, 0.2, mesh.rotations.shape))
@@ -274,7 +277,7 @@ def test_what_is_saved_as_bvh_is_what_was_played(
 def test_the_view_of_the_inputs_shows_inputs_of_the_network(
     tab: Any, network: Network, examples: ModuleType
 ) -> None:
-    """Heights where the samples are, 25 cm to either side of the path too; velocities as Python's."""
+    """Ground samples are at the right places, also 25 cm beside the path; velocities are those of Python."""
     animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
     for _ in range(40):
         pose = animation.next_pose([0.5, 2.4], None, "walk", terrain=hills)
@@ -341,7 +344,7 @@ def test_a_link_pasted_into_the_open_page_is_followed_and_taken_with_care(tab: A
 
 
 def test_the_camera_comes_round_behind_at_any_rate_of_pictures(tab: Any) -> None:
-    """Its way depends on the time that passed and not on how many pictures were drawn."""
+    """The camera's path depends on the time and not on the number of pictures."""
     script = """((rate) => {
       const orbit = { yaw: 0 }, chase = Hobble.chase(orbit, document.createElement("canvas"));
       let eye;

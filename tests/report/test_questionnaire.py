@@ -1,4 +1,4 @@
-"""The questionnaire in a browser: every film once, in an order of its own, and a file that can be counted."""
+"""The questionnaire in a browser: each film once, in random order, and answers that can be counted."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def tab(
 
 
 def again(tab: Any, forget: bool = False) -> None:
-    """Open the page once more, with or without what the browser kept of the last time."""
+    """Open the page again, with or without the answers that the browser has stored."""
     if forget:
         tab.run("localStorage.clear()")
     tab.open(tab.run("location.href"))

@@ -28,7 +28,7 @@ def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) 
 
 @pytest.fixture(scope="module")
 def walks(examples: ModuleType, holden31: Skeleton) -> dict[str, Array]:
-    """Walks (F, J, 3), cm: even, uneven in every joint, bending its way, and one that goes nowhere."""
+    """Walks (F, J, 3), cm: even, with noise in every joint, along a curve, and on the spot."""
     even = examples.walker(holden31, 240, 2.2)["positions"].astype(float)
     frames, rng = np.arange(240), np.random.default_rng(4)
     uneven = even + 1.5 * np.sin(frames[:, None, None] / 19 + rng.uniform(0, 6, even.shape[1:]))
@@ -72,7 +72,7 @@ def test_cycles_and_their_numbers_are_those_of_python(
 
 
 def test_answers_are_those_of_python(tab: Any) -> None:
-    """Of people's own walks at several strengths, beside their healthy ones."""
+    """People's impaired walks at several strengths, compared with their healthy walks."""
     known = people()
     healthy, cases = known.normal(), []
     for gait in range(len(known.profiles)):
@@ -105,7 +105,7 @@ def test_every_kind_has_words_of_its_own() -> None:
 def test_a_walk_is_compared_with_the_healthy_walk_of_the_same_figure(
     network: Network, examples: ModuleType, holden31: Skeleton, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of a figure that goes nowhere, or has no knees, nothing is said."""
+    """There is no answer for a figure that stays on the spot or has no knees."""
     spec = playable_with_recogniser(network, examples.RUNTIME)
     assert spec["recogniser"]["healthy"] == healthy_walk(network, holden31, examples.RUNTIME)
     assert spec["recogniser"]["healthy"]["speed_per_leg"] > 0.5
@@ -117,7 +117,7 @@ def test_a_walk_is_compared_with_the_healthy_walk_of_the_same_figure(
 
 
 def test_the_panel_shows_the_recognised_limp(tab: Any, walks: dict[str, Array], holden31: Skeleton) -> None:
-    """The watch sees three seconds, and asks for a walk where there is none."""
+    """The recogniser in Play uses three seconds, and asks the user to walk if there is no cycle."""
     healthy = profile(measure(holden31, walks["even"], 60))
     spec = {"names": list(holden31.joints), "roles": dict(holden31.roles)}
     spec["recogniser"] = {"learnt": learnt(), "healthy": healthy}

@@ -1,4 +1,4 @@
-"""Loops without a browser: they go round, what hurts is shown where asked, and other programs open them."""
+"""Loops drawn without a browser: seamless, with injuries coloured on request, readable by others."""
 
 from __future__ import annotations
 

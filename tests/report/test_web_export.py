@@ -1,4 +1,4 @@
-"""The character for other pages: the module moves as Python does, and says what it is not given rightly."""
+"""The character for other pages: the module moves as Python does and refuses bad arguments."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def network(make_network: MakeNetwork) -> Pfnn:
 
 @pytest.fixture
 def steady(make_network: MakeNetwork) -> Pfnn:
-    """A network that predicts a figure gliding straight ahead at 1.5 cm a frame, whatever it is told."""
+    """A network that predicts a figure gliding straight ahead at 1.5 cm a frame, for any input."""
     return make_network(scale=0.0)
 
 

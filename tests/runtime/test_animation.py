@@ -98,7 +98,7 @@ def test_the_pose_is_that_of_the_prediction(network) -> None:
 
 
 def test_no_joint_turns_faster_than_a_joint_can(steady) -> None:
-    """A prediction that jumps half a turn is followed at 25 degrees a frame, the shorter way round."""
+    """After a jump of the prediction by half a turn, the pose follows at 25 degrees a frame."""
     character = ProceduralAnimation(steady)
     evaluate, hand = character._predictor.evaluate, steady.skeleton.role("left_wrist")
     first = steady.layout.y_joint_rotation.start + 3 * hand
@@ -320,7 +320,7 @@ def test_terrain_as_function_heightmap_and_array(network) -> None:
 @pytest.mark.parametrize("unit", ["cm", "m"])
 @pytest.mark.parametrize(("handed", "up"), MATRICES)
 def test_a_heightmap_is_in_the_callers_axes_and_unit(network, handed: str, up: str, unit: str) -> None:
-    """A map in the caller's coordinates is the same ground as its function, on the same side."""
+    """A heightmap in the caller's coordinates gives the same ground as the function that it was made from."""
     axes = Axes(handed, up, unit)
 
     def terrain(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -353,7 +353,7 @@ def test_heightmap_is_bilinear_and_goes_on_outside() -> None:
 @pytest.mark.parametrize("unit", ["cm", "m"])
 @pytest.mark.parametrize(("handed", "up"), MATRICES)
 def test_the_callers_axes(network, handed: str, up: str, unit: str) -> None:
-    """The same walk over the same hills, in the caller's terms, is the same walk, left and right included."""
+    """A walk over hills in the caller's axes equals the walk in Hobble's axes, left and right included."""
     axes = Axes(handed, up, unit)
     vertical = "XYZ".index(up)
     level = [k for k in range(3) if k != vertical]
@@ -418,7 +418,7 @@ def test_an_asymmetric_pose_is_the_same_in_every_convention(
 
 
 def test_sides_in_unity_and_unreal() -> None:
-    """The left hand of a figure that faces ahead is where those engines have left."""
+    """The left hand of a character that faces ahead is on the left in each engine's axes."""
     left, up, ahead = np.eye(3)
     unity, unreal, blender = Axes("left", "Y"), Axes("left", "Z"), Axes("right", "Z")
     np.testing.assert_array_equal(
@@ -435,7 +435,7 @@ def test_sides_in_unity_and_unreal() -> None:
 
 
 def test_what_a_game_loads(root: Path) -> None:
-    """No torch, and nothing of what only the workflow or an export needs."""
+    """The runtime imports neither torch nor anything that only the workflow or an export needs."""
     heavy = "{'torch', 'snakemake', 'pydantic', 'onnx', 'onnxruntime', 'matplotlib', 'plotly'}"
     code = f"import sys, hobble.runtime; sys.exit({heavy} & set(sys.modules) or 0)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=root)
@@ -482,7 +482,7 @@ def test_the_released_network_does_not_fall_apart(shared: Path, holden31, mode: 
 
 @pytest.mark.shared
 def test_the_released_network_keeps_its_feet_on_hills(shared: Path, holden31) -> None:
-    """A quarter of a minute in a curve over rolling ground: soles neither in it nor floating, nor sliding."""
+    """A quarter of a minute in a curve over rolling ground: soles neither sink nor float nor slide."""
     network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
     character = ProceduralAnimation(network)
     legs, _, soles = character._controller._legs
@@ -542,7 +542,7 @@ def test_a_start_too_far_from_the_origin_is_refused(network) -> None:
 
 @pytest.mark.parametrize("call", range(2))
 def test_a_terrain_that_raises_leaves_the_state_as_it_was(hurtable, call: int) -> None:
-    """At the first question, about the path, or at the second, about the feet, after the prediction."""
+    """The terrain function fails at its first call (for the path) or at its second (for the feet)."""
     calm, troubled = ProceduralAnimation(hurtable), ProceduralAnimation(hurtable)
     calls = []
 
@@ -563,7 +563,7 @@ def test_a_terrain_that_raises_leaves_the_state_as_it_was(hurtable, call: int) -
 
 
 def test_a_failed_frame_leaves_no_trace(hurtable) -> None:
-    """Whichever of its two looks at the ground failed, in the first frame too."""
+    """Both of the calls in a frame are tried, also in the first frame."""
 
     def hills(x, z):
         return 40 + 0.2 * z

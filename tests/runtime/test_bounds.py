@@ -17,7 +17,7 @@ from hobble.runtime.bounds import MARGIN_SHARE, SPEED_MARGIN, Bounds, clip_rows
 
 
 def walked(network: Pfnn, fastest: float = 4.0) -> Seen:
-    """What a network would have seen of figures that walk ahead at 1 to 2 cm a frame, and never stand."""
+    """The ranges of training data in which figures walk at 1 to 2 cm a frame and never stand."""
     layout = network.layout
     x = np.zeros(layout.x_size, np.float32)
     x[layout.x_direction][layout.samples :] = 1
@@ -64,7 +64,7 @@ def test_wild_predictions_do_not_break_the_character(make_network) -> None:
 
 
 def test_bounds_do_not_change_a_sound_network(make_network) -> None:
-    """Bounds that hold nothing back change no bit."""
+    """If no value is outside the bounds, every bit stays the same."""
     network = make_network()
     seen = walked(network)
     far = {f.name: getattr(seen, f.name) + (1e6 if "high" in f.name else -1e6) for f in fields(seen)[:4]}

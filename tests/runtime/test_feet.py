@@ -52,7 +52,7 @@ def test_reach_is_two_bone_ik(holden31: Skeleton, x: float, y: float, z: float) 
     before, turned = position.copy(), rotation.copy()
     shift = np.array([x, y, z])
     added = np.tile([1.0, 0, 0, 0], (2, 1))
-    for _ in range(12):  # it takes so many frames to get there at most
+    for _ in range(12):  # enough frames to reach any of the targets
         position, rotation = before.copy(), turned.copy()
         bend(position, rotation, hip, knee, heel, shift, added)
     upper, lower = (
@@ -74,7 +74,7 @@ def test_reach_is_two_bone_ik(holden31: Skeleton, x: float, y: float, z: float) 
 
 
 def test_the_knee_stays_on_its_side(holden31: Skeleton) -> None:
-    """A heel moved by so little at a time moves the knee by little, all the way round under the hip."""
+    """When the heel moves in small steps under the hip, the knee moves in small steps too."""
     hip, knee, heel, _ = leg_joints(holden31)[0]
     knees = []
     for z in np.linspace(-70, 90, 321):
@@ -233,7 +233,7 @@ def test_the_character_stands_on_the_ground_it_is_given(steady, slope: float) ->
 
 
 def test_no_leg_turns_too_fast_for_any_foot_target(holden31: Skeleton) -> None:
-    """Under hips that leap about thigh and shank keep their lengths and turn by MOST_ADDED at most."""
+    """With hips that jump at random, thigh and shank keep their lengths and turn by at most MOST_ADDED."""
     rng = np.random.default_rng(3)
     feet = Feet(holden31)
     hip, knee, heel, _ = leg_joints(holden31)[0]
@@ -257,7 +257,7 @@ def test_no_leg_turns_too_fast_for_any_foot_target(holden31: Skeleton) -> None:
 
 
 def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
-    """Up out of the ground and down to it, by the foot in contact; the hips stay within their range."""
+    """The foot in contact decides how far the body is raised or lowered; the hips stay within their range."""
     base, _ = crouched(holden31)
     legs, hips, sole = leg_joints(holden31), holden31.role("hips"), np.array([5.0, 4.0])
     soles = [min(base[leg[2], 1] - sole[0], base[leg[3], 1] - sole[1]) for leg in legs]

@@ -1,4 +1,4 @@
-"""Limits: the wished speed stops at the limit, and a body that cannot jog walks."""
+"""Speed limits: a target speed above the limit is lowered to it, and a body that cannot jog walks."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def limited(make_network) -> Network:
 def asked(
     network: Network, velocity, hurt, gait=None, frames: int = 90, **options
 ) -> tuple[float, np.ndarray]:
-    """The speed that the network is asked for in the end, and the shares of gaits."""
+    """The target speed after some seconds, and the gait shares."""
     animation = ProceduralAnimation(network, **{"steering": 0.0, **options})
     for _ in range(frames):
         animation.next_pose(velocity, gait=gait, injury=hurt)
@@ -67,7 +67,7 @@ def test_a_body_that_cannot_jog_walks_faster(limited: Network) -> None:
 
 
 def test_steering_makes_up_to_the_limit_and_not_beyond(limited: Network) -> None:
-    """The network glides at 1.5 whatever it is asked for: that is above the limit of 1."""
+    """The network glides at 1.5 for any input, which is above the limit of 1."""
     speed, _ = asked(limited, (0, 2.5), {KNEE: 10}, steering=2.0)
     assert speed < 1.0
     speed, _ = asked(limited, (0, 2.5), {}, steering=2.0)

@@ -126,7 +126,8 @@ def test_movement_against_the_wish_is_reduced(wish, moved) -> None:
         ((0.0, 2.1), (0.0, 2.1)),  # reached with less than the whole share
         ((0.0, 9.0), (0.0, 2.2)),  # faster
         ((0.0, 0.0), (0.0, 1.8)),  # to stop
-        ((5.0, 2.0), (0.2, 2.0)),  # to the left
+        ((5.0, 0.0), (0.2, 1.8)),  # to the left
+        ((3.0, 4.0), (0.12 + 0.16, 2.0 + 0.16 - 0.12)),  # faster, and more to the left
     ],
 )
 def test_movement_is_drawn_toward_the_wish_by_a_share_of_itself(wish, moved) -> None:

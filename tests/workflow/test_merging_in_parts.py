@@ -1,4 +1,4 @@
-"""A data set that says so is merged by several jobs, which leave nothing but the same database."""
+"""With `database.parts`, several jobs merge a data set; the result is the same database and nothing else."""
 
 from __future__ import annotations
 

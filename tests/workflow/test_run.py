@@ -23,7 +23,7 @@ MEASURED = {"milliseconds", "seconds", "machine"}
 
 
 def without_times(value: Any) -> Any:
-    """JSON without measured times."""
+    """The JSON of a file, without measured times."""
     if isinstance(value, dict):
         return {k: without_times(v) for k, v in value.items() if k not in MEASURED}
     return [without_times(v) for v in value] if isinstance(value, list) else value

@@ -20,6 +20,8 @@ def make(piece, log):
     )
     for sentence in report["repairs"]:
         log.info("%s", sentence)
+    for sentence in report["unsure"]:
+        log.warning("%s: %s", piece.name, sentence)
     save_clip(piece.output["clip"], clip)
     write_json(piece.output["report"], report)
     if "mirror" in piece.output:

@@ -20,8 +20,8 @@ LEVELS = 5  # number of values (0 to the highest) with a speed; others are inter
 TOP = 95  # percentile of the speeds of healthy cycles in a gait: the limit of a healthy body
 # Percentile of the same speeds that counts as usual. The median is too low, because clips start and stop.
 USUAL = 65
-# A body with this share of the usual speed, or less, cannot hurry. With all of it, it can go as fast as a
-# healthy one.
+# A body that keeps at most this share of the usual speed cannot hurry. One that keeps all of it can go as
+# fast as a healthy one.
 CANNOT_HURRY = 0.85
 AHEAD = 0.9  # a cycle counts if at least this share of its speed is forward
 STEADY = 0.35  # of the highest value: a cycle in which a value changes by more is left out

@@ -68,7 +68,7 @@ def converted(name: str, file: Path, options: argparse.Namespace) -> tuple[Clip,
     if options.skeleton:
         target = batch.skeleton_file(options.skeleton)
         clip, report = make_clip(file, target, folder, clip=name, skeleton_name=target.stem, options=keys)
-        return resample(clip, options.fps), report["repairs"] + report["notes"]
+        return resample(clip, options.fps), report["repairs"] + report["unsure"] + report["notes"]
     source = load_source(read_bvh(file), batch.skeleton(ROLES_FROM), folder, keys)
     clip = resample(source.clip, options.fps)
     if options.loops > 1:

@@ -50,7 +50,7 @@ def write_database(
     """
     path = Path(path)
     path.mkdir(parents=True, exist_ok=True)
-    _sweep(path, keep=None)
+    _remove_others(path, keep=None)
     work = path / f"part-{os.getpid()}"
     try:
         work.mkdir()
@@ -97,7 +97,7 @@ def publish(
     """Turn the folder `work`, which holds all chunks, into the database in the folder `path`."""
     save_npz(work / STATISTICS, **{f.name: getattr(statistics, f.name) for f in fields(statistics)})
     manifest = Manifest(
-        folder=_name(work, chunks),
+        folder=_folder_name(work, chunks),
         layout=plan.layout,
         skeleton=plan.skeleton,
         visits=plan.visits,
@@ -109,11 +109,11 @@ def publish(
         bytes=sum(chunk.bytes for split in SPLITS for chunk in chunks[split]),
         limits={name: found.to_dict() for name, pace in paces.items() if (found := pace.learn())},
     )
-    _publish(path, work, manifest)
+    _put_in_place(path, work, manifest)
     return manifest
 
 
-def _sweep(path: Path, keep: str | None) -> None:
+def _remove_others(path: Path, keep: str | None) -> None:
     """Remove leftovers of killed builds and, with `keep`, all builds but that one."""
     for entry in path.iterdir():
         if entry.is_dir() and (entry.name.startswith("part-") or (keep is not None and entry.name != keep)):
@@ -122,14 +122,14 @@ def _sweep(path: Path, keep: str | None) -> None:
         entry.unlink()
 
 
-def _name(work: Path, chunks: Mapping[str, list[Chunk]]) -> str:
+def _folder_name(work: Path, chunks: Mapping[str, list[Chunk]]) -> str:
     """A name for the build from a hash of its content."""
     digest = hashlib.sha256((work / STATISTICS).read_bytes())
     digest.update(repr(chunks).encode())
     return f"rows-{digest.hexdigest()[:12]}"
 
 
-def _publish(path: Path, work: Path, manifest: Manifest) -> None:
+def _put_in_place(path: Path, work: Path, manifest: Manifest) -> None:
     """Rename the finished build, write the manifest, then remove the previous build."""
     final = path / manifest.folder
     if final.exists():  # the same rows were built before: replace every file, since some may be damaged
@@ -141,4 +141,4 @@ def _publish(path: Path, work: Path, manifest: Manifest) -> None:
     else:
         os.rename(work, final)
     manifest.save(path)
-    _sweep(path, keep=manifest.folder)
+    _remove_others(path, keep=manifest.folder)

@@ -19,7 +19,7 @@ import numpy as np
 class Stretch:
     """Samples `start` to `stop` of a section; each batch gets `share` of them.
 
-    low, high: which of each `share` samples this process reads; the others are for other processes.
+    low, high: this process reads samples low to high - 1 of each `share` samples; others read the rest.
     """
 
     start: int

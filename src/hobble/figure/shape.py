@@ -18,7 +18,7 @@ TOE_HEIGHT = 2.5  # cm, height of the ball of the foot above the sole
 # Heights (cm) of hip joints, chest, neck and head in the table of the trunk. They are scaled to the skeleton.
 LEVELS = (-8.0, 23.0, 38.0, 48.0)
 
-# height, half width, half depth, to the front, squareness
+# height; half width; half depth; centre, to the front; exponent of the superellipse
 TRUNK = (
     (-18.5, 3.5, 4.5, 0.2, 2.0),
     (-16.5, 7.0, 7.0, 0.0, 2.0),
@@ -38,7 +38,7 @@ TRUNK = (
     (49.0, 5.1, 5.4, -0.1, 2.0),
     (54.0, 4.2, 4.6, 0.4, 2.0),
 )
-# along thigh (0 to 1) and shank (1 to 2), half width, half depth, to the front
+# position along thigh (0 to 1) and shank (1 to 2); half width; half depth; centre, to the front
 LEG = (
     (-0.2, 2.5, 3.5, -0.4),
     (-0.12, 6.0, 7.6, -0.3),
@@ -56,7 +56,7 @@ LEG = (
     (1.97, 3.2, 3.7, -0.2),
     (2.04, 3.0, 3.4, -0.2),
 )
-# along upper arm (0 to 1) and forearm (1 to 2), half width to the front, half depth
+# position along upper arm (0 to 1) and forearm (1 to 2); half width, from front to back; half depth
 ARM = (
     (-0.16, 3.6, 3.2),
     (-0.08, 5.1, 4.7),
@@ -72,7 +72,7 @@ ARM = (
     (1.93, 2.7, 1.95),
     (2.03, 2.7, 1.9),
 )
-# cm from the wrist, half width, half thickness, towards the thumb
+# cm from the wrist; half width; half thickness; centre, towards the thumb
 PALM = (
     (-1.5, 2.4, 1.7, 0.0),
     (0.5, 2.8, 1.75, 0.1),
@@ -81,10 +81,11 @@ PALM = (
     (9.2, 3.9, 1.3, 0.0),
     (10.2, 3.3, 1.0, 0.0),
 )
-# across the palm, where it begins, length, half width
+# each finger: place across the palm; cm from the wrist where it begins; length; half width
 FINGERS = ((3.1, 8.7, 7.0, 0.84), (1.0, 9.2, 7.8, 0.86), (-1.1, 8.9, 7.2, 0.83), (-3.05, 8.1, 5.6, 0.74))
 CURL = (0.16, 0.30, 0.26)  # radians, bend of each finger joint
-# place along the foot (share of ankle to ball, and cm), half width, height, towards the other foot
+# place along the foot (share of the way from ankle to ball, plus cm); half width; height; centre, towards the
+# other foot
 FOOT = (
     (0.0, -6.0, 2.4, 4.6, 0.0),
     (0.0, -5.0, 3.2, 6.8, 0.0),
@@ -101,7 +102,7 @@ FOOT = (
 
 
 def person(bind: Bind) -> Iterator[Solid]:
-    """The solids of a person. Each is blended with the ones before it, or cut from them."""
+    """The solids of a person, in the order in which they are added to the body or cut from it."""
     at = bind.at
     legs = [np.linalg.norm(at[f"{s}_heel"] - at[f"{s}_knee"]) for s in SIDES]
     legs += [np.linalg.norm(at[f"{s}_knee"] - at[f"{s}_hip"]) for s in SIDES]
@@ -117,7 +118,7 @@ def person(bind: Bind) -> Iterator[Solid]:
 
 
 def scale(bind: Bind) -> float:
-    """Size of the body relative to that of the tables."""
+    """Leg length of the body, divided by LEG_LENGTH."""
     legs = [np.linalg.norm(bind.at[f"{s}_{a}"] - bind.at[f"{s}_{b}"]) for s in SIDES for a, b in
             (("heel", "knee"), ("knee", "hip"))]  # fmt: skip
     return float(max(sum(legs) / 2 / LEG_LENGTH, 0.05))
@@ -185,7 +186,10 @@ def _unit(v: Array) -> Array:
 def _limb(
     places: tuple[Array, Array, Array], forward: Array, table: tuple, size: float, roles: tuple[str, str]
 ) -> Sweep:
-    """A sweep along two bones that lie in a line; table: share of the way, half widths, to the front."""
+    """A sweep along two bones in a line.
+
+    table: rows of position, half width, half depth, centre to the front.
+    """
     a, b, c = places
     axis = _unit(c - a)
     first, second = float((b - a) @ axis), float((c - b) @ axis)
@@ -213,7 +217,7 @@ def _with_blend(sweep: Sweep, blend: float) -> Sweep:
 
 def _arm(at: dict[str, Array], side: str, sign: float, size: float) -> Iterator[Solid]:
     shoulder, elbow, wrist = (at[f"{side}_{role}"] for role in ("shoulder", "elbow", "wrist"))
-    # Its third direction is turned to the back of the hand, so that `wide` is measured to the front.
+    # The third direction points to the back of the hand, so that the half width is from front to back.
     out = np.array([sign, 0.6, 0.0])
     table = [(t, wide, deep, 0.0) for t, wide, deep in ARM]
     arm = _limb((shoulder, elbow, wrist), out, tuple(table), size, (f"{side}_shoulder", f"{side}_elbow"))

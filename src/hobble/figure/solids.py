@@ -1,4 +1,4 @@
-"""The solids of a body as signed distances to their surface, in cm; negative inside."""
+"""The solids that a body is built from, as signed distances to their surface in cm, negative inside."""
 
 from __future__ import annotations
 
@@ -17,8 +17,11 @@ Owner = tuple[float, str]
 
 @dataclass(frozen=True)
 class Solid:
-    """blend: cm within which it melts into what was there before; cut: it is taken away instead.
-    owners: which bone moves it, along its length. fine: it is modelled, and moved, in small steps."""
+    """A part of a body. Solids are added one after another; each is blended with the body so far.
+
+    blend: width of the blend, cm. owners: the bones that move it, in order along its length. cut: remove it
+    from the body instead of adding it.
+    """
 
     blend: float
     owners: tuple[Owner, ...]
@@ -41,9 +44,9 @@ class Solid:
 class Sweep(Solid):
     """Sections across a straight line from `start` along the unit vector `axis`.
 
-    sections: rows of (place along the line, half width along `across`, half depth along the third direction,
-    centre along `across`, centre along the third, squareness: 2 is an ellipse). Cubic
-    splines run through them, so that no section is seen as an edge.
+    sections: rows of (position along the line, half width along `across`, half depth along the third
+    direction, centre along `across`, centre along the third direction, exponent of the superellipse: 2 is an
+    ellipse). Cubic splines connect the sections, so that none is visible as an edge.
     """
 
     start: Array
@@ -158,6 +161,6 @@ def united(a: Array, b: Array, blend: float) -> Array:
     return np.minimum(a, b) - 0.25 * blend * near * near
 
 
-def taken_away(a: Array, b: Array, blend: float) -> Array:
-    """Smooth difference: the part of `a` outside `b`."""
+def subtracted(a: Array, b: Array, blend: float) -> Array:
+    """Smooth difference of two distances: the part of `a` outside `b`, blended over `blend` cm."""
     return -united(-a, b, blend)

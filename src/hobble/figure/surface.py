@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hobble.core.quat import Array
-from hobble.figure.solids import Solid, taken_away, united
+from hobble.figure.solids import Solid, subtracted, united
 
 FAR = 12.0  # cm; larger distances to the surface are clipped to this
 NEAR = 7.0  # cm; a solid has no effect farther away; larger than all blends
@@ -31,13 +31,13 @@ def distances(solids: Sequence[Solid], points: Array) -> Array:
         chosen = np.flatnonzero(near)
         if len(chosen):
             found = solid.distance(x[chosen], y[chosen], z[chosen])
-            act = taken_away if solid.cut else united
-            out[chosen] = act(out[chosen], found, solid.blend)
+            combine = subtracted if solid.cut else united
+            out[chosen] = combine(out[chosen], found, solid.blend)
     return out
 
 
-def ticks(low: float, high: float, step: float, bands: Sequence[tuple[float, float, float]]) -> Array:
-    """Coordinates from low to high with spacing `step`, gradually finer within bands (from, to, step)."""
+def grid_lines(low: float, high: float, step: float, bands: Sequence[tuple[float, float, float]]) -> Array:
+    """Grid coordinates from low to high with spacing `step`, finer near bands (from, to, step)."""
     places, at = [low], low
     while at < high:
         here = min([step, *(_gentle(at, band) for band in bands)])
@@ -53,7 +53,7 @@ def _gentle(at: float, band: tuple[float, float, float]) -> float:
 
 
 def field(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
-    """Distances on the grid of three axes."""
+    """Distances (X, Y, Z) to the blended solids on the grid of three axes, cm; FAR away from all solids."""
     out = np.full([len(axis) for axis in axes], FAR, np.float64)
     for solid in solids:
         low, high = solid.bounds()
@@ -68,31 +68,31 @@ def field(solids: Sequence[Solid], axes: Sequence[Array]) -> Array:
         grid = np.meshgrid(
             *(axis[part] for axis, part in zip(axes, parts, strict=True)), indexing="ij", sparse=True
         )
-        act = taken_away if solid.cut else united
-        out[parts] = act(out[parts], solid.distance(*grid), solid.blend)
+        combine = subtracted if solid.cut else united
+        out[parts] = combine(out[parts], solid.distance(*grid), solid.blend)
     return out
 
 
 def surface(
     solids: Sequence[Solid], step: float, fine: Sequence[Fine] = ()
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Corners (V, 3) and triangles (T, 3), counter-clockwise seen from outside, of a closed surface.
+    """Corners (V, 3), cm, and triangles (T, 3), counter-clockwise seen from outside, of the closed surface.
 
     step: cm between grid points, finer within the boxes `fine`.
     """
     kept = [solid for solid in solids if not solid.cut]
     low = np.min([solid.bounds()[0] for solid in kept], axis=0) - 3 * step
     high = np.max([solid.bounds()[1] for solid in kept], axis=0) + 3 * step
-    axes = [ticks(low[i], high[i], step, [(a[i], b[i], s) for a, b, s in fine]) for i in range(3)]
-    values = settled(field(solids, axes))
-    corners, faces = nets(values, axes)
+    axes = [grid_lines(low[i], high[i], step, [(a[i], b[i], s) for a, b, s in fine]) for i in range(3)]
+    values = without_touching_sheets(field(solids, axes))
+    corners, faces = surface_net(values, axes)
     for _ in range(2):
-        corners = corners - onto(solids, corners, 0.35 * step)
+        corners = corners - offsets(solids, corners, 0.35 * step)
     return corners, faces
 
 
-def onto(solids: Sequence[Solid], points: Array, most: float) -> Array:
-    """How far points (N, 3) lie from the surface along its slope, (N, 3), `most` cm at the most."""
+def offsets(solids: Sequence[Solid], points: Array, most: float) -> Array:
+    """(N, 3) vectors from the surface to points (N, 3), along the slope, at most `most` cm long."""
     slope, away = slopes(solids, points)
     steep = (slope * slope).sum(axis=1)
     move = (away / np.maximum(steep, 0.25))[:, None] * slope
@@ -101,8 +101,10 @@ def onto(solids: Sequence[Solid], points: Array, most: float) -> Array:
 
 
 def slopes(solids: Sequence[Solid], points: Array, h: float = 0.06) -> tuple[Array, Array]:
-    """Slope (N, 3) of the distance at points (N, 3), and the distance (N,), from the corners of a small
-    tetrahedron around each."""
+    """Slope (N, 3) of the distance at points (N, 3), and the distance (N,).
+
+    Both are estimated from the corners of a tetrahedron of `h` cm around each point.
+    """
     slope, away = np.zeros_like(points), np.zeros(len(points))
     for corner in np.array([[1.0, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]]):
         found = distances(solids, points + h * corner)
@@ -111,10 +113,11 @@ def slopes(solids: Sequence[Solid], points: Array, h: float = 0.06) -> tuple[Arr
     return slope, away
 
 
-def settled(values: Array) -> Array:
-    """The same distances without squares of the grid whose inner corners lie across from each other.
+def without_touching_sheets(values: Array) -> Array:
+    """The distances, changed so that two sheets of the surface never touch along an edge.
 
-    At these two sheets of the surface would touch along an edge; the gap between them is closed.
+    They touch at a square of the grid of which two opposite corners are inside and the other two outside.
+    There the outer corner nearest to the surface is moved inside, which closes the gap.
     """
     values = values.copy()
     while True:
@@ -137,9 +140,12 @@ def settled(values: Array) -> Array:
             return values
 
 
-def nets(values: Array, axes: Sequence[Array]) -> tuple[Array, NDArray[np.int64]]:
-    """A corner in every cell that the surface crosses, and a square around every edge of the grid that it
-    does."""
+def surface_net(values: Array, axes: Sequence[Array]) -> tuple[Array, NDArray[np.int64]]:
+    """Corners (V, 3) and triangles (T, 3) of the surface where the grid's `values` are 0.
+
+    Each cell that the surface crosses has one corner. Each edge of the grid that it crosses is surrounded by
+    four such cells; their corners make two triangles.
+    """
     inside = values < 0
     shape = np.array(values.shape) - 1
     count = np.zeros(shape, np.int8)

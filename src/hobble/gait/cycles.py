@@ -78,8 +78,9 @@ class Walk:
 def measure(skeleton: Skeleton, positions: Array, fps: float = 60.0) -> Walk:
     """Find and measure the cycles in which a figure walks straight ahead.
 
-    positions: (F, J, 3) world, cm, Y up. Standing, turning, walking backward or sideways, and steps without
-    exactly one step of the other foot between them give no cycle. A clip shorter than a cycle has none.
+    positions: (F, J, 3) world, cm, Y up. Frames of standing, turning, and walking backward or
+    sideways give no cycle. Between the two landings of a cycle the other foot must land exactly once. A clip
+    shorter than a cycle has none.
     """
     if len(positions) < SHORTEST * fps:
         return Walk(fps, (), ())

@@ -1,11 +1,9 @@
-"""Recognises what hurts, the side, and the strength relative to people's strong limps.
+"""Recognises limps, also mild ones: what hurts, the side, and the strength relative to people's strong limps.
 
-It knows mild limps, too.
-
-An impairment is a direction in which people's walks differ from their normal walks. A walk of strength s is
-at s times the mean over people. Its spread is s times the spread over people plus the spread of healthy
-walks; a healthy walk has only the latter. So walks of medium strength are people's own walks, part of the
-way, and not the output of a generator of limps. Impairments that the data cannot distinguish share a label:
+An impairment is a direction in which people's walks differ from their normal walks. At strength s the mean of
+the features is s times the mean over people. Their spread is s times the spread over people, plus the spread
+of healthy walks. So mild limps are modelled as part of the way from people's normal to their impaired walks,
+without a generator of limps. Impairments that the data cannot distinguish share a label:
 see PARTS.
 """
 

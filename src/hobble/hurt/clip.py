@@ -70,7 +70,7 @@ def hurt_clip(
         same = Clip(name, clip.skeleton, clip.fps, clip.rotations, clip.root, clip.translations)
         return HurtClip(same, severity, labels, np.arange(len(clip), dtype=float))
     if clip.translations is not None:
-        raise HobbleError(f"clip {clip.name} has joints that move in their parents, so it cannot be hurt")
+        raise HobbleError(f"clip {clip.name} has bones that change their length, so it cannot be hurt")
     source = read_source(clip, labels)
     changes = effects(clip.skeleton, severity, clip.fps)
     timing = retime(source, changes)

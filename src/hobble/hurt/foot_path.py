@@ -23,7 +23,7 @@ LEVEL = np.radians(8.0)
 SHORT = 12.0  # cm: progress of a shorter swing is measured by time, not by distance
 CLEARANCE = 1.3  # cm: height of a swinging toe joint above its stance, unless it is lower in the source
 EVEN = 4.0  # cm: with this height between two stances the swing is not lowered
-JOGGING = 0.65  # a jog's steps change less by this share
+JOGGING = 0.65  # in a jog, the change of a step is smaller by this share
 ENDS = 0.22  # share of the swing over which its lower height is blended in and out
 
 
@@ -136,7 +136,10 @@ def _way(ankle: Array) -> Array:
 
 
 def _moved(place: Array, when: float, source: Source, effects: Effects, path: Path, side: int) -> Array:
-    """A footprint in the new world: it moves with the body, the hurt one less far ahead, both wider apart."""
+    """A footprint in the new world.
+
+    It moves with the body; the hurt foot lands less far ahead, both wider apart.
+    """
     frames = np.arange(len(source))
     at = min(round(when), len(source) - 1)
     speed = np.gradient(source.path, axis=0)[at] if len(source) > 1 else np.zeros(2)

@@ -12,7 +12,7 @@ from hobble.hurt.effects import Effects
 from hobble.hurt.parts import LEFT, RIGHT
 from hobble.hurt.source import Source
 
-SQUEEZE = 0.57  # the time between two events of a leg shrinks at most to this share
+LEAST_SHARE = 0.57  # the time between two events of a leg shrinks at most to this share
 JOG_STRIDE = 0.15  # a jog takes on only this share of a longer stride time, because flight cannot last longer
 JOG_SHIFT = 0.6  # a jog, whose stances are short, takes on only this share of the shifts of landings
 MOST_SHIFT = 0.3  # cycles
@@ -22,8 +22,8 @@ MOST_SHIFT = 0.3  # cycles
 class Timing:
     """Source frames, with fractions, that show in each of N new frames.
 
-    body: (N,). legs: (N, 2) left and right. begins: (F,) new frame of each source frame if only the cadence
-    changed. slower: (F,) factor of the stride time.
+    body: (N,). legs: (N, 2) left and right. begins: (F,) the new frame in which each source frame would show
+    if only the cadence changed. slower: (F,) factor of the stride time.
     """
 
     body: Array = field(repr=False)
@@ -57,15 +57,15 @@ def retime(source: Source, effects: Effects) -> Timing:
             events += [(stance.land, land), (stance.off, off)]
         own = [(at, float(np.interp(at, np.arange(len(source)), shift))) for at, shift in events[1:-1]]
         landings += own[1::2]
-        legs.append(_looking_back(own, begins, new))
-    return Timing(_looking_back(sorted(landings), begins, new), np.stack(legs, axis=1), begins, stride)
+        legs.append(_source_frames(own, begins, new))
+    return Timing(_source_frames(sorted(landings), begins, new), np.stack(legs, axis=1), begins, stride)
 
 
 def _limited(shift: Array) -> Array:
     return MOST_SHIFT * np.tanh(shift / MOST_SHIFT)
 
 
-def _looking_back(events: list[tuple[float, float]], begins: Array, new: Array) -> Array:
+def _source_frames(events: list[tuple[float, float]], begins: Array, new: Array) -> Array:
     """(N,) source frames shown in the frames `new`. events: (source frame, delay in new frames)."""
     last = len(begins) - 1
     at, goal = [0.0], [0.0]
@@ -75,7 +75,7 @@ def _looking_back(events: list[tuple[float, float]], begins: Array, new: Array) 
             goal.append(float(np.interp(when, np.arange(last + 1), begins)) + later)
     at.append(float(last))
     goal.append(float(begins[-1]))
-    least = SQUEEZE * np.diff(np.interp(at, np.arange(last + 1), begins))
+    least = LEAST_SHARE * np.diff(np.interp(at, np.arange(last + 1), begins))
     for i, gap in enumerate(least[:-1]):
         goal[i + 1] = max(goal[i + 1], goal[i] + gap)
     for i in range(len(at) - 2, 0, -1):

@@ -1,8 +1,8 @@
 """Finds where each foot lands, from the motion alone: a foot that swings and then rests.
 
-A foot is down while its heel or its toe rests. The limit of rest is relative to the two unit speeds of the
-facts page and to the foot's own swings. So it fits a slow shuffle, a jog whose feet never quite rest, and a
-dragged leg.
+A foot is down while its heel or its toe rests, that is while it is slower than a limit. The limit is relative
+to unit speeds of heel and toe (options) and to the foot's own swings. So it fits a slow shuffle, a jog whose
+feet never quite rest, and a dragged leg.
 """
 
 from __future__ import annotations
@@ -21,17 +21,16 @@ from hobble.labels.options import Labels
 RIGHT, LEFT = 0, 1
 END_OF_BOUT = (np.nan, -1)
 
-# Shares of the unit speeds and of the adjacent swings, cm, and frames at 60 Hz. They were set on the
-# hand-made labels of the original release and on generated walks with exact landings.
-SLOWEST_REST = 0.35
-REST_OF_SWING = 0.12
-DIP_OF_SWING = 0.35
-LEAST_PATH = 6.0
-SAME_SWING = 12
-LESSER_SWING = 0.4
-LONGEST_REST = 60
-SETTLING = 8.0
-LAST_FRAMES = 2
+# Set on the hand-made labels of the original release and on generated walks with exact landings.
+SLOWEST_REST = 0.35  # of the unit speed: a foot slower than this always rests
+REST_OF_SWING = 0.12  # of the speed of the slower adjacent swing: a foot slower than this rests, too
+DIP_OF_SWING = 0.35  # of the lower of two peaks: a dip at most this fast separates two swings
+LEAST_PATH = 6.0  # cm: a shorter way of the toe is no swing
+SAME_SWING = 12  # frames: swings separated by a shorter rest are one
+LESSER_SWING = 0.4  # of the longer of two successive swings of a foot: a shorter one is no step of its own
+LONGEST_REST = 60  # frames: a longer rest ends a bout of walking
+SETTLING = 8.0  # cm, see `landings`
+LAST_FRAMES = 2  # a swing that ends in the last frames may not have landed
 
 
 @dataclass(frozen=True)
@@ -98,8 +97,8 @@ def landings(swings: list[Swing], frames: int, shortest_step: float) -> list[tup
     """Alternating landings (frame, foot). END_OF_BOUT separates bouts of walking.
 
     shortest_step: a landing at most so many frames (at 120 Hz) after one of the other foot is left out. The
-    frame is that of first contact. After slow swings it is later, because people mark the frame in which the
-    weight comes down: by the time in which the toe at top speed goes SETTLING cm.
+    frame is that of first contact, plus the time that the toe needs for SETTLING cm at its top speed. So
+    landings after slow swings are later, because people mark the frame in which the weight comes down.
     """
     out: list[tuple[float, int]] = []
     resting_since = -1
@@ -143,10 +142,7 @@ def swing_peaks(relative: Array) -> np.ndarray:
 
 
 def _local_highs(values: Array, least: float) -> np.ndarray:
-    """Frames where `values` (F,) are at least `least` and higher than on both sides.
-
-    Of plateaus the middle.
-    """
+    """Frames of local highs of at least `least` in `values` (F,); the middle of a plateau."""
     steps = np.diff(np.concatenate([[0.0], values, [0.0]]))
     moves = np.flatnonzero(steps)
     tops = np.flatnonzero((steps[moves[:-1]] > 0) & (steps[moves[1:]] < 0))

@@ -138,8 +138,8 @@ def _has_32_registers() -> bool:
     return not getattr(config, "CPU_NAME", None) and bool(llvm.get_host_cpu_features().get("avx512f"))
 
 
-# Panels in a tile of one row, of two or three rows, and of four to six rows. The sums about fill the
-# registers, and there are enough of them to hide the latency of an addition.
+# Panels in a tile of one row, of two or three rows, and of four to six rows. With these numbers the sums
+# nearly fill the registers, and there are enough of them to hide the latency of an addition.
 PANELS_FOR_1_ROW, PANELS_FOR_3_ROWS, PANELS_FOR_6_ROWS = (6, 4, 4) if _has_32_registers() else (4, 2, 1)
 ROWS = 6
 

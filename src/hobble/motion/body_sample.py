@@ -24,8 +24,10 @@ class BodySample:
     the joint's own axes. The joint's world rotation times its frame is the turn of the body part from that
     stance.
 
-    positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds: (S, J) cm a second. ends: position of
-    an ankle's end site, if it has one. spine: direction of the trunk's bones in that stance.
+    positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds: (S, J) cm a second. rest: (J, 3)
+    positions in the zero pose. ends: position of an ankle's end site, if it has one. spine: the shape of the
+    target's trunk in that stance. target_tilt: radians by which the bones from ankle to ball point down on
+    the target.
     """
 
     def __init__(
@@ -34,11 +36,13 @@ class BodySample:
         positions: Array,
         rotations: Array,
         speeds: Array,
+        rest: Array,
         ends: Mapping[str, tuple[float, float, float] | None],
         spine: Spine,
+        target_tilt: float,
     ) -> None:
         self.body, self.at, self.turned, self.speeds = body, positions, rotations, speeds
-        self.ends, self.spine = ends, spine
+        self.rest, self.ends, self.spine, self.target_tilt = rest, ends, spine, target_tilt
         self.hips_left = self.line(body.legs["right"][0], body.legs["left"][0])
         self.chest_left = self.line(body.arms["right"][1], body.arms["left"][1])
 
@@ -60,10 +64,10 @@ class BodySample:
         ways = (self.at[:, b] - self.at[:, a] for a, b in pairwise(joints))
         return sum(float(np.median(np.linalg.norm(way, axis=-1))) for way in ways)
 
-    def first_long(self, joint: int, following: Sequence[int]) -> Array:
-        """(3,) the bone to the first of the following joints that is at another place."""
-        bones = [self.bone(joint, end) for end in following]
-        return next((bone for bone in bones if np.linalg.norm(bone) > SHORT), bones[-1])
+    def first_long(self, joint: int, following: Sequence[int]) -> tuple[Array, int]:
+        """(3,) the bone to the first of the following joints that is at another place, and that joint."""
+        bones = [(self.bone(joint, end), end) for end in following]
+        return next((found for found in bones if np.linalg.norm(found[0]) > SHORT), bones[-1])
 
     def hinge(self, start: int, middle: int, end: int, otherwise: Array) -> Array:
         """(S, 3) axis of a limb's bend, for a knee to the body's left. `otherwise` if it hardly bends."""

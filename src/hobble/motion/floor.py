@@ -38,7 +38,7 @@ def on_floor(clip: Clip) -> tuple[Clip, list[str], list[str]]:
         heights = f"The feet stand {low:.0f} to {high:.0f} cm high, too uneven for flat ground"
         return clip, [], [f"{heights}: set `ground: rocky` for this clip in the data set."]
     moved = replace(clip, root=clip.root - [0.0, floor, 0.0])
-    return moved, [f"The floor lies at {floor:.0f} cm; the clip was moved so that it lies at 0."], []
+    return moved, [f"The floor lies at {floor:.1f} cm; the clip was moved so that it lies at 0."], []
 
 
 def _stands(clip: Clip, toes: Array) -> bool:

@@ -12,8 +12,12 @@ from hobble.core.quat import Array
 from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import flat_feet
 from hobble.motion.orient import frame, mean, unit
+from hobble.motion.spine import SHORT, spine_shares
 
 UP, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+# Standard deviation of the chest's lean if the head shows it and no neck does: seven subjects of CMU, whose
+# necks show it as well.
+LEAN_ERROR = np.radians(3.8)
 AGREE = np.radians(25.0)  # trunk joints that differ by less have the same rest pose
 
 
@@ -27,28 +31,53 @@ def from_motion(seen: BodySample) -> dict[int, Array]:
     return frames | flat_feet(seen)
 
 
+def bends(seen: BodySample) -> dict[int, Array]:
+    """Hips and chest -> how the bone above each is turned. Without those that have a joint for it."""
+    body, out = seen.body, {}
+    for joint, following in ((body.hips, body.trunk), (body.chest, (*body.neck, body.head))):
+        if following and seen.length(joint, following[0]) > SHORT:
+            bone, axis, left = _bone(seen, joint)
+            out[joint] = frame(bone, axis, left, LEFT)
+    return out
+
+
+def lean_doubt(seen: BodySample) -> str | None:
+    """A sentence on how far the chest leans, on a rig without a neck. None if that is known."""
+    body = seen.body
+    if body.neck:
+        return None
+    arm = float(np.mean([seen.length(body.chest, arm[1]) for arm in body.arms.values()]))
+    return (
+        "It has no joint for the neck, so how far the chest leans is uncertain: arms may lie "
+        f"{2 * LEAN_ERROR * arm:.0f} cm too far forward or back."
+    )
+
+
 def _trunk(seen: BodySample, frames: dict[int, Array]) -> None:
     body = seen.body
-    chain = (body.hips, *body.trunk)
-    ends = (*body.neck, body.head)
-    both = unit(seen.hips_left + seen.chest_left)
-    steps = [
-        float(np.median(np.linalg.norm(seen.at[:, b] - seen.at[:, a], axis=-1))) for a, b in pairwise(chain)
-    ]
-    way = np.concatenate([[0.0], np.cumsum(steps)])
-    for i, joint in enumerate(chain):
-        left = seen.hips_left if i == 0 else seen.chest_left if joint == body.chest else both
-        following = (*chain[i + 1 :], *ends)
-        bone = seen.first_long(joint, following)
-        axis, own = seen.spine.at(way[i] / max(way[-1], 1e-9)), seen.local(joint, left)
+    chain = (body.hips, *body.trunk, *body.neck)
+    for joint in chain:
+        bone, axis, left = _bone(seen, joint)
         # Hips and chest are level where limbs begin. Spines of captured rigs bend sideways by some degrees.
         carries = joint in (body.hips, body.chest)
-        frames[joint] = frame(own, LEFT, bone, axis) if carries else frame(bone, axis, own, LEFT)
-    for i, joint in enumerate(body.neck):
-        bone = seen.first_long(joint, ends[i + 1 :])
-        axis = seen.spine.neck if joint == body.neck[-1] else seen.spine.at(1.0)
-        frames[joint] = frame(bone, axis, seen.local(joint, seen.chest_left), LEFT)
-    frames[body.head] = _head(seen, frames, (*chain, *body.neck))
+        frames[joint] = frame(left, LEFT, bone, axis) if carries else frame(bone, axis, left, LEFT)
+    frames[body.head] = _head(seen, frames, chain)
+
+
+def _bone(seen: BodySample, joint: int) -> tuple[Array, Array, Array]:
+    """(3,) the bone above a joint of trunk or neck, its direction in a standing rest pose, and left."""
+    body = seen.body
+    trunk = (body.hips, *body.trunk)
+    chain = (*trunk, *body.neck, body.head)
+    lengths = np.array([seen.length(a, b) for a, b in pairwise(chain)])
+    share = dict(zip(chain, spine_shares(lengths, len(body.trunk)), strict=True))
+    bone, end = seen.first_long(joint, chain[chain.index(joint) + 1 :])
+    left = seen.chest_left
+    if joint == body.hips:
+        left = seen.hips_left
+    elif joint in trunk and joint != body.chest:
+        left = unit(seen.hips_left + seen.chest_left)
+    return bone, seen.spine.direction(share[joint], share[end]), seen.local(joint, left)
 
 
 def _head(seen: BodySample, frames: dict[int, Array], chain: Sequence[int]) -> Array:

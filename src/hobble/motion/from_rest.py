@@ -20,12 +20,12 @@ SHRUG = 12.0  # degrees: mean angle to the chest up to which the zero pose count
 LIMP = 60.0  # degrees: the same for hands and their forearms
 
 
-def from_rest(seen: BodySample, rest: Array) -> dict[int, Array]:
-    """Frames of all joints from a standing rest pose (J, 3).
+def from_rest(seen: BodySample) -> dict[int, Array]:
+    """Frames of all joints from the zero pose, if a person could stand so.
 
     Limbs are turned by the direction that they have in it.
     """
-    body = seen.body
+    body, rest = seen.body, seen.rest
     across = [rest[side["left"][k]] - rest[side["right"][k]] for side, k in ((body.legs, 0), (body.arms, 1))]
     left = unit(unit(across[0]) + unit(across[1]))
     middle = [

@@ -7,8 +7,9 @@ rate that would not.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ RATES = (24, 25, 30, 60, 120, 240)  # usual frame rates of files
 STILL = 3.0  # cm a second: slower hips stand
 STANDING = 0.5  # seconds: a shorter rest does not count as standing
 STRIDE = 0.25  # leg lengths: least distance of the ankles in a step
+MANY = 5  # clips with the same warning: it is told once
 ENOUGH = {"mirrors of each other": "hold both out or neither"}
 
 
@@ -73,7 +75,16 @@ def look(folder: Path, skeleton: Path, maps: Path, options: ClipMotion | None = 
         raise InputError(folder, "no .bvh files here")
     clips = tuple(_one(file, skeleton, maps, options or ClipMotion()) for file in files)
     orphans = () if folder.is_file() else tuple(unused_file_notes(folder, [file.stem for file in files]))
-    return Folder(clips, (*same_notes(clips), *standing_notes(clips), *orphans))
+    short, common = shared_warnings(clips)
+    return Folder(tuple(short), (*common, *same_notes(clips), *standing_notes(clips), *orphans))
+
+
+def shared_warnings(clips: Sequence[Look]) -> tuple[list[Look], list[str]]:
+    """Moves a warning that at least MANY clips have from their lines to one sentence on the folder."""
+    count = Counter(warning for clip in clips for warning in clip.warnings)
+    common = {warning: times for warning, times in count.items() if times >= MANY}
+    short = [replace(clip, warnings=tuple(w for w in clip.warnings if w not in common)) for clip in clips]
+    return short, [f"{times} of {len(clips)} clips: {warning}" for warning, times in common.items()]
 
 
 def _one(file: Path, skeleton: Path, maps: Path, options: ClipMotion) -> Look:

@@ -11,7 +11,7 @@ import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.motion.look import Look, same_notes, seen, standing_notes
+from hobble.motion.look import Look, same_notes, seen, shared_warnings, standing_notes
 from hobble.motion.root import facing
 
 FRAMES, SECONDS = 40, 4.0  # of the picture, from the middle of the clip
@@ -85,9 +85,9 @@ def look_page(
 
     reports, labels: `motion/<clip>.json` and `labels/<clip>.json` of each clip. down: see `foot_down`.
     """
-    looks = [seen(clip, report) for clip, report in zip(clips, reports, strict=True)]
+    looks, common = shared_warnings([seen(clip, report) for clip, report in zip(clips, reports, strict=True)])
     rows = [_row(*of) for of in zip(looks, reports, labels, down, strict=True)]
-    notes = [*same_notes(looks), *standing_notes(looks)]
+    notes = [*common, *same_notes(looks), *standing_notes(looks)]
     seconds = sum(look.seconds for look in looks)
     data = json.dumps([figure(clip) for clip in clips], separators=(",", ":"))
     title = html.escape(name)

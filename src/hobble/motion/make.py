@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,6 @@ from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import load_skeleton
 from hobble.motion.root import facing
 from hobble.motion.source import FOUND, Source, load_source
-from hobble.motion.spine import Spine
 from hobble.motion.stance import upright
 
 SAME = 1e-3  # cm: offsets that differ less from the skeleton's are equal
@@ -70,6 +69,7 @@ def make_clip(
         "cycle_frames": len(made) // loops,
         "scale": fitted.scale,
         "retarget": fitted.figures,
+        "unsure": fitted.unsure,
     }
     return made, _report(file, source, made) | extra | {"repairs": said, "notes": source.notes}
 
@@ -129,12 +129,14 @@ class Fitted:
     """A clip on the joints of the target, the scale of its path, and notes.
 
     figures: difference from its source (`hobble.motion.check.compare`), or None if it was not retargeted.
+    unsure: sentences on what is uncertain.
     """
 
     clip: Clip
     scale: float
     repairs: list[str]
     figures: dict[str, Any] | None = None
+    unsure: list[str] = field(default_factory=list)
 
 
 def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str) -> Fitted:
@@ -149,11 +151,11 @@ def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str)
         if same or proportions == "clip":
             own = replace(own, skeleton=target) if same else own
             return Fitted(own, 1.0, [KEPT] if source.moving else [])
-    sources = match.sources
+    sources, unsure = match.sources, source.unsure
     if not source.straightened:
         wanted = {clip.skeleton.index(name) for name in sources.values()}
-        spine = Spine.of(target, body_by_roles(target))
-        clip = upright(clip, body_by_roles(clip.skeleton), spine, wanted).clip
+        standing = upright(clip, body_by_roles(clip.skeleton), target, wanted)
+        clip, unsure = standing.clip, standing.notes
         sources = {mine: theirs for mine, theirs in sources.items() if theirs in clip.skeleton.joints}
     how = plan(clip.skeleton, target, sources)
     repairs = [DROPPED] if source.moving else []
@@ -161,7 +163,7 @@ def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str)
         rig = "another" if match.rig == FOUND else match.rig
         repairs.append(f"Its rig is {rig}, so it got the bone lengths of {target.name}.")
     made = retarget_clip(clip, how)
-    return Fitted(made, round(how.scale, 6), repairs, compare(clip, made, how.scale))
+    return Fitted(made, round(how.scale, 6), repairs, compare(clip, made, how.scale), unsure)
 
 
 def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
@@ -190,6 +192,5 @@ def _report(file: Bvh, source: Source, made: Clip) -> dict[str, Any]:
         "rest_facing": source.axes.facing,
         "rig": source.match.rig,
         "stance": source.stance,
-        "unsure": source.unsure,
         "roles": dict(source.match.roles),
     }

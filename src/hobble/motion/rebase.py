@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -16,11 +15,15 @@ from hobble.motion.body_sample import LEFT
 from hobble.motion.tree import above
 
 MOVES = 0.1  # cm
-BALL = np.array([0.0, -0.045, 0.14])  # from the ankle, in leg lengths, for feet without toes
 
 
-def rebased(clip: Clip, body: Body, joints: list[int], frames: dict[int, Array]) -> tuple[Clip, Body]:
-    """The clip on these joints alone, relative to its new rest pose, and the body with new indices."""
+def rebased(
+    clip: Clip, body: Body, joints: list[int], frames: dict[int, Array], roles: Mapping[str, str]
+) -> tuple[Clip, Body]:
+    """The clip on these joints alone, relative to its new rest pose, and the body with new indices.
+
+    frames: joint -> (4,) how it is turned in that pose. roles: role -> joint, of the new skeleton.
+    """
     skeleton = clip.skeleton
     joints = [
         body.hips,
@@ -42,7 +45,7 @@ def rebased(clip: Clip, body: Body, joints: list[int], frames: dict[int, Array])
     moving = np.abs(arms - offsets).max() > MOVES
     moved = body.renumbered(new)
     names = tuple(skeleton.joints[j] for j in joints)
-    made = Skeleton(skeleton.name, names, tuple(parents), offsets, roles=moved.roles(names))
+    made = Skeleton(skeleton.name, names, tuple(parents), offsets, roles=roles)
     rotations = quat.continuous(local_rotations(made, turned))
     return Clip(clip.name, made, clip.fps, rotations, places[:, 0], arms if moving else None), moved
 
@@ -66,38 +69,3 @@ def _carrier(parents: Sequence[int], body: Body, joint: int, among: Collection[i
             if joint in parts[1:]:
                 return parts[parts.index(joint) - 1]
     return next((j for j in above(parents, joint)[1:] if j in among), body.hips)
-
-
-def with_balls(clip: Clip, body: Body, frames: dict[int, Array]) -> tuple[Clip, Body]:
-    """The clip with a ball on every foot, and frames with the balls.
-
-    Missing balls are put where people have them.
-    """
-    without = [side for side in SIDES if body.legs[side][3] is None]
-    if not without:
-        return clip, body
-    skeleton = clip.skeleton
-    names, parents, offsets = list(skeleton.joints), list(skeleton.parents), list(skeleton.offsets)
-    legs = dict(body.legs)
-    p = clip.positions
-    for side in without:
-        hip, knee, heel, _ = body.legs[side]
-        thigh, shank = (
-            float(np.median(np.linalg.norm(p[:, b] - p[:, a], axis=-1)))
-            for a, b in ((hip, knee), (knee, heel))
-        )
-        frames[len(names)] = frames[heel]
-        legs[side] = (hip, knee, heel, len(names))
-        names.append(f"{names[heel]}_ball")
-        parents.append(heel)
-        offsets.append(quat.rotate(frames[heel], BALL * (thigh + shank)))
-    still = np.broadcast_to(quat.IDENTITY, (len(clip), len(without), 4))
-    moved = clip.translations
-    if moved is not None:
-        tail = np.broadcast_to(np.array(offsets[-len(without) :]), (len(clip), len(without), 3))
-        moved = np.concatenate([moved, tail], axis=1)
-    grown = replace(skeleton, joints=tuple(names), parents=tuple(parents), offsets=np.array(offsets))
-    made = replace(
-        clip, skeleton=grown, rotations=np.concatenate([clip.rotations, still], axis=1), translations=moved
-    )
-    return made, replace(body, legs=legs)

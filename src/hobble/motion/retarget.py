@@ -28,7 +28,9 @@ from hobble.motion.rig import leg_length, missing_bone
 # Bones of limbs: role of the joint -> role of the bone's other end.
 LIMB_BONES = {"shoulder": "elbow", "elbow": "wrist", "hip": "knee", "knee": "heel"}
 SIDES = ("left", "right")
-# Stretch of the source's leg from which on, and from which fully, the target's must not be straighter.
+# How far a leg is stretched, as a share of its length. While the source's leg is bent more than BENT, the
+# target's may be straighter than it. From NEARLY_STRAIGHT on it may not; in between the rule sets in
+# gradually.
 BENT, NEARLY_STRAIGHT = 0.88, 0.95
 SMOOTH = 0.08  # seconds on each side over which the hips come down
 MOST_DROP = 6.0  # cm
@@ -43,10 +45,10 @@ class Retarget:
     they follow. turns: (M, 4) world rotation of the target = world rotation of the source times this.
     leaders: (J,) for each target joint the nearest of `joints` above it, or itself if it is one of them.
     arms: (J, 3) position of a joint in its leader's frame; for one of `joints`, in the frame of its parent's
-    leader. levels: the `joints` below the hips in groups, such that the leaders of a group's parents are
-    placed before it. forward: (3,) where the target's rest pose faces. pelvis: (3,) from the target's hips to
-    the middle between its legs. scale: leg length of the target / leg length of the source. lift: cm that the
-    target's ankles are higher above the ground than the source's, scaled.
+    leader. levels: the `joints` below the hips, in groups in the order in which they are placed. forward:
+    (3,) where the target's rest pose faces. pelvis: (3,) from the target's hips to the middle between its
+    legs. scale: leg length of the target / leg length of the source. lift: cm that the target's ankles are
+    higher above the ground than the source's, scaled.
     """
 
     source: Skeleton = field(repr=False)

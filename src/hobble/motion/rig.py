@@ -44,13 +44,15 @@ class Match:
     """Which known skeleton a clip's rig is, and how it maps to the target.
 
     rig: name of the skeleton file. roles: role -> the clip's joint. same: the clip is on the target itself.
-    sources: the target's joint -> the clip's joint that it follows.
+    sources: the target's joint -> the clip's joint that it follows. alike: whether the clip's rest pose is
+    that of the file.
     """
 
     rig: str
     roles: Mapping[str, str]
     same: bool
     sources: Mapping[str, str]
+    alike: bool = True
 
 
 def load_skeleton(path: str | Path, name: str | None = None) -> Target:
@@ -116,22 +118,20 @@ def match_rig(rig: Skeleton, target: Target, folder: str | Path) -> Match | None
     """Find which known skeleton a clip's rig is, and how it maps to the target.
 
     rig: the clip's joints. folder: the folder of the skeleton files, for their maps. Returns None if no
-    skeleton file has the rig's names. If its rest pose differs from the file's, or no map leads to the
-    target, the match has roles but no sources.
+    skeleton file has the rig's names. If no map leads to the target, the match has roles but no sources.
     """
     if not _differences(rig, target.skeleton):
         roles = target.skeleton.roles
         alike = rest_alike(replace(rig, roles=roles), target.skeleton)
-        sources = {name: name for name in target.skeleton.joints} if alike else {}
-        return Match(target.skeleton.name, roles, alike, sources)
+        same = {name: name for name in target.skeleton.joints}
+        return Match(target.skeleton.name, roles, alike, same, alike)
     known = nearest(rig.joints, target, folder)
     if _share(rig, known.skeleton) < KNOWN or _unfit(rig, known.skeleton):
         return None
     roles = _roles(rig, known.skeleton)
     sources = {a: b for a, b in joint_pairs(known, target).items() if b in rig.joints}
-    if not rest_alike(replace(rig, roles=roles), known.skeleton):
-        sources = {}
-    return Match(known.skeleton.name, roles, False, sources)
+    alike = rest_alike(replace(rig, roles=roles), known.skeleton)
+    return Match(known.skeleton.name, roles, False, sources, alike)
 
 
 def rest_alike(rig: Skeleton, known: Skeleton) -> bool:

@@ -33,7 +33,6 @@ from hobble.motion.rig import (
     missing_bone,
     unit_of,
 )
-from hobble.motion.spine import Spine
 from hobble.motion.stance import upright
 from hobble.motion.standing import stands
 
@@ -74,7 +73,7 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion
     repairs = _frame_count(file, options.defects)
     hips = find_hips(clean_names(file.names), target, maps)
     known = match_rig(rig_of(below_hips(file, hips)), target, maps)
-    if known is not None and known.sources:
+    if known is not None and known.alike and known.sources:
         return _known(file, hips, known, repairs, options)
     return _unknown(file, target, known, repairs, options)
 
@@ -124,12 +123,14 @@ def _unknown(
     clip, axes, unsure = straighten(clip, options.up, options.handedness, standing)
     axes = axes if standing else replace(axes, facing="+Z")
     theirs = body_by_roles(target.skeleton)
-    standing_clip = upright(clip, body, Spine.of(target.skeleton, theirs))
+    # A rig with the target's own names follows it name by name, and any other rig part by part.
+    named = known.sources if known is not None and known.rig == target.skeleton.name else {}
+    standing_clip = upright(clip, body, target.skeleton, [rig.index(joint) for joint in named.values()])
     match = Match(
         known.rig if known else FOUND,
         standing_clip.clip.skeleton.roles,
         False,
-        pairs(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, theirs),
+        named or pairs(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, theirs),
     )
     notes = decoded.notes + unsure + ([] if known else _said(found, options.handedness))
     moving = _moving(decoded, body, unit)

@@ -1,9 +1,8 @@
-"""Directions of the bones of trunk and neck in a standing rest pose."""
+"""The shape of trunk and neck in a standing rest pose."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -19,33 +18,50 @@ SHORT = 2.0  # cm: a bone shorter than this has no direction
 
 @dataclass(frozen=True)
 class Spine:
-    """Directions of the bones of trunk and neck in a rest pose that stands facing +Z.
+    """The points where trunk and neck may bend, in a rest pose that stands facing +Z.
 
-    shares: (N,) where the bones begin between hips (0) and chest (1). axes: (N, 3). neck: (3,) to the head.
+    shares: (N,) position of each point along the body: hips 0, chest 1, head 2. points: (N, 3) cm.
     """
 
     shares: Array
-    axes: Array
-    neck: Array
+    points: Array
 
     @classmethod
     def of(cls, skeleton: Skeleton, body: Body) -> Spine:
         """The spine of a skeleton with a standing rest pose. Converted motion gets the same directions."""
         rest = quat.rotate(quat.inv(rest_frame(skeleton)), rest_positions(skeleton))
         chain = (body.hips, *body.trunk, *body.neck, body.head)
-        long = [j for k, j in enumerate(chain[1:]) if np.linalg.norm(rest[j] - rest[chain[k]]) > SHORT]
-        long = [body.hips, *long]
-        way = np.concatenate(
-            [[0.0], np.cumsum([np.linalg.norm(rest[b] - rest[a]) for a, b in pairwise(long)])]
-        )
-        axes = np.array([unit(rest[b] - rest[a]) for a, b in pairwise(long)])
-        chest = max(
-            float(np.linalg.norm(np.diff(rest[list(chain[: len(body.trunk) + 1])], axis=0), axis=-1).sum()),
-            1e-9,
-        )
-        below = way[:-1] <= chest * 1.001
-        return cls(way[:-1][below] / chest, axes[below], axes[-1])
+        places = rest[list(chain)]
+        lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1)
+        long = [0, *(k for k, length in enumerate(lengths, 1) if length > SHORT)]
+        return cls(spine_shares(lengths, len(body.trunk))[long], places[long])
 
-    def at(self, share: float) -> Array:
-        """(3,) direction of the bone that begins nearest below a share, or slightly above it."""
-        return self.axes[max(0, int(np.searchsorted(self.shares, share + REACH, side="right")) - 1)]
+    def direction(self, start: float, end: float) -> Array:
+        """(3,) direction of a bone between two positions along the body.
+
+        A rig with fewer joints has longer bones. They go the way that several bones go here.
+        """
+        chest = int(np.searchsorted(self.shares, 1.0 - 1e-6))
+        first = min(self._below(start), chest - 1 if start < 1 else len(self.shares) - 2)
+        last = min(self._below(end), chest if end <= 1 else len(self.shares) - 1)
+        first = max(first, 0)
+        return unit(self.points[max(last, first + 1)] - self.points[first])
+
+    def _below(self, share: float) -> int:
+        """The highest point that is at most REACH above a position."""
+        return int(np.searchsorted(self.shares, share + REACH, side="right")) - 1
+
+
+def spine_shares(lengths: Array, trunk: int) -> Array:
+    """(N,) position of each joint along the body: hips 0, chest 1, head 2.
+
+    lengths: (N-1,) of the bones from the hips over `trunk` joints, the last of which is the chest, and the
+    neck to the head.
+    """
+    way = np.concatenate([[0.0], np.cumsum(lengths)])
+    below, above = way[: trunk + 1], way[trunk:] - way[trunk]
+    shares = np.concatenate(
+        [below[:-1] / max(float(below[-1]), 1e-9), 1.0 + above / max(float(above[-1]), 1e-9)]
+    )
+    shares[0] = 0.0
+    return shares

@@ -16,14 +16,15 @@ import numpy as np
 from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.core.skeleton import rest_positions
-from hobble.motion.body import Body
+from hobble.core.skeleton import Skeleton, rest_positions
+from hobble.motion.added_joints import with_balls, with_bends
+from hobble.motion.body import Body, body_by_roles
 from hobble.motion.body_sample import LEFT, BodySample
-from hobble.motion.flat_feet import doubt
-from hobble.motion.from_motion import from_motion
+from hobble.motion.flat_feet import doubt, rest_tilt
+from hobble.motion.from_motion import bends, from_motion, lean_doubt
 from hobble.motion.from_rest import TRUSTED, add_rest, from_rest
 from hobble.motion.orient import apart, mean, pointed
-from hobble.motion.rebase import rebased, with_balls
+from hobble.motion.rebase import rebased
 from hobble.motion.spine import SHORT, Spine
 from hobble.motion.standing import stands
 from hobble.motion.tree import above
@@ -45,11 +46,11 @@ class Upright:
     notes: list[str] = field(default_factory=list)
 
 
-def upright(clip: Clip, body: Body, spine: Spine, others: Collection[int] = ()) -> Upright:
+def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = ()) -> Upright:
     """The motion of a body on a rig that stands in its rest pose.
 
-    clip: centimetres, right-handed, Y up. spine: directions of the trunk's bones in that pose. others:
-    further joints to keep, turned like the body part that they are on.
+    clip: centimetres, right-handed, Y up. target: the skeleton that it is for. others: further joints to
+    keep, turned like the body part that they are on.
 
     The directions of the bones alone decide how trunk, limbs and feet are turned, so that the same motion
     gives the same result on any rig. A standing zero pose adds what no bone shows: how head, clavicles and
@@ -60,20 +61,32 @@ def upright(clip: Clip, body: Body, spine: Spine, others: Collection[int] = ()) 
         side: clip.skeleton.end_sites.get(clip.skeleton.joints[leg[2]]) for side, leg in body.legs.items()
     }
     speeds = _speeds(clip)[every]
-    seen = BodySample(body, clip.positions[every], clip.global_rotations[every], speeds, ends, spine)
-    rest = rest_positions(clip.skeleton)
+    rest, theirs = rest_positions(clip.skeleton), body_by_roles(target)
+    seen = BodySample(
+        body,
+        clip.positions[every],
+        clip.global_rotations[every],
+        speeds,
+        rest,
+        ends,
+        Spine.of(target, theirs),
+        rest_tilt(target, theirs),
+    )
     frames, problem = from_motion(seen), stands(body, rest)
     if problem is None:
-        zero = from_rest(seen, rest)
+        zero = from_rest(seen)
         if max(apart(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED:
             problem = "the trunk is twisted"
         else:
             add_rest(frames, zero, seen)
     said = "its zero pose" if problem is None else f"its motion, because in its zero pose {problem}"
-    unsure = None if problem is None else doubt(seen)
+    unsure = [lean_doubt(seen), doubt(seen, problem is None)]
     kept = _kept(clip, seen, others, frames)
     clip, body = with_balls(clip, body, frames)
-    return Upright(*rebased(clip, body, [*body.joints, *kept], frames), said, [unsure] if unsure else [])
+    roles = body.roles(clip.skeleton.joints)
+    clip, body = with_bends(clip, body, frames, bends(seen))
+    made = rebased(clip, body, [*body.joints, *kept], frames, roles)
+    return Upright(*made, said, [note for note in unsure if note])
 
 
 def _speeds(clip: Clip) -> Array:

@@ -164,10 +164,11 @@ def clip_table(material: Material, clips: frozenset[str]) -> Table:
 
 
 def remarks_table(material: Material) -> Table | None:
-    """Every repair and warning; of many, each kind with its number and one of its clips."""
+    """Every repair, doubt and warning; of many, each kind with its number and one of its clips."""
     rows = []
     for stage, reports, key in (
         ("motion", material.motion, "repairs"),
+        ("motion", material.motion, "unsure"),
         ("labels", material.labels, "warnings"),
         (None, material.channels, "warnings"),
     ):

@@ -45,7 +45,7 @@ class Bounds:
         if seen is None:
             spread = DEFAULT_DEVIATIONS * network.y_std + DEFAULT_MARGIN
             x = np.full(layout.x_size, LARGEST_SOUND, np.float32)
-            spread[layout.y_joint_rotation] = 2 * np.pi  # an angle cannot explode
+            spread[layout.y_joint_rotation] = 2 * np.pi  # angles of joints stay within a full turn
             return cls(-x, x, network.y_mean - spread, network.y_mean + spread, LARGEST_SOUND)
         x_more = MARGIN_SHARE * (seen.x_high - seen.x_low)
         y_more = MARGIN_SHARE * (seen.y_high - seen.y_low)

@@ -10,7 +10,8 @@ from hobble.core.compiled import njit
 from hobble.core.skeleton import Skeleton
 from hobble.models.network import Network
 
-# Contact from which a foot is held. With the original's .8, a foot slides 4.8 cm a step before and after.
+# Contact from which a foot is held. With the original's .8, a foot slides 4.8 cm a step before it is held and
+# after it is released.
 LOCK_AT = 0.5
 # Share of the hold that is released each frame after contact. With .075 the foot drags behind the swing, and
 # the knee bends by 46 degrees instead of the network's 53.

@@ -25,7 +25,7 @@ GAIT_MIX = 0.1
 OWED_RATE = 0.01  # integral gain a frame: a steady error is corrected within a second or two
 OWED_WITHIN = 0.8  # share of the wish; with a larger error the character is still turning or starting
 MOST_OWED = 1.0  # largest integral correction, as a share of the wish
-FURTHEST_TURN = np.radians(137)  # largest turn to ask for; beyond it the other way round may be shorter
+FURTHEST_TURN = np.radians(137)  # largest turn to ask for; a larger one may come out the other way round
 DRAWN = 0.1  # with `Network.rooted`: largest change of a frame's movement toward the wish, as a share of it
 UNWISHED_LOSS = 0.5  # share of movement against the wish that is removed; removing all would drag the feet
 STRAFE_FROM = np.radians(45)  # angle between facing and velocity from which the strafe share is 1
@@ -221,6 +221,24 @@ def prepare(
 
 
 @njit
+def _draw(share: float, wish_x: float, wish_z: float, x: float, z: float) -> tuple[float, float]:
+    """What to add to a movement (x, z) so that it comes nearer to the wish.
+
+    Along the wish and across it, each at most `share` times the movement's length. If the two shared one
+    limit, a clip that is too slow would use all of it, and the character would leave its path sideways.
+    """
+    most = share * np.sqrt(x * x + z * z)
+    size = np.sqrt(wish_x * wish_x + wish_z * wish_z)
+    ahead_x, ahead_z = (wish_x / size, wish_z / size) if size >= STILL else (0.0, 0.0)
+    lack_x, lack_z = wish_x - x, wish_z - z
+    along = lack_x * ahead_x + lack_z * ahead_z
+    lack_x, lack_z = lack_x - along * ahead_x, lack_z - along * ahead_z
+    along = min(max(along, -most), most)
+    part = min(1.0, most / max(np.sqrt(lack_x * lack_x + lack_z * lack_z), 1e-9))
+    return along * ahead_x + part * lack_x, along * ahead_z + part * lack_z
+
+
+@njit
 def advance(
     y: Any, at: Any, wish: Any, held: float, whole: bool, drawn: float, path: Trajectory, phase: Any
 ) -> None:
@@ -258,11 +276,9 @@ def advance(
         else:
             against = held * min(0.0, x * wish[c, 0] + z * wish[c, 1]) / speed
             x, z = x - against * wish[c, 0], z - against * wish[c, 1]
-        lack_x, lack_z = wish[c, 0] - x, wish[c, 1] - z
-        lack = np.sqrt(lack_x * lack_x + lack_z * lack_z)
-        share = min(1.0, drawn * np.sqrt(x * x + z * z) / max(lack, 1e-9))
-        position[c, middle, 0] += x + share * lack_x
-        position[c, middle, 1] += z + share * lack_z
+        more_x, more_z = _draw(drawn, wish[c, 0], wish[c, 1], x, z)
+        position[c, middle, 0] += x + more_x
+        position[c, middle, 1] += z + more_z
         yaw -= moving * y[c, at[1]]
         sin, cos = np.sin(yaw), np.cos(yaw)
         direction[c, middle, 0], direction[c, middle, 1] = sin, cos

@@ -57,11 +57,12 @@ def stances(
     out: tuple[list[Stance], list[Stance]] = ([], [])
     for land, side in sorted(events):
         here = np.interp(land, frames, phase)
-        # The share on the ground is that at the time of leaving, so a faster walker leaves sooner.
+        # How long a foot stands depends on the speed at the time of leaving, so a foot leaves sooner if the
+        # walker has become faster.
         leave = np.interp(here, phase - style.duty[:, side], frames)
         middle = np.interp((here + np.interp(leave, frames, phase)) / 2, phase, frames)
-        before, beside = (out[s][-1] if out[s] else None for s in (side, 1 - side))
-        ankle, turn = _footprint(path, style, ground, side, middle, beside, rng)
+        before, other = (out[s][-1] if out[s] else None for s in (side, 1 - side))
+        ankle, turn = _footprint(path, style, ground, side, middle, other, rng)
         standing = np.interp(middle, frames, path.speed) < STILL
         if before and standing and _close(before, ankle, turn):
             out[side].append(Stance(land, leave, before.ankle, before.turn, swings=False))
@@ -76,7 +77,7 @@ def _footprint(
     ground: Ground,
     side: int,
     middle: float,
-    beside: Stance | None,
+    other: Stance | None,
     rng: np.random.Generator,
 ) -> tuple[Array, Array]:
     """The place of a foot: under the body in mid-stance, but never across the other foot."""
@@ -93,8 +94,8 @@ def _footprint(
     yaw = facing + SIGN[side] * toe_out
     x = value(path.position[:, 0]) + out * np.cos(facing) + along * np.sin(facing)
     z = value(path.position[:, 1]) - out * np.sin(facing) + along * np.cos(facing)
-    if beside is not None:
-        apart = SIGN[side] * ((x - beside.ankle[0]) * np.cos(facing) - (z - beside.ankle[2]) * np.sin(facing))
+    if other is not None:
+        apart = SIGN[side] * ((x - other.ankle[0]) * np.cos(facing) - (z - other.ankle[2]) * np.sin(facing))
         aside = SIGN[side] * max(0.0, APART - apart)
         x, z = x + aside * np.cos(facing), z - aside * np.sin(facing)
     return _planted(ground, np.array([x, z]), yaw)

@@ -129,7 +129,7 @@ class Pits:
 def dig_pits(soles: Array, standing: Stances, depth: float) -> Pits:
     """Pits that leave soles (N, 3) no more than `depth` cm below the ground.
 
-    Their walls are steep enough that the ground under other standing feet, such as on a step, stays.
+    Their walls are steep enough not to lower the ground under other standing feet, such as on a step.
     """
     places, heights = soles[:, [0, 2]], soles[:, 1] + depth
     apart = np.maximum(distances(places, standing.place), 1e-3)

@@ -69,7 +69,7 @@ def recipe_hash(network: Options, training: Training, database: Database, code: 
 def run_name(recipe: str, start: Arrays | None) -> str:
     """The name of a run: the recipe hash, combined with its start checkpoint if that has another recipe.
 
-    A start with the same recipe does not count: the run itself would pass through that state.
+    A start with the same recipe does not change the name, because the run would reach that state by itself.
     """
     if start is None or str(start.get("recipe")) == recipe:
         return recipe
@@ -90,7 +90,7 @@ def begin(
 ) -> tuple[State, Path]:
     """The state from the run's own checkpoint, else from `start`, else a new one; and the path of its own.
 
-    An own checkpoint that is past `training.passes` (after they were lowered) is ignored. Raises InputError
+    If the run's own checkpoint has more passes than `training.passes`, it is ignored. Raises InputError
     for a checkpoint that is damaged or has a network of another shape, and for a start that is past
     `training.passes` or has another number of sections. With several processes, the first one reads the
     checkpoint and sends the state to the others.

@@ -65,7 +65,7 @@ class Demands:
         return _minutes(each * thousands, attempt, least=5)
 
     def part_memory(self, dataset: str, attempt: int = 1) -> int:
-        """Megabytes for a job that orders its part of a database: what one shard has for it, and buckets."""
+        """MB for a job that orders a part of a database. It holds the rows of one shard for it at a time."""
         parts = self.project.datasets.parts(dataset)
         return _megabytes(400 + ROW_KB * self.all_thousands(dataset) / parts**2, attempt)
 

@@ -25,7 +25,7 @@ INFRASTRUCTURE = {
 }
 LOGGERS = {"log", "logger", "logging", "warnings"}
 LEVELS = {"debug", "info", "warning", "error", "exception", "critical", "warn"}
-WORDLESS = {"__future__", "collections.abc", "logging", "typing", "warnings"}
+NOT_HASHED = {"__future__", "collections.abc", "logging", "typing", "warnings"}
 
 
 def fingerprint(script: Path, source: Path, modules: Iterable[str] = ()) -> str:
@@ -152,7 +152,7 @@ class _Bare(ast.NodeTransformer):
 
     def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST:
         module = node.module or ""
-        if module in WORDLESS or _is_infrastructure(module):
+        if module in NOT_HASHED or _is_infrastructure(module):
             return ast.Pass()
         if not node.level:
             full = [f"{module}.{alias.name}" for alias in node.names]

@@ -1,4 +1,4 @@
-"""The limp in sizes: a character that limps by known amounts, one that does not, one on the wrong side."""
+"""Sizes of limps: of a known limp, of none, and of one on the wrong side."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_severities_that_do_nothing_are_nobodys_limp(measured) -> None:
 
 
 def test_a_change_of_two_percent_is_steady_and_still_small(measured) -> None:
-    """The rank correlation that the size has to stand beside."""
+    """The rank correlation of an effect that has a given size at 10."""
     found = measured(lambda s: 0.002 * s)
     knee = next(row for row in found["steady"] if row["gait"] == "walk" and row["effect"] == "knee_hurt")
     assert knee["spearman"] == pytest.approx(-1)
@@ -128,7 +128,7 @@ def test_a_limp_of_the_other_leg_is_seen(measured) -> None:
 def test_a_limp_is_measured_beside_the_walk_of_the_same_mood(
     hurtable, holden31, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Sad is half as fast and changes no limp; with old nobody limps; with tired there is no cycle."""
+    """Sad: half as fast, the same limp. Old: no limp. Tired: no cycle."""
     layout = replace(hurtable.layout, channels=(("injury", 25), ("mood", 5)))
     moods = channel("mood").columns(holden31)
     links = hurtable.channels["injury"][:25]

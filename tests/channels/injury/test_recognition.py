@@ -23,7 +23,7 @@ KNEE, ARM = "LeftUpLeg-LeftLeg", "RightArm-RightForeArm"
 
 
 def figure(skeleton: Skeleton, frames: int, knee: float, elbow: float, seed: int) -> np.ndarray:
-    """(F, J, 3) a figure that walks with a knee of so many radians less and an elbow of so many more."""
+    """(F, J, 3) a walking figure; its knee bends less and its elbow more by these radians."""
     rng = np.random.default_rng(seed)
     t = 2 * np.pi * np.arange(frames) / 60
     local = np.tile(quat.IDENTITY, (frames, len(skeleton.joints), 1))
@@ -176,7 +176,7 @@ def test_without_side_a_leg_is_not_told_from_the_other(holden31: Skeleton) -> No
 
 
 def test_what_is_judged_was_not_learnt() -> None:
-    """Windows that nothing but their label tells apart are named by chance."""
+    """Windows that differ in nothing but their label are named by chance."""
     rng = np.random.default_rng(6)
     windows = [
         Window("a", f"{n % 2}", 5.0, {f"{d}": float(v) for d, v in enumerate(rng.normal(size=60))}, n // 10)

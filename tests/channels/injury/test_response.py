@@ -1,4 +1,4 @@
-"""The response to injury: sweeps, their numbers, and networks that feel nothing."""
+"""The response to injury: sweeps, their numbers, and networks without an effect."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ KNEE = "LeftUpLeg-LeftLeg"
 
 
 def slowing(hurtable, links: tuple[str, ...] = (KNEE,)):
-    """A network whose root is the slower, and whose head the lower, the more `links` hurt, and nothing else.
+    """A network that walks slower and lowers its head in proportion to the severities of `links`.
 
     One unit of each hidden layer carries 1 + severity / 10 through the ELU, where it is linear.
     """
@@ -126,7 +126,7 @@ def test_the_same_numbers_each_time(hurtable) -> None:
 
 
 def test_a_second_injury_adds_to_the_first(hurtable) -> None:
-    """Both lower the head: by the same again, whatever the first is."""
+    """Each injury lowers the head by its own amount, whatever the other is."""
     other = "RightLeg-RightFoot"
     found = second_injuries(slowing(hurtable, (KNEE, other)), [KNEE, other], 2.0, RUNTIME)
     assert [(r["first"], r["second"]) for r in found] == [(KNEE, other), (other, KNEE)]
@@ -153,14 +153,14 @@ def test_an_injury_is_kept_from_walking_into_jogging(hurtable) -> None:
 
 
 def test_each_gait_is_held_against_its_own_healthy_one(hurtable) -> None:
-    """A network whose jog is another motion than its walk."""
+    """A network whose jog differs from its walk."""
     healthy, *hurt = into_a_jog(hurtable, [KNEE], 1.0, RUNTIME)
     assert healthy["walk_from_healthy_cm"] == healthy["jog_from_healthy_cm"] == 0
     assert all(row["jog_from_healthy_cm"] != row["walk_from_healthy_cm"] for row in hurt)
 
 
 def test_the_way_back_is_measured_on_its_own(hurtable) -> None:
-    """Rows whose way back is another than their way up."""
+    """Rows that differ between rising and falling severity."""
     sweep = Sweep(hurtable, [KNEE], "walk", 0.2, RUNTIME)
     rows = sweep.rows(0)
     rng = np.random.default_rng(2)
@@ -187,7 +187,7 @@ def test_divided_severities_are_smaller_ones(hurtable) -> None:
 
 
 def test_figures_of_a_crowd_do_not_mind_each_other(hurtable) -> None:
-    """Each walks as it would alone."""
+    """A character in a crowd walks as it does alone."""
     hurt = severities(hurtable, [{}, {KNEE: 4.0}, {KNEE: 10.0}])
     together = run(hurtable, [Stretch(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
     for figure, gait in enumerate(("walk", "jog", "walk")):

@@ -1,4 +1,4 @@
-"""The status file: what it says, what it must not say, and that writing and reading it lose nothing."""
+"""The status file: valid and invalid content, and that writing and reading it loses nothing."""
 
 from __future__ import annotations
 

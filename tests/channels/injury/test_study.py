@@ -1,4 +1,4 @@
-"""The questionnaire's films and tables: answers that are made up, whose tables are known."""
+"""The questionnaire's films, and the tables of made-up answers."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def study(folder: Path) -> Study:
 
 
 def write(folder: Path, name: str, says: Callable[[Any], tuple[list[str], int]], **changed: Any) -> Path:
-    """The answers of a person who says of each film what `says` does, shown last film first."""
+    """The answers of a person: `says(film)` for each film. The films are shown in reverse order."""
     answers = [dict(zip(("parts", "fluid"), says(f), strict=True)) | {"film": f.number} for f in FILMS[::-1]]
     data = {"study": "abc", "person": name, "order": [], "answers": answers} | changed
     path = folder / f"{name}.json"
@@ -78,7 +78,7 @@ def back(film) -> tuple[list[str], int]:
 
 
 def test_tables_of_people_whose_answers_are_known(folder: Path, study: Study) -> None:
-    """One names everything, one confuses the sides, one always says the back."""
+    """Three people: one names all parts, one confuses the sides, one always says the back."""
     people = [read_answers(write(folder, says.__name__, says), study) for says in (right, mirrored, back)]
     made = tables(study, people)
     assert tuple(made) == NUMERALS
@@ -107,7 +107,7 @@ def test_tables_of_people_whose_answers_are_known(folder: Path, study: Study) ->
 
 
 def test_a_part_of_the_parts_is_seen_in_part(study: Study) -> None:
-    """Of film 9's three parts one is ticked, by one of two people; of film 1 both tick one more."""
+    """Film 9 has three parts; one of two people ticks one of them. For film 1 both tick one part too many."""
     first = [Answer(f.number, f.parts[:1] if f.number == 9 else f.parts, 4) for f in FILMS]
     second = [Answer(f.number, () if f.number == 9 else f.parts, 2) for f in FILMS]
     rows = {row["film"]: row for row in tables(study, [first, second])["XVI"][:13]}

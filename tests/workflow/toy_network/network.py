@@ -43,7 +43,7 @@ class Toy(Network):
     def predict(self, x, phase):
         return (standardised(self, x) @ self.weights.T + self.biases) * self.y_std + self.y_mean
 
-    def predictor(self, mode=None, storage="float32"):
+    def predictor(self, mode=None, storage=None):
         self.mode(mode)
         return Predictor(self)
 

@@ -6,6 +6,6 @@ from hobble.models.options import Options
 
 
 class ToyOptions(Options):
-    """None but its kind."""
+    """The kind of network is the only option."""
 
     kind: Literal["toy"] = "toy"

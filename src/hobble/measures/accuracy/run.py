@@ -41,7 +41,7 @@ log = logging.getLogger("hobble")
 
 @dataclass(frozen=True)
 class Errors:
-    """Relative error and position error (cm) over `frames` frames; a frame's fits share its weight."""
+    """Relative error and position error (cm) over `frames` frames, which have equal weights."""
 
     frames: int = 0
     moments: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
@@ -53,7 +53,7 @@ class Errors:
         )
 
     def weighing(self, weight: float) -> Errors:
-        """The same, each frame of which stands for so many."""
+        """The same errors with each frame counted `weight` times."""
         return self if weight == 1 else Errors(self.frames, self.moments * weight, self.histogram * weight)
 
     def quantile(self, share: float) -> float:

@@ -17,7 +17,6 @@ from hobble.measures.given import Json
 NAME = "responsivity"
 STEPS = ("prepare", "input", "insert", "predict", "output", "update", "total")
 COUNTS = ("true", "table_6_1", "table_6_1_as_printed")
-FLOAT = 4  # bytes of a stored weight
 
 
 def compared(all_measured: Sequence[ConfigurationResults], published: Json) -> SideBySide:
@@ -59,7 +58,7 @@ def _sizes(measured: ConfigurationResults) -> dict[str, Any]:
     counts = found["parameters"]
     return {
         "computations": {key: counts[key] if counts else None for key in COUNTS},
-        "weights_bytes": {mode: count * FLOAT for mode, count in found["stored"].items()},
+        "weights_bytes": {mode: count * found["bytes_each"] for mode, count in found["stored"].items()},
         "exact": found["exact"],
     }
 

@@ -100,8 +100,7 @@ def lap_chart(found: Json, material: Material) -> Chart | None:
     counts = [max(len(trace["x"]) for trace in traces) for traces in options.values()]
     laps = max(counts)
     fewer = (
-        f" The other phase modes ran {min(counts)} laps, because the second lap and later ones are all the "
-        "same."
+        f" The other phase modes ran {min(counts)} laps, because from the second lap on all laps are alike."
         if min(counts) < laps
         else ""
     )
@@ -262,7 +261,7 @@ def track_figures(found: Json) -> list[Figure]:
             "Largest distance from the path",
             number(found.get("path_overshoot_cm")),
             "cm",
-            "usually at a turn",
+            "usually the largest is at a turn",
         ),
         Figure("Foot slide", number(slide), "cm" if slide is not None else "", measured),
         _turn(found),

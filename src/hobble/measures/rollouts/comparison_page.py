@@ -58,7 +58,7 @@ def rollout_chart(compared: Compared) -> Chart | None:
         return None
     return Chart(
         "compare-rollouts",
-        "Error over time, from their own poses",
+        "Error when a network continues from its own poses",
         "Mean distance between a joint and its captured position when a network continues from its own "
         "poses, for this many frames (60 frames are one second).",
         layout={

@@ -52,7 +52,7 @@ def rollout_chart(found: Json) -> Chart | None:
         return None
     return Chart(
         "rollouts",
-        "Error over time, from its own poses",
+        "Error when the network continues from its own poses",
         "Mean distance between a joint and its captured position when the network continues from its own "
         "poses, as at run time, for this many frames (60 frames are one second). If the line flattens, the "
         "character stays stable. This chart measures the pose as drawn: the mean of the predicted position "

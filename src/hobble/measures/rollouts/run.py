@@ -44,7 +44,7 @@ log = logging.getLogger("hobble")
 
 
 @dataclass(frozen=True)
-class Strayed:
+class RollOutErrors:
     """Relative error and position error (cm) over `frames` frames of roll-outs.
 
     last: position error and phase error (cycles) in the last frame, over the `ended` roll-outs that reached
@@ -57,8 +57,8 @@ class Strayed:
     last: Moments = field(default_factory=lambda: Moments.nothing(2), repr=False)
     ended: int = 0
 
-    def __add__(self, other: Strayed) -> Strayed:
-        return Strayed(
+    def __add__(self, other: RollOutErrors) -> RollOutErrors:
+        return RollOutErrors(
             self.frames + other.frames,
             self.starts + other.starts,
             self.moments + other.moments,
@@ -66,11 +66,11 @@ class Strayed:
             self.ended + other.ended,
         )
 
-    def weighing(self, weight: float) -> Strayed:
+    def weighing(self, weight: float) -> RollOutErrors:
         """The same, with each frame counted `weight` times."""
         if weight == 1:
             return self
-        return Strayed(self.frames, self.starts, self.moments * weight, self.last * weight, self.ended)
+        return RollOutErrors(self.frames, self.starts, self.moments * weight, self.last * weight, self.ended)
 
     def to_dict(self, phase: bool = True) -> dict[str, Any]:
         """Plain data, with None if there were no frames, or if no roll-out reached its full length.
@@ -147,7 +147,8 @@ def roll_out(
             break
         row = asked.x[at].copy()
         if age:
-            # What it made of the frame before, in that frame's root, with heights less this frame's mean.
+            # The predicted pose, still in the last frame's root. Heights are made relative to this frame's
+            # mean.
             lower = place[:alive].copy()
             lower[..., 1] += (asked.mean[at - 1] - asked.mean[at])[:, None]
             row[:, layout.x_joint_position] = lower.reshape(alive, -1)
@@ -174,27 +175,27 @@ def _carried(place: Array, asked: Inputs, at: np.ndarray) -> Array:
 
 def clip_roll_outs(
     predictor: Predictor, rows: ClipRows, joints: Sequence[int], lengths: Sequence[int]
-) -> dict[int, Strayed]:
+) -> dict[int, RollOutErrors]:
     """Length -> errors of roll-outs over every frame of the clip.
 
     No roll-out begins at the first frame of a stretch, because the movement of the root to it is unknown.
     Each frame is in OVERLAP roll-outs of a length, or in one if they are one frame long.
     """
     layout = predictor.network.layout
-    out = {length: Strayed() for length in lengths}
+    out = {length: RollOutErrors() for length in lengths}
     for chosen in unbroken(rows.frame):
         asked = inputs(rows, chosen, layout)
         for length in lengths:
             all_starts = np.arange(1, len(chosen), max(1, length // OVERLAP))
             for first in range(0, len(all_starts), BATCH):
                 starts = all_starts[first : first + BATCH]
-                out[length] += _strayed(predictor, asked, starts, length, joints)
+                out[length] += _errors(predictor, asked, starts, length, joints)
     return out
 
 
-def _strayed(
+def _errors(
     predictor: Predictor, asked: Inputs, starts: np.ndarray, length: int, joints: Sequence[int]
-) -> Strayed:
+) -> RollOutErrors:
     layout = predictor.network.layout
     truth = asked.y[:, layout.y_joint_position].reshape(len(asked.y), -1, 3)[:, joints]
     made, phase = roll_out(predictor, asked, starts, length)
@@ -209,10 +210,10 @@ def _strayed(
     # The phase is already that of the next frame, so that one has to be in the stretch too.
     ended = int(np.searchsorted(starts, len(asked.x) - length))
     if not ended:
-        return Strayed(frames, len(starts), moments)
+        return RollOutErrors(frames, len(starts), moments)
     off = np.abs(np.mod(phase[:ended] - asked.phase[starts[:ended] + length] + 0.5, 1.0) - 0.5)
     last = np.stack([errors[:ended, :, 1].mean(axis=1), off], axis=1)
-    return Strayed(frames, len(starts), moments, Moments.of(last), ended)
+    return RollOutErrors(frames, len(starts), moments, Moments.of(last), ended)
 
 
 def measure_roll_outs(
@@ -234,7 +235,7 @@ def measure_roll_outs(
     network = load_network(weights)
     predictor = network.predictor(mode)
     joints = joint_indices(network, equivalents)
-    total = {length: dict.fromkeys(SPLITS, Strayed()) for length in lengths}
+    total = {length: dict.fromkeys(SPLITS, RollOutErrors()) for length in lengths}
     entries: dict[int, list[dict[str, Any]]] = {length: [] for length in lengths}
     for name, weight in (sample.weights if sample else dict.fromkeys(sorted(clips), 1.0)).items():
         rows = load_clip_rows(clips[name])

@@ -1,4 +1,4 @@
-// One character that is played: the controller, its body and figure, what it leaves on the ground, and its last seconds.
+// One character in Play: its controller, its body, its footprints, and the motion of its last seconds.
 import { createCharacter } from "./character.js";
 import { createFigure } from "./figure.js";
 import { drawInputs } from "./inputs.js";
@@ -24,7 +24,7 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
   };
   const sole = (j) => { const [x, z] = [rig.places[3 * j], rig.places[3 * j + 2]]; return [x, floor(x, z), z]; };
 
-  // values: a value for each column of a channel, by `keyed`; what is not there is 0.
+  // Runs one frame. values: Map from `keyed(channel, column)` to its value. A missing column has the value 0.
   actor.frame = ({ velocity, ahead, gait }, values) => {
     const c = actor.character, before = performance.now();
     spec.channels.forEach((one) => one.columns.forEach((column, l) => { c.channelTargets[one.first + l] = (values.get(keyed(one, column)) || 0) / one.scale; }));
@@ -42,7 +42,7 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
     });
     lab.add(rig.places, [0, 1].map((f) => c.contacts[2 * f] > .5 || c.contacts[2 * f + 1] > .5));
     actor.watch?.add(rig.places);
-    if (!c.pose.every(Number.isFinite)) { actor.falls++; actor.start(floor); } // a network that has learnt nothing runs away
+    if (!c.pose.every(Number.isFinite)) { actor.falls++; actor.start(floor); } // after too little training, predictions may grow without end
   };
   const drawGround = (way) => {
     if (way === null) return;
@@ -54,7 +54,7 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
       marks.strip(a, b, 2.2, tint ? paint[tint] : paint.accent, i > c.px.length / 2 ? .85 : .35);
     }
   };
-  // way: whether the path that the network was and is about to take is drawn on the ground; null: nothing is, no prints either.
+  // way: whether the past and predicted path is drawn on the ground. With null, footprints are not drawn either.
   actor.draw = (way = true) => {
     const c = actor.character, { paint } = view, plain = tint ? paint[tint] : paint.body, one = placed(spec);
     drawGround(way);
@@ -65,7 +65,8 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
       return channelColour(paint, most, plain);
     });
   };
-  // What is under a point of the screen: {columns, by name, of the channel that lies in the body; deep}; null where nothing is.
+  // The part of the body at a point of the screen, or null. columns: its columns of the channel that has parts of the body.
+  // deep: its distance from the camera.
   actor.under = (x, y) => {
     const found = figure.under(x, y);
     return found && { deep: found.deep, columns: found.links.map((l) => placed(spec).columns[l]) };

@@ -1,4 +1,4 @@
-// What every part of the page shares: its data, its colours, numbers packed as text, and vectors.
+// Shared by every part of the page: its data and its colours.
 
 export const material = JSON.parse(document.getElementById("material").textContent);
 
@@ -8,7 +8,8 @@ export const onTheme = [];
 export const find = (id) => document.getElementById(id);
 
 export const colour = (() => {
-  // A custom property may hold light-dark(...), which only a real property resolves; so a hidden element wears it.
+  // A custom property may contain light-dark(...). The browser resolves that only in a real property, so set one on a
+  // hidden element and read it back.
   const probe = document.createElement("span");
   probe.hidden = true;
   document.body.append(probe);

@@ -1,4 +1,4 @@
-// What was played as a BVH file.
+// Writes the played motion as a BVH file.
 import { at4, conjugate, multiply } from "./turns.js";
 
 const FPS = 60;

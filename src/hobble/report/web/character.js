@@ -1,5 +1,5 @@
-// The character: the controller of `hobble.runtime` once more, for one figure. The same steps in the same order, so
-// that one set of vectors tests both. Centimetres, 60 Hz, yaw 0 faces +Z and grows toward +X.
+// The controller of `hobble.runtime` in JavaScript, for one character. It has the same steps in the same order, so the
+// same test data check both. Centimetres, 60 Hz; yaw 0 faces +Z and grows toward +X.
 import { networks } from "networks"; // by kind; the bundle gathers them from the folders of hobble.models
 import { bytes, dot, minus } from "./numbers.js";
 import { at4, between, multiply, rotate } from "./turns.js";
@@ -22,20 +22,20 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     hold: [[0, 0], [0, 0]], lift: [0, 0], raised: 0, placed: false, added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
     memory: filled(spec.network.memory ?? 0, 0),
   };
-  // The rotation at `i` of the outputs, an axis times half the angle, turned about Y with the root; into q.
+  // Writes into q the rotation at index `i` of the outputs (axis times half the angle), turned about Y with the root.
   const q = [1, 0, 0, 0];
   const turned = (y, i, co, si) => {
     const half = hypot(y[i], y[i + 1], y[i + 2]), scale = half > 1e-8 ? sin(half) / half : 1, w = cos(half);
     const [a, b, d] = [y[i] * scale, y[i + 1] * scale, y[i + 2] * scale];
     [q[0], q[1], q[2], q[3]] = [co * w - si * b, co * a + si * d, co * b + si * w, co * d - si * a];
   };
-  // The rotations of this frame; joints that move nothing stay at rest on the one above.
+  // The rotations to draw. Joints that move no bone keep the rotation of their parent.
   const rests = spec.parents.flatMap((p, j) => (p < 0 || spec.turning.includes(j) ? [] : [[j, p]]));
   const settle = () => {
     c.turns.set(c.rotations);
     for (const [j, p] of rests) for (let i = 0; i < 4; i++) c.turns[4 * j + i] = c.turns[4 * p + i];
   };
-  // It begins in a frame of the clips, turned to its heading.
+  // The character starts in a frame of the clips, turned to its heading.
   const at = (name) => new Float32Array(bytes(spec.start[name])), [si, co] = [sin(heading), cos(heading)];
   const [path, ahead, joints, velocities] = ["position", "direction", "joint_position", "joint_velocity"].map(at);
   for (let t = 0; t < T; t++) {
@@ -82,8 +82,8 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     return out;
   };
 
-  // A hurt body is asked for what it can do, as `hobble.runtime.limits` holds it to: at most so much a frame, and who
-  // cannot run any more walks.
+  // The limits of a hurt body, as in `hobble.runtime.limits`: a highest speed, and a walk instead of a jog if the body
+  // cannot jog.
 
   const limited = spec.channels.filter((one) => one.limits);
   const allowed = (g) => {
@@ -142,7 +142,8 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     return [x + more[0] * limit, z + more[1] * limit];
   };
   const prepare = (velocity, direction, strafe, gait, ground) => {
-    // What the last half of the past lacks of the wished velocity is asked for on top, what is missing then is owed.
+    // Steering, as in `_ask_velocity` and `_ask_turn` of hobble.runtime.trajectory: the error of the velocity over half of
+    // the past is added to the wish, and a steady error is added up in `owed`.
     const speed = hypot(...velocity), span = floor(M / 2);
     let asked = velocity, wished = atan2(...direction);
     if (spec.steering > 0) {
@@ -182,7 +183,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       c.ground[3 * s + 2] = ground(c.px[i] - a, c.pz[i] + b);
       c.height += c.ground[3 * s + 1] / S;
     }
-    if (!c.placed) { // where it starts the ground may be anywhere
+    if (!c.placed) { // the ground at the start may have any height
       for (let j = 1; j < 3 * J; j += 3) c.joints[j] += c.height;
       c.root[1] = c.height;
       c.placed = true;
@@ -227,7 +228,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
         c.joints[j + i] += i === 1 ? climbed + share * (move[1] - climbed) : share * move[i];
       }
     }
-    // No joint turns further than fastestTurn in a frame, along the shorter way.
+    // Limit the turn of a joint to fastestTurn a frame, along the shorter way.
     const yaw = atan2(si, co), halfCos = cos(yaw / 2), halfSin = sin(yaw / 2), slowest = cos(k.fastestTurn / 2);
     for (let n = 0; n < spec.turning.length; n++) {
       const o = 4 * spec.turning[n], old = c.rotations;
@@ -257,7 +258,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     }
     const moving = spec.rooted ? 1 : max(0, 1 - c.gait[M * G]) ** .25, [vx, vz] = [y[Y.root_velocity], y[Y.root_velocity + 1]];
     let yaw = atan2(c.dx[M], c.dz[M]);
-    // Half of a movement that nobody asked for is held back: against the wish, or where the figure turns on the spot.
+    // Remove half of the movement against the wish, or of all movement while the character turns on the spot.
     let a = moving * (vx * cos(yaw) + vz * sin(yaw)), b = moving * (vz * cos(yaw) - vx * sin(yaw));
     const held = spec.steering > 0 && !spec.rooted ? k.held : 0, squared = wish[0] ** 2 + wish[1] ** 2;
     if (squared < k.still ** 2) [a, b] = [(1 - held) * a, (1 - held) * b];
@@ -265,11 +266,14 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       const against = held * min(0, a * wish[0] + b * wish[1]) / squared;
       [a, b] = [a - against * wish[0], b - against * wish[1]];
     }
-    // The movement of a clip is drawn toward the wish, a little: clips have only some directions and speeds.
-    const drawn = spec.steering > 0 && spec.rooted ? k.drawn : 0, lack = [wish[0] - a, wish[1] - b];
-    const share = min(1, drawn * hypot(a, b) / max(hypot(...lack), 1e-9));
-    c.px[M] += a + share * lack[0];
-    c.pz[M] += b + share * lack[1];
+    // With motion matching, change the movement a little toward the wish, because clips have only some directions and speeds.
+    // Along the wish and across it, each by a share of the movement.
+    const most = spec.steering > 0 && spec.rooted ? k.drawn * hypot(a, b) : 0, size = hypot(...wish);
+    const ahead = size >= k.still ? wish.map((v) => v / size) : [0, 0], lack = [wish[0] - a, wish[1] - b];
+    const along = lack[0] * ahead[0] + lack[1] * ahead[1], across = lack.map((v, i) => v - along * ahead[i]);
+    const share = min(1, most / max(hypot(...across), 1e-9)), limited = min(max(along, -most), most);
+    c.px[M] += a + limited * ahead[0] + share * across[0];
+    c.pz[M] += b + limited * ahead[1] + share * across[1];
     yaw -= moving * y[Y.turn];
     const si = c.dx[M] = sin(yaw), co = c.dz[M] = cos(yaw);
     for (let i = M + 1; i < T; i++) {
@@ -286,10 +290,10 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     c.phase = phase - floor(phase);
   };
 
-  // Feet in contact are held where they landed and kept out of the ground; the leg bends to reach.
+  // Foot placement: hold feet in contact where they landed, keep feet out of the ground, and bend the leg to reach.
 
   const joint = (j) => c.pose.subarray(3 * j, 3 * j + 3);
-  // How far a foot is in the ground; below 0, above it.
+  // How deep a foot is in the ground, cm; negative if it is above.
   const sunk = (f, ground) => {
     const [heel, toe] = [2, 3].map((i) => {
       const [px, py, pz] = joint(spec.legs[f][i]);
@@ -297,7 +301,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     });
     return max(heel, toe);
   };
-  // The figure goes up or down to where its standing feet say, its hips as far above the ground as in training.
+  // Raise or lower the body so that standing feet are on the ground. The hips stay within their height range in training.
   const hips = spec.names.indexOf(spec.roles.hips);
   const carryBody = (ground) => {
     let wanted = 0, weight = 0;
@@ -365,7 +369,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       }
     }
   };
-  // `held` turned to `aim`, by mostAdded at most; whether that was too little.
+  // Turns `held` toward `aim` by at most mostAdded. Returns whether it did not reach it.
   const approach = (held, aim) => {
     const near = held[0] * aim[0] + held[1] * aim[1] + held[2] * aim[2] + held[3] * aim[3], to = near < 0 ? aim.map((v) => -v) : aim;
     const whole = Math.acos(min(abs(near), 1)), most = .5 * k.mostAdded, late = whole > most;
@@ -373,7 +377,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     for (let i = 0; i < 4; i++) held[i] = keep * held[i] + take * to[i];
     return late;
   };
-  // `reach`, thigh and shank turning no further than mostAdded beyond the network's own turn.
+  // Like `reach`, but adds at most mostAdded to the network's own turn of thigh and shank.
   const bend = (hip, knee, heel, shift, h, n, added) => {
     const thigh = minus(knee, hip), shank = minus(heel, knee);
     if (abs(shift[0]) + abs(shift[1]) + abs(shift[2]) > 1e-9) reach(hip, knee, heel, shift);
@@ -397,7 +401,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     const was = leg.map((v) => v / before), way = aim.map((v) => v / distance);
     const length = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * .999);
     const cosine = min(max((upper * upper + length * length - lower * lower) / (2 * upper * length), -1), 1);
-    // The knee's side of the leg, turned with the leg.
+    // Turn the direction in which the knee bends with the leg.
     const along = dot(thigh, was), side = thigh.map((v, i) => v - along * was[i]);
     const turn = dot(side, way) / max(1 + dot(was, way), 1e-6);
     const out = side.map((v, i) => v - turn * (was[i] + way[i])), size = hypot(...out);
@@ -409,7 +413,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     }
   };
 
-  // Become as another is, `by` [x, z] cm aside.
+  // Copies the state of another character, moved by [x, z] cm.
   c.follow = (other, by = [0, 0]) => {
     for (const [name, value] of Object.entries(other)) {
       if (ArrayBuffer.isView(value)) c[name].set(value);

@@ -1,8 +1,8 @@
 // A camera that follows the character and turns behind it, smoothed by time, so that it does not depend on the frame rate.
 import { wrap } from "./numbers.js";
 
-const FOLLOW = 8, COME_ROUND = .9; // share of the way that is gone in a second, as 1 - exp(-rate)
-const PATIENCE = 2500; // ms after somebody turned the camera until it comes round again
+const FOLLOW = 8, COME_ROUND = .9; // rates per second: in a second the camera goes 1 - exp(-rate) of the remaining way
+const PATIENCE = 2500; // ms after the user turned the camera until it turns behind the character again
 
 export const createChase = (orbit, canvas) => {
   let eye = null, last = null, touched = -Infinity;
@@ -13,8 +13,8 @@ export const createChase = (orbit, canvas) => {
     reset() { eye = null; last = null; },
     rest() { last = null; },
     touch() { touched = performance.now(); },
-    // middle [x, y, z]: what is followed; going [x, z]: where it is asked to go, null where it stands or strafes.
-    // Returns where to look.
+    // middle: [x, y, z] to follow. going: [x, z] target direction, or null if the character stands or strafes. Returns the
+    // point to look at.
     follow(now, middle, going) {
       const passed = last === null ? 0 : Math.min(.25, (now - last) / 1000);
       last = now;

@@ -5,7 +5,7 @@ import {
 import { bodyOf } from "./bodies.js";
 import { linear } from "./paint.js";
 
-// What a figure looks like: solid, or a ghost, which is seen through in the middle and not at its outline.
+// The material: solid, or a ghost that is transparent except at its outline.
 const look = (tints, ghost) => {
   const material = new MeshStandardMaterial({ roughness: .78, metalness: 0, transparent: ghost, depthWrite: !ghost });
   material.onBeforeCompile = (shader) => {
@@ -45,7 +45,7 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
     meshes.push(mesh);
     return mesh;
   };
-  if (ghost) { // first only how far away it is, so that no part of it shows through another
+  if (ghost) { // draw only the depth first, so that no part of the ghost shows through another
     const deep = add(new MeshStandardMaterial({ colorWrite: false }));
     deep.renderOrder = 1;
   }
@@ -56,7 +56,7 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
 
   const figure = { mesh, keep, places: new Float64Array(3 * B), turns: new Float64Array(4 * B) };
   const spot = new Vector3(), turn = new Quaternion();
-  // Move to where `figure.places` and `figure.turns` of the bones are; colour(links): [r, g, b] of a part, 0 to 255.
+  // Moves the bones to `figure.places` and `figure.turns`. colour(links): returns [r, g, b], 0 to 255, of a part.
   figure.pose = (colour) => {
     const { places: p, turns: q } = figure;
     for (let b = 0; b < B; b++) {
@@ -66,14 +66,14 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
       linear(colour(regions[b] || []), tints.value[b]);
     }
   };
-  // Take the bones out of arrays of all joints.
+  // Copies the bones from arrays of all joints.
   figure.take = ({ places, turns }) => {
     keep.forEach((j, b) => {
       for (let i = 0; i < 3; i++) figure.places[3 * b + i] = places[3 * j + i];
       for (let i = 0; i < 4; i++) figure.turns[4 * b + i] = turns[4 * j + i];
     });
   };
-  // The lowest round parts of the body in the world [x, y, z, cm], for the shade on the ground.
+  // The lowest round parts of the body in the world, [x, y, z, radius in cm]. They darken the ground.
   figure.balls = (count = 10) => {
     const out = balls.map(([x, y, z, r], b) => {
       spot.set(x, y, z).applyMatrix4(bones[b].matrixWorld);
@@ -87,7 +87,7 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
   };
   figure.remove = () => { for (const each of meshes) { view.scene.remove(each); each.material.dispose(); } };
 
-  // Where the corners are now, as the graphics card works them out.
+  // World positions of the corners, computed as the graphics card does.
   figure.corners = () => {
     const moved = inverses.map((inverse, b) => new Matrix4().multiplyMatrices(bones[b].matrixWorld, inverse).elements);
     const { position, skinIndex, skinWeight } = geometry.attributes, out = new Float64Array(position.array.length);
@@ -102,7 +102,7 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
     }
     return out;
   };
-  // The links of the part under a point of the screen, and how far away it is; null where there is none.
+  // The links of the part at a point of the screen, and its distance; null if there is none.
   figure.under = (x, y) => {
     const corners = figure.corners(), n = corners.length / 3, index = geometry.index.array, seen = new Float64Array(3 * n);
     for (let v = 0; v < n; v++) seen.set(view.project([corners[3 * v], corners[3 * v + 1], corners[3 * v + 2]]), 3 * v);

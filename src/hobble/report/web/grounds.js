@@ -1,5 +1,5 @@
-// The grounds that one may play on: height in cm at x, z. Those with `tile` are made of level pieces, each `tile` cm
-// along x and z (0: without end), and are drawn so.
+// The grounds in Play: height in cm at x, z. Those with `tile` consist of level tiles of this size in cm along x and z (0:
+// unlimited), and are drawn with vertical edges.
 const scattered = (i, k) => { // the same number for the same tile, 0 to 1
   const n = Math.sin(12.9898 * i + 78.233 * k) * 43758.5453;
   return n - Math.floor(n);

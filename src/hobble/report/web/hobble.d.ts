@@ -1,7 +1,7 @@
 /** Centimetres, 60 Hz, Y up; yaw 0 faces +Z; +X is the character's left. Quaternions w first. */
 import type * as Three from "three";
 
-/** What lies in character.json: the network, the skeleton, the body. */
+/** The content of character.json: the network, the skeleton, the body. */
 export interface CharacterData { spec: object; body: object }
 
 export interface Wish {
@@ -22,8 +22,9 @@ export interface Character {
   readonly channels: Record<string, { columns: string[]; highest: number }>;
   /** By name for people ("left thigh"): the channel and its column. */
   readonly parts: Record<string, { channel: string; column: string }>;
-  /** Where all joints are, three numbers each, and their rotations in the world, four each; the next step writes over them. */
+  /** World positions of all joints, three numbers each. The next step overwrites them. */
   readonly places: Float64Array;
+  /** World rotations of all joints, four numbers each. The next step overwrites them. */
   readonly turns: Float64Array;
   /** Left heel, left toe, right heel, right toe: 0 to 1. */
   readonly contacts: number[];
@@ -31,7 +32,7 @@ export interface Character {
   readonly root: [number, number, number];
   /** Sets values of a channel, by column. Columns that are not named go back to 0. Throws RangeError for an unknown name or a bad value. */
   setChannel(channel: string, values?: Record<string, number>): void;
-  /** One frame of a sixtieth of a second. */
+  /** Runs one frame, a sixtieth of a second. */
   step(wish?: Wish): Character;
 }
 

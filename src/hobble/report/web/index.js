@@ -1,4 +1,4 @@
-// The report's page. What a person may want in the browser's console, and the tests use, is `Hobble`.
+// The report's page. `Hobble` gives access to its parts from the browser's console and from the tests.
 import { colour, material } from "./base.js";
 import { bvh } from "./bvh.js";
 import { createCharacter } from "./character.js";

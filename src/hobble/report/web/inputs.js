@@ -2,7 +2,8 @@
 const AHEAD = 8; // frames that a joint would go on for at its velocity
 const LEAST = .15; // cm a frame; slower joints have no line
 
-// The samples of the ground along the path that was and is to come, and to its sides; higher ones than the path are warm.
+// The ground samples of the network's input: along the past and future path and to both sides of it. above: cm above the
+// mean height of the path.
 export const groundSamples = (c, spec) => {
   const { step, constants: { side } } = spec, out = [];
   for (let s = 0; s < c.ground.length / 3; s++) {

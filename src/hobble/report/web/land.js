@@ -1,4 +1,5 @@
-// The ground: a sheet around where the camera looks, lit, with a grid a metre wide, darker under a body, fading far away.
+// The ground around the point that the camera looks at. It has a grid of one metre, is darker under bodies and fades out
+// far away.
 import { BufferAttribute, BufferGeometry, Color, Mesh, MeshLambertMaterial, Vector4 } from "three";
 import { linear } from "./paint.js";
 
@@ -22,7 +23,7 @@ const sheet = (n) => {
   }
   return geometryOf(new Float32Array(3 * n * n), index);
 };
-// Level pieces between lines across x and z, and the upright ones where their heights differ.
+// Level tiles between lines at `xs` and `zs`, with vertical pieces where the heights of neighbours differ.
 const pieces = (xs, zs, height) => {
   const place = [], index = [];
   const quad = (...corners) => {
@@ -66,7 +67,7 @@ export const createLand = (scene) => {
         vec2 drawn = (1. - smoothstep(vec2(width), vec2(width) + 1.5 * pixel, off)) * clamp(width / pixel + .35, 0., 1.);
         return max(drawn.x, drawn.y);
       }
-      // How much of the sky a ball hides from a place with its normal (the share of a sphere above a plane).
+      // The share of the sky that the balls hide from a point of the ground (the part of each sphere above the plane).
       float hidden() {
         float sum = 0.;
         for (int i = 0; i < ${BALLS}; i++) {
@@ -90,7 +91,7 @@ export const createLand = (scene) => {
 
   let drawn = null;
   const wear = (geometry) => { mesh.geometry.dispose(); mesh.geometry = geometry; };
-  // A grid n by n of heights over x in [x0, x1] and z in [z0, z1]; at(i, k) gives the height in cm.
+  // Fills the sheet with n by n heights over x in [x0, x1] and z in [z0, z1]; at(i, k, x, z) gives the height in cm.
   const fill = (n, [x0, x1], [z0, z1], at) => {
     if (mesh.geometry.attributes.position.count !== n * n) wear(sheet(n));
     const place = mesh.geometry.attributes.position;
@@ -105,7 +106,7 @@ export const createLand = (scene) => {
     place.needsUpdate = true;
     mesh.geometry.computeVertexNormals();
   };
-  // Lines between tiles `size` apart whose middles are at its multiples, within `far` of a place.
+  // Edges of tiles whose centres are at multiples of `size`, within `far` of `middle`.
   const between = (size, middle, far) => {
     if (!size) return [middle - far, middle + far];
     const from = Math.floor((middle - far) / size), to = Math.ceil((middle + far) / size);
@@ -116,12 +117,12 @@ export const createLand = (scene) => {
       linear(paint.sky.map((v, i) => v + (paint.dark ? .75 : .55) * (paint.ground[i] - v)), material.color);
       linear(paint.line, ink.value);
     },
-    // Round parts of bodies [x, y, z, cm], which hide the sky from the ground.
+    // Sets the round parts of bodies that darken the ground: [x, y, z, radius in cm].
     under(parts) {
       used.value = Math.min(BALLS, parts.length);
       for (let i = 0; i < used.value; i++) balls.value[i].set(...parts[i]);
     },
-    // The ground that `height` tells, around a point [x, y, z]; tile: as of grounds.js; name: what tells one from another.
+    // Draws the ground around a point [x, y, z]. height, tile: see grounds.js. name: a different one for each ground.
     around([x, , z], { height, tile } = { height: () => 0 }, name = "flat") {
       focus.value = [x, z];
       const key = `${name} ${Math.round(x / 200)} ${Math.round(z / 200)}`;
@@ -132,7 +133,7 @@ export const createLand = (scene) => {
       const n = name === "flat" ? 2 : 2 * Math.round(far / STEP) + 1;
       fill(n, [cx - far, cx + far], [cz - far, cz + far], (i, k, u, w) => height(u, w));
     },
-    // A piece of ground of its own, all of it shown: n by n heights in rows of x.
+    // Draws one piece of ground, whole: n by n heights in rows of x.
     piece(n, x, z, heights) {
       focus.value = [(x[0] + x[1]) / 2, (z[0] + z[1]) / 2];
       reach.value = 4 * Math.max(x[1] - x[0], z[1] - z[0]);

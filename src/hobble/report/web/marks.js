@@ -1,9 +1,9 @@
-// Strips and dots that lie on the ground or in the air, given anew for every picture.
+// Strips, dots and needles on the ground or in the air. They are set anew for every picture.
 import { BufferAttribute, BufferGeometry, Color, DoubleSide, DynamicDrawUsage, Mesh, MeshBasicMaterial } from "three";
 import { cross, minus, unit } from "./numbers.js";
 import { linear } from "./paint.js";
 
-// most: four-cornered pieces. over: whether they are seen through the figure.
+// most: the largest number of quads. over: draw them in front of the body.
 export const createMarks = (scene, { most = 4000, over = false } = {}) => {
   const geometry = new BufferGeometry(), colour = new Color(), index = [];
   const place = new BufferAttribute(new Float32Array(12 * most), 3), shade = new BufferAttribute(new Float32Array(16 * most), 4);
@@ -23,7 +23,7 @@ export const createMarks = (scene, { most = 4000, over = false } = {}) => {
 
   const marks = {
     clear() { used = 0; },
-    // Four corners of one colour [r, g, b] and opacity.
+    // Adds a quad with a colour [r, g, b] and an opacity.
     piece(points, rgb, alpha) {
       if (used === most || alpha < .02) return;
       linear(rgb, colour);

@@ -1,11 +1,11 @@
-// The character for another page or a game: an ES module that needs nothing. What hobble.d.ts says of it.
+// The character for another page or a game: an ES module without dependencies. hobble.d.ts documents it.
 import { createCharacter as controller } from "./character.js";
 import { createRig } from "./rig.js";
 import { unpackBody } from "./skinned.js";
 
 const FLAT = () => 0;
 
-// data: of character.json. place [x, z] in cm and heading in radians: where and how it stands.
+// data: content of character.json. place: [x, z] in cm, and heading: radians, where the character starts.
 export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
   const { spec } = data, c = controller(spec, place, heading), rig = createRig(spec);
   const character = { spec, joints: spec.names, gaits: spec.gaits, channels: {}, parts: {}, places: rig.places, turns: rig.turns };
@@ -17,7 +17,7 @@ export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
   rig.take(c.pose, c.turns);
   read();
 
-  // Values by column of a channel; columns that are not named go back to 0.
+  // Sets the values of a channel. values: column -> value; columns that are not named go back to 0.
   character.setChannel = (name, values = {}) => {
     const one = spec.channels.find((channel) => channel.name === name);
     if (!one) throw new RangeError(`no channel ${name}; there are: ${spec.channels.map((channel) => channel.name).join(", ") || "none"}`);
@@ -27,7 +27,7 @@ export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
     }
     one.columns.forEach((column, l) => { c.channelTargets[one.first + l] = (values[column] || 0) / one.scale; });
   };
-  // One frame of a sixtieth of a second.
+  // Runs one frame, a sixtieth of a second.
   character.step = ({ velocity = [0, 0], facing = null, gait = null, ground = FLAT } = {}) => {
     if (gait !== null && !spec.gaits.includes(gait)) throw new RangeError(`no gait ${gait}; there are: ${spec.gaits.join(", ")}`);
     c.frame(velocity, facing, gait, ground);
@@ -38,7 +38,7 @@ export const createCharacter = (data, { place = [0, 0], heading = 0 } = {}) => {
   return character;
 };
 
-// Its body for three.js, whose namespace is given: {mesh, pose(character)}.
+// The body for three.js: {mesh, pose(character)}. THREE: the namespace of the caller's three.js.
 export const createFigure = (THREE, data, material = new THREE.MeshStandardMaterial({ color: 0xd6d6d2, roughness: .8 })) => {
   const { geometry, inverses, keep } = unpackBody(THREE, data.body), bones = keep.map(() => new THREE.Bone());
   const mesh = new THREE.SkinnedMesh(geometry, material), spot = new THREE.Vector3(), turn = new THREE.Quaternion(), one = new THREE.Vector3(1, 1, 1);

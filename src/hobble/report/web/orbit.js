@@ -42,7 +42,7 @@ export const createOrbit = (canvas, home, changed) => {
   });
   for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => touches.delete(event.pointerId));
   canvas.addEventListener("wheel", (event) => {
-    if (!event.ctrlKey) return; // plain scrolling belongs to the page
+    if (!event.ctrlKey) return; // without Ctrl the page scrolls
     event.preventDefault();
     orbit.nearer(Math.exp(event.deltaY / 300));
   }, { passive: false });

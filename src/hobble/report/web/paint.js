@@ -3,7 +3,7 @@ import { Color, SRGBColorSpace } from "three";
 import { rgb } from "./base.js";
 import { mix } from "./numbers.js";
 
-// Numbers 0 to 255, as the page shows them.
+// All colours as [r, g, b], 0 to 255, for the current theme.
 export const palette = () => {
   const dark = rgb("paper")[0] < 128;
   return {
@@ -19,5 +19,5 @@ export const channelColour = (paint, t, plain = paint.body) => {
   return t < .5 ? mix(plain, paint.low, .35 + 1.3 * t) : mix(paint.low, paint.high, 2 * t - 1);
 };
 
-// A colour [r, g, b], 0 to 255, as light is reckoned with.
+// A colour [r, g, b], 0 to 255, in the linear colour space of three.js.
 export const linear = ([r, g, b], colour = new Color()) => colour.setRGB(r / 255, g / 255, b / 255, SRGBColorSpace);

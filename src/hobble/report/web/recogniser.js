@@ -9,7 +9,7 @@ export const SECONDS = 3; // of motion that are used; within two seconds, half o
 
 const clip = (v, low, high) => Math.min(Math.max(v, low), high);
 
-// About twenty numbers that distinguish limps, by name, in the same order as in Python.
+// About twenty features that distinguish limps, by name, in the same order as in Python.
 export const features = (walk, healthy) => {
   const change = (name) => walk[name] - healthy[name], sides = (name) => change(`${name}_R`) - change(`${name}_L`);
   const share = (name) => Math.min(Math.max(walk[`range ${name}`], LEAST_RANGE) / Math.max(healthy[`range ${name}`], LEAST_RANGE), MOST);

@@ -1,5 +1,5 @@
-// A body whose bones keep their lengths: rotations decide where joints are, and legs bend so that toes come to where
-// they were predicted. What Python's `hobble.runtime.export.jointed` does.
+// Joints on bones of fixed length, from predicted rotations. Legs bend so that toes are where they were predicted. The same
+// as `hobble.runtime.export.jointed` in Python.
 import { dot, minus } from "./numbers.js";
 import { at3, at4, between, multiply } from "./turns.js";
 

@@ -1,8 +1,8 @@
-// A body that lies in JSON, unpacked for three.js. The classes are given, so that whoever has three.js uses its own.
+// Unpacks a body from JSON for three.js. The caller passes the classes of its own three.js.
 import { bytes } from "./numbers.js";
 
-// {geometry, inverses, keep, balls}: `keep`, the joints that are its bones; `inverses`, the matrix of each that undoes how
-// it stood; `balls`, [x, y, z, half width] of the part of each, seen from the bone.
+// Returns {geometry, inverses, keep, balls}. keep: the joints that are bones. inverses: inverse matrix of each bone in the
+// rest pose. balls: [x, y, z, radius] of the part of each bone, in its own frame.
 export const unpackBody = ({ BufferAttribute, BufferGeometry, Matrix4, Quaternion, Sphere, Vector3 }, b) => {
   const geometry = new BufferGeometry(), steps = new Int16Array(bytes(b.corners));
   geometry.setAttribute("position", new BufferAttribute(Float32Array.from(steps, (v) => v * b.unit), 3));

@@ -1,7 +1,7 @@
 // Where the character is asked to go: keys, a gamepad, or a thumb on the disc.
 import { find } from "./base.js";
 
-// By place and not by letter, so that they lie alike on every keyboard.
+// Keys by their place on the keyboard, not by letter, so that WASD is in the same place on every layout.
 const CODES = {
   KeyW: [0, 1], KeyS: [0, -1], KeyA: [-1, 0], KeyD: [1, 0],
   ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0],
@@ -20,7 +20,7 @@ export const createSteering = (stage, orbit) => {
   };
   for (const name of Object.keys(on)) find(`play-${name}`).addEventListener("click", () => steering.toggle(name));
 
-  // What is wished for now, seen from the camera: velocity [x, z], facing [x, z] or null, gait or null.
+  // The wish now, relative to the camera: velocity [x, z], facing [x, z] or null, gait or null.
   steering.wish = () => {
     let [right, ahead] = [stick.x, -stick.y], fast = on.jog || held.has("ShiftLeft") || held.has("ShiftRight"), look = on.strafe;
     for (const code of held) if (CODES[code]) { right += CODES[code][0]; ahead += CODES[code][1]; }
@@ -42,7 +42,7 @@ export const createSteering = (stage, orbit) => {
   };
   steering.release = () => held.clear();
 
-  // act(event): what other keys do; true where one did something.
+  // act(event): handles all other keys. Returns true if the key did something.
   steering.listen = (act) => {
     stage.addEventListener("keydown", (event) => {
       if (event.target !== stage || event.ctrlKey || event.metaKey || event.altKey) return;

@@ -1,5 +1,5 @@
-// A lit scene on a canvas. One WebGL context draws every view of the page, which keeps its picture for printing and
-// saving; centimetres, Y up.
+// A lit scene on a canvas. All views of the page share one WebGL context. Each copies its picture to its own canvas, for
+// printing and saving. Centimetres, Y up.
 import {
   DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, VSMShadowMap, WebGLRenderer,
 } from "three";
@@ -10,12 +10,13 @@ import { cross, dot, minus, unit } from "./numbers.js";
 import { createOrbit } from "./orbit.js";
 import { palette } from "./paint.js";
 
-// Draws every view, also those that were never scrolled to: for printing.
+// For printing: functions that draw each view, even if it was never scrolled to.
 export const views = [];
 
-// How finely is drawn, best first: pixels of the screen to one of the picture, the shadows' map, parts that shade the ground.
+// Levels of quality, best first. scale: pixels drawn for each CSS pixel. shadow: size of the shadow map. balls: round parts
+// of bodies that darken the ground under them.
 const LEVELS = [{ scale: 2, shadow: 768, balls: 24 }, { scale: 1, shadow: 512, balls: 16 }, { scale: .8, shadow: 0, balls: 12 }];
-const SLOW = 50, PATIENCE = 24; // ms between pictures that are too many, and after how many such pictures less is drawn
+const SLOW = 50, PATIENCE = 24; // ms; after this many pictures that took longer, the quality goes down a level
 const asked = new URLSearchParams(location.search).get("quality");
 let level = 0, slow = 0;
 
@@ -29,9 +30,9 @@ const shared = () => {
       renderer.setScissorTest(true);
       const gl = renderer.getContext(), info = gl.getExtension("WEBGL_debug_renderer_info");
       const card = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
-      // A processor that draws in place of a graphics card has little time for it.
+      // Without a graphics card the processor draws, so start with the lowest quality.
       if (asked !== "high" && (asked === "low" || /swiftshader|llvmpipe|software|basic render/i.test(card))) level = LEVELS.length - 1;
-    } catch { renderer = false; } // no WebGL here: the page says so where the picture would be
+    } catch { renderer = false; } // no WebGL: a message is drawn in place of the picture
   }
   return renderer;
 };
@@ -43,7 +44,7 @@ const lit = (scene) => {
   Object.assign(key.shadow.camera, { left: -190, right: 190, top: 190, bottom: -190, near: 100, far: 1200 });
   scene.add(sky, key, key.target, rim, rim.target);
   return {
-    // The shadows' map may change while the page is open.
+    // Changes the size of the shadow map; 0 draws no shadows.
     fine(size) {
       key.castShadow = size > 0;
       if (!size || key.shadow.mapSize.x === size) return;
@@ -60,7 +61,7 @@ const lit = (scene) => {
       rim.color.set(paint.dark ? 0x9fd4e0 : 0xdfeef5);
       rim.intensity = paint.dark ? 1.1 : .7;
     },
-    // From the left of the camera, and against it from behind, wherever it is.
+    // Places the lights relative to the camera: the key light to the left of it, the rim light behind the body.
     aim([x, y, z], yaw) {
       const put = (light, turn, out, up) => {
         light.target.position.set(x, y, z);
@@ -73,12 +74,12 @@ const lit = (scene) => {
   };
 };
 
-// draw(now, view) is called when something asked for it and the canvas can be seen.
+// draw(now, view) is called after `view.ask()`, once the canvas can be seen.
 export const createView = (canvas, home, draw) => {
   const context = canvas.getContext("2d"), scene = new Scene(), camera = new PerspectiveCamera(30, 1, 10, 6000);
   const lights = lit(scene);
   let scale = 1, eye = [0, 0, 1], right, up, ahead, seen = false, waiting = false, drawnAt = 0, drawnFor = -1;
-  // framing: how large what is looked at is drawn, and by how much of the width and height it is moved aside.
+  // framing: size of the body in the picture, and its shift as a share of the width (aside) and of the height (up).
   const view = { scene, W: 0, H: 0, zoom: 1, paint: {}, milliseconds: 0, framing: { size: 1.75, aside: 0, up: 0 }, balls: 12, inputs: false, onHidden: () => {} };
   view.land = createLand(scene);
   view.marks = createMarks(scene);
@@ -86,7 +87,7 @@ export const createView = (canvas, home, draw) => {
 
   const paint = (now) => {
     if (drawnFor < 0) return; // not laid out yet
-    if (view.W < 4 || view.H < 4) return; // a window that is being made or folded away
+    if (view.W < 4 || view.H < 4) return; // the window is opening or closing
     const gl = shared();
     if (!gl) {
       context.fillStyle = "gray";
@@ -94,7 +95,7 @@ export const createView = (canvas, home, draw) => {
       return;
     }
     if (drawnFor !== level) fit();
-    // Less is drawn where pictures keep coming slowly.
+    // Lower the quality if pictures keep coming slowly.
     slow = now - drawnAt > SLOW && now - drawnAt < 1000 ? slow + 1 : Math.max(0, slow - 2);
     drawnAt = now;
     if (slow > PATIENCE && level + 1 < LEVELS.length && !asked) { level++; slow = 0; }
@@ -108,7 +109,7 @@ export const createView = (canvas, home, draw) => {
     view.marks.done();
     view.over.done();
     gl.render(scene, camera);
-    // The sky lies under the scene, so that saved pictures and films have one.
+    // Draw the sky first, so that saved pictures and films have one.
     const sky = context.createLinearGradient(0, 0, 0, h), [r, g, b] = view.paint.sky, [u, v, t] = view.paint.zenith;
     sky.addColorStop(0, `rgb(${u},${v},${t})`);
     sky.addColorStop(.7, `rgb(${r},${g},${b})`);
@@ -139,7 +140,7 @@ export const createView = (canvas, home, draw) => {
     camera.updateProjectionMatrix();
     lights.aim(target, yaw);
   };
-  // Screen x, y and distance along the view.
+  // The x and y on the screen, and the distance from the camera along its view.
   view.project = (p) => {
     const d = minus(p, eye), z = Math.max(1, dot(d, ahead));
     const { aside, up: raised } = view.framing;
@@ -164,8 +165,8 @@ export const createView = (canvas, home, draw) => {
     view.balls = LEVELS[level].balls;
   };
   const fits = () => drawnFor >= 0 && view.W === canvas.clientWidth && view.H === canvas.clientHeight;
-  // A canvas loses its picture with its size. For printing it takes its size before it is drawn, and where the observer
-  // hears of that size afterwards the picture stays.
+  // Setting the size of a canvas clears it. For printing, the size is set first and then the picture is drawn. The observer
+  // is told of this size afterwards and must not clear the picture again, hence `fits`.
   views.push(() => {
     shared();
     if (!fits()) fit();

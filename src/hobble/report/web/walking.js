@@ -26,7 +26,8 @@ import { createView } from "./view.js";
     return unpacked.get(index);
   };
   const joint = (s, frame, b) => s.motion.at(frame, b);
-  // Where the camera looks: the root over the second around a frame, so that it glides and scrubbing is repeatable.
+  // Where the camera looks: the mean position of the root over a second around the frame. So the camera moves smoothly, and
+  // a frame always looks the same.
   const followed = (s) => {
     const half = Math.round(fps / 2), { roots } = s.motion, out = new Float32Array(roots.length);
     for (let f = 0; f < s.frames; f++) {
@@ -39,7 +40,7 @@ import { createView } from "./view.js";
     }
     return out;
   };
-  // {frame, heel, toe}: where a foot stands, every other frame, so that one that slides leaves a smear.
+  // {frame, heel, toe} of each standing foot in every second frame. A sliding foot leaves overlapping prints.
   const footprints = (s) => {
     const out = [];
     if (!s.contacts || !scenes.feet.length) return out;
@@ -51,7 +52,7 @@ import { createView } from "./view.js";
     return out;
   };
   const flat = ([x, , z]) => [x, 0, z];
-  // The share of the highest that a scenario's column has.
+  // The value of the swept column, as a share of its highest.
   const share = (s, frame) => (s.values ? s.values[frame] / 250 : 0);
 
   // Drawing

@@ -204,8 +204,8 @@ def overview(responses: Sequence[Mapping[str, Any]]) -> list[Chart]:
             "cm per joint at severity 10",
             2.0,
             "Distance from the healthy walk at the same phase, mean over joints. Hollow dots are links that "
-            "were never hurt in training. They have no effect and show how far a healthy walk drifts. A link "
-            "whose dot is no further out has no effect either.",
+            "were never hurt in training. They have no effect, so they show how much healthy walks differ. A "
+            "filled dot at the same distance means that this link has no effect either.",
         ),
         (
             "injury-speed",

@@ -39,8 +39,8 @@ def second_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
         "second-injury",
         "A second injury in addition to a first",
         "Rows: the first injury, at severity 7, one link of each part of the body. Columns: the second, at "
-        "10. Shown is how much the second changes the walk, in centimetres and as a share of its effect on a "
-        "healthy body. A pale field means that the first injury hides the second.",
+        "10. The cell says how much the second changes the walk, in centimetres and as a share of its effect "
+        "on a healthy body. A pale field means that the first injury hides the second.",
         layout={
             "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
             "yaxis": {"type": "category", "autorange": "reversed", "automargin": True},
@@ -110,8 +110,8 @@ def jog_chart(rows: Sequence[Mapping[str, Any]], untrained: Collection[str] = ()
         "into-a-jog",
         "From a hurt walk into a jog",
         "Distance of the jog from the healthy jog. The dotted line is the mean of links that were never hurt "
-        "in training. It shows how much two healthy jogs differ. If a line is no higher, the injury does not "
-        "show in the jog.",
+        "in training, so it shows how much two healthy jogs differ. If the line of a link is not above it, "
+        "the injury does not show in the jog.",
         traces,
         {
             "xaxis": axis("severity", dtick=1),

@@ -1,0 +1,83 @@
+"""A network that learnt injuries next to one of the same recipe that did not, on healthy motion.
+
+    snakemake -c2 results/limp/network/weights.npz
+    snakemake -c2 results/holden/network/weights.npz --config training=limp
+    python benchmarks/hurt_and_healthy.py results/limp results/holden DATABASE
+
+DATABASE is results/datasets/synthetic/database/plain. Errors of one step and of roll-outs on its healthy
+clips, waypoints of the track, ten minutes of walks, jogs, crouches and turns, and the processor time of the
+trainings. The last column is the first network's value divided by the second's.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from pathlib import Path
+
+from hobble.database.reader import Database
+from hobble.evaluation.stability import stability
+from hobble.measures.accuracy.run import measure
+from hobble.measures.responsivity.run import responsivity
+from hobble.measures.rollouts.run import measure_roll_outs
+from hobble.models.load import load_network
+from hobble.runtime.options import Runtime
+from hobble.training.options import Training
+
+LENGTHS = (1, 10, 60, 300)
+
+
+def training_seconds(folder: Path) -> float | None:
+    """Processor seconds of the training, as the workflow measured them."""
+    file = folder / "benchmarks/training/training.tsv"
+    if not file.exists():
+        return None
+    with file.open() as lines:
+        return sum(float(row["cpu_time"]) for row in csv.DictReader(lines, delimiter="\t"))
+
+
+def values(folder: Path, files: dict[str, Path], splits: dict[str, str], minutes: float) -> dict[str, object]:
+    """The row of values of one network, by name."""
+    weights = folder / "network/weights.npz"
+    network = load_network(weights)
+    out: dict[str, object] = {}
+    steps = measure(weights, files, splits, folder.name)
+    rolled = measure_roll_outs(weights, files, splits, folder.name, lengths=LENGTHS)
+    for split in ("train", "held_out"):
+        out[f"{split}: one step, share"] = steps[split]["mean"]
+        out[f"{split}: one step, cm"] = steps[split]["position_error_cm"]
+        for row in rolled["lengths"]:
+            out[f"{split}: {row['length']} frames, cm"] = row[split]["position_error_cm"]
+    lap = responsivity(network, configuration="", runtime=Runtime(), laps=1, lap_seconds=400, modes=())
+    out["waypoints"] = f"{lap['waypoints_reached']} of {lap['waypoints']}"
+    out["off the path, cm"] = lap["path_overshoot_cm"]
+    found = stability(network, minutes)
+    out["hips, cm"] = f"{found['hips_lowest_cm']:.0f} to {found['hips_highest_cm']:.0f}"
+    out["largest turn, degrees"] = found["largest_turn_degrees"]
+    out["foot slide, cm a step"] = found["foot_slide_cm"]
+    out["training, processor s"] = training_seconds(folder)
+    return out
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("hurt", type=Path, help="results of the configuration with injuries")
+    parser.add_argument("healthy", type=Path, help="results of the one without")
+    parser.add_argument("database", type=Path, help="the database of healthy clips")
+    parser.add_argument("--minutes", type=float, default=10.0)
+    asked = parser.parse_args()
+    database = Database.open(asked.database, Training().memory_mb)
+    splits = {c["clip"]: c["split"] for c in database.manifest.clips if c["rows"]}
+    files = {name: asked.database.parent / "clips" / f"{name}.npz" for name in splits}
+    hurt, healthy = (values(folder, files, splits, asked.minutes) for folder in (asked.hurt, asked.healthy))
+    print(f"{'':28}{asked.hurt.name:>12}{asked.healthy.name:>12}{'ratio':>8}")
+    for name, value in hurt.items():
+        other = healthy[name]
+        if isinstance(value, float) and isinstance(other, float):
+            print(f"{name:28}{value:12.4g}{other:12.4g}{value / other:8.2f}")
+        else:
+            print(f"{name:28}{value!s:>12}{other!s:>12}")
+
+
+if __name__ == "__main__":
+    main()
