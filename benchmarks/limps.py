@@ -2,7 +2,8 @@
 
     python benchmarks/limps.py CMU_FOLDER [CLIP.bvh ...]
 
-Also prints how often healthy walks are called impaired.
+Also prints how often healthy walks are called impaired, and whether hurt versions of healthy walks are nearer
+to captured limps than the healthy walks are.
 """
 
 from __future__ import annotations
@@ -13,19 +14,33 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
+import yaml
 
+from hobble.channels.injury.limp.run import distance
+from hobble.channels.injury.status import parse_links
+from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import load_npz
 from hobble.gait.comparison import compare, healthy_profile
+from hobble.gait.cycles import joined, measure
 from hobble.gait.derive_healthy import REFERENCE, healthy_windows
 from hobble.gait.graded import HEALTHY, Grader, grade, healthy_covariance, learn_grader
 from hobble.gait.people import GAITS, NORMAL, people
-from hobble.gait.profile import NAMES, Profile, mirrored
+from hobble.gait.profile import NAMES, Profile, mirrored, profile
 from hobble.gait.read import read_clip
 from hobble.gait.recogniser import SHRINKAGE, examples, learn, recognise
+from hobble.hurt.clip import hurt_clip
+from hobble.labels.label import label_clip
+from hobble.labels.model import Labels
+from hobble.labels.options import Labels as LabelOptions
+from hobble.motion.make import make_clip
+from hobble.motion.options import ClipMotion
 
 STRENGTHS = (0.15, 0.3, 0.5, 0.7, 1.0)
 EXAM = ("105_16", "105_25", "105_26", "105_15")
+SKELETONS = Path("config/skeletons")
+DATA_SET = Path("config/datasets/cmu.yaml")  # has the severities of the captured limps
+HEALTHY_WALKS = ("105_29", "105_36")  # hurt to be compared with captured limps
 
 
 def left_out() -> Iterator[tuple[int, list[int]]]:
@@ -117,6 +132,36 @@ def captured(folder: Path, clips: list[str]) -> None:
         print(f"    graded {g.label} {g.side or ''} {g.strength:.1f}; windows: {rounded(seen.graded())}")
 
 
+def made(folder: Path) -> None:
+    def read(name: str) -> tuple[Clip, Labels]:
+        file, skeleton = folder / f"{name}.bvh", SKELETONS / "holden31.yaml"
+        clip, _ = make_clip(
+            file, skeleton, SKELETONS, clip=name, skeleton_name="holden31", options=ClipMotion(ground="flat")
+        )
+        source = {"source_frames": len(clip), "source_fps": clip.fps}
+        return clip, label_clip(clip, [], source, "walk", "flat", LabelOptions())[0]
+
+    def walks(clips: list[Clip]) -> Profile:
+        return profile(joined(measure(clip.skeleton, clip.positions, clip.fps) for clip in clips))
+
+    sources = [read(name) for name in HEALTHY_WALKS]
+    healthy = walks([clip for clip, _ in sources])
+    print(f"\nspreads from a captured limp: healthy {', '.join(HEALTHY_WALKS)}; their hurt versions")
+    for name, entry in yaml.safe_load(DATA_SET.read_text())["clips"].items():
+        if not (status := entry.get("channels", {}).get("injury")):
+            continue
+        links = sources[0][0].skeleton.link_names
+        hurt = dict(parse_links(status, links, name))
+        severity = np.array([hurt.get(link, 0.0) for link in links])
+        versions = [
+            hurt_clip(clip, labels, np.tile(severity, (len(clip), 1))).clip for clip, labels in sources
+        ]
+        captured_limp = walks([read(name)[0]])
+        far = distance(captured_limp, healthy, healthy, healthy)
+        near = distance(captured_limp, healthy, walks(versions), healthy)
+        print(f"  {name} {far:.2f} {near:.2f}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -132,6 +177,7 @@ def main() -> None:
     strangers()
     healthy_walks(options.folder)
     captured(options.folder, options.clips)
+    made(options.folder)
 
 
 if __name__ == "__main__":

@@ -99,8 +99,10 @@ class Mapped:
         return [(self.chunk_rows[i], int(self.starts[i])) for i in members]
 
 
-def same(db: Database, mapped: Mapped) -> None:
-    """Assert that both give the same blocks."""
+def task_same(folder: Path, memory_mb: str) -> None:
+    """Assert that both give the same blocks, in a process that does not keep the maps."""
+    db = Database.open(folder / "db", int(memory_mb))
+    mapped = Mapped(db, folder / "tables")
     rows, every = db.block_rows(BATCH), len(mapped.chunk_rows)
     for width in (db.window("train", rows), every):
         pairs = zip(
@@ -180,7 +182,7 @@ def main() -> None:
     parser.add_argument("--argument", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.task:
-        task_maps(args.folder, args.argument)
+        globals()[f"task_{args.task}"](args.folder, args.argument)
         return
     folder = Path(tempfile.mkdtemp(prefix="hobble-maps-", dir=args.folder))
     try:
@@ -191,8 +193,7 @@ def main() -> None:
         shutil.rmtree(folder / "clips")
         db = Database.open(folder / "db", args.memory_mb)
         write_tables(db, folder / "tables")
-        mapped = Mapped(db, folder / "tables")
-        same(db, mapped)
+        of_files.child("same", folder, str(args.memory_mb), script=__file__)
         print(f"both give the same blocks; {db.manifest.bytes >> 20} MB of rows")
         ours = lines(reader, window, chunks)
         without = lines(window, chunks, Database._parts, Database._wanted, Database.load, Database._whole)

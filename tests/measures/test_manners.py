@@ -96,8 +96,8 @@ def test_whole_people_are_left_out() -> None:
             name = f"{person}-{take}"
             people[name] = str(person)
             windows += [window(name, manner, *(own + rng.normal(0, 0.02, 6))) for _ in range(20)]
-    by_clip = run.left_out(windows, {name: name for name in people})
-    by_person = run.left_out(windows, people)
+    by_clip = run.left_out(windows, {name: name for name in people}, 0.6)
+    by_person = run.left_out(windows, people, 0.6)
     assert by_clip["people"] == 24
     assert by_person["people"] == 12
     assert by_person["people_of"] == {NONE: 6, "sad": 6}
@@ -113,7 +113,7 @@ def test_a_manner_of_one_person_is_never_named_without_that_person() -> None:
         for n in range(1 if m == "sad" else 3)
         for _ in range(10)
     ]
-    found = run.left_out(windows, {w.clip: w.clip for w in windows})
+    found = run.left_out(windows, {w.clip: w.clip for w in windows}, 0.02)
     assert found["by_manner"] == {NONE: 1.0, "old": 1.0, "sad": 0.0}
     assert found["right"] == round(60 / 70, 5)
     assert found["none_or_not"] == 1.0, "but that it is not the neutral walk is seen"
@@ -137,6 +137,7 @@ def test_each_manner_is_tried_with_each_column_of_another_channel(
     [found] = measured(both, motion)["channels"]
     assert found["manners"] == ["old", "sad"]
     assert found["captured"]["right"] == 1.0
+    assert found["captured"]["shrinkage"] == 0.6, "of equals the largest"
     assert found["right_at_1"] == 1.0
     rows = found["together"]
     assert len(rows) == 3 * 25

@@ -18,18 +18,16 @@ from hobble.runtime.feet import (
     FLOATING,
     FOOT,
     LOCK_AT,
-    MOST_ADDED,
     RELEASE,
     STRETCH,
     TOES,
     TOO_FAR,
-    bend,
     carried,
     carry_body,
     leg_joints,
     place_feet,
-    reach,
 )
+from hobble.runtime.leg_reach import MOST_ADDED, bend, reach
 
 coordinate = st.floats(-25, 25)
 

@@ -29,14 +29,14 @@ class Source:
     """Where the values of one clip come from.
 
     clip: its name (for a mirrored clip, the original's). entry: its entry in the data set. value: the part of
-    the entry for this channel. options: the data set's section `channels.<name>`. files: the existing files
-    beside the clip, and the tables that the data set names.
+    the entry for this channel. options: the data set's section `channels.<name>` as the channel's model.
+    files: the existing files beside the clip, and the tables that the data set names.
     """
 
     clip: str
     entry: Mapping[str, Any] = field(default_factory=dict)
     value: Any = None
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Section | None = None
     files: Sequence[str | Path] = ()
 
 
@@ -87,7 +87,18 @@ class Channel(ABC):
     def check(self, source: Source, rig: Rig) -> None:  # noqa: B027 - most channels check nothing
         """Raise InputError if the clip's entry or the options are wrong. Called before any job runs."""
 
-    def tables(self, options: Mapping[str, Any]) -> Sequence[str]:
+    def source(self, fields: Mapping[str, Any], files: Sequence[str | Path] = ()) -> Source:
+        """A source from plain data: the fields of a `Source` without `files`.
+
+        Raises pydantic.ValidationError for options that the channel does not have.
+        """
+        return Source(**{**fields, "options": self.options_of(fields.get("options", {}))}, files=files)
+
+    def options_of(self, section: Mapping[str, Any]) -> Section | None:
+        """The data set's section for this channel as its model; None without a section."""
+        return self.Options.model_validate(section) if self.Options is not None and section else None
+
+    def tables(self, options: Section | None) -> Sequence[str]:
         """Files in the mocap folder that the options name."""
         return ()
 

@@ -23,7 +23,9 @@ class Words:
 
     rest: label of the button that sets all values to 0. step: of a slider. key: name of its values in the
     address of a page, by default the channel's name. grows: a sentence about a column that rises. never: a
-    sentence about a column that was 0 in all of training.
+    sentence about a column that was 0 in all of training. headline: of the page. says: what the page says
+    about a value that the figure has, with {} for the column. on: a word for a figure with a value; empty:
+    the column's name.
     """
 
     rest: str = "Neutral"
@@ -31,6 +33,9 @@ class Words:
     key: str | None = None
     grows: str = "Walks {} more and more"
     never: str = "always 0 in training, so it has no effect"
+    headline: str = "Say how it walks."
+    says: str = "{}"
+    on: str = ""
 
 
 @dataclass(frozen=True)

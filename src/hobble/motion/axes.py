@@ -78,16 +78,30 @@ def rest_frame(skeleton: Skeleton) -> Array:
     return quat.from_matrix(axes)
 
 
-def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> tuple[Clip, Axes, list[str]]:
+@dataclass(frozen=True)
+class Straight:
+    """A clip with right-handed coordinates and Y up, and its axes before.
+
+    notes: a sentence if motion and rest pose disagree on what is up. unsure: the same if it is in doubt.
+    """
+
+    clip: Clip
+    axes: Axes
+    notes: list[str]
+    unsure: list[str]
+
+
+def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> Straight:
     """The clip with right-handed coordinates, Y up, and a rest pose that faces +Z if whole axes allow it.
 
     up: "auto", "Y" or "Z". handedness: "auto", "right" or "left". standing: whether a person can stand in the
     rest pose; if not, it does not show what is up.
 
     With `auto` the axes come from the motion. Up goes from hips to head and from feet to hips, unless the
-    figure crawls. The feet point forward. Also returns a note if motion and rest pose disagree on what is up.
+    figure crawls. The feet point forward. Raises ValueError if neither the motion nor a rest pose shows what
+    is up.
     """
-    name, notes = _up_of(clip, standing) if up == "auto" else (f"+{up}", [])
+    name, notes, unsure = _up_of(clip, standing) if up == "auto" else (f"+{up}", [], [])
     if handedness == "auto":
         handedness = _hand_of(clip)
     if handedness == "left":
@@ -98,22 +112,26 @@ def straighten(clip: Clip, up: str, handedness: str, standing: bool = True) -> t
     facing, near = nearest_axis(quat.rotate(rest, np.array([0.0, 0.0, 1.0])))
     turn = quat.inv(rest) if near > 1 - 1e-9 else quat.IDENTITY
     axes = Axes(name, handedness, facing if near > 1 - 1e-9 else "oblique")
-    return _turned(clip, world, turn), axes, notes
+    return Straight(_turned(clip, world, turn), axes, notes, unsure)
 
 
-def _up_of(clip: Clip, standing: bool) -> tuple[str, list[str]]:
-    """The axis that is up, and a note if motion and rest pose disagree."""
+def _up_of(clip: Clip, standing: bool) -> tuple[str, list[str], list[str]]:
+    """The axis that is up, and a sentence if motion and rest pose disagree: a note, or a doubt."""
     body, rest = (
         nearest_axis(_along_body(clip.skeleton, positions).mean(axis=0))[0]
         for positions in (clip.positions, rest_positions(clip.skeleton)[None])
     )
+    crawls = _crawls(clip, body)
+    if not standing and crawls:
+        raise ValueError(f"the body moves along itself ({body}), and nobody could stand in its zero pose")
     if body == rest or not standing:
-        return body, []
-    up, why = (rest, "the body crawls") if _crawls(clip, body) else (body, "the body moves that way up")
-    return up, [
+        return body, [], []
+    up, why = (rest, "the body crawls") if crawls else (body, "the body moves that way up")
+    note = (
         f"The body lies along {body} and its rest pose along {rest}. {up} was taken for up, because {why} "
         "(motion.up overrides this)."
-    ]
+    )
+    return (up, [note], []) if crawls or _travels(clip, body) else (up, [], [note])
 
 
 def _along_body(skeleton: Skeleton, positions: Array) -> Array:
@@ -136,6 +154,13 @@ def _crawls(clip: Clip, axis: str) -> bool:
     early, late = np.percentile(along.min(axis=1), [25, 75])
     travel = np.ptp(clip.root, axis=0)
     return bool(late - early > CLIMB and travel @ np.abs(DIRECTIONS[axis]) >= 0.9 * travel.max())
+
+
+def _travels(clip: Clip, axis: str) -> bool:
+    """Whether the figure goes further over the ground than it is tall, if an axis is up."""
+    along, level = DIRECTIONS[axis], 1 - np.abs(DIRECTIONS[axis])
+    tall = float(np.median(np.ptp(clip.positions @ along, axis=1)))
+    return bool(np.linalg.norm(np.ptp(clip.root * level, axis=0)) > tall)
 
 
 def _hand_of(clip: Clip) -> str:

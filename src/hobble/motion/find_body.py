@@ -25,6 +25,7 @@ RATIOS = {"leg": (0.6, 1.6), "arm": (0.48, 1.6)}  # shank to thigh, forearm to u
 APART = {"leg": 0.2, "arm": 0.4}  # of hips to knees, of shoulders to elbows, which may be spread for balance
 FEWEST = 3  # joints of a limb
 LEAST = 0.15  # least length of a limb, relative to the size of the body
+SWING = 10.0  # degrees: limbs that bend and stretch by more are surely limbs
 AWAY = -0.2  # legs and trunk point apart if the cosine between them is below this
 WORDS = {
     "leg": {"thigh", "shank", "foot", "ankle", "toe", "leg", "hip"},
@@ -39,6 +40,10 @@ class Doubt(Exception):
     def __init__(self, why: str, roles: dict[str, int] | None = None) -> None:
         super().__init__(why)
         self.roles = roles or {}
+
+
+class TwoFigures(Doubt):
+    """A rig with more than one body."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +93,25 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
         {s: (rig.clavicle(arms, k, arm[k][0]), *arm[k]) for s, k in across.items()},
         {s: (*leg[k], rig.toe(legs, k, leg[k][2])) for s, k in ordered.items()},
     )
+    if other := _second(names, parents, positions, hips):
+        raise TwoFigures(f"it holds two figures, {names[hips]} and {names[other]}")
     return Found(body, sided)
+
+
+def _second(names: Sequence[str], parents: Sequence[int], positions: Array, hips: int) -> int | None:
+    """The top joint of another figure beside the one with these hips, or None."""
+    chain = above(parents, hips)
+    for top in range(len(parents)):
+        if parents[top] not in chain[1:] or top in chain:
+            continue
+        part = [j for j in range(len(parents)) if top in above(parents, j)]
+        new = {old: i for i, old in enumerate(part)}
+        try:
+            find_body([names[j] for j in part], [new.get(parents[j], -1) for j in part], positions[:, part])
+        except Doubt:
+            continue
+        return top
+    return None
 
 
 @dataclass(frozen=True)
@@ -175,9 +198,10 @@ class _Rig:
                 if away > AWAY:
                     continue
                 ratio = self._long(legs, known[i, "leg"]) / self._long(arms, known[k, "arm"])
-                found.append(
-                    (np.log(ratio) - away + self._named(legs, "leg") + self._named(arms, "arm"), i, k)
-                )
+                score = np.log(ratio) - away
+                for pair, place, kind in ((legs, known[i, "leg"], "leg"), (arms, known[k, "arm"], "arm")):
+                    score += self._named(pair, kind) + self._swing(pair, place)
+                found.append((score, i, k))
         if not found:
             raise Doubt("the motion does not show which chains are legs and which are arms")
         _, i, k = max(found)
@@ -195,6 +219,11 @@ class _Rig:
             self._chord(pair.chains[0][a], pair.chains[0][b])[0]
             + self._chord(pair.chains[0][b], pair.chains[0][c])[0]
         )
+
+    def _swing(self, pair: _Pair, middle: tuple[int, int, int]) -> float:
+        """How much the limbs bend and stretch, 0 to 1. Hair, skirts and wings often keep one angle."""
+        turns = [np.ptp(np.percentile(self._bend(chain, *middle), [3, 97])) for chain in pair.chains]
+        return float(np.minimum(np.mean(turns) / SWING, 1.0))
 
     def _named(self, pair: _Pair, kind: str) -> float:
         """How strongly names suggest a kind of limb, -1 to 1."""
@@ -259,12 +288,16 @@ class _Rig:
     def _bends(self, pair: _Pair, i: int, j: int, k: int) -> bool:
         """Whether the limb bends there, by at least six degrees on either side."""
         for chain in pair.chains:
-            upper = _unit(self.at[:, chain[j]] - self.at[:, chain[i]])
-            lower = _unit(self.at[:, chain[k]] - self.at[:, chain[j]])
-            angle = np.degrees(np.arccos(np.clip(np.sum(upper * lower, axis=-1), -1, 1)))
+            angle = self._bend(chain, i, j, k)
             if np.percentile(angle, 97) > 6:
                 return True
         return False
+
+    def _bend(self, chain: Sequence[int], i: int, j: int, k: int) -> Array:
+        """(S,) degrees between the bones before and after the middle one of three joints of a chain."""
+        upper = _unit(self.at[:, chain[j]] - self.at[:, chain[i]])
+        lower = _unit(self.at[:, chain[k]] - self.at[:, chain[j]])
+        return np.degrees(np.arccos(np.clip(np.sum(upper * lower, axis=-1), -1, 1)))
 
     def joints_of(self, pair: _Pair, kind: str, k: int) -> tuple[int, int, int]:
         places = self.segments(pair, kind)
@@ -321,6 +354,11 @@ class _Rig:
 
         below = [j for j in range(len(self.names)) if arms.hub in above(self.parents, j)[1:]]
         below = [j for j in below if not limbs & set(above(self.parents, j))]
+        # Hair, ears and wings have a left and a right, and a head has not.
+        pairs = [set(sum(pair.chains, ())) for pair in self.pairs()]
+        twins = set().union(*(pair for pair in pairs if not pair & limbs))
+        single = [j for j in below if not twins & set(above(self.parents, j)) and not side_of(self.names[j])]
+        below = single or below
         if not below:
             raise Doubt("there is no joint for the head above the arms")
         top = max(below, key=height)

@@ -34,6 +34,7 @@ UPRIGHT = 0.6  # least height of the hips above a standing foot, in leg lengths
 # Feet that were animated or cleaned stand at exactly one angle: their 10th and 50th percentile differ by less
 # (.00 degrees in most clips of `styles`). Those of captured feet differ by at least .1 degrees.
 EXACT = np.radians(0.02)
+TILTS = np.radians(10.0)
 EXACT_ERROR = np.radians(0.5)
 # Standard deviation of the difference between a captured foot that stands and the same foot in the rig's zero
 # pose: 3 degrees over seven subjects of CMU, and one for the clip.
@@ -195,9 +196,10 @@ def _steepness(seen: BodySample, side: str) -> float | None:
 
 
 def _exact(seen: BodySample, side: str) -> bool:
-    """Whether the foot stands at exactly one angle."""
-    low, middle = np.percentile(_steep(_ahead(seen, side)[_stance(seen, side)]), [10, 50])
-    return bool(middle - low < EXACT)
+    """Whether the foot stands at exactly one angle, and tilts at other times."""
+    steep = _steep(_ahead(seen, side))
+    low, middle = np.percentile(steep[_stance(seen, side)], [10, 50])
+    return bool(middle - low < EXACT and np.ptp(steep) > TILTS)
 
 
 def _stance(seen: BodySample, side: str) -> NDArray[np.integer]:

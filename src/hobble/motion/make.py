@@ -155,7 +155,7 @@ def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str)
     if not source.straightened:
         wanted = {clip.skeleton.index(name) for name in sources.values()}
         standing = upright(clip, body_by_roles(clip.skeleton), target, wanted)
-        clip, unsure = standing.clip, standing.notes
+        clip, unsure = standing.clip, unsure + standing.notes
         sources = {mine: theirs for mine, theirs in sources.items() if theirs in clip.skeleton.joints}
     how = plan(clip.skeleton, target, sources)
     repairs = [DROPPED] if source.moving else []

@@ -18,8 +18,9 @@ from hobble.motion.body import SIDES, Body, body_by_roles, pairs, with_fingers
 from hobble.motion.decode import Decoded, decode, frame_rate
 from hobble.motion.defects import Repaired, flips, repair
 from hobble.motion.draft import refusal
-from hobble.motion.find_body import Doubt, Found, find_body
+from hobble.motion.find_body import Doubt, Found, TwoFigures, find_body
 from hobble.motion.floor import on_floor
+from hobble.motion.four_legs import on_four_legs
 from hobble.motion.hips_root import below_hips, decode_below
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import Bvh
@@ -86,22 +87,22 @@ def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: Clip
     clip = _scaled(file, rig, decoded, unit, options)
     if bone := missing_bone(clip.skeleton):
         raise _boneless(file, bone)
-    clip, axes, unsure = straighten(clip, options.up, options.handedness)
+    straight = straighten(clip, options.up, options.handedness)
     moving = decoded.translations is not None
-    notes = decoded.notes + unsure
-    return _mended(
+    source = _mended(
         file,
-        clip,
+        straight.clip,
         match,
         (unit, unit_name),
-        axes,
+        straight.axes,
         repairs + decoded.repairs,
-        notes,
+        decoded.notes + straight.notes,
         "its zero pose",
         moving,
         False,
         options,
     )
+    return replace(source, unsure=straight.unsure)
 
 
 def _unknown(
@@ -120,19 +121,29 @@ def _unknown(
     rig = replace(rig, roles=body.roles(rig.joints))
     clip = _scaled(file, rig, decoded, unit, options)
     standing = stands(body, rest_positions(rig)) is None
-    clip, axes, unsure = straighten(clip, options.up, options.handedness, standing)
-    axes = axes if standing else replace(axes, facing="+Z")
+    if not standing and on_four_legs(body, raw.positions):
+        raise InputError(
+            file.path, "the figure goes on four legs", fix="Only clips of figures with two legs can be used."
+        )
+    try:
+        straight = straighten(clip, options.up, options.handedness, standing)
+    except ValueError as error:
+        raise InputError(
+            file.path, f"what is up is in doubt: {error}", fix="Set motion.up in the data set to Y or Z."
+        ) from None
+    axes = straight.axes if standing else replace(straight.axes, facing="+Z")
     theirs = body_by_roles(target.skeleton)
     # A rig with the target's own names follows it name by name, and any other rig part by part.
     named = known.sources if known is not None and known.rig == target.skeleton.name else {}
-    standing_clip = upright(clip, body, target.skeleton, [rig.index(joint) for joint in named.values()])
+    wanted = [rig.index(joint) for joint in named.values()]
+    standing_clip = upright(straight.clip, body, target.skeleton, wanted)
     match = Match(
         known.rig if known else FOUND,
         standing_clip.clip.skeleton.roles,
         False,
         named or pairs(standing_clip.clip.skeleton, standing_clip.body, target.skeleton, theirs),
     )
-    notes = decoded.notes + unsure + ([] if known else _said(found, options.handedness))
+    notes = decoded.notes + straight.notes + ([] if known else _said(found, options.handedness))
     moving = _moving(decoded, body, unit)
     source = _mended(
         file,
@@ -147,7 +158,7 @@ def _unknown(
         True,
         options,
     )
-    return replace(source, unsure=standing_clip.notes)
+    return replace(source, unsure=straight.unsure + standing_clip.notes)
 
 
 def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: ClipMotion) -> Found:
@@ -155,6 +166,8 @@ def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: Cl
         return Found(body_by_roles(replace(rig, roles=known.roles)), True)
     try:
         found = find_body(rig.joints, rig.parents, raw.positions)
+    except TwoFigures as error:
+        raise InputError(file.path, str(error), fix="Export each figure on its own.") from None
     except Doubt as doubt:
         raise refusal(file, rig, doubt) from None
     if not found.sided and options.handedness == "auto":

@@ -1,21 +1,21 @@
-"""The state in which the page opens: which part of the body hurts, and how much."""
+"""The state in which the page opens: which value of which channel the figure has, and how much."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-OPENING_SHARE = 0.7  # of the highest value: easy to see, but not the maximum
+OPENING = 7  # tenths of the highest value: easy to see, but not the maximum
 
 
 def opening(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     """The slider that is set when the page opens, and its value.
 
     `part`: the label of the slider whose column changes the walk most according to `measured`, the JSON of
-    the measurements; the first slider if they do not say; None if no channel has parts of the body. `value`:
-    what the slider is set to.
+    the measurements; the first slider if they do not say; None if no channel has sliders. `value`: what the
+    dial is set to, in tenths of the highest value.
     """
-    one = placed(playable)
+    one = first_shown(playable)
     if one is None:
         return {"part": None, "value": 0}
     parts = {one["columns"][i]: label for label, i in one["sliders"].items()}
@@ -25,10 +25,15 @@ def opening(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) 
         for row in found.get("responses") or ()
         if row.get("gait") == "walk" and row["link"] in parts
     }
-    best = max(seen, key=lambda column: seen[column]) if seen else next(iter(parts), None)
-    return {"part": parts.get(best) if best else None, "value": round(OPENING_SHARE * one["highest"], 6)}
+    best = max(seen, key=lambda column: seen[column]) if seen else next(iter(parts))
+    return {"part": parts[best], "value": OPENING}
 
 
 def placed(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:
     """The first channel with parts of the body and a slider; None if there is none."""
     return next((c for c in playable.get("channels", ()) if c["regions"] and c["sliders"]), None)
+
+
+def first_shown(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The channel that the top of the page shows: one with parts of the body, else the first with sliders."""
+    return placed(playable) or next((c for c in playable.get("channels", ()) if c["sliders"]), None)

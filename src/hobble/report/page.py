@@ -24,7 +24,7 @@ from hobble.report import (
 from hobble.report.formats import embedded, plain
 from hobble.report.gather import Material
 from hobble.report.ground_pictures import ground_pictures
-from hobble.report.hero import opening, placed
+from hobble.report.hero import first_shown, opening, placed
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
@@ -81,6 +81,7 @@ def render(
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable={material.name: playable} if playable else {},
         hurts=placed(playable or {}) is not None,
+        shown_channel=first_shown(playable or {}),
         compared=[clip["name"] for clip in (compared or {}).get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
         strips=[strip["clip"] for strip in strips],

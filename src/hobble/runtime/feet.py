@@ -9,6 +9,7 @@ import numpy as np
 from hobble.core.compiled import njit
 from hobble.core.skeleton import Skeleton
 from hobble.models.network import Network
+from hobble.runtime.leg_reach import MOST_ADDED, bend, turn, turned
 
 # Contact from which a foot is held. With the original's .8, a foot slides 4.8 cm a step before it is held and
 # after it is released.
@@ -18,10 +19,6 @@ LOCK_AT = 0.5
 RELEASE = 0.2
 TOO_FAR = 20.0  # cm between a held foot and the network's foot at which the foot is released
 HEIGHT_MIX = 0.5  # share of the remaining foot lift that is applied each frame
-# Radians a frame by which foot placement may turn thigh and shank beyond the network's own turn. One frame in
-# 2,000 needs more; then the foot arrives some frames later. Without the limit, legs snapped by up to 148
-# degrees.
-MOST_ADDED = float(np.radians(28))
 # Share of its length to which foot placement may stretch the leg of a held foot behind the hips, unless the
 # network stretches it further. Beyond that the heel rises. Otherwise a foot that is 5 cm behind the network's
 # straightens a knee that is bent by 26 degrees, and a stiff leg would look as if it bent and stretched.
@@ -59,125 +56,6 @@ def sole_heights(network: Network, legs: np.ndarray) -> np.ndarray:
     layout = network.layout
     height = network.y_mean[layout.y_joint_position].reshape(-1, 3)[:, 1]
     return np.minimum(SOLE, 0.6 * height[legs[:, 2:]].mean(axis=0).astype(float))
-
-
-# Vectors below are written out by component: array expressions take seconds to compile and allocate memory.
-
-
-@njit
-def between(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> Any:
-    """The smallest rotation (w, x, y, z) from direction a to b; the identity if they are opposite."""
-    w = np.sqrt((ax * ax + ay * ay + az * az) * (bx * bx + by * by + bz * bz)) + ax * bx + ay * by + az * bz
-    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    norm = np.sqrt(w * w + x * x + y * y + z * z)
-    if norm < 1e-9:
-        return 1.0, 0.0, 0.0, 0.0
-    return w / norm, x / norm, y / norm, z / norm
-
-
-@njit
-def approach(held: Any, w: float, x: float, y: float, z: float) -> bool:
-    """Turn `held` (4,) in place toward the rotation (w, x, y, z), by MOST_ADDED at most.
-
-    Returns whether it did not reach it.
-    """
-    dot = held[0] * w + held[1] * x + held[2] * y + held[3] * z
-    if dot < 0.0:
-        dot, w, x, y, z = -dot, -w, -x, -y, -z
-    whole = np.arccos(min(dot, 1.0))
-    if whole <= 0.5 * MOST_ADDED:
-        held[0], held[1], held[2], held[3] = w, x, y, z
-        return False
-    keep = np.sin(whole - 0.5 * MOST_ADDED) / np.sin(whole)
-    take = np.sin(0.5 * MOST_ADDED) / np.sin(whole)
-    held[0], held[1] = keep * held[0] + take * w, keep * held[1] + take * x
-    held[2], held[3] = keep * held[2] + take * y, keep * held[3] + take * z
-    return True
-
-
-@njit
-def turned(by: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """The vector turned by the rotation `by` (4,)."""
-    w, a, b, c = by[0], by[1], by[2], by[3]
-    p, q, r = 2 * (b * z - c * y), 2 * (c * x - a * z), 2 * (a * y - b * x)
-    return x + w * p + b * r - c * q, y + w * q + c * p - a * r, z + w * r + a * q - b * p
-
-
-@njit
-def turn(by: Any, rotation: Any) -> None:
-    """Turn the rotation (4,) in place by the rotation `by` (4,)."""
-    w, x, y, z = by[0], by[1], by[2], by[3]
-    a, b, c, d = rotation[0], rotation[1], rotation[2], rotation[3]
-    rotation[0] = w * a - x * b - y * c - z * d
-    rotation[1] = w * b + x * a + y * d - z * c
-    rotation[2] = w * c - x * d + y * a + z * b
-    rotation[3] = w * d + x * c - y * b + z * a
-
-
-@njit
-def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, sz: float) -> None:
-    """Move the heel of a pose, positions (J, 3), by (sx, sy, sz), by bending the knee.
-
-    Bone lengths stay, and the knee keeps bending to the same side. A target out of reach is approached up to
-    99.9% of full stretch (law of cosines, as `hobble.core.ik.two_bone_knee`).
-    """
-    hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]
-    tx, ty, tz = position[knee, 0] - hx, position[knee, 1] - hy, position[knee, 2] - hz
-    lx, ly, lz = position[heel, 0] - hx - tx, position[heel, 1] - hy - ty, position[heel, 2] - hz - tz
-    upper, lower = np.sqrt(tx * tx + ty * ty + tz * tz), np.sqrt(lx * lx + ly * ly + lz * lz)
-    ax, ay, az = tx + lx, ty + ly, tz + lz
-    wx, wy, wz = ax + sx, ay + sy, az + sz
-    before, distance = np.sqrt(ax * ax + ay * ay + az * az), np.sqrt(wx * wx + wy * wy + wz * wz)
-    if min(before, distance, upper, lower) < 1e-6:
-        return
-    ax, ay, az = ax / before, ay / before, az / before
-    wx, wy, wz = wx / distance, wy / distance, wz / distance
-    distance = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * 0.999)
-    cosine = (upper * upper + distance * distance - lower * lower) / (2 * upper * distance)
-    cosine = min(max(cosine, -1.0), 1.0)
-    # Turn the old bend direction with the leg. Computed from the new leg alone, the knee may bend backwards.
-    along = tx * ax + ty * ay + tz * az
-    ox, oy, oz = tx - along * ax, ty - along * ay, tz - along * az
-    turn = (ox * wx + oy * wy + oz * wz) / max(1 + ax * wx + ay * wy + az * wz, 1e-6)
-    ox, oy, oz = ox - turn * (ax + wx), oy - turn * (ay + wy), oz - turn * (az + wz)
-    size = np.sqrt(ox * ox + oy * oy + oz * oz)
-    if size < 1e-6:
-        return
-    sine = np.sqrt(1 - cosine * cosine) / size
-    position[knee, 0] = hx + upper * (wx * cosine + ox * sine)
-    position[knee, 1] = hy + upper * (wy * cosine + oy * sine)
-    position[knee, 2] = hz + upper * (wz * cosine + oz * sine)
-    position[heel, 0] = hx + wx * distance
-    position[heel, 1] = hy + wy * distance
-    position[heel, 2] = hz + wz * distance
-
-
-@njit
-def bend(position: Any, rotation: Any, hip: int, knee: int, heel: int, shift: Any, added: Any) -> None:
-    """`reach` by `shift` (3,), where thigh and shank turn at most MOST_ADDED beyond the network's own turn.
-
-    added: (2, 4) rotations added to the network's thigh and shank in the last frame; updated to this frame's.
-    If a joint would have to turn further, the heel does not reach its target in this frame.
-    """
-    hx, hy, hz = position[hip, 0], position[hip, 1], position[hip, 2]
-    kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
-    tx, ty, tz = kx - hx, ky - hy, kz - hz
-    lx, ly, lz = position[heel, 0] - kx, position[heel, 1] - ky, position[heel, 2] - kz
-    if abs(shift[0]) + abs(shift[1]) + abs(shift[2]) > 1e-9:
-        reach(position, hip, knee, heel, shift[0], shift[1], shift[2])
-        kx, ky, kz = position[knee, 0], position[knee, 1], position[knee, 2]
-    w, x, y, z = between(tx, ty, tz, kx - hx, ky - hy, kz - hz)
-    late = approach(added[0], w, x, y, z)
-    w, x, y, z = between(lx, ly, lz, position[heel, 0] - kx, position[heel, 1] - ky, position[heel, 2] - kz)
-    late |= approach(added[1], w, x, y, z)
-    if late:
-        x, y, z = turned(added[0], tx, ty, tz)
-        kx, ky, kz = hx + x, hy + y, hz + z
-        position[knee, 0], position[knee, 1], position[knee, 2] = kx, ky, kz
-        x, y, z = turned(added[1], lx, ly, lz)
-        position[heel, 0], position[heel, 1], position[heel, 2] = kx + x, ky + y, kz + z
-    turn(added[0], rotation[hip])
-    turn(added[1], rotation[knee])
 
 
 @njit

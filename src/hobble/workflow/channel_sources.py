@@ -6,7 +6,7 @@ import functools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from hobble.channels import NAMES, Source, channel
+from hobble.channels import NAMES, channel
 from hobble.config.load import Catalogue
 from hobble.core.errors import HobbleError, InputError
 
@@ -55,7 +55,8 @@ class ChannelSources:
             return False
         made = self.catalogue.dataset(dataset).synthetic is not None
         files = self._tables(dataset, name) if made else self.files(dataset, clip, name)
-        return channel(name).is_neutral(Source(**self.source(dataset, clip, name), files=files))
+        one = channel(name)
+        return one.is_neutral(one.source(self.source(dataset, clip, name), files))
 
     def check(self, dataset: str) -> None:
         """Check what clip entries and options say about channels. Raises HobbleError if it is wrong."""
@@ -69,13 +70,15 @@ class ChannelSources:
                 )
             for name in self.channels(dataset):
                 said = self.source(dataset, clip, name) | {"clip": f"data set {dataset}: clips.{clip}"}
-                channel(name).check(Source(**said, files=self._tables(dataset, name)), rig)
+                one = channel(name)
+                one.check(one.source(said, self._tables(dataset, name)), rig)
 
     def _value(self, dataset: str, clip: str, name: str) -> Any:
         return self.clips.entry(dataset, clip).channels.get(name)
 
     def _tables(self, dataset: str, name: str) -> list[str]:
-        given: Sequence[str] = channel(name).tables(self.catalogue.dataset(dataset).channels.get(name, {}))
+        one, section = channel(name), self.catalogue.dataset(dataset).channels.get(name, {})
+        given = one.tables(one.options_of(section))
         files = [self.clips.mocap / file for file in given]
         for file in files:
             if not file.is_file():

@@ -36,7 +36,8 @@ def table(tmp_path: Path) -> Path:
 def test_what_a_walker_has_holds_all_through_a_clip(
     holden31: Skeleton, table: Path, clip: str, value: str | None, expected: list[float], warns: bool
 ) -> None:
-    source = Source(clip, value=value, options={"table": table.name}, files=[table])
+    fields = {"clip": clip, "value": value, "options": {"table": table.name}}
+    source = channel("diagnosis").source(fields, [table])
     rotations = np.tile([1.0, 0, 0, 0], (7, 31, 1))
     values, warnings = clip_values(
         "diagnosis", Clip(clip, holden31, 60.0, rotations, np.zeros((7, 3))), source, {}

@@ -150,11 +150,11 @@ def test_on_a_skeleton_without_links_a_clip_is_hurt_and_has_no_column(clip):
     figure = replace(clip, skeleton=replace(clip.skeleton, links=()))
     severity, warnings = clip_severity(figure, None, f"{THIGH}[4]", motion())
     assert (severity.shape, warnings) == ((300, 0), [])
-    said = Source("walk", {}, f"{THIGH}[4]", {}, ())
+    said = Source("walk", {}, f"{THIGH}[4]")
     CHANNEL.check(said, figure.skeleton)
     assert not CHANNEL.is_neutral(said)
     with pytest.raises(InputError, match="no such link"):
-        CHANNEL.check(Source("walk", {}, "Thigh[4]", {}, ()), clip.skeleton)
+        CHANNEL.check(Source("walk", {}, "Thigh[4]"), clip.skeleton)
 
 
 def test_a_healthy_clip_is_all_zero(clip):

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from hobble.channels import Source, channel
 from hobble.channels.files import clip_values
+from hobble.channels.mood import CHANNEL
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
@@ -15,7 +17,7 @@ PATTERNS = {"patterns": {"*_sad_*": {"sad": 1.0}, "*_tired_*": {"tired": 0.5, "o
 
 
 def source(clip: str, value: object = None) -> Source:
-    return Source(clip, value=value, options=PATTERNS)
+    return Source(clip, value=value, options=CHANNEL.options_of(PATTERNS))
 
 
 @pytest.fixture
@@ -50,3 +52,11 @@ def test_a_name_that_no_pattern_fits_is_told(clip: Clip) -> None:
 def test_an_entry_that_is_no_mood_is_refused(holden31: Skeleton, value: object) -> None:
     with pytest.raises(InputError, match=r"walk\.channels\.mood: cannot be .*sad"):
         channel("mood").check(source("walk", value), holden31)
+
+
+def test_a_misspelt_option_does_not_reach_a_clip() -> None:
+    with pytest.raises(ValidationError, match="pattern"):
+        CHANNEL.source({"clip": "walk_tired_1", "options": {"pattern": {"*": {"sad": 1}}}})
+    with pytest.raises(ValidationError, match="bored"):
+        CHANNEL.source({"clip": "walk_tired_1", "options": {"patterns": {"*": {"bored": 1}}}})
+    assert CHANNEL.source({"clip": "walk", "options": PATTERNS}).options == CHANNEL.options_of(PATTERNS)

@@ -50,9 +50,9 @@ class Diagnosis(Channel):
         """The diagnoses."""
         return DIAGNOSES
 
-    def tables(self, options: Mapping[str, Any]) -> tuple[str, ...]:
+    def tables(self, options: Section | None) -> tuple[str, ...]:
         """The table that the data set names."""
-        return (options["table"],) if options else ()
+        return (options.table,) if isinstance(options, Table) else ()
 
     def is_neutral(self, source: Source) -> bool:
         """Whether the person is healthy or the diagnosis is unknown."""

@@ -15,6 +15,9 @@ WORDS = Words(
     key="hurt",
     grows="Walks while the {} hurts more and more",
     never="never hurt in training, so it has no effect",
+    headline="Say where it hurts.",
+    says="that its {} hurts",
+    on="hurt",
 )
 # Parts of the body with a slider and a key: label, roles of the two ends.
 PARTS = (

@@ -72,14 +72,17 @@ class Mood(Channel):
         return np.tile(np.array(row, np.float32), (len(clip), 1)), warnings
 
 
-def _patterns(source: Source) -> Mapping[str, Mapping[str, float]]:
-    return source.options.get("patterns", {})
+def _patterns(source: Source) -> Mapping[str, Mapping[Name, float]]:
+    return source.options.patterns if isinstance(source.options, Patterns) else {}
 
 
-def _moods(source: Source) -> Mapping[str, float]:
+def _moods(source: Source) -> Mapping[Any, float]:
     if source.value is not None:
         return source.value
-    return next((m for pattern, m in _patterns(source).items() if fnmatchcase(source.clip, pattern)), {})
+    for pattern, moods in _patterns(source).items():
+        if fnmatchcase(source.clip, pattern):
+            return moods
+    return {}
 
 
 CHANNEL = Mood()

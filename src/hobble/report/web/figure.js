@@ -1,6 +1,6 @@
 // The figure: one surface, moved by the rotations of its bones and coloured frame by frame.
 import {
-  Bone, Color, DetachedBindMode, Matrix4, MeshStandardMaterial, Quaternion, Skeleton, SkinnedMesh, Vector3,
+  Bone, Color, DetachedBindMode, Matrix4, MeshStandardMaterial, Quaternion, Skeleton, SkinnedMesh, Sphere, Vector3,
 } from "three";
 import { bodyOf } from "./bodies.js";
 import { linear } from "./paint.js";
@@ -41,6 +41,7 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
     mesh.bindMode = DetachedBindMode;
     mesh.bind(skeleton, new Matrix4());
     mesh.frustumCulled = false;
+    mesh.boundingSphere = new Sphere(); // else three.js poses every corner to find one, which nothing needs
     view.scene.add(mesh);
     meshes.push(mesh);
     return mesh;

@@ -1,21 +1,24 @@
-// The top of the page: the walking character, and next to it a healthy, transparent one with the same controls.
+// The top of the page: the walking character with a value of a channel, and next to it a
+// transparent one without, with the same controls.
 import { createActor } from "./actor.js";
 import { find, material } from "./base.js";
 import { createDial } from "./dial.js";
-import { keyed, placed } from "./sliders.js";
+import { firstShown, keyed } from "./sliders.js";
 import { createView } from "./view.js";
 
-const GHOST_OFFSET = -84; // cm from the hurt figure to the healthy one, negative: to its left
-const MOST_AHEAD = 120; // cm that the healthy one may get ahead before it is moved back
+const GHOST_OFFSET = -84; // cm from the figure to the transparent one, negative: to its left
+const MOST_AHEAD = 120; // cm that the transparent one may get ahead before it is moved back
 const FADE = 24; // frames in which it fades out, and in
-const WARM_UP = 100; // frames that are simulated before the first picture
+// Frames that are simulated before the first picture: in the first both walk alike, so one is enough; then the value
+// begins. These predictions are most of the time until the figures move.
+const ALIKE = 40, APART = 30;
 const SPEED = 2.5; // target speed, cm per frame
 
 const createHero = (spec, asked) => {
   const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), still = find("hero-walk");
-  const one = placed(spec), labels = one ? Object.keys(one.sliders) : [], hurts = labels.length > 0;
-  const hurtValues = new Map(), healthyValues = new Map(), flat = () => 0, hero = { frames: 0 };
-  let part = hurts ? (labels.includes(asked.part) ? asked.part : labels[0]) : null;
+  const one = firstShown(spec), labels = one ? Object.keys(one.sliders) : [];
+  const values = new Map(), neutralValues = new Map(), flat = () => 0, hero = { frames: 0 };
+  let part = labels.includes(asked.part) ? asked.part : labels[0];
   let last = null, owed = 0, shown = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
   // Both have the same target direction, which turns slowly from side to side.
@@ -27,14 +30,14 @@ const createHero = (spec, asked) => {
     if (walks) view.ask();
   });
   view.onHidden = () => { last = null; };
-  const main = createActor(view, spec), ghost = hurts ? createActor(view, spec, { place: [GHOST_OFFSET, 0], tint: "ghost", ghost: true }) : null;
+  const main = createActor(view, spec), ghost = one ? createActor(view, spec, { place: [GHOST_OFFSET, 0], tint: "ghost", ghost: true }) : null;
   const aside = () => [GHOST_OFFSET * Math.cos(heading()), -GHOST_OFFSET * Math.sin(heading())];
 
   const step = () => {
     hero.frames++;
-    main.frame(wish(), hurtValues);
+    main.frame(wish(), values);
     if (!ghost) return;
-    ghost.frame(wish(), healthyValues);
+    ghost.frame(wish(), neutralValues);
     const [sin, cos] = [Math.sin(heading()), Math.cos(heading())], [a, b] = [main.character.root, ghost.character.root];
     const [dx, dz] = [b[0] - a[0], b[2] - a[2]], along = dx * sin + dz * cos, across = dx * cos - dz * sin;
     if (!leaving && (Math.abs(along) > MOST_AHEAD || Math.abs(across - GHOST_OFFSET) > 70)) leaving = true;
@@ -80,18 +83,21 @@ const createHero = (spec, asked) => {
     if (ghost) find("hero-ghost").textContent = `${pace(ghost).toFixed(2)} m/s`;
   };
 
-  if (hurts) {
+  if (one) {
+    const [before, after] = one.says.split("{}");
     const words = { part: document.createElement("b"), much: document.createElement("b") };
     const say = () => {
       words.part.textContent = part;
-      words.much.textContent = `${dial.value} of ${one.highest}`;
-      if (dial.value) line.replaceChildren("One neural network moves both figures, and both have the same target speed. For the solid one, the network also gets the input that its ", words.part, " hurts, ", words.much, ".");
-      else line.replaceChildren("One neural network moves both figures, and both have the same target speed. Nothing hurts, so they walk alike.");
+      words.much.textContent = `${dial.value} of 10`;
+      if (!one.on) find("hero-on").textContent = part;
+      const same = "One neural network moves both figures, and both have the same target speed. ";
+      if (dial.value) line.replaceChildren(`${same}For the solid one, the network also gets the input ${before}`, words.part, `${after}, `, words.much, ".");
+      else line.replaceChildren(`${same}At 0 they walk alike.`);
       chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
     };
     const hurt = () => {
-      hurtValues.clear();
-      hurtValues.set(keyed(one, one.columns[one.sliders[part]]), dial.value);
+      values.clear();
+      values.set(keyed(one, one.columns[one.sliders[part]]), dial.value / 10 * one.highest);
       say();
       view.ask();
     };
@@ -119,8 +125,9 @@ const createHero = (spec, asked) => {
   rest();
 
   for (const actor of [main, ghost]) actor?.start(flat);
-  const warm = new Map(hurtValues);
-  for (let f = 0; f < WARM_UP; f++) { hero.frames++; main.frame(wish(), f > 40 ? warm : healthyValues); ghost?.frame(wish(), healthyValues); }
+  for (; hero.frames < ALIKE; hero.frames++) main.frame(wish(), neutralValues);
+  ghost?.character.follow(main.character, [GHOST_OFFSET, 0]);
+  for (; hero.frames < ALIKE + APART; hero.frames++) { main.frame(wish(), values); ghost?.frame(wish(), neutralValues); }
   glide(1);
   showPace();
   section.classList.add("ready");

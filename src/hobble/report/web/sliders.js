@@ -4,6 +4,11 @@ import { find } from "./base.js";
 export const keyed = (one, column) => `${one.name}/${column}`;
 // The channel with parts of the body, if there is one.
 export const placed = (spec) => spec.channels.find((one) => one.regions.length);
+// The channel that the top of the page shows: one with parts of the body, else the first with a slider.
+export const firstShown = (spec) => {
+  const some = spec.channels.filter((one) => Object.keys(one.sliders).length);
+  return some.find((one) => one.regions.length) || some[0];
+};
 
 // specs: of the played characters, which may have different channels. changed(): called after every change.
 export const createSliders = (specs, changed) => {

@@ -45,7 +45,10 @@ def limps_together(
 
 
 def named_together(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """For each column the shares of windows that are called impaired, and recognised with the right side."""
+    """For each column the shares of windows that are called impaired, and recognised with the right side.
+
+    walks: of how many walks the recognisers say something; very slow ones may have no window of whole cycles.
+    """
     out = []
     for other, column in dict.fromkeys((row["channel"], row["column"]) for row in rows):
         some = [row for row in rows if (row["channel"], row["column"]) == (other, column)]
@@ -54,5 +57,6 @@ def named_together(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             for key in ("impaired", "named", "wrong_side", "speed_share")
             if (known := [row[key] for row in some if row[key] is not None])
         }
-        out.append({"channel": other, "column": column, "walks": len(some), **shares})
+        answered = sum(row["named"] is not None for row in some)
+        out.append({"channel": other, "column": column, "walks": answered, **shares})
     return out

@@ -1,0 +1,143 @@
+"""Rigs of other programs, studios and languages come out as the clip itself does, or are refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from hobble.core.bvh import write_bvh
+from hobble.core.errors import InputError
+from hobble.motion.options import ClipMotion
+from hobble.motion.read import read_bvh
+from hobble.motion.rig import load_skeleton
+from hobble.motion.source import load_source
+from tests.motion.other_rigs import CLOTHES, GAME, PLAIN, ROLLS, TRUNK, crawling, dog, human, nameless, rigged
+from tests.motion.scramble import compare
+
+PELVIS = PLAIN.replace("thigh_l|hips", "thigh_l|pelvis").replace("thigh_r|hips", "thigh_r|pelvis")
+RIGS = {
+    "Xsens, right first": (
+        human(
+            "{S}{n}",
+            "Pelvis=Hips L5=LowerBack L3=Spine T12=Spine+0,4,0 T8=Spine1 Neck=Neck1 Head=Head",
+            "UpperLeg LowerLeg Foot Toe",
+            "Shoulder UpperArm ForeArm Hand",
+            "RL",
+        ),
+        {},
+    ),
+    "LaFAN, bones along one axis": (
+        human(
+            "{S}{n}",
+            "Hips=Hips Spine=LowerBack Spine1=Spine Spine2=Spine1 Neck=Neck1 Head=Head",
+            "UpLeg Leg Foot Toe",
+            "Shoulder Arm ForeArm Hand",
+        ),
+        {"rest": "one axis"},
+    ),
+    "Japanese": (
+        human(
+            "{J}{n}",
+            TRUNK.format("センター", "上半身", "上半身2", "首", "頭"),
+            "足 ひざ 足首 つま先",
+            "肩 腕 ひじ 手首",
+        ),
+        {},
+    ),
+    "Spanish, bones along one axis": (
+        human(
+            "{n}_{l}",
+            TRUNK.format("Cadera", "Columna", "Pecho", "Cuello", "Cabeza"),
+            "Muslo Pierna Pie Dedos",
+            "Hombro Brazo Antebrazo Mano",
+        ),
+        {"rest": "one axis"},
+    ),
+    "rolls in every limb": (ROLLS, {}),
+    "roots and metres": (
+        "Armature|-|ground\nReference|Armature|ground\n" + PLAIN.replace("hips|-|", "hips|Reference|"),
+        {"unit": "m"},
+    ),
+    "game with targets for feet, Z up": (
+        "root|-|ground\n" + PLAIN.replace("hips|-|", "hips|root|") + GAME,
+        {"z_up": True},
+    ),
+    "pelvis beside the spine": (PELVIS.replace("thigh_l|", "pelvis|hips|Hips\nthigh_l|", 1), {}),
+    "skirt, hair, wings and tail": (PLAIN + CLOTHES, {}),
+    "the same without names": (nameless(PLAIN + CLOTHES), {"rest": "one axis"}),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def clip(root, shared):
+    """Five seconds of a CMU walk on its own rig."""
+    maps = root / "config/skeletons"
+    path = shared / "mocap/cmu/07_01.bvh"
+    whole = load_source(read_bvh(path), load_skeleton(maps / "holden31.yaml"), maps, ClipMotion()).clip
+    return replace(whole, rotations=whole.rotations[:600], root=whole.root[:600])
+
+
+@pytest.fixture
+def outcome(clip, tmp_path, make):
+    """What comes of a clip on another rig, and of the clip itself: both clips, and the joints' names."""
+
+    def run(rig, source=None, **how):
+        told, names = rigged(source or clip, rig, **how)
+        write_bvh(tmp_path / "plain.bvh", source or clip, decimals=6)
+        write_bvh(tmp_path / "other.bvh", told, "YZX", decimals=8)
+        return make(tmp_path / "plain.bvh")[0], make(tmp_path / "other.bvh"), names
+
+    return run
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("name", RIGS)
+def test_a_rig_comes_out_as_the_clip_itself(outcome, name):
+    rig, how = RIGS[name]
+    first, (second, report), names = outcome(rig, **how)
+    off = compare(first, second, names)
+    assert off.mean() < 1.0, (name, report["roles"])
+    assert off.max() < 1.5, dict(zip(names, off.round(1), strict=True))
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(
+    ("without", "why"),
+    [
+        (("shoulder", "upper_arm", "forearm", "hand"), "two equal legs and two equal arms"),
+        (("thigh", "shin", "foot", "toe"), "two equal legs and two equal arms"),
+        (("upper_arm_r", "forearm_r", "hand_r"), "two equal legs and two equal arms"),
+        (("neck", "head"), "no joint for the head"),
+    ],
+)
+def test_a_body_without_limbs_or_head_is_refused_with_a_draft(outcome, without, why):
+    rig = "\n".join(line for line in PLAIN.splitlines() if not line.startswith(without))
+    with pytest.raises(InputError, match=rf"in doubt: .*{why}[\s\S]*roles:"):
+        outcome(rig)
+
+
+@pytest.mark.shared
+def test_two_figures_under_one_root_are_refused(outcome):
+    one = PLAIN.replace("hips|-|", "hips|scene|")
+    other = "\n".join(
+        "|".join((f"other_{name}", parent if parent == "scene" else f"other_{parent}", joint))
+        for name, parent, joint in (line.split("|") for line in one.splitlines())
+    )
+    with pytest.raises(InputError, match=r"two figures, \w*hips and \w*hips. Export each figure on its own"):
+        outcome(f"scene|-|ground\n{one}\n{other}")
+
+
+@pytest.mark.shared
+def test_a_crawling_figure_is_right_or_what_is_up_is_asked_for(outcome, clip):
+    crawl = crawling(clip)
+    first, (second, _), names = outcome(PLAIN, crawl)
+    assert compare(first, second, names).mean() < 1.0
+    with pytest.raises(InputError, match=r"what is up is in doubt.*Set motion.up"):
+        outcome(PLAIN, crawl, rest="heap")
+
+
+def test_a_figure_on_four_legs_is_refused(tmp_path, make):
+    write_bvh(tmp_path / "dog.bvh", dog())
+    with pytest.raises(InputError, match=r"dog.bvh: the figure goes on four legs"):
+        make(tmp_path / "dog.bvh")
