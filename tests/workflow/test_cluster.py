@@ -74,7 +74,7 @@ def test_a_profile_keeps_what_the_default_one_says(root, name: str) -> None:
     assert ours["default-resources"].items() >= asked.items()
 
 
-def test_a_pod_gets_the_requests_of_its_job(root) -> None:
+def test_a_pod_is_tried_as_often_as_a_job_of_slurm(root) -> None:
     assert profile(root, "kubernetes")["retries"] == profile(root, "slurm")["retries"] == 2
 
 
