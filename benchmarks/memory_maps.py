@@ -26,7 +26,7 @@ from database import BATCH, PROGRAM_MB, cold, made_up, status
 from hobble.database import chunks, order, reader, window
 from hobble.database.merge import write_database
 from hobble.database.reader import Block, Database, ahead
-from hobble.database.window import room
+from hobble.database.window import empty_buffers
 
 TABLES = ("x", "y", "fits", "count", "clip", "frame", "phase")
 SECTIONS = 10
@@ -36,7 +36,7 @@ def write_tables(db: Database, folder: Path) -> None:
     """The arrays of all training chunks, one after another, as .npy files."""
     folder.mkdir()
     all_chunks = db.manifest.chunks["train"]
-    kinds = room(db.manifest, "train", 1)
+    kinds = empty_buffers(db.manifest, "train", 1)
     for name in TABLES:
         rows = sum(c.fits if name == "fits" else c.rows for c in all_chunks)
         shape = (rows, *kinds[name].shape[1:])
@@ -89,7 +89,7 @@ class Mapped:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Rows and fits of a group of chunks. own: the group's rows in the tables."""
         rows, count = [n for n, _ in self.pieces(members)], np.asarray(self.count[own])
-        here, fit = order.shown(
+        here, fit = order.rows_and_fits(
             members, rows, count, np.zeros(len(own), np.int64), self.db.manifest.visits, place, part
         )
         return own[here], self.first[own[here]] + fit
@@ -197,7 +197,7 @@ def main() -> None:
         print(f"both give the same blocks; {db.manifest.bytes >> 20} MB of rows")
         ours = lines(reader, window, chunks)
         without = lines(window, chunks, Database._parts, Database._wanted, Database.load, Database._whole)
-        without += lines(Database._rooms)
+        without += lines(Database._buffers)
         print(f"lines of reader, window and chunks: {ours}; with memory maps about ", end="")
         print(f"{ours - without + lines(Mapped)}, without checksums and the memory limit")
         measure(folder, args.memory_mb, args.rounds)

@@ -161,10 +161,10 @@ def test_files_come_back_as_they_were_and_the_report_draws(walker, options, tmp_
     assert LabelReport.from_dict(data) == report
     assert data["seconds"]["walk"] == pytest.approx(10, abs=1)
     assert data["cycles"] == len(labels.cycles)
-    strip = data["strip"]
-    assert len(strip["seconds"]) == len(strip["phase"]) == len(strip["speed"]) == 400
-    assert strip["speed"][200] == pytest.approx(1.2, rel=0.01)
-    assert strip["phase"][0] is None
-    assert len(strip["landings"]["right"]) == np.isfinite(labels.footsteps[:, 0]).sum()
-    down = [b - a for a, b in strip["contacts"]["right_toe"]]
+    curves = data["curves"]
+    assert len(curves["seconds"]) == len(curves["phase"]) == len(curves["speed"]) == 400
+    assert curves["speed"][200] == pytest.approx(1.2, rel=0.01)
+    assert curves["phase"][0] is None
+    assert len(curves["landings"]["right"]) == np.isfinite(labels.footsteps[:, 0]).sum()
+    down = [b - a for a, b in curves["contacts"]["right_toe"]]
     assert sum(down) == pytest.approx(labels.contacts[:, 3].sum() / 60, abs=0.02)

@@ -116,7 +116,7 @@ def test_a_manner_of_one_person_is_never_named_without_that_person() -> None:
     found = run.left_out(windows, {w.clip: w.clip for w in windows}, 0.02)
     assert found["by_manner"] == {NONE: 1.0, "old": 1.0, "sad": 0.0}
     assert found["right"] == round(60 / 70, 5)
-    assert found["none_or_not"] == 1.0, "but that it is not the neutral walk is seen"
+    assert found["presence_right"] == 1.0, "but that it is not the neutral walk is seen"
 
 
 def test_each_manner_is_tried_with_each_column_of_another_channel(

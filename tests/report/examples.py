@@ -245,7 +245,7 @@ def clip_reports(folder: Path, clips: tuple[str, ...]) -> dict[str, list[str]]:
                 "cycles": frames // 60,
                 "cycles_dropped": 1,
                 "warnings": ["2 steps are shorter than 5 frames and were dropped."] * (clip == "strafe"),
-                "strip": strip(frames / 60),
+                "curves": strip(frames / 60),
             }
             side = "Right" if i else "Left"
             hurt = {

@@ -188,6 +188,18 @@ def test_fits_its_window(tab: Any, width: int) -> None:
     tab.size(1280, 900)
 
 
+def test_a_long_name_in_a_chooser_makes_no_phone_scroll_sideways(tab: Any) -> None:
+    tab.size(390, 900)
+    added = """[...document.querySelectorAll('main select')].forEach((one) => {
+      one.append(new Option('a very long name of something that can be chosen here, '.repeat(3), 'long'));
+      one.value = 'long';
+    })"""
+    tab.run(added)
+    assert tab.until("document.documentElement.scrollWidth <= 390")
+    tab.run("document.querySelectorAll('main select').forEach((one) => { one.lastChild.remove(); })")
+    tab.size(1280, 900)
+
+
 CUT = """(() => [...document.querySelectorAll('[data-chart]')].flatMap((e) => {
   const box = (one) => one.getBoundingClientRect(), whole = box(e);
   const all = [...e.querySelectorAll('.xtick, .ytick, .xtitle, .ytitle, .legendtext')];

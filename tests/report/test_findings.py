@@ -173,13 +173,13 @@ def test_key_figures_without_results(material: Material) -> None:
 
 def test_missing_data_comes_before_longer_training(material: Material) -> None:
     """If nobody stands in the clips and the error still falls, the hint on the clips comes first."""
-    labels = [{"clip": "a", "seconds": {"walk": 30.0}, "strip": {}}]
+    labels = [{"clip": "a", "seconds": {"walk": 30.0}, "curves": {}}]
     falling = history([0.5 * 0.9**k for k in range(20)])
     found = list(heads(material, labels=labels, history=falling))
     missing = next(k for k, head in enumerate(found) if head.startswith("Nobody stands"))
     longer = next(k for k, head in enumerate(found) if "still fell" in head)
     assert missing < longer
-    standing = [{"clip": "a", "seconds": {"walk": 30.0, "stand": 5.0}, "strip": {}}]
+    standing = [{"clip": "a", "seconds": {"walk": 30.0, "stand": 5.0}, "curves": {}}]
     assert not any("Nobody stands" in head for head in heads(material, labels=standing, history=falling))
 
 

@@ -138,6 +138,35 @@ def show(tab: Any) -> None:
     tab.run("document.getElementById('play-stage').focus({ preventScroll: true })")
 
 
+def test_the_top_of_the_page_has_a_hurt_figure_and_a_healthy_one_beside_it(tab: Any) -> None:
+    """Also after a click on another part and a turn of the dial."""
+    tab.run("scrollTo(0, 0)")
+    of = "(({ character }) => Array.from(character.channelValues))"
+    spec = "Object.values(Hobble.material.playable)[0].channels[0]"
+    hero = "Hobble.hero"
+    steps = f"for (let f = 0; f < 60; f++) {hero}.step()"  # without waiting for pictures
+    tab.run(steps)
+    hurt, healthy = tab.run(f"[{of}({hero}.main), {of}({hero}.ghost)]")
+    assert max(hurt) == pytest.approx(7.0)
+    assert max(healthy) == 0.0
+    apart = f"(({{ main, ghost }}) => main.character.root[0] - ghost.character.root[0])({hero})"
+    assert 40 < tab.run(apart) < 140
+    line = "document.getElementById('hero-line').textContent"
+    part = tab.run(f"{hero}.chips[0].textContent")
+    tab.run(f"{hero}.chips[0].click()")
+    assert f"the input that its {part} hurts, 7 of 10." in tab.run(line)
+    tab.run("document.getElementById('hero-dial').focus()")
+    for _ in range(2):
+        tab.press("ArrowDown")
+    column = tab.run(f"{spec}.sliders['{part}']")
+    tab.run(steps)
+    assert tab.run(f"{of}({hero}.main)[{column}]") == pytest.approx(5.0)
+    assert "5 of 10" in tab.run(line)
+    assert max(tab.run(f"{of}({hero}.ghost)")) == 0.0
+    tab.press("Home")
+    assert "At 0 they walk alike." in tab.run(line)
+
+
 def test_keys_move_the_figure(tab: Any) -> None:
     show(tab)
     character = "Hobble.player.actors[0].character"

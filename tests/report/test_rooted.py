@@ -56,7 +56,7 @@ def test_it_is_drawn_toward_the_wish_as_in_python(
     found = np.reshape(json.loads(done.stdout), np.shape(poses))
     np.testing.assert_allclose(found, poses, atol=1e-3)
     # The test would say nothing if the wish drew nothing.
-    monkeypatch.setattr("hobble.runtime.trajectory.DRAWN", 0.0)
+    monkeypatch.setattr("hobble.runtime.trajectory.PULL", 0.0)
     animation = ProceduralAnimation(network, storage="int16", **dict(examples.RUNTIME))
     other = [animation.next_pose(wish, None, "walk").positions for wish in wishes]
     assert np.abs(found - other).max() > 1.0

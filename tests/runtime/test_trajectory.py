@@ -46,14 +46,14 @@ def move(
     gait,
     phase=None,
     wish=(0.0, 1.0),
-    held: float = 0.0,
-    whole=False,
-    drawn: float = 0.0,
+    loss: float = 0.0,
+    rooted=False,
+    pull: float = 0.0,
 ) -> np.ndarray:
     phase = np.zeros(1) if phase is None else phase
     columns = trajectory.advance_columns(LAYOUT)
     wishes = np.array([wish], float)
-    trajectory.advance(y, columns, wishes, held, whole, drawn, (position, direction, gait), phase)
+    trajectory.advance(y, columns, wishes, loss, rooted, pull, (position, direction, gait), phase)
     return phase
 
 
@@ -97,7 +97,7 @@ def test_a_standing_figure_is_held() -> None:
 
 def test_a_rooted_network_is_not_held_while_standing() -> None:
     position, direction, gait = path(stand=1.0)
-    phase = move(prediction(speed=2.0, turn=-0.1), position, direction, gait, whole=True)
+    phase = move(prediction(speed=2.0, turn=-0.1), position, direction, gait, rooted=True)
     np.testing.assert_allclose(position[0, MIDDLE], [0, 2.0], atol=1e-6)
     np.testing.assert_allclose(direction[0, MIDDLE], [np.sin(0.1), np.cos(0.1)], atol=1e-6)
     assert phase[0] == pytest.approx(0.02)
@@ -115,7 +115,7 @@ def test_a_rooted_network_is_not_held_while_standing() -> None:
 )
 def test_movement_against_the_wish_is_reduced(wish, moved) -> None:
     position, direction, gait = path()
-    move(prediction(speed=2.0, side=0.5), position, direction, gait, wish=wish, held=0.25)
+    move(prediction(speed=2.0, side=0.5), position, direction, gait, wish=wish, loss=0.25)
     np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
 
 
@@ -130,9 +130,9 @@ def test_movement_against_the_wish_is_reduced(wish, moved) -> None:
         ((3.0, 4.0), (0.12 + 0.16, 2.0 + 0.16 - 0.12)),  # faster, and more to the left
     ],
 )
-def test_movement_is_drawn_toward_the_wish_by_a_share_of_itself(wish, moved) -> None:
+def test_movement_is_pulled_toward_the_wish_by_a_share_of_itself(wish, moved) -> None:
     position, direction, gait = path(stand=0.5)
-    move(prediction(speed=2.0), position, direction, gait, wish=wish, whole=True, drawn=0.1)
+    move(prediction(speed=2.0), position, direction, gait, wish=wish, rooted=True, pull=0.1)
     np.testing.assert_allclose(position[0, MIDDLE], moved, atol=1e-6)
 
 
@@ -166,8 +166,8 @@ def test_wishes_are_taken_up_at_their_rates() -> None:
     velocity, direction, strafe = np.zeros((1, 2)), np.array([[0.0, 1.0]]), np.zeros(1)
     shares = np.eye(6)[[1]]
     wish = np.array([[2.0, 0.0]]), np.array([[1.0, 0.0]]), np.ones(1), shares
-    owed = np.zeros((1, 2))
-    trajectory.follow_wish(wish, 0.0, (velocity, direction, strafe, owed), (position, heading, gait))
+    correction = np.zeros((1, 2))
+    trajectory.follow_wish(wish, 0.0, (velocity, direction, strafe, correction), (position, heading, gait))
     np.testing.assert_allclose(velocity, [[1.8, 0]])
     np.testing.assert_allclose(np.arctan2(*direction[0]), 0.9 * np.pi / 2)
     np.testing.assert_allclose(strafe, 0.9)
@@ -194,31 +194,31 @@ def test_steering_adds_the_error_to_the_wish(steering: float, wish: tuple, asked
     np.testing.assert_allclose(velocity, 0.9 * np.array(asked), atol=1e-9)
 
 
-def follow(wish, facing, steering: float, frames: int = 1, speed: float = 1.5, owed=None):
-    """Targets (2,) velocity and (2,) direction, and what is owed (2,), of a figure that glides ahead at any
+def follow(wish, facing, steering: float, frames: int = 1, speed: float = 1.5, correction=None):
+    """Targets (2,) velocity and (2,) direction, and the correction (2,), of a figure that glides ahead at any
     wish."""
     position, heading, gait = path(speed)
     velocity, direction = np.zeros((1, 2)), np.array([[0.0, 1.0]])
-    owed = np.zeros((1, 2)) if owed is None else np.array([owed], float)
+    correction = np.zeros((1, 2)) if correction is None else np.array([correction], float)
     for _ in range(frames):
         wanted = np.array([wish]), np.array([facing]), np.zeros(1), np.eye(6)[[1]]
-        target = velocity, direction, np.zeros(1), owed
+        target = velocity, direction, np.zeros(1), correction
         trajectory.follow_wish(wanted, steering, target, (position, heading, gait))
-    return velocity[0], direction[0], owed[0]
+    return velocity[0], direction[0], correction[0]
 
 
 def test_a_steady_error_is_integrated_along_and_across_the_wish() -> None:
     for frames in (1, 40, 1000):
-        asked, _, owed = follow((0.5, 1.5), (0.0, 1.0), 2.0, frames)
+        asked, _, correction = follow((0.5, 1.5), (0.0, 1.0), 2.0, frames)
         speed = np.hypot(0.5, 1.5)
         ahead = np.array([0.5, 1.5]) / speed
         lack = np.array([0.5, 0.0])
-        rate = 2.0 * trajectory.OWED_RATE / speed * frames
+        rate = 2.0 * trajectory.CORRECTION_RATE / speed * frames
         along, left = lack @ ahead, lack @ [ahead[1], -ahead[0]]
-        expected = np.minimum(rate * np.array([along, left]), trajectory.MOST_OWED)
-        np.testing.assert_allclose(owed, expected, atol=1e-9)
+        expected = np.minimum(rate * np.array([along, left]), trajectory.MOST_CORRECTION)
+        np.testing.assert_allclose(correction, expected, atol=1e-9)
     # Asked for from the next frame on: here all of it, and the shortfall of the moment, within the limit.
-    more = speed * (owed[0] * ahead + owed[1] * np.array([ahead[1], -ahead[0]])) + 2.0 * lack
+    more = speed * (correction[0] * ahead + correction[1] * np.array([ahead[1], -ahead[0]])) + 2.0 * lack
     more *= min(1.0, trajectory.STEERING_LIMIT * speed / np.linalg.norm(more))
     np.testing.assert_allclose(asked, np.array([0.5, 1.5]) + more, atol=1e-3)
 
@@ -233,8 +233,8 @@ def test_a_steady_error_is_integrated_along_and_across_the_wish() -> None:
     ],
 )
 def test_when_the_error_is_not_integrated(wish, steering: float, expected) -> None:
-    _, _, owed = follow(wish, (0.0, 1.0), steering, 30, owed=(0.3, -0.2))
-    np.testing.assert_allclose(owed, expected, atol=1e-9)
+    _, _, correction = follow(wish, (0.0, 1.0), steering, 30, correction=(0.3, -0.2))
+    np.testing.assert_allclose(correction, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("sign", [1, -1])

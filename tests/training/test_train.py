@@ -147,7 +147,7 @@ def test_a_held_out_sample_is_a_part_of_the_whole(data: Database, monkeypatch: p
     network = initialise((data.layout.x_size, 8, data.layout.y_size), 4, 1)
     held_out = HeldOut(data, torch.device("cpu"), 0)
     assert sum(len(part[0]) for part in held_out.sample) == 70
-    assert held_out.errors(network) == held_out.whole(network)
+    assert held_out.errors(network) == held_out.every_row(network)
 
 
 def poisoned(data: Database, monkeypatch: pytest.MonkeyPatch, turn: int, value: float) -> None:

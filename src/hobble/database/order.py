@@ -82,7 +82,7 @@ def starts(count: np.ndarray) -> np.ndarray:
     return np.cumsum(count, dtype=np.int64) - count
 
 
-def shown(
+def rows_and_fits(
     chunks: Sequence[int],
     rows: Sequence[int],
     count: np.ndarray,

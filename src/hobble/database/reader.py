@@ -19,7 +19,7 @@ from hobble.database.manifest import STATISTICS, Manifest
 from hobble.database.precision import widen
 from hobble.database.statistics import Statistics
 from hobble.database.stretches import Stretch
-from hobble.database.window import Room, Window, load, room
+from hobble.database.window import Buffers, Window, empty_buffers, load
 from hobble.rows.compose import compose
 from hobble.rows.layout import RowLayout
 
@@ -50,7 +50,7 @@ class Database:
     manifest: Manifest
     statistics: Statistics
     memory_mb: int
-    _kept: dict[str, Window] = field(default_factory=dict, repr=False)
+    _loaded: dict[str, Window] = field(default_factory=dict, repr=False)
     _verified: set[str] = field(default_factory=set, repr=False)
 
     @classmethod
@@ -58,7 +58,7 @@ class Database:
         """Open the database folder `path`.
 
         memory_mb: memory limit for its rows, for each reader of a section. A database that fits is loaded
-        once; a larger one is read in every layer, chunk by chunk. Raises InputError if there is no complete
+        once; a larger one is read again and again, chunk by chunk. Raises InputError if there is no complete
         database.
         """
         path = Path(path)
@@ -123,12 +123,12 @@ class Database:
         cut = stretch.start, stretch.stop
         spans = order.spans(self.rows(split), self.manifest.visits, section, sections, cut)
         window = window or self.window(split, block_rows)
-        rooms = self._rooms(split, window)
+        buffers = self._buffers(split, window)
         parts = chain.from_iterable(
-            self._parts(split, (seed, pass_index, layer), start, stop, window, rooms)
+            self._parts(split, (seed, pass_index, layer), start, stop, window, buffers)
             for layer, start, stop in spans
         )
-        return ahead(self._composed(_kept(parts, stretch), stretch.rows, block_rows))
+        return ahead(self._composed(_own(parts, stretch), stretch.rows, block_rows))
 
     def _parts(
         self,
@@ -137,11 +137,11 @@ class Database:
         start: int,
         stop: int,
         window: int,
-        rooms: Iterator[Room],
+        buffers: Iterator[Buffers],
     ) -> Iterator[Part]:
         """Places start to stop of a layer: windows, the rows to use in order, and the fit of each row.
 
-        of: seed, pass and layer. A window is loaded into one of `rooms` while the previous window is in use
+        of: seed, pass and layer. A window is loaded into one of `buffers` while the previous window is in use
         in the other. So a window must not be used after the next one is requested.
         """
         every = range(len(self.manifest.chunks[split]))
@@ -150,10 +150,10 @@ class Database:
             windows = iter([self._whole(split)])
         else:
             wanted = list(self._wanted(split, of, start, stop, window))
-            windows = ahead(self.load(split, some, next(rooms)) for _, some, _, _ in wanted)
+            windows = ahead(self.load(split, some, next(buffers)) for _, some, _, _ in wanted)
         for group, _, low, high in wanted:
             w, part, visits = next(windows), slice(low, high), self.manifest.visits
-            yield w, *order.shown(w.chunks, w.rows, w.count, w.first, visits, (*of, group), part)
+            yield w, *order.rows_and_fits(w.chunks, w.rows, w.count, w.first, visits, (*of, group), part)
 
     def _wanted(
         self, split: str, of: tuple[int, int, int], start: int, stop: int, window: int
@@ -184,20 +184,20 @@ class Database:
         sizes = [chunk.bytes for chunk in self.manifest.chunks[split]]
         return len(sizes) if self.manifest.bytes <= memory else max(1, memory // (2 * max(sizes)))
 
-    def _rooms(self, split: str, window: int) -> Iterator[Room]:
+    def _buffers(self, split: str, window: int) -> Iterator[Buffers]:
         """Two sets of buffers for windows, in turn. All windows of a section reuse them."""
         if window >= len(self.manifest.chunks[split]):
             return iter(())
-        return cycle([room(self.manifest, split, window) for _ in range(2)])
+        return cycle([empty_buffers(self.manifest, split, window) for _ in range(2)])
 
     def _whole(self, split: str) -> Window:
-        if split not in self._kept:
+        if split not in self._loaded:
             every = range(len(self.manifest.chunks[split]))
-            self._kept[split] = self.load(split, every, room(self.manifest, split, len(every)))
-        return self._kept[split]
+            self._loaded[split] = self.load(split, every, empty_buffers(self.manifest, split, len(every)))
+        return self._loaded[split]
 
-    def load(self, split: str, some: Sequence[int], into: Room) -> Window:
-        """Read chunks of a split into the buffers `into` (`hobble.database.window.room`)."""
+    def load(self, split: str, some: Sequence[int], into: Buffers) -> Window:
+        """Read chunks of a split into the buffers `into` (`hobble.database.window.empty_buffers`)."""
         folder = self.path / self.manifest.folder
         return load(folder, self.manifest.chunks[split], some, into, self._verified)
 
@@ -234,7 +234,7 @@ class Database:
         return Block(x, y, np.empty(rows, np.float32), np.empty(rows, np.int32), np.empty(rows, np.int32))
 
 
-def _kept(parts: Iterator[Part], stretch: Stretch) -> Iterator[Part]:
+def _own(parts: Iterator[Part], stretch: Stretch) -> Iterator[Part]:
     """Only the samples of a stretch that this process reads."""
     at = 0
     for window, rows, fits in parts:

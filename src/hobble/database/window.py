@@ -15,7 +15,7 @@ from hobble.database.manifest import Manifest
 from hobble.database.precision import STORED
 from hobble.rows.compose import fit_columns, x_columns
 
-Room = Mapping[str, np.ndarray]
+Buffers = Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Window:
     phase: Array
 
 
-def room(manifest: Manifest, split: str, most: int) -> dict[str, np.ndarray]:
+def empty_buffers(manifest: Manifest, split: str, most: int) -> dict[str, np.ndarray]:
     """Empty arrays that are large enough for any `most` chunks of a split, in the order of the tables."""
     chunks = manifest.chunks[split]
     rows = sum(sorted(chunk.rows for chunk in chunks)[-most:])
@@ -56,7 +56,7 @@ def room(manifest: Manifest, split: str, most: int) -> dict[str, np.ndarray]:
 
 
 def load(
-    folder: Path, chunks: Sequence[Chunk], some: Sequence[int], into: Room, verified: set[str]
+    folder: Path, chunks: Sequence[Chunk], some: Sequence[int], into: Buffers, verified: set[str]
 ) -> Window:
     """Read the chunks numbered `some`, one after another, directly into the arrays `into`.
 

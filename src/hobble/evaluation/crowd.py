@@ -90,16 +90,16 @@ def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
     return Walks(local, contacts, phase, root, rough, starts)
 
 
-def channel_values(network: Network, name: str, each: Sequence[Mapping[str, float]]) -> dict[str, Array]:
+def channel_values(network: Network, name: str, figures: Sequence[Mapping[str, float]]) -> dict[str, Array]:
     """The values of channel `name` for a stretch, or {} if the network does not have that channel.
 
-    each: column -> value, for each figure.
+    figures: column -> value, for each figure.
     """
     columns = network.channels.get(name)
     if columns is None:
         return {}
-    out = np.zeros((len(each), len(columns)))
-    for row, values in zip(out, each, strict=True):
+    out = np.zeros((len(figures), len(columns)))
+    for row, values in zip(out, figures, strict=True):
         for column, value in values.items():
             row[columns.index(column)] = value
     return {name: out}

@@ -56,7 +56,7 @@ def published_row(
     """A published figure (`theirs`) with ours, which is None if it was not measured.
 
     row: has `configuration` and `source`, and may have the `table` in which it was printed and another
-    figure that the same publication gives `elsewhere`.
+    figure that the same publication gives `other_figure`.
     """
     return {
         "measure": measure,
@@ -66,5 +66,5 @@ def published_row(
         "ours": ours,
         "source": row["source"],
         "table": row.get("table"),
-        "elsewhere": row.get("elsewhere"),
+        "other_figure": row.get("other_figure"),
     }

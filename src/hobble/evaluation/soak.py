@@ -107,11 +107,11 @@ def soak(
 ) -> dict[str, Any]:
     """The worst values over all characters and frames. options: of ProceduralAnimation.
 
-    `finite`: all numbers are. `hips_lowest_cm`, `hips_highest_cm`: above the ground under the hips.
-    `network_turn_degrees`: largest turn of a joint in a frame by the network, `turn_degrees`: by the pose,
-    `added_turn_degrees`: largest difference of the two in the same joint and frame; `frames_beyond`: frames
-    of a character in which it exceeds its limit. `fastest_joint_cm`: a frame. `slide_cm`: mean of a stance.
-    `holds`: whether all values are within LIMITS.
+    `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: above the ground under
+    them. `network_turn_degrees`: largest turn of a joint in a frame by the network, `turn_degrees`: by the
+    pose, `added_turn_degrees`: largest difference of the two in the same joint and frame; `frames_beyond`:
+    frames of a character in which it exceeds its limit. `fastest_joint_cm`: a frame. `slide_cm`: mean of a
+    stance. `holds`: whether all values are within LIMITS.
     """
     rng = np.random.default_rng(seed)
     skeleton = network.skeleton

@@ -40,8 +40,9 @@ def spread(
 ) -> tuple[NDArray[np.int64], Array]:
     """Joints (V, 4) and their weights (V, 4), largest first. Weights sum to 1.
 
-    Each corner begins as its owner's and the shares flow along the surface, as heat would, over about
-    `reach` cm (one, or one for each corner). So a hand that hangs beside a thigh takes nothing from it.
+    At first each corner belongs to its owner alone. Then the weights spread along the surface like heat, over
+    about `reach` cm (one number, or one for each corner). So a hand that hangs beside a thigh gets no weight
+    from it.
     """
     joints = np.unique(owner)
     shares = (owner[:, None] == joints).astype(float)

@@ -98,9 +98,9 @@ def signals(skeleton: Skeleton, positions: Array, fps: float) -> Signals:
         "shoulders_turn_left": _angle(-_dot(shoulders, ahead), _dot(shoulders, left)),
         "hips_height": at["hips"][:, 1] / leg,
     }
-    across = pelvis / np.maximum(np.linalg.norm(pelvis, axis=1, keepdims=True), 1e-9)
-    across = across + shoulders / np.maximum(np.linalg.norm(shoulders, axis=1, keepdims=True), 1e-9)
-    facing = gaussian(np.cross(across, [0.0, 1.0, 0.0]), TRAVEL * fps)
+    to_left = pelvis / np.maximum(np.linalg.norm(pelvis, axis=1, keepdims=True), 1e-9)
+    to_left = to_left + shoulders / np.maximum(np.linalg.norm(shoulders, axis=1, keepdims=True), 1e-9)
+    facing = gaussian(np.cross(to_left, [0.0, 1.0, 0.0]), TRAVEL * fps)
     facing = facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-9)
     ankles = {side: at[f"{NAMES[side]}_heel"] for side in SIDES}
     return Signals(

@@ -101,13 +101,13 @@ def _turns(source: Source, effects: Effects) -> tuple[Array, Array, Array]:
         rows += [going * np.cos(2 * np.pi * h * phase), going * np.sin(2 * np.pi * h * phase)]
     forward, left, left_up, turn, shoulders = np.einsum("fck,kf->cf", effects.curves, np.stack(rows))
     side, hike = effects.sided["side"], effects.sided["list"] * source.swing
-    forward = forward + effects.whole["forward"]
+    forward = forward + effects.body["forward"]
     left = left + side[:, LEFT] - side[:, RIGHT]
     left_up = left_up + hike[:, LEFT] - hike[:, RIGHT]
     pelvis = _lean(source, turn, left_up, PELVIS * forward)
     chest = _lean(source, shoulders, -left, forward)
     calm = 1 - LOOK["head"]
-    head = _lean(source, calm * shoulders, -calm * left, calm * forward + effects.whole["nod"])
+    head = _lean(source, calm * shoulders, -calm * left, calm * forward + effects.body["nod"])
     return pelvis, chest, head
 
 

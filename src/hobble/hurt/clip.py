@@ -79,7 +79,7 @@ def hurt_clip(
     feet = [move_foot(source, changes, path, feet[side], side) for side in (LEFT, RIGHT)]
     out = _assembled(source, changes, timing, path, feet, name)
     which = np.clip(np.floor(timing.body + 1e-6).astype(int), 0, len(clip) - 1)
-    return HurtClip(out, changes.felt[which], relabel(labels, timing, zero, margins), timing.body)
+    return HurtClip(out, changes.shown[which], relabel(labels, timing, zero, margins), timing.body)
 
 
 def _ground(source: Source, feet: list[Foot]) -> Array:

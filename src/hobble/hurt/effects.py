@@ -16,7 +16,7 @@ HIGHEST = 10.0
 POWER = 0.75  # strength = (severity / 10) ** POWER: .41 at 3, .59 at 5, .77 at 7
 LEAST_RATIO = 0.02
 SETTLING = 0.3  # seconds: sigma of the Gaussian that smooths changes of severity
-UNFELT = 0.05  # smaller severities count as 0
+LEAST_SEVERITY = 0.05  # smaller severities count as 0
 TOGETHER = 3.0  # exponent by which injuries add: 1 gives the sum, infinity the maximum
 WHOLE = ("speed", "stride", "back", "head", "forward", "nod")  # changes of the whole body
 SIDED = (
@@ -39,7 +39,8 @@ SIDED = (
 )
 OTHER = "_sound"
 FLIPPED = np.array([1.0, -1.0, -1.0, -1.0, -1.0])  # signs of CURVES in a mirror
-LATER = np.array([1.0, -1.0, -1.0, 1.0, 1.0])  # signs of a curve's factors after half a cycle
+# Signs of the factors of a curve (mean, then cosine and sine of one and two cycles) shifted by half a cycle.
+LATER = np.array([1.0, -1.0, -1.0, 1.0, 1.0])
 GUARD = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore", "hand": "carry"}
 
 
@@ -47,20 +48,20 @@ GUARD = {"shoulder": "upper", "upper arm": "upper", "forearm": "fore", "hand": "
 class Effects:
     """The changes of each of F frames of a clip, named as in `hobble.hurt.amounts`.
 
-    whole: name -> (F,). sided: name -> (F, 2), left and right. curves: (F, 5, 5). strength: (F,) of the worst
-    link, 0 to 1. felt: (F, L) severities that the frames show. They follow the requested ones over about a
+    body: name -> (F,). sided: name -> (F, 2), left and right. curves: (F, 5, 5). strength: (F,) of the worst
+    link, 0 to 1. shown: (F, L) severities that the frames show. They follow the requested ones over about a
     second.
     """
 
-    whole: dict[str, Array] = field(repr=False)
+    body: dict[str, Array] = field(repr=False)
     sided: dict[str, Array] = field(repr=False)
     curves: Array = field(repr=False)
     strength: Array = field(repr=False)
-    felt: Array = field(repr=False)
+    shown: Array = field(repr=False)
 
     def ratio(self, name: str) -> Array:
         """(F,) or (F, 2) factor for a ratio."""
-        return np.maximum(1.0 + (self.whole[name] if name in self.whole else self.sided[name]), LEAST_RATIO)
+        return np.maximum(1.0 + (self.body[name] if name in self.body else self.sided[name]), LEAST_RATIO)
 
 
 def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
@@ -70,7 +71,7 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
     """
     frames = len(severity)
     strength = gaussian((np.clip(severity, 0, HIGHEST) / HIGHEST) ** POWER, SETTLING * fps)
-    whole = {name: _Sum(np.zeros(frames)) for name in WHOLE}
+    body = {name: _Sum(np.zeros(frames)) for name in WHOLE}
     sided = {name: _Sum(np.zeros((frames, 2))) for name in SIDED}
     curves = _Sum(np.zeros((frames, 5, 5)))
     parts: dict[tuple[str, int | None], Array] = {}
@@ -86,24 +87,24 @@ def effects(skeleton: Skeleton, severity: Array, fps: float) -> Effects:
             if name == "curves":
                 curves.add(own[:, None, None] * _of_side(np.asarray(amount), side))
             elif name in WHOLE:
-                whole[name].add(own * amount)
+                body[name].add(own * amount)
             else:
                 _add_sided(sided, name, own * amount, side)
         if part in GUARD and side is not None:
             _add_sided(sided, GUARD[part], own, side)
     return Effects(
-        {name: total.value() for name, total in whole.items()},
+        {name: total.value() for name, total in body.items()},
         {name: total.value() for name, total in sided.items()},
         curves.value(),
         strength.max(axis=1, initial=0.0),
-        _felt(strength),
+        _shown(strength),
     )
 
 
-def _felt(strength: Array) -> Array:
+def _shown(strength: Array) -> Array:
     """The severities (F, L) of strengths. Very small ones are 0."""
     severity = np.round(HIGHEST * np.clip(strength, 0.0, 1.0) ** (1 / POWER), 3)
-    return np.where(severity < UNFELT, 0.0, severity)
+    return np.where(severity < LEAST_SEVERITY, 0.0, severity)
 
 
 def _add_sided(sided: dict[str, _Sum], name: str, values: Array, side: int | None) -> None:

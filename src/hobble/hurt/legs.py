@@ -43,7 +43,7 @@ class Leg:
 
 
 def read_leg(clip: Clip, side: int) -> Leg:
-    """The source's leg. If it is nearly straight, its knee points where the thigh usually has it."""
+    """The source's leg. While it is nearly straight, the knee points in its usual direction on the thigh."""
     skeleton = clip.skeleton
     hip, knee, heel = (skeleton.role(f"{SIDES[side]}_{r}") for r in ("hip", "knee", "heel"))
     at = clip.positions

@@ -42,7 +42,7 @@ class Timing:
 
 def retime(source: Source, effects: Effects) -> Timing:
     """Slow the cadence, and shift each foot's landing and leaving within the cycle."""
-    stride = 1 + effects.whole["stride"] * (1 - (1 - JOG_STRIDE) * source.jog)
+    stride = 1 + effects.body["stride"] * (1 - (1 - JOG_STRIDE) * source.jog)
     begins = np.concatenate([[0.0], np.cumsum((stride[1:] + stride[:-1]) / 2)])
     unit = source.cycle * stride
     new = np.arange(int(begins[-1] + 1e-6) + 1, dtype=float)

@@ -14,8 +14,8 @@ from hobble.labels.model import GAITS
 STAND, WALK, JOG, CROUCH = range(4)
 GRAVITY = 981.0 / 3600.0  # cm a frame, each frame
 
-# A slower figure stands (leg lengths a frame), a lower one crouches (lengths of the bones below).
-STANDING_SPEED = 0.0019
+STANDING_SPEED = 0.0019  # leg lengths a frame; a slower figure stands
+# A figure whose head or hips are lower crouches. Unit: length of the bones from there to the ground.
 CROUCHED_HEAD = 0.8
 CROUCHED_HIPS = 0.85
 
@@ -45,7 +45,7 @@ SWITCH_COST = 18.0  # frames of full evidence that a change of gait costs
 FADE_FRAMES = 31
 LONGEST_START = 180  # frames: a shorter doubtful walk between standing and jogging counts as jog
 CLEARLY_WALKING = -4.0  # log odds in the second half of such a walk
-LONGEST_PASSAGE = 75  # frames: any other shorter walk between the two is divided between them
+LONGEST_PASSAGE = 75  # frames: of any other shorter walk, half counts as standing and half as jogging
 
 
 def overwrite_crouch(gait: Array, clip: Clip) -> Array:

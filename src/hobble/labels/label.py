@@ -118,7 +118,7 @@ def write_report(path: str | Path, report: LabelReport, labels: Labels, clip: Cl
             **asdict(report),
             "seconds": seconds,
             "cycles": len(labels.cycles),
-            "strip": label_picture(labels, clip),
+            "curves": label_picture(labels, clip),
         },
     )
 

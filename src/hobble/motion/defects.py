@@ -16,10 +16,12 @@ from hobble.core import quat
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
 
-JUMP = 12.0  # cm more than neighbouring frames suggest, in the limit of a high frame rate
-JUMP_AT_30 = 30.0  # cm to add at 30 Hz, where velocities change more between frames
+# A jump is a step that differs from the neighbouring steps by more than JUMP cm, plus JUMP_AT_30 at 30 Hz,
+# where velocities change more between frames. At f Hz it is JUMP + JUMP_AT_30 * (30 / f)^2.
+JUMP = 12.0
+JUMP_AT_30 = 30.0
 GLITCH = 6.5  # cm: distance of a wrong frame from the mean of its neighbours
-GLITCH_AT_30 = 8.0
+GLITCH_AT_30 = 8.0  # added at 30 Hz, as above
 TELEPORT = 30.0  # cm: a larger jump of the root is not the seam of a loop
 HEAD, TAIL = 0.5, 1.0  # seconds: shorter pieces before the first and after the last jump are cut off
 BRIDGE = 0.25  # seconds: shorter pieces between two jumps are bridged
@@ -122,7 +124,8 @@ def _find_glitches(clip: Clip) -> list[tuple[int, float, str]]:
         p = clip.positions[first - 1 : first + BLOCK + 1]
         off = np.linalg.norm(p[1:-1] - 0.5 * (p[:-2] + p[2:]), axis=-1)
         size[first : first + len(off)], joint[first : first + len(off)] = off.max(axis=1), off.argmax(axis=1)
-    # A step in the motion raises two frames equally. A wrong frame rises twice as much as its neighbours.
+    # Where the motion jumps, two frames are equally far off. A wrong frame is twice as far off as its
+    # neighbours.
     alone = size[1:-1] > 1.5 * np.maximum(size[:-2], size[2:])
     alone[[0, -1]] = False
     found = np.flatnonzero((size[1:-1] > limit) & alone) + 1
@@ -130,7 +133,7 @@ def _find_glitches(clip: Clip) -> list[tuple[int, float, str]]:
 
 
 def flips(clip: Clip, first: int) -> list[str]:
-    """A sentence for each joint that spins faster than a living one can without moving.
+    """A sentence for each joint that stays in place but spins faster than a living joint can.
 
     first: the source's frame at which the clip begins. Thumbs and end joints of captured rigs do this,
     because markers do not show how they are turned.

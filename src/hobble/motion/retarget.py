@@ -43,12 +43,12 @@ class Retarget:
 
     joints: (M,) target joints that follow a joint of the source, parents first. follows: (M,) the joints that
     they follow. turns: (M, 4) world rotation of the target = world rotation of the source times this.
-    leaders: (J,) for each target joint the nearest of `joints` above it, or itself if it is one of them.
-    arms: (J, 3) position of a joint in its leader's frame; for one of `joints`, in the frame of its parent's
-    leader. levels: the `joints` below the hips, in groups in the order in which they are placed. forward:
-    (3,) where the target's rest pose faces. pelvis: (3,) from the target's hips to the middle between its
-    legs. scale: leg length of the target / leg length of the source. lift: cm that the target's ankles are
-    higher above the ground than the source's, scaled.
+    drivers: (J,) for each target joint the nearest of `joints` above it, or itself if it is one of them.
+    driver_offsets: (J, 3) position of a joint in its driver's frame; for one of `joints`, in the frame of its
+    parent's driver. levels: the `joints` below the hips, in groups in the order in which they are placed.
+    forward: (3,) where the target's rest pose faces. pelvis: (3,) from the target's hips to the middle
+    between its legs. scale: leg length of the target / leg length of the source. lift: cm that the target's
+    ankles are higher above the ground than the source's, scaled.
     """
 
     source: Skeleton = field(repr=False)
@@ -56,8 +56,8 @@ class Retarget:
     joints: Array
     follows: Array
     turns: Array = field(repr=False)
-    leaders: Array = field(repr=False)
-    arms: Array = field(repr=False)
+    drivers: Array = field(repr=False)
+    driver_offsets: Array = field(repr=False)
     levels: tuple[Array, ...] = field(repr=False)
     forward: Array = field(repr=False)
     pelvis: Array = field(repr=False)
@@ -87,7 +87,7 @@ def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Reta
     for i, pair in enumerate(pairs):
         turns[i] = bones.get(pair, turns[i])
     scale = leg_length(target) / leg_length(source)
-    leaders, arms = _leaders(target, joints)
+    drivers, driver_offsets = _drivers(target, joints)
     rest = rest_positions(target)
     middle = 0.5 * (rest[target.role("left_hip")] + rest[target.role("right_hip")])
     return Retarget(
@@ -96,9 +96,9 @@ def plan(source: Skeleton, target: Skeleton, sources: Mapping[str, str]) -> Reta
         joints=joints,
         follows=follows,
         turns=turns,
-        leaders=leaders,
-        arms=arms,
-        levels=_levels(target, joints, leaders),
+        drivers=drivers,
+        driver_offsets=driver_offsets,
+        levels=_levels(target, joints, drivers),
         forward=quat.rotate(rest_frame(target), np.array([0.0, 0.0, 1.0])),
         pelvis=middle - rest[target.role("hips")],
         scale=scale,
@@ -130,23 +130,23 @@ def _ankle(skeleton: Skeleton, to_upright: Array) -> float:
     return float(np.mean([p[skeleton.role(f"{s}_heel")] - p[skeleton.role(f"{s}_toe")] for s in SIDES]))
 
 
-def _leaders(target: Skeleton, joints: Array) -> tuple[Array, Array]:
-    """`leaders` and `arms` of a Retarget. Joints above the hips follow the hips."""
+def _drivers(target: Skeleton, joints: Array) -> tuple[Array, Array]:
+    """`drivers` and `driver_offsets` of a Retarget. Joints above the hips follow the hips."""
     rest, hips = rest_positions(target), target.role("hips")
-    leaders = np.full(len(target.joints), hips)
-    arms = np.zeros((len(target.joints), 3))
+    drivers = np.full(len(target.joints), hips)
+    driver_offsets = np.zeros((len(target.joints), 3))
     for j, p in enumerate(target.parents):
-        above = leaders[p] if p >= 0 else hips
-        leaders[j] = j if j in joints else above
-        arms[j] = rest[j] - rest[above]
-    return leaders, arms
+        above = drivers[p] if p >= 0 else hips
+        drivers[j] = j if j in joints else above
+        driver_offsets[j] = rest[j] - rest[above]
+    return drivers, driver_offsets
 
 
-def _levels(target: Skeleton, joints: Array, leaders: Array) -> tuple[Array, ...]:
+def _levels(target: Skeleton, joints: Array, drivers: Array) -> tuple[Array, ...]:
     depth = {target.role("hips"): 0}
     for j in joints:
         if j not in depth:
-            depth[int(j)] = depth[int(leaders[target.parents[j]])] + 1
+            depth[int(j)] = depth[int(drivers[target.parents[j]])] + 1
     return tuple(np.array([j for j in depth if depth[j] == d]) for d in range(1, max(depth.values()) + 1))
 
 
@@ -156,7 +156,7 @@ def retarget_clip(clip: Clip, how: Retarget) -> Clip:
     for side in SIDES:
         heel, toe = (clip.positions[:, how.source.role(f"{side}_{part}")] for part in ("heel", "toe"))
         joint, ball = how.target.role(f"{side}_heel"), how.target.role(f"{side}_toe")
-        foot = quat.rotate(rotations[:, joint], how.arms[ball])
+        foot = quat.rotate(rotations[:, joint], how.driver_offsets[ball])
         tilt = level_heels(foot, heel * how.scale, toe * how.scale, clip.fps)
         rotations[:, joint] = quat.mul(tilt, rotations[:, joint])
     positions, rotations = _posed(how, clip.positions, rotations, clip.fps)
@@ -195,14 +195,14 @@ def _posed(how: Retarget, source: Array, rotations: Array, fps: float | None = N
     positions[..., how.target.role("hips"), :] = hips
     parents = np.array(how.target.parents)
     for level in how.levels:
-        above = how.leaders[parents[level]]
-        arms = quat.rotate(rotations[..., above, :], how.arms[level])
-        positions[..., level, :] = positions[..., above, :] + arms
-    led = np.flatnonzero(how.leaders != np.arange(len(how.leaders)))
-    leaders = how.leaders[led]
-    rotations[..., led, :] = rotations[..., leaders, :]
-    arms = quat.rotate(rotations[..., leaders, :], how.arms[led])
-    positions[..., led, :] = positions[..., leaders, :] + arms
+        above = how.drivers[parents[level]]
+        offsets = quat.rotate(rotations[..., above, :], how.driver_offsets[level])
+        positions[..., level, :] = positions[..., above, :] + offsets
+    driven = np.flatnonzero(how.drivers != np.arange(len(how.drivers)))
+    drivers = how.drivers[driven]
+    rotations[..., driven, :] = rotations[..., drivers, :]
+    offsets = quat.rotate(rotations[..., drivers, :], how.driver_offsets[driven])
+    positions[..., driven, :] = positions[..., drivers, :] + offsets
     return positions, rotations
 
 
@@ -235,14 +235,14 @@ class _Leg:
         roles = [f"{side}_{part}" for part in ("hip", "knee", "heel", "toe")]
         self.hip, self.knee, heel, ball = (how.target.role(role) for role in roles)
         self.forward, self.rotations = how.forward, rotations
-        self.thigh, self.shank = how.arms[self.knee], how.arms[heel]
+        self.thigh, self.shank = how.driver_offsets[self.knee], how.driver_offsets[heel]
         self.start, joint = hips, self.hip
         while joint != how.target.role("hips"):
-            above = how.leaders[how.target.parents[joint]]
-            self.start = self.start + quat.rotate(rotations[..., above, :], how.arms[joint])
+            above = how.drivers[how.target.parents[joint]]
+            self.start = self.start + quat.rotate(rotations[..., above, :], how.driver_offsets[joint])
             joint = above
         toe = source[..., how.source.role(roles[3]), :] * how.scale
-        self.ankle = toe - quat.rotate(rotations[..., heel, :], how.arms[ball])
+        self.ankle = toe - quat.rotate(rotations[..., heel, :], how.driver_offsets[ball])
         a, b, c = (source[..., how.source.role(role), :] for role in roles[:3])
         length = np.linalg.norm(b - a, axis=-1) + np.linalg.norm(c - b, axis=-1)
         self.stretch = np.linalg.norm(c - a, axis=-1) / length

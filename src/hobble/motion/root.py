@@ -83,13 +83,13 @@ def continued(root: RootFrames, frames: int) -> RootFrames:
     before = root.position[0] - n[::-1] * np.median(steps[:STEADY], axis=0)
     after = root.position[-1] + n * np.median(steps[-STEADY:], axis=0)
 
-    def held(values: Array) -> Array:
+    def repeat_ends(values: Array) -> Array:
         return np.pad(values, ((frames, frames), (0, 0)), mode="edge")
 
     return RootFrames(
         np.concatenate([before, root.position, after]),
-        held(root.direction),
-        held(root.rotation),
+        repeat_ends(root.direction),
+        repeat_ends(root.rotation),
         np.pad(root.turn, frames),
     )
 

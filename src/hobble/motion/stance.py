@@ -99,7 +99,7 @@ def _speeds(clip: Clip) -> Array:
 def _kept(clip: Clip, seen: BodySample, others: Collection[int], frames: dict[int, Array]) -> list[int]:
     """The other joints that can be kept. Their frames are added to `frames`.
 
-    On average each is turned like the body part that it is on. The base of a finger points along the finger.
+    Each gets the mean rotation of the body part that it is on. The base of a finger points along the finger.
     """
     body, parents = seen.body, clip.skeleton.parents
     out = []

@@ -51,17 +51,17 @@ def gait_chart(material: Material) -> Chart | None:
 
 
 def speed_chart(material: Material) -> Chart | None:
-    """Seconds at each speed over the ground, from the label strips."""
+    """Seconds at each speed over the ground, from the speeds in the label reports."""
     edges = np.arange(0, 6.01, 0.2)
     traces: list[Trace] = []
     for split, colour in (("train", "@muted"), ("held_out", "@accent")):
         seconds = np.zeros(len(edges) - 1)
         for report in material.labels:
-            strip = report.get("strip") or {}
-            speed = [v for v in strip.get("speed") or () if v is not None]
+            curves = report.get("curves") or {}
+            speed = [v for v in curves.get("speed") or () if v is not None]
             if speed and material.split(report["clip"]) == split:
                 counts, _ = np.histogram(np.clip(speed, 0, edges[-1] - 1e-6), edges)
-                seconds += counts / len(speed) * strip["seconds"][-1]
+                seconds += counts / len(speed) * curves["seconds"][-1]
         if seconds.any():
             traces.append(
                 {
@@ -210,14 +210,14 @@ def strips(material: Material, clips: frozenset[str]) -> list[dict[str, Any]]:
     known = {report["clip"] for report in material.labels}
     out = []
     for report in material.labels:
-        strip, clip = report.get("strip"), report["clip"]
+        curves, clip = report.get("curves"), report["clip"]
         mirrors = clip.endswith("_mirror") and clip.removesuffix("_mirror") in known
-        if clip not in clips or mirrors or not strip or not strip.get("seconds"):
+        if clip not in clips or mirrors or not curves or not curves.get("seconds"):
             continue
-        length = lengths.get(clip) or strip["seconds"][-1]
+        length = lengths.get(clip) or curves["seconds"][-1]
         status = [
             {"name": say(label), "spans": value.get("spells") or [[0, length, value["highest"]]], **highest}
             for label, (value, highest) in of_clip.get(clip, {}).items()
         ]
-        out.append({**strip, "clip": clip, "length": length, "status": status})
+        out.append({**curves, "clip": clip, "length": length, "status": status})
     return out

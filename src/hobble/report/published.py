@@ -9,7 +9,7 @@ from typing import Any
 def cited(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     """Source and table of a figure, with a different value in the same publication if there is one.
 
-    >>> cited({"source": "a", "table": "5.2", "elsewhere": "3 in Appendix A"}, {"a": "Author (2021)"})
+    >>> cited({"source": "a", "table": "5.2", "other_figure": "3 in Appendix A"}, {"a": "Author (2021)"})
     'Author (2021), Table 5.2 (but 3 in Appendix A)'
     >>> cited({"source": "a"}, {"a": "Author (2021)"})
     'Author (2021)'
@@ -17,4 +17,4 @@ def cited(row: Mapping[str, Any], sources: Mapping[str, str]) -> str:
     text = sources.get(row["source"], row["source"])
     if row.get("table"):
         text += f", Table {row['table']}"
-    return f"{text} (but {row['elsewhere']})" if row.get("elsewhere") else text
+    return f"{text} (but {row['other_figure']})" if row.get("other_figure") else text

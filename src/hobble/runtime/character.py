@@ -19,7 +19,7 @@ class Character:
     ground: (C, samples, 3) heights at left, path, right; root_height: (C,) mean of the heights on the path.
     joint_position, joint_velocity: (C, J, 3); joint_rotation: (C, J, 4) world. This is the network's copy.
     phase: (C,). channel_values, channel_targets: (C, K) present and wanted values of all channels' columns.
-    target_velocity, target_direction: (C, 2); strafe: (C,); owed: (C, 2): see `trajectory.follow_wish`.
+    target_velocity, target_direction: (C, 2); strafe: (C,); correction: (C, 2): see `trajectory.follow_wish`.
     foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2), foot_added (C, 2, 2, 4), body_lift (C,): see
     `feet`.
     placed: (C,) whether the joints have been lifted to the ground at the start.
@@ -40,7 +40,7 @@ class Character:
     target_velocity: Array
     target_direction: Array
     strafe: Array
-    owed: Array
+    correction: Array
     foot_lock: Array
     foot_hold: Array
     foot_lift: Array
@@ -96,7 +96,7 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         target_velocity=np.zeros((count, 2)),
         target_direction=facing.copy(),
         strafe=np.zeros(count),
-        owed=np.zeros((count, 2)),
+        correction=np.zeros((count, 2)),
         foot_lock=np.zeros((count, 2)),
         foot_hold=np.zeros((count, 2, 2)),
         foot_lift=np.zeros((count, 2)),

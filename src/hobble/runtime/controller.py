@@ -32,9 +32,9 @@ joint_place = register_jitable(rule.joint_place)
 STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
 HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; beyond it, heights are imprecise
-# Radians a frame (1500 degrees a second). No joint of a walking or running person turns as fast. But a
-# prediction between two rotations half a turn apart, as in hands, may point anywhere, and a new wish changes
-# the next pose at once.
+# Radians a frame (1500 degrees a second). No joint of a walking or running person turns as fast. A prediction
+# can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation, and a new wish
+# changes the next pose at once.
 FASTEST_TURN = np.radians(25)
 
 # Parts of the state that have to be finite. The others are checked at the call or computed in each frame.
@@ -44,7 +44,7 @@ CHECKED = (
         "channel_values",
         "target_velocity",
         "target_direction",
-        "owed",
+        "correction",
         "foot_hold",
         "foot_lift",
         "foot_added",
@@ -119,7 +119,7 @@ class Controller:
     def _group(self, c: Character) -> None:
         """Group the arrays for the compiled functions. They only change in place, so this is done once."""
         self._path = (c.position, c.direction, c.gait)
-        self._target = (c.target_velocity, c.target_direction, c.strafe, c.owed)
+        self._target = (c.target_velocity, c.target_direction, c.strafe, c.correction)
         self._channels = (c.channel_values, c.channel_targets, self._channel_steps)
         self._joints = (c.joint_position, c.joint_velocity, c.joint_rotation)
         self._drawn = (self.root, self.yaw, self.pose_position, self.pose_rotation)
@@ -215,12 +215,12 @@ class Controller:
         )  # fmt: skip
 
     def _update(self, velocity: Array) -> None:
-        whole = self.predictor.network.rooted
+        rooted = self.predictor.network.rooted
         steered = self.steering > 0
-        held = trajectory.UNWISHED_LOSS if steered and not whole else 0.0
-        drawn = trajectory.DRAWN if steered and whole else 0.0
+        loss = trajectory.UNWISHED_LOSS if steered and not rooted else 0.0
+        pull = trajectory.PULL if steered and rooted else 0.0
         trajectory.advance(
-            self.y, self._y_columns, velocity, held, whole, drawn, self._path, self.character.phase
+            self.y, self._y_columns, velocity, loss, rooted, pull, self._path, self.character.phase
         )
 
 
@@ -350,9 +350,9 @@ def _take_output(
             keep, take = 0.0, 1.0
             if abs(dot) < slowest:
                 # Turn by FASTEST_TURN along the shorter way (slerp).
-                whole = np.arccos(abs(dot))
-                keep = np.sin(whole - FASTEST_TURN / 2) / np.sin(whole)
-                take = np.sin(FASTEST_TURN / 2) / np.sin(whole) * (1.0 if dot >= 0 else -1.0)
+                half = np.arccos(abs(dot))
+                keep = np.sin(half - FASTEST_TURN / 2) / np.sin(half)
+                take = np.sin(FASTEST_TURN / 2) / np.sin(half) * (1.0 if dot >= 0 else -1.0)
             old[0], old[1] = keep * old[0] + take * w, keep * old[1] + take * rx
             old[2], old[3] = keep * old[2] + take * ry, keep * old[3] + take * rz
             for k in range(3):

@@ -119,11 +119,11 @@ def carry_foot(
 
 
 @njit
-def sunk(position: Any, heel: int, toe: int, ground_heel: float, ground_toe: float, sole: Any) -> float:
+def sole_depth(position: Any, heel: int, toe: int, ground_heel: float, ground_toe: float, sole: Any) -> float:
     """How deep a foot of a pose (J, 3) is in the ground, cm; negative if it is above."""
-    heel_sunk = ground_heel + sole[0] - position[heel, 1]
-    toe_sunk = ground_toe + sole[1] - position[toe, 1]
-    return max(heel_sunk, toe_sunk)
+    heel_depth = ground_heel + sole[0] - position[heel, 1]
+    toe_depth = ground_toe + sole[1] - position[toe, 1]
+    return max(heel_depth, toe_depth)
 
 
 @njit
@@ -152,7 +152,7 @@ def carry_body(
         wanted, weight = 0.0, 0.0
         for f in range(2):
             under = ground[c, 2 * f], ground[c, 2 * f + 1]
-            rise = sunk(position[c], joints[f, 2], joints[f, 3], under[0], under[1], sole)
+            rise = sole_depth(position[c], joints[f, 2], joints[f, 3], under[0], under[1], sole)
             stands = min(max(contacts[c, 2 * f], contacts[c, 2 * f + 1], 0.0), 1.0)
             wanted += stands * (max(rise - BODY_FREE, 0.0) + min(rise + BODY_FREE, 0.0))
             weight += stands
@@ -193,7 +193,7 @@ def place_feet(
             else:
                 lock[c, f] = max(0.0, lock[c, f] - RELEASE)
             # Lift a foot out of the ground; lower a held foot that floats.
-            rise = sunk(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
+            rise = sole_depth(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
             rise = max(rise, 0.0) + lock[c, f] * min(rise + FLOATING, 0.0)
             lift[c, f] += HEIGHT_MIX * (rise - lift[c, f])
             shift[0], shift[1], shift[2] = lock[c, f] * away_x, lift[c, f], lock[c, f] * away_z

@@ -28,22 +28,22 @@ def between(ax: float, ay: float, az: float, bx: float, by: float, bz: float) ->
 
 
 @njit
-def approach(held: Any, w: float, x: float, y: float, z: float) -> bool:
-    """Turn `held` (4,) in place toward the rotation (w, x, y, z), by MOST_ADDED at most.
+def approach(rotation: Any, w: float, x: float, y: float, z: float) -> bool:
+    """Turn `rotation` (4,) in place toward the rotation (w, x, y, z), by MOST_ADDED at most.
 
     Returns whether it did not reach it.
     """
-    dot = held[0] * w + held[1] * x + held[2] * y + held[3] * z
+    dot = rotation[0] * w + rotation[1] * x + rotation[2] * y + rotation[3] * z
     if dot < 0.0:
         dot, w, x, y, z = -dot, -w, -x, -y, -z
-    whole = np.arccos(min(dot, 1.0))
-    if whole <= 0.5 * MOST_ADDED:
-        held[0], held[1], held[2], held[3] = w, x, y, z
+    half = np.arccos(min(dot, 1.0))
+    if half <= 0.5 * MOST_ADDED:
+        rotation[0], rotation[1], rotation[2], rotation[3] = w, x, y, z
         return False
-    keep = np.sin(whole - 0.5 * MOST_ADDED) / np.sin(whole)
-    take = np.sin(0.5 * MOST_ADDED) / np.sin(whole)
-    held[0], held[1] = keep * held[0] + take * w, keep * held[1] + take * x
-    held[2], held[3] = keep * held[2] + take * y, keep * held[3] + take * z
+    keep = np.sin(half - 0.5 * MOST_ADDED) / np.sin(half)
+    take = np.sin(0.5 * MOST_ADDED) / np.sin(half)
+    rotation[0], rotation[1] = keep * rotation[0] + take * w, keep * rotation[1] + take * x
+    rotation[2], rotation[3] = keep * rotation[2] + take * y, keep * rotation[3] + take * z
     return True
 
 
@@ -87,7 +87,7 @@ def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, s
     distance = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * 0.999)
     cosine = (upper * upper + distance * distance - lower * lower) / (2 * upper * distance)
     cosine = min(max(cosine, -1.0), 1.0)
-    # Turn the old bend direction with the leg. Computed from the new leg alone, the knee may bend backwards.
+    # Turn the old bend direction with the leg. One from the new leg alone may bend the knee backwards.
     along = tx * ax + ty * ay + tz * az
     ox, oy, oz = tx - along * ax, ty - along * ay, tz - along * az
     turn = (ox * wx + oy * wy + oz * wz) / max(1 + ax * wx + ay * wy + az * wz, 1e-6)

@@ -22,11 +22,11 @@ phase_change, moving_share = register_jitable(rule.phase_change), register_jitab
 STEERING_LIMIT = 2.0
 TARGET_MIX = 0.9  # share of the remaining difference to the wish that is applied each frame
 GAIT_MIX = 0.1
-OWED_RATE = 0.01  # integral gain a frame: a steady error is corrected within a second or two
-OWED_WITHIN = 0.8  # share of the wish; with a larger error the character is still turning or starting
-MOST_OWED = 1.0  # largest integral correction, as a share of the wish
+CORRECTION_RATE = 0.01  # integral gain a frame: a steady error is corrected within a second or two
+CORRECTION_WITHIN = 0.8  # share of the wish; with a larger error the character is still turning or starting
+MOST_CORRECTION = 1.0  # largest integral correction, as a share of the wish
 FURTHEST_TURN = np.radians(137)  # largest turn to ask for; a larger one may come out the other way round
-DRAWN = 0.1  # with `Network.rooted`: largest change of a frame's movement toward the wish, as a share of it
+PULL = 0.1  # with `Network.rooted`: largest change of a frame's movement toward the wish, as a share of it
 UNWISHED_LOSS = 0.5  # share of movement against the wish that is removed; removing all would drag the feet
 STRAFE_FROM = np.radians(45)  # angle between facing and velocity from which the strafe share is 1
 STILL = 0.1  # cm a frame: a slower wish means standing
@@ -40,8 +40,8 @@ STILL = 0.1  # cm a frame: a slower wish means standing
 Trajectory = tuple[Any, Any, Any]
 # What the caller wants: velocity, direction (C, 2); strafe (C,) share; gait (C, 6) shares.
 Wish = tuple[Any, Any, Any, Any]
-# The smoothed wish: velocity, direction (C, 2); strafe (C,); owed (C, 2), steady error of the velocity along
-# the wish and across it, see `_ask_velocity`.
+# The smoothed wish: velocity, direction (C, 2); strafe (C,); correction (C, 2) of a steady error of the
+# velocity, see `_ask_velocity`.
 Target = tuple[Any, Any, Any, Any]
 # values, targets (C, K) of all channels' columns; steps (K,), largest change of a value in a frame.
 Channels = tuple[Any, Any, Any]
@@ -81,7 +81,7 @@ def follow_wish(wish: Wish, steering: float, target: Target, path: Trajectory) -
     original runtime.
     """
     wish_velocity, wish_direction, wish_strafe, wish_gait = wish
-    velocity, direction, strafe, owed = target
+    velocity, direction, strafe, correction = target
     position, heading, gait = path
     middle = gait.shape[1] // 2
     for c in range(velocity.shape[0]):
@@ -91,7 +91,7 @@ def follow_wish(wish: Wish, steering: float, target: Target, path: Trajectory) -
             if x * x + z * z >= STILL * STILL:
                 facing = np.arctan2(heading[c, middle, 0], heading[c, middle, 1])
                 goal += _ask_turn(0.5 * steering, wrap(goal - facing))
-            x, z = _ask_velocity(steering, x, z, position[c], owed[c])
+            x, z = _ask_velocity(steering, x, z, position[c], correction[c])
         velocity[c, 0] += TARGET_MIX * (x - velocity[c, 0])
         velocity[c, 1] += TARGET_MIX * (z - velocity[c, 1])
         now = np.arctan2(direction[c, 0], direction[c, 1])
@@ -103,13 +103,13 @@ def follow_wish(wish: Wish, steering: float, target: Target, path: Trajectory) -
 
 
 @njit
-def _ask_velocity(steering: float, x: float, z: float, position: Any, owed: Any) -> tuple[float, float]:
+def _ask_velocity(steering: float, x: float, z: float, position: Any, correction: Any) -> tuple[float, float]:
     """The velocity to ask the network for, so that the character reaches (x, z).
 
     A network tends to keep its past velocity. So the error (wish minus mean velocity over the last half of
     the past window) is added to the wish, times `steering`, up to STEERING_LIMIT times the wish. A steady
-    error, such as weaker strafing to one side, is integrated in `owed` (2,): along the wish and across it to
-    the left, as shares of the wish.
+    error, such as weaker strafing to one side, is integrated in `correction` (2,): along the wish, and across
+    it to the left, as shares of the wish.
     """
     middle = position.shape[0] // 2
     span = middle // 2
@@ -118,17 +118,17 @@ def _ask_velocity(steering: float, x: float, z: float, position: Any, owed: Any)
     lack_z = z - (position[middle, 1] - position[middle - span, 1]) / span
     more_x, more_z = steering * lack_x, steering * lack_z
     if speed < STILL:
-        owed[:] = 0.0
+        correction[:] = 0.0
     else:
-        more_x += owed[0] * x + owed[1] * z
-        more_z += owed[0] * z - owed[1] * x
+        more_x += correction[0] * x + correction[1] * z
+        more_z += correction[0] * z - correction[1] * x
         # Do not integrate while the character turns or starts: that error goes away by itself.
-        if lack_x * lack_x + lack_z * lack_z < (OWED_WITHIN * speed) ** 2:
-            rate = steering * OWED_RATE / (speed * speed)
-            owed[0] += rate * (lack_x * x + lack_z * z)
-            owed[1] += rate * (lack_x * z - lack_z * x)
+        if lack_x * lack_x + lack_z * lack_z < (CORRECTION_WITHIN * speed) ** 2:
+            rate = steering * CORRECTION_RATE / (speed * speed)
+            correction[0] += rate * (lack_x * x + lack_z * z)
+            correction[1] += rate * (lack_x * z - lack_z * x)
             for k in range(2):
-                owed[k] = min(max(owed[k], -MOST_OWED), MOST_OWED)
+                correction[k] = min(max(correction[k], -MOST_CORRECTION), MOST_CORRECTION)
     limit = STEERING_LIMIT * speed / max(np.sqrt(more_x * more_x + more_z * more_z), 1e-6)
     return x + more_x * min(1.0, limit), z + more_z * min(1.0, limit)
 
@@ -221,7 +221,7 @@ def prepare(
 
 
 @njit
-def _draw(share: float, wish_x: float, wish_z: float, x: float, z: float) -> tuple[float, float]:
+def _pull(share: float, wish_x: float, wish_z: float, x: float, z: float) -> tuple[float, float]:
     """What to add to a movement (x, z) so that it comes nearer to the wish.
 
     Along the wish and across it, each at most `share` times the movement's length. If the two shared one
@@ -240,18 +240,17 @@ def _draw(share: float, wish_x: float, wish_z: float, x: float, z: float) -> tup
 
 @njit
 def advance(
-    y: Any, at: Any, wish: Any, held: float, whole: bool, drawn: float, path: Trajectory, phase: Any
+    y: Any, at: Any, wish: Any, loss: float, rooted: bool, pull: float, path: Trajectory, phase: Any
 ) -> None:
     """Advance one frame: shift the past, move and turn the root, take the predicted future and phase change.
 
     y: (C, outputs) prediction. at: columns of y (root velocity, turn, phase change, position, direction),
     then the number of future samples and the step.
-    Movement is scaled by (1 - stand)^.25, except with `whole` (`Network.rooted`), where movement belongs to
-    the pose. held: the share that is removed of movement against the wished velocity `wish` (C, 2), or of all
-    movement if the wish is to turn on the spot; 0 is the original runtime.
-    drawn: how far the movement is drawn toward the wish, at most, as a share of its own length (after the
-    adjustment of Holden et al. 2020). Clips have only some directions and speeds, and feet in contact are
-    held.
+    rooted: as `Network.rooted`, the movement belongs to the pose. Otherwise it is scaled by (1 - stand)^.25.
+    loss: the share that is removed of movement against the wished velocity `wish` (C, 2), or of all movement
+    if the wish is to turn on the spot; 0 is the original runtime.
+    pull: how far the movement is changed toward the wish, at most, as a share of its own length (after the
+    adjustment of Holden et al. 2020), because clips have only some directions and speeds.
     The predicted yaw velocity is that of the world seen from the root, so the root turns by its negative.
     """
     position, direction, gait = path
@@ -265,18 +264,18 @@ def advance(
                 direction[c, i, k] = direction[c, i + 1, k]
             for k in range(gait.shape[2]):
                 gait[c, i, k] = gait[c, i + 1, k]
-        moving = 1.0 if whole else moving_share(gait[c, middle, 0])
+        moving = 1.0 if rooted else moving_share(gait[c, middle, 0])
         yaw = np.arctan2(direction[c, middle, 0], direction[c, middle, 1])
         sin, cos = np.sin(yaw), np.cos(yaw)
         vx, vz = y[c, at[0]], y[c, at[0] + 1]
         x, z = moving * (vx * cos + vz * sin), moving * (vz * cos - vx * sin)
         speed = wish[c, 0] * wish[c, 0] + wish[c, 1] * wish[c, 1]
         if speed < STILL * STILL:
-            x, z = (1.0 - held) * x, (1.0 - held) * z
+            x, z = (1.0 - loss) * x, (1.0 - loss) * z
         else:
-            against = held * min(0.0, x * wish[c, 0] + z * wish[c, 1]) / speed
+            against = loss * min(0.0, x * wish[c, 0] + z * wish[c, 1]) / speed
             x, z = x - against * wish[c, 0], z - against * wish[c, 1]
-        more_x, more_z = _draw(drawn, wish[c, 0], wish[c, 1], x, z)
+        more_x, more_z = _pull(pull, wish[c, 0], wish[c, 1], x, z)
         position[c, middle, 0] += x + more_x
         position[c, middle, 1] += z + more_z
         yaw -= moving * y[c, at[1]]

@@ -25,7 +25,12 @@ TABLE: dict[str, tuple[tuple[float, float], ...]] = {
     "flat": ((0.15, 0), (0.14, 0), (0.30, 0), (0.15, 0)),  # share of stance until the toe is down
     "heel_off": ((0.6, 0), (0.32, -0.03), (0.30, 0), (0.48, 0)),  # share of stance when the heel leaves
     "roll": ((2.8, 0), (3.2, 0), (2.6, 0), (1.9, 0)),  # power of the heel's rise: slow at first, then fast
-    "lift": ((2, 0), (0.3, 1), (3, 3), (4, 0)),  # of the swinging foot over the line of its ends
+    "lift": (
+        (2, 0),
+        (0.3, 1),
+        (3, 3),
+        (4, 0),
+    ),  # height of the swinging foot above the line from where it leaves to where it lands
     "clearance": ((1, 0), (2.5, 0), (3, 0), (2, 0)),  # least height of the swinging sole
     "behind": ((4, 0), (9.9, 5.5), (7.5, 3), (10, 5)),  # of an ankle behind the body in mid-stance
     "width": ((9.5, 0), (5.5, 0), (3.5, 0), (9.5, 0)),  # of an ankle from the path

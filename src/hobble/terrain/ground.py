@@ -109,8 +109,8 @@ def flat_ground(
     floor or capture), a surface is added. Otherwise pits are dug under feet more than `deepest` below it.
     """
     heights = soles[..., 1]
-    held = np.concatenate([contacts[:-1], contacts[-2:-1]])
-    zero = heights[held if held.any() else contacts].mean() if level == "feet" else 0.0
+    original = np.concatenate([contacts[:-1], contacts[-2:-1]])
+    zero = heights[original if original.any() else contacts].mean() if level == "feet" else 0.0
     plain = Ground(None, np.array([-1]), np.zeros(1), np.zeros(2), np.array([zero]))
     if deepest is None or not bent:
         return plain
@@ -143,7 +143,7 @@ def meet_feet(plain: Ground, soles: Array, contacts: Mask, smoothing: float, dee
 
 
 def _dug(ground: Ground, soles: Array, standing: Stances, deepest: float) -> list[Pits]:
-    """For each fit, pits for the feet more than `deepest` below it. They leave them deepest / 2 below."""
+    """For each fit, pits under the feet more than `deepest` below it, so that they are deepest / 2 below."""
     return [dig_pits(soles[covered], standing, deepest / 2) for covered in ground.above(soles) > deepest]
 
 

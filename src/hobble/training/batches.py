@@ -25,7 +25,7 @@ Piece = tuple[Tensor, Tensor, Tensor, np.ndarray, np.ndarray]  # the first five 
 class Batch(NamedTuple):
     """n samples on the training's device: x (n, X), y (n, Y), p (n,); clip and frame (n,) as in a `Block`.
 
-    These are the samples of one process, maybe none. whole: number of samples over all processes.
+    These are the samples of one process, maybe none. total: number of samples over all processes.
     """
 
     x: Tensor
@@ -33,7 +33,7 @@ class Batch(NamedTuple):
     p: Tensor
     clip: np.ndarray
     frame: np.ndarray
-    whole: int
+    total: int
 
 
 class Rows:
@@ -69,15 +69,16 @@ class HostRows(Rows):
         sections is complete.
         """
         place = (pass_index, section, sections, seed)
-        # By the whole batch: the order of the rows depends on it, but must not depend on the processes.
+        # From the size of the whole batch, not of this process's part: the order of the rows depends on it,
+        # and must be the same for any number of processes.
         window = self.database.window(TRAIN, self.database.block_rows(size))
         sharing = self.sharing(section, sections, size)
         read = [self._pieces(place, stretch, window) for stretch in sharing.read()]
-        for whole, _ in sharing.sizes():
+        for total, _ in sharing.sizes():
             # A short batch fills its first places only, so later stretches may have no samples for it.
             pieces = [piece for one in read if (piece := next(one, None)) is not None]
             piece = pieces[0] if len(pieces) == 1 else _joined(pieces, self._nothing)
-            yield Batch(*piece, whole)
+            yield Batch(*piece, total)
 
     def _pieces(self, place: tuple[int, int, int, int], stretch: Stretch, window: int) -> Iterator[Piece]:
         """The samples of one stretch, batch by batch."""
@@ -118,8 +119,8 @@ class Watch:
     def add(self, loss: Tensor, batch: Batch) -> None:
         """Note a batch and its loss over all processes, a scalar on any device."""
         self._waiting.append((loss, batch))
-        self.seen += batch.whole
-        self._new += batch.whole
+        self.seen += batch.total
+        self._new += batch.total
         if self._new >= CHECK_EVERY:
             self._check()
 
@@ -141,8 +142,8 @@ class Watch:
                 raise HobbleError(self._message("its error is not a finite number", self._batches, batch))
             if loss > DIVERGED and (self._worst is None or loss > self._worst[0]):
                 self._worst = (loss, self._batches, batch)
-            self.samples += batch.whole
-            self._total += loss * batch.whole
+            self.samples += batch.total
+            self._total += loss * batch.total
         self._waiting.clear()
         self._new = 0
 

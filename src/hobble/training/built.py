@@ -52,7 +52,7 @@ def run_built(
     facts = {"passes": 1, "samples": frames, "steps": 0, "terrain_side": terrain_side}
     write_weights(weights, made, database, configuration, facts)
     blocks = database.layout.blocks("y")
-    errors = HeldOut(database, torch.device("cpu"), 0).whole(Standardised(load_network(weights)))
+    errors = HeldOut(database, torch.device("cpu"), 0).every_row(Standardised(load_network(weights)))
     log.info("held out, every row: %.4f", errors[0])
     write_history(history, blocks, [[1, 1, frames, seconds, float("nan"), *errors]])
     save_npz(checkpoint, network=np.array(made.described), sections=np.array(0))

@@ -12,7 +12,7 @@ from hobble.database import order
 from hobble.database.manifest import Manifest
 from hobble.database.reader import Database
 from hobble.database.stretches import Sharing, Stretch
-from hobble.database.window import room
+from hobble.database.window import empty_buffers
 from hobble.rows.compose import compose, fit_columns, x_columns
 from hobble.training.batches import TRAIN, Batch, HostRows, Rows
 from hobble.training.processes import ALONE, Processes
@@ -53,7 +53,7 @@ class DeviceRows(Rows):
 
     def _upload(self) -> None:
         row = fit = 0
-        into = room(self.database.manifest, TRAIN, 1)
+        into = empty_buffers(self.database.manifest, TRAIN, 1)
         for number, chunk in enumerate(self.chunks):
             rows, fits = slice(row, row + chunk.rows), slice(fit, fit + chunk.fits)
             read = self.database.load(TRAIN, [number], into)
@@ -82,8 +82,8 @@ class DeviceRows(Rows):
             for start in range(0, len(p), own):
                 part = slice(start, start + own)
                 yield Batch(x[part], y[part], p[part], clip[part], frame[part], next(sizes)[0])
-        for whole, _ in sizes:  # the last batch is too short to have rows for this process
-            yield Batch(x[:0], y[:0], p[:0], clip[:0], frame[:0], whole)
+        for total, _ in sizes:  # the last batch is too short to have rows for this process
+            yield Batch(x[:0], y[:0], p[:0], clip[:0], frame[:0], total)
 
     def _read(self, sharing: Sharing, place: tuple[int, int, int, int]) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of the rows and fits that this process reads in a section, batch by batch."""
@@ -110,7 +110,9 @@ class DeviceRows(Rows):
         yield nothing, nothing
         for layer, start, stop in order.spans(len(self.count), visits, section, sections, cut):
             place = (seed, pass_index, layer, 0)
-            yield order.shown(every, of_each, self.count, self.first, visits, place, slice(start, stop))
+            yield order.rows_and_fits(
+                every, of_each, self.count, self.first, visits, place, slice(start, stop)
+            )
 
     def _composed(self, rows: Tensor, fits: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """x (n, X), y (n, Y) and p (n,), composed on the device."""

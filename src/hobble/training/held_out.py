@@ -30,7 +30,7 @@ class HeldOut:
     """Rows of the held-out clips, each with one of its terrain fits, kept in memory.
 
     section: samples of a section of the training. After each section a tenth as many rows are measured, 2,000
-    to 20,000, which takes a few percent of the training time. `whole` measures every row, without keeping
+    to 20,000, which takes a few percent of the training time. `every_row` measures every row, without keeping
     them.
     """
 
@@ -49,7 +49,7 @@ class HeldOut:
         """Mean squared error of the standardised output on the sample, then that of each block of Y."""
         return self._errors(network, self.sample)
 
-    def whole(self, network: Predicts) -> list[float]:
+    def every_row(self, network: Predicts) -> list[float]:
         """The same over every held-out row."""
         return self._errors(network, self._stream())
 

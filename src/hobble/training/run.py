@@ -74,7 +74,7 @@ def run(
         state.network.flat.copy_(state.best)
         best_section = state.sections - state.since_best
         log.info("best weights: section %d of %d, by the held-out error", best_section, state.sections)
-    whole = HeldOut(data, state.network.flat.device, 0).whole(state.network)
+    whole = HeldOut(data, state.network.flat.device, 0).every_row(state.network)
     each = zip(["held out, every row", *blocks], whole, strict=True)
     log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in each))
     facts = {

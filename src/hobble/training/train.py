@@ -91,10 +91,10 @@ def _run(
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
             roll_out.add(batch.x)
             rate = learning_rate_share(training, (state.samples + watch.seen) / pairs)
-            watch.add(update(batch.x, batch.y, batch.p, rate, batch.whole), batch)
+            watch.add(update(batch.x, batch.y, batch.p, rate, batch.total), batch)
             roll_out.remember(step.error)
             if record:
-                record.bar.update(batch.whole)
+                record.bar.update(batch.total)
         train_mse = watch.mean()
         processes.check_same(state.network.flat)
         state.sections, state.samples = turn + 1, state.samples + watch.samples

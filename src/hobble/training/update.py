@@ -19,10 +19,10 @@ class Update:
     def __init__(self, step: Step, adam: Adam) -> None:
         self.step, self.adam = step, adam
 
-    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, whole: int | None = None) -> Tensor:
+    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, total: int | None = None) -> Tensor:
         """Train on x (B, X), y (B, Y), p (B,). Returns the loss, a scalar tensor.
 
-        share: factor of the learning rate. whole: rows of the batch over all processes, if there are several.
+        share: factor of the learning rate. total: rows of the batch over all processes, if there are several.
         """
         loss = self.step(x, y, p, self.step.masks(len(x)))
         self.adam.step(self.step.gradients, share)
@@ -43,16 +43,16 @@ class SharedUpdate(Update):
         self.sent = self.sent.to(adam.network.flat.device)
         self.gradients = adam.network.views(self.sent[:-1])
 
-    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, whole: int | None = None) -> Tensor:
+    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, total: int | None = None) -> Tensor:
         """As in `Update`; the loss is that of the whole batch."""
-        whole = whole or len(p)
-        masks = self.step.masks(whole, slice(self.own.start, self.own.stop))
+        total = total or len(p)
+        masks = self.step.masks(total, slice(self.own.start, self.own.stop))
         if len(p):
             loss = self.step(x, y, p, masks)
             for sent, gradient in zip(self.gradients, self.step.gradients, strict=True):
                 sent.copy_(gradient.view(sent.shape))
             self.sent[-1] = loss
-            self.sent.mul_(len(p) / whole)
+            self.sent.mul_(len(p) / total)
         else:
             self.sent.zero_()
             self.step.error = self.step.error[:0]
@@ -78,12 +78,12 @@ class CapturedUpdate(Update):
         self.graph = torch.cuda.CUDAGraph()
         self.graph.register_generator_state(step.generator)
         before = [tensor.clone() for tensor in (flat, adam.first, adam.second)]
-        beside = torch.cuda.Stream()
-        beside.wait_stream(torch.cuda.current_stream())
-        with torch.cuda.stream(beside):
+        side_stream = torch.cuda.Stream()
+        side_stream.wait_stream(torch.cuda.current_stream())
+        with torch.cuda.stream(side_stream):
             for _ in range(WARM_UP):
                 self._once()
-        torch.cuda.current_stream().wait_stream(beside)
+        torch.cuda.current_stream().wait_stream(side_stream)
         with torch.cuda.graph(self.graph):
             self.loss = self._once()
         self.error = step.error
@@ -95,7 +95,7 @@ class CapturedUpdate(Update):
         self.adam.move(self.step.gradients, self.numbers)
         return loss
 
-    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, whole: int | None = None) -> Tensor:
+    def __call__(self, x: Tensor, y: Tensor, p: Tensor, share: float, total: int | None = None) -> Tensor:
         """As in `Update`."""
         if len(p) != len(self.p):
             return super().__call__(x, y, p, share)

@@ -113,7 +113,7 @@ def test_severities_that_do_nothing_are_nobodys_limp(measured) -> None:
 def test_a_change_of_two_percent_is_steady_and_still_small(measured) -> None:
     """The rank correlation of an effect that has a given size at 10."""
     found = measured(lambda s: 0.002 * s)
-    knee = next(row for row in found["steady"] if row["gait"] == "walk" and row["effect"] == "knee_hurt")
+    knee = next(row for row in found["trends"] if row["gait"] == "walk" and row["effect"] == "knee_hurt")
     assert knee["spearman"] == pytest.approx(-1)
     assert 0.95 < knee["at_10"] < 1
     assert found["named"][-1]["named"] == 0

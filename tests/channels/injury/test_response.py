@@ -71,21 +71,23 @@ def test_a_response_that_is_known(hurtable) -> None:
     """
     each = (30 * 0.05 + np.hypot(0.4, 0.05)) / 31
     result = response(slowing(hurtable))
-    for rows, way in ((result["rows"], SEVERITIES), (result["back"], SEVERITIES[-2::-1])):
+    for rows, way in ((result["rows"], SEVERITIES), (result["falling"], SEVERITIES[-2::-1])):
         walk = [row for row in rows if row["gait"] == "walk"]
         assert [row["severity"] for row in walk] == way.tolist()
         np.testing.assert_allclose([r["speed"] for r in walk], 60 * (1.5 - 0.05 * way), rtol=0.01)
         np.testing.assert_allclose([r["from_healthy"] for r in walk], each * way, atol=0.005)
         np.testing.assert_allclose([r["from_worst"] for r in walk], each * (10 - way), atol=0.005)
-        np.testing.assert_allclose([r["from_way_up"] for r in walk], 0, atol=0.005)
+        np.testing.assert_allclose([r["from_rising"] for r in walk], 0, atol=0.005)
     for gait, found in zip(GAITS, result["responses"], strict=True):
         assert found["gait"] == gait
         assert found["link"] == KNEE
-        assert found["spearman"]["speed"] == found["spearman_back"]["speed"] == pytest.approx(-1)
-        assert found["spearman"]["from_healthy"] == found["spearman_back"]["from_healthy"] == pytest.approx(1)
+        assert found["spearman"]["speed"] == found["spearman_falling"]["speed"] == pytest.approx(-1)
+        assert (
+            found["spearman"]["from_healthy"] == found["spearman_falling"]["from_healthy"] == pytest.approx(1)
+        )
         assert found["speed_share"] == pytest.approx(2 / 3, rel=0.02)
         assert found["after_healing_cm"] == pytest.approx(0, abs=1e-3)
-        assert found["way_back_cm"] == pytest.approx(0, abs=0.005)
+        assert found["hysteresis_cm"] == pytest.approx(0, abs=0.005)
         assert found["from_healthy_cm"] == pytest.approx(10 * each, rel=0.02)
         # The severity moves for a second, and a mean over a second follows it for another.
         assert 0.9 < found["settle_seconds"] < 2.1
@@ -114,7 +116,7 @@ def test_every_link_is_swept_and_those_never_hurt_are_marked(hurtable) -> None:
     assert len(result["links"]) == 30
     assert result["trained"] == hurt
     assert len(result["rows"]) == 2 * 30 * 11
-    assert len(result["back"]) == 2 * 30 * 10
+    assert len(result["falling"]) == 2 * 30 * 10
     assert [r["link"] for r in result["responses"] if r["trained"]] == 2 * hurt
     assert [(r["first"], r["second"]) for r in result["second"]] == [tuple(hurt)]  # two thighs: one first
     assert {r["link"] for r in result["into_a_jog"]} == {None, *hurtable.channels["injury"]}
@@ -159,21 +161,21 @@ def test_each_gait_is_held_against_its_own_healthy_one(hurtable) -> None:
     assert all(row["jog_from_healthy_cm"] != row["walk_from_healthy_cm"] for row in hurt)
 
 
-def test_the_way_back_is_measured_on_its_own(hurtable) -> None:
+def test_falling_severity_is_measured_on_its_own(hurtable) -> None:
     """Rows that differ between rising and falling severity."""
     sweep = Sweep(hurtable, [KNEE], "walk", 0.2, RUNTIME)
     rows = sweep.rows(0)
     rng = np.random.default_rng(2)
     for row in rows:
-        row["speed"], row["from_way_up"] = float(rng.integers(9)), 0.0
-    rows[15]["from_way_up"] = 4.0
+        row["speed"], row["from_rising"] = float(rng.integers(9)), 0.0
+    rows[15]["from_rising"] = 4.0
     found = sweep.response(0, rows)
     up, back = ([row["speed"] for row in some] for some in (rows[:11], rows[10:]))
     assert found["spearman"]["speed"] == pytest.approx(spearmanr(SEVERITIES, up).statistic, abs=1e-5)
-    assert found["spearman_back"]["speed"] == pytest.approx(
+    assert found["spearman_falling"]["speed"] == pytest.approx(
         spearmanr(SEVERITIES[::-1], back).statistic, abs=1e-5
     )
-    assert found["way_back_cm"] == pytest.approx(4.0 - rows[0]["from_healthy"])
+    assert found["hysteresis_cm"] == pytest.approx(4.0 - rows[0]["from_healthy"])
     assert found["after_healing_cm"] == pytest.approx(rows[20]["from_healthy"] - rows[0]["from_healthy"])
 
 

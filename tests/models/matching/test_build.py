@@ -22,18 +22,18 @@ from .example import CUT, FRAMES, built, clip, layout_of
 
 def test_a_frame_that_two_cycles_share_is_kept_once(holden31: Skeleton) -> None:
     rows = clip(holden31, 0)
-    one, left = in_runs(rows)
+    one, remaining = in_runs(rows)
     np.testing.assert_array_equal(rows.frame[one], 100 + np.arange(FRAMES[0]))
     assert rows.cycle[one[CUT]] == 1, "the row with which a cycle begins"
-    np.testing.assert_array_equal(left, np.arange(FRAMES[0])[::-1])
+    np.testing.assert_array_equal(remaining, np.arange(FRAMES[0])[::-1])
 
 
 def test_a_gap_between_cycles_ends_a_run(holden31: Skeleton) -> None:
     rows = clip(holden31, 0)
     rows = replace(rows, frame=np.where(rows.cycle > 0, rows.frame + 30, rows.frame))
-    one, left = in_runs(rows)
+    one, remaining = in_runs(rows)
     assert len(one) == len(rows)
-    np.testing.assert_array_equal(left, [*range(CUT, -1, -1), *range(len(rows) - CUT - 2, -1, -1)])
+    np.testing.assert_array_equal(remaining, [*range(CUT, -1, -1), *range(len(rows) - CUT - 2, -1, -1)])
 
 
 def test_a_clip_without_rows_gives_none(holden31: Skeleton) -> None:
@@ -59,7 +59,7 @@ def test_tables_hold_the_clips_in_order(holden31: Skeleton, tmp_path: Path) -> N
         on_mean_ground(rows, rows.layout)[1][in_runs(rows)[0]] for rows in map(clip, [holden31] * 2, (0, 1))
     ]
     np.testing.assert_allclose(tables.y, np.concatenate(each), atol=1e-6)
-    assert tables.left[FRAMES[0] - 1] == tables.left[-1] == 0
+    assert tables.remaining[FRAMES[0] - 1] == tables.remaining[-1] == 0
     assert set(network.starts) == {*range(1, FRAMES[0] - 20), *range(FRAMES[0] + 1, sum(FRAMES) - 20)}
 
 

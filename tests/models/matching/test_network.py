@@ -82,7 +82,7 @@ def test_the_end_of_a_run_starts_a_search(made: Made) -> None:
     _, _, network = made
     predictor, memory = network.predictor(), np.zeros((1, network.memory))
     memory[0, ROW], last = FRAMES[0], FRAMES[0] - 1  # the last row of the first clip
-    assert network.left[last] == 0
+    assert network.remaining[last] == 0
     predictor.predict(x_of(network, 40), np.zeros(1), None, memory)
     assert memory[0, ROW] - 1 == 40
 
@@ -184,7 +184,7 @@ def test_a_page_of_many_rows_has_the_first_part_of_each_run(made: Made) -> None:
     _, _, network = made
     assert network.shortened(1000) is network
     short = network.shortened(80)  # of 70 and 90 rows, half
-    np.testing.assert_array_equal(short.left, [*range(34, -1, -1), *range(44, -1, -1)])
+    np.testing.assert_array_equal(short.remaining, [*range(34, -1, -1), *range(44, -1, -1)])
     np.testing.assert_array_equal(short.frames[35:], network.frames[70:115])
     np.testing.assert_array_equal(short.features[:35], network.features[:35])
     assert short.starts.max() < 80 - 20
@@ -210,16 +210,16 @@ def test_there_are_no_export_formats(made: Made, tmp_path: Path) -> None:
         ("features", lambda a: a[:, 1:]),
         ("phase", lambda a: a + 2),
         ("phase", lambda a: a[1:]),
-        ("left", lambda a: a + 1),  # the last row would be followed by one that is not there
-        ("left", lambda a: a[::-1]),
-        ("left", lambda a: a.astype(float)),
+        ("remaining", lambda a: a + 1),  # the last row would be followed by one that is not there
+        ("remaining", lambda a: a[::-1]),
+        ("remaining", lambda a: a.astype(float)),
         ("columns", lambda a: a + 10_000),
         ("columns", lambda a: a - 100),
         ("feature_weights", lambda a: -a),
         ("feature_weights", lambda a: a[1:]),
         ("frames", None),
         ("features", None),
-        ("left", None),
+        ("remaining", None),
         ("columns", None),
         ("feature_weights", None),
         ("phase", None),

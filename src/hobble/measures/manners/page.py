@@ -37,12 +37,12 @@ def summary(found: Json) -> str:
     text = (
         f"A classifier trained on captured clips finds the right {found['title'].lower()} in "
         f"{_percent(found['right_at_1'])} of the windows of generated walks with a value of 1, and in "
-        f"{_percent(captured['right'])} of the windows of captured clips of which it saw no other part "
+        f"{_percent(captured['right'])} of the windows of captured clips that it was not trained on "
         f"({captured['people']} clips or people, each left out in turn). All generated walks had the same "
         f"three target speeds around {found['speed_asked']:.2f} m/s."
     )
     if alone := [m for m, count in captured["people_of"].items() if count < 2]:
-        text += f" Only one clip or person shows {', '.join(alone)}, so nothing is left to learn that from."
+        text += f" Only one clip or person shows {', '.join(alone)}, so it cannot be learnt without them."
     return text
 
 
@@ -72,8 +72,9 @@ def together_chart(found: Json) -> Chart | None:
         "yaxis": {"type": "category", "automargin": True},
     }
     words = (
-        f"The share of windows in which the classifier names the right {found['title'].lower()} while "
-        f"another value, below, is at its highest: {_percent(manner / whole)} over all with a manner."
+        f"The share of windows in which the classifier names the right {found['title'].lower()} while the "
+        f"value at the bottom is at its highest. It is {_percent(manner / whole)} over all rows but "
+        f'"{NONE}".'
     )
     return Chart(f"{found['channel']}-together", "Two at once", words, [trace], layout, 340)
 
@@ -99,4 +100,4 @@ def effect_chart(found: Json, effect: str) -> Chart:
 
 
 def _percent(share: float | None) -> str:
-    return f"{100 * (share or 0):.0f} %"
+    return f"{100 * (share or 0):.0f}\N{NO-BREAK SPACE}%"

@@ -125,8 +125,8 @@ def left_out(windows: Sequence[Window], people: Mapping[str, str], shrinkage: fl
     """Windows of each person (or clip, with its mirror), named with what was learnt from all others.
 
     people: number of persons, `people_of` those of each manner. right: share of windows named right,
-    `by_manner` too. none_or_not: share in which it is right whether there is a manner at all. A manner that
-    only one person has cannot be named.
+    `by_manner` too. presence_right: share in which it is right whether there is a manner at all. A manner
+    that only one person has cannot be named.
     """
     persons: dict[str, list[Window]] = {}
     for w in windows:
@@ -149,7 +149,7 @@ def left_out(windows: Sequence[Window], people: Mapping[str, str], shrinkage: fl
         "windows": sum(map(len, right.values())),
         "right": _share([r for some in right.values() for r in some]),
         "by_manner": {manner: _share(some) for manner, some in sorted(right.items())},
-        "none_or_not": _share(either),
+        "presence_right": _share(either),
     }
 
 

@@ -24,8 +24,9 @@ from hobble.rows.layout import RowLayout
 class Tables:
     """R frames of clips, in runs of consecutive frames.
 
-    features: (R, n) float32, weighted; y: (R, Y) float32 raw; phase: (R,); left: (R,) int32, how many frames
-    follow in the run; columns: (n,) of X, weights: (n,) of the features. every, halflife: from the options.
+    features: (R, n) float32, weighted; y: (R, Y) float32 raw; phase: (R,); remaining: (R,) int32, how many
+    frames follow in the run; columns: (n,) of X, weights: (n,) of the features. every, halflife: from
+    the options.
     """
 
     kind: ClassVar[str] = "matching"
@@ -33,7 +34,7 @@ class Tables:
     features: Array = field(repr=False)
     y: Array = field(repr=False)
     phase: Array = field(repr=False)
-    left: NDArray[np.int32] = field(repr=False)
+    remaining: NDArray[np.int32] = field(repr=False)
     columns: NDArray[np.int64]
     weights: Array
     every: int
@@ -45,7 +46,7 @@ class Tables:
             "features": self.features,
             "frames": self.y,
             "phase": self.phase,
-            "left": self.left,
+            "remaining": self.remaining,
             "columns": self.columns,
             "feature_weights": self.weights,
         }
@@ -73,7 +74,7 @@ def build(
 
     Raises InputError if a file is not a file of rows or has another layout, or if no file has a frame.
     """
-    xs, ys, phases, lefts = [], [], [], []
+    xs, ys, phases, remainings = [], [], [], []
     for path in clips:
         rows = load_clip_rows(path)
         if rows.layout.with_channels(()) != layout.with_channels(()) or not set(layout.channels) <= set(
@@ -81,11 +82,11 @@ def build(
         ):
             raise InputError(path, f"its rows ({rows.layout}) are not those of the database ({layout})")
         x, y = on_mean_ground(rows, layout)
-        one, left = in_runs(rows)
+        one, remaining = in_runs(rows)
         xs.append(x[one])
         ys.append(y[one])
         phases.append(rows.p[one])
-        lefts.append(left)
+        remainings.append(remaining)
     if not sum(map(len, ys)):
         raise InputError("the clips", "hold no frame to match", fix="Train on a clip with a whole cycle.")
     x = np.concatenate(xs)
@@ -94,7 +95,7 @@ def build(
         features=np.ascontiguousarray(x[:, columns] * weights, np.float32),
         y=np.concatenate(ys),
         phase=np.concatenate(phases).astype(np.float32) % 1.0,
-        left=np.concatenate(lefts),
+        remaining=np.concatenate(remainings),
         columns=columns,
         weights=weights,
         every=options.every,

@@ -31,18 +31,18 @@ def memory_size(joints: int) -> int:
 
 
 @njit
-def find_following(memory: Any, left: Any, every: int, before: Any, following: Any, due: Any) -> None:
+def find_following(memory: Any, remaining: Any, every: int, before: Any, following: Any, due: Any) -> None:
     """Find the next row of each character's run, and mark the characters that need a search.
 
-    memory: (C, M); left: (R,) frames that follow each row in its run. Writes before (C,): the last row shown,
-    or -1; following (C,): the row after it, or -1 if its run ends; due (C,): whether to search.
+    memory: (C, M); remaining: (R,) frames that follow each row in its run. Writes before (C,): the last row
+    shown, or -1; following (C,): the row after it, or -1 if its run ends; due (C,): whether to search.
     """
-    rows = len(left)
+    rows = len(remaining)
     for c in range(len(memory)):
         row = memory[c, ROW]
         sound = 1 <= row <= rows
         before[c] = np.int64(row) - 1 if sound else -1
-        following[c] = before[c] + 1 if sound and left[before[c]] > 0 else -1
+        following[c] = before[c] + 1 if sound and remaining[before[c]] > 0 else -1
         due[c] = following[c] < 0 or not memory[c, SINCE] + 1 < every
 
 
@@ -54,8 +54,8 @@ def show_rows(
     """Write row `shown` (C,) plus the offsets of each character into `out` (C, Y), and update the memory.
 
     frames: (R, Y), to be multiplied by scale (Y,); phases: (R,); at: first columns of joint positions,
-    velocities, rotations and of the change of phase. A row other than `following` starts a transition. Only a
-    character's very first row may be the first of its run.
+    velocities, rotations and of the change of phase. A row other than `following` starts a transition.
+    It must not be the first of its run, because the rotation speed is the turn since the row before it.
     """
     damping = 2.0 * np.log(2.0) / halflife
     for c in range(len(memory)):

@@ -26,7 +26,7 @@ export const createNetwork = (spec) => {
   const { columns, every, halflife, joints, at, turning, frames: table } = spec.network;
   const values = new Int16Array(bytes(table.values)), scale = floats(table.scale), width = table.columns, rows = table.rows;
   const features = floats(spec.network.features), weights = floats(spec.network.weights), n = columns.length;
-  const phases = floats(spec.network.phases), left = new Int32Array(bytes(spec.network.left));
+  const phases = floats(spec.network.phases), remaining = new Int32Array(bytes(spec.network.remaining));
   const starts = new Int32Array(bytes(spec.network.start)), { inputs } = createScales(spec);
   const seen = Int32Array.from(spec.seen), query = new Float32Array(n), out = new Float32Array(width);
   const [position, velocity, change] = at, damping = 2 * Math.LN2 / halflife;
@@ -90,7 +90,7 @@ export const createNetwork = (spec) => {
 
   return (x, phase, memory = new Float64Array(spec.network.memory)) => {
     const known = memory[ROW] >= 1 && memory[ROW] <= rows, before = known ? memory[ROW] - 1 : -1;
-    const following = known && left[before] > 0 ? before + 1 : -1, due = following < 0 || !(memory[SINCE] + 1 < every);
+    const following = known && remaining[before] > 0 ? before + 1 : -1, due = following < 0 || !(memory[SINCE] + 1 < every);
     const row = due ? searched(x, following) : following;
     frame(row, out);
     if (known) {

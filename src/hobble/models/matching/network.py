@@ -29,8 +29,8 @@ MOST_ON_PAGE = 8000  # rows, about 8 MB of text; a page with several characters 
 
 @dataclass(frozen=True)
 class Matching(Network):
-    """features: (R, n) float32; frames: (R, Y) float32 raw; phases: (R,) float32; left: (R,) how many frames
-    follow in the run; columns: (n,) of X and weights: (n,) of the features. every: frames between two
+    """features: (R, n) float32; frames: (R, Y) float32 raw; phases: (R,) float32; remaining: (R,) how many
+    frames follow in the run; columns: (n,) of X and weights: (n,) of the features. every: frames between two
     searches; halflife: of the inertialisation, frames.
     """
 
@@ -41,7 +41,7 @@ class Matching(Network):
     features: Array = field(repr=False)
     frames: Array = field(repr=False)
     phases: Array = field(repr=False)
-    left: NDArray[np.int64] = field(repr=False)
+    remaining: NDArray[np.int64] = field(repr=False)
     columns: NDArray[np.int64] = field(repr=False)
     weights: Array = field(repr=False)
     every: int
@@ -56,10 +56,10 @@ class Matching(Network):
         phases = checks.numbers(path, arrays, "phase", 1, 1.0)
         weights = checks.numbers(path, arrays, "feature_weights", 1, MOST_WEIGHT)
         columns = _whole(path, arrays, "columns", inputs - 1)
-        left = _whole(path, arrays, "left", MOST_ROWS)
+        remaining = _whole(path, arrays, "remaining", MOST_ROWS)
         rows, n = len(frames), len(columns)
-        expected = {"frames": (rows, outputs), "features": (rows, n), "phase": (rows,), "left": (rows,)}
-        found = {"frames": frames, "features": features, "phase": phases, "left": left}
+        expected = {"frames": (rows, outputs), "features": (rows, n), "phase": (rows,), "remaining": (rows,)}
+        found = {"frames": frames, "features": features, "phase": phases, "remaining": remaining}
         for name, shape in expected.items():
             if found[name].shape != shape:
                 raise InputError(path, f"{name} has shape {found[name].shape}, expected {shape}")
@@ -68,15 +68,18 @@ class Matching(Network):
         if rows > MOST_ROWS:
             raise InputError(path, f"{rows} frames; at most {MOST_ROWS} are allowed")
         # This check guarantees that playing a run never leaves the table.
-        if left[-1] != 0 or (left[:-1][left[:-1] > 0] != left[1:][left[:-1] > 0] + 1).any():
-            raise InputError(path, "left does not count down to the end of each run")
+        if (
+            remaining[-1] != 0
+            or (remaining[:-1][remaining[:-1] > 0] != remaining[1:][remaining[:-1] > 0] + 1).any()
+        ):
+            raise InputError(path, "remaining does not count down to the end of each run")
         if common["skeleton"] is None:
             raise InputError(path, "motion matching needs a skeleton, but its meta has none")
         return cls(
             features=features,
             frames=frames,
             phases=phases,
-            left=left,
+            remaining=remaining,
             columns=columns,
             weights=weights,
             every=checks.whole(path, "every", meta.get("every"), 1, MOST_FRAMES),
@@ -86,21 +89,21 @@ class Matching(Network):
 
     def shortened(self, most: int) -> Matching:
         """A copy with only the first part of each run, so that about `most` rows remain in all."""
-        rows = len(self.left)
+        rows = len(self.remaining)
         if rows <= most:
             return self
-        begins = np.flatnonzero(np.r_[True, self.left[:-1] == 0])
-        lengths = self.left[begins] + 1
+        begins = np.flatnonzero(np.r_[True, self.remaining[:-1] == 0])
+        lengths = self.remaining[begins] + 1
         kept = np.ceil(lengths * (most / rows)).astype(np.int64)
         within = np.arange(rows) - np.repeat(begins, lengths)
-        left = np.repeat(kept, lengths) - 1 - within
-        some = left >= 0
+        remaining = np.repeat(kept, lengths) - 1 - within
+        some = remaining >= 0
         return replace(
             self,
             features=self.features[some],
             frames=self.frames[some],
             phases=self.phases[some],
-            left=left[some],
+            remaining=remaining[some],
         )
 
     @cached_property
@@ -109,8 +112,8 @@ class Matching(Network):
 
         If all runs are too short, all rows but the first of each run; if there are none, all rows.
         """
-        begins = np.r_[True, self.left[:-1] == 0]
-        found = np.flatnonzero((self.left >= FEWEST_LEFT) & ~begins)
+        begins = np.r_[True, self.remaining[:-1] == 0]
+        found = np.flatnonzero((self.remaining >= FEWEST_LEFT) & ~begins)
         return found if len(found) else np.flatnonzero(~begins) if (~begins).any() else np.arange(len(begins))
 
     @cached_property
@@ -177,7 +180,7 @@ class Matching(Network):
             "columns": [place[int(c)] for c in used],
             "weights": packed(self.weights[there]),
             "phases": packed(self.phases),
-            "left": packed(np.minimum(self.left, 1 << 30).astype(np.int32)),
+            "remaining": packed(np.minimum(self.remaining, 1 << 30).astype(np.int32)),
             "start": packed(self.starts.astype(np.int32)),
             "every": self.every,
             "halflife": self.halflife,

@@ -54,7 +54,7 @@ class MatchingPredictor:
             memory = np.zeros((count, network.memory))
         before, following = np.empty(count, np.int64), np.empty(count, np.int64)
         due = np.empty(count, np.bool_)
-        find_following(memory, network.left, network.every, before, following, due)
+        find_following(memory, network.remaining, network.every, before, following, due)
         shown = following.copy()
         if due.any():
             some = np.flatnonzero(due)

@@ -18,7 +18,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     px: filled(T, place[0]), pz: filled(T, place[1]), dx: filled(T, sin(heading)), dz: filled(T, cos(heading)),
     gait: filled(T * G, 0), ground: filled(S * 3, 0), height: 0, phase: 0, joints: filled(3 * J, 0),
     velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), channelValues: filled(L, 0), channelTargets: filled(L, 0),
-    velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, owed: [0, 0], lock: [0, 0],
+    velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, correction: [0, 0], lock: [0, 0],
     hold: [[0, 0], [0, 0]], lift: [0, 0], raised: 0, placed: false, added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
     memory: filled(spec.network.memory ?? 0, 0),
   };
@@ -128,14 +128,14 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
 
   const ask = ([x, z], speed, [goingX, goingZ]) => {
     const a = x - goingX, b = z - goingZ, more = [spec.steering * a, spec.steering * b];
-    if (speed < k.still) c.owed = [0, 0];
+    if (speed < k.still) c.correction = [0, 0];
     else {
-      more[0] += c.owed[0] * x + c.owed[1] * z;
-      more[1] += c.owed[0] * z - c.owed[1] * x;
-      if (a * a + b * b < (k.owedWithin * speed) ** 2) {
-        const rate = spec.steering * k.owedRate / (speed * speed);
-        c.owed = [c.owed[0] + rate * (a * x + b * z), c.owed[1] + rate * (a * z - b * x)];
-        c.owed = c.owed.map((v) => min(max(v, -k.mostOwed), k.mostOwed));
+      more[0] += c.correction[0] * x + c.correction[1] * z;
+      more[1] += c.correction[0] * z - c.correction[1] * x;
+      if (a * a + b * b < (k.correctionWithin * speed) ** 2) {
+        const rate = spec.steering * k.correctionRate / (speed * speed);
+        c.correction = [c.correction[0] + rate * (a * x + b * z), c.correction[1] + rate * (a * z - b * x)];
+        c.correction = c.correction.map((v) => min(max(v, -k.mostCorrection), k.mostCorrection));
       }
     }
     const limit = min(1, k.steeringLimit * speed / max(hypot(...more), 1e-6));
@@ -143,7 +143,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   };
   const prepare = (velocity, direction, strafe, gait, ground) => {
     // Steering, as in `_ask_velocity` and `_ask_turn` of hobble.runtime.trajectory: the error of the velocity over half of
-    // the past is added to the wish, and a steady error is added up in `owed`.
+    // the past is added to the wish, and a steady error is added up in `correction`.
     const speed = hypot(...velocity), span = floor(M / 2);
     let asked = velocity, wished = atan2(...direction);
     if (spec.steering > 0) {
@@ -260,15 +260,15 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     let yaw = atan2(c.dx[M], c.dz[M]);
     // Remove half of the movement against the wish, or of all movement while the character turns on the spot.
     let a = moving * (vx * cos(yaw) + vz * sin(yaw)), b = moving * (vz * cos(yaw) - vx * sin(yaw));
-    const held = spec.steering > 0 && !spec.rooted ? k.held : 0, squared = wish[0] ** 2 + wish[1] ** 2;
-    if (squared < k.still ** 2) [a, b] = [(1 - held) * a, (1 - held) * b];
+    const loss = spec.steering > 0 && !spec.rooted ? k.unwishedLoss : 0, squared = wish[0] ** 2 + wish[1] ** 2;
+    if (squared < k.still ** 2) [a, b] = [(1 - loss) * a, (1 - loss) * b];
     else {
-      const against = held * min(0, a * wish[0] + b * wish[1]) / squared;
+      const against = loss * min(0, a * wish[0] + b * wish[1]) / squared;
       [a, b] = [a - against * wish[0], b - against * wish[1]];
     }
     // With motion matching, change the movement a little toward the wish, because clips have only some directions and speeds.
     // Along the wish and across it, each by a share of the movement.
-    const most = spec.steering > 0 && spec.rooted ? k.drawn * hypot(a, b) : 0, size = hypot(...wish);
+    const most = spec.steering > 0 && spec.rooted ? k.pull * hypot(a, b) : 0, size = hypot(...wish);
     const ahead = size >= k.still ? wish.map((v) => v / size) : [0, 0], lack = [wish[0] - a, wish[1] - b];
     const along = lack[0] * ahead[0] + lack[1] * ahead[1], across = lack.map((v, i) => v - along * ahead[i]);
     const share = min(1, most / max(hypot(...across), 1e-9)), limited = min(max(along, -most), most);
@@ -294,7 +294,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
 
   const joint = (j) => c.pose.subarray(3 * j, 3 * j + 3);
   // How deep a foot is in the ground, cm; negative if it is above.
-  const sunk = (f, ground) => {
+  const soleDepth = (f, ground) => {
     const [heel, toe] = [2, 3].map((i) => {
       const [px, py, pz] = joint(spec.legs[f][i]);
       return ground(px, pz) + spec.sole[i - 2] - py;
@@ -306,7 +306,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const carryBody = (ground) => {
     let wanted = 0, weight = 0;
     for (let f = 0; f < 2; f++) {
-      const rise = sunk(f, ground), stands = min(max(c.contacts[2 * f], c.contacts[2 * f + 1], 0), 1);
+      const rise = soleDepth(f, ground), stands = min(max(c.contacts[2 * f], c.contacts[2 * f + 1], 0), 1);
       wanted += stands * (max(rise - k.bodyFree, 0) + min(rise + k.bodyFree, 0));
       weight += stands;
     }
@@ -327,7 +327,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       }
       c.lock[f] = 1;
     } else c.lock[f] = max(0, c.lock[f] - k.release);
-    const up = sunk(f, ground), rise = max(up, 0) + c.lock[f] * min(up + k.floating, 0);
+    const up = soleDepth(f, ground), rise = max(up, 0) + c.lock[f] * min(up + k.floating, 0);
     c.lift[f] += k.heightMix * (rise - c.lift[f]);
     const shift = [c.lock[f] * away[0], c.lift[f], c.lock[f] * away[1]];
     const by = c.lock[f] > 0 ? raiseHeel(joint(hip), joint(knee), joint(heel), point, shift) : [1, 0, 0, 0];

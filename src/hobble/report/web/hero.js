@@ -19,7 +19,7 @@ const createHero = (spec, asked) => {
   const one = firstShown(spec), labels = one ? Object.keys(one.sliders) : [];
   const values = new Map(), neutralValues = new Map(), flat = () => 0, hero = { frames: 0 };
   let part = labels.includes(asked.part) ? asked.part : labels[0];
-  let last = null, owed = 0, shown = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  let last = null, due = 0, shown = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
   // Both have the same target direction, which turns slowly from side to side.
   const heading = () => .5 * Math.sin(hero.frames / 700);
@@ -50,10 +50,10 @@ const createHero = (spec, asked) => {
     }
   };
   const advance = (now) => {
-    owed = Math.min(3, owed + (last === null ? 1 : (now - last) * .06));
+    due = Math.min(3, due + (last === null ? 1 : (now - last) * .06));
     const passed = last === null ? 0 : now - last;
     last = now;
-    for (; owed >= 1; owed--) step();
+    for (; due >= 1; due--) step();
     glide(1 - Math.exp(-passed / 350));
   };
   // The camera follows the path and not the hips, because they move up and down.

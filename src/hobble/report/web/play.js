@@ -17,7 +17,7 @@ const SIDE = 95; // cm between two figures
 const createPlay = (stage, playables) => {
   const canvas = find("play-view"), ground = find("play-ground"), chosen = [find("play-first"), find("play-second")];
   const names = Object.keys(playables), player = { actors: [] };
-  let panels = [], sliders, last = null, owed = 0, shown = 0, ready = false, wish = null;
+  let panels = [], sliders, last = null, due = 0, shown = 0, ready = false, wish = null;
   const land = () => GROUNDS.get(ground.value), floor = (x, z) => land().height(x, z);
 
   const view = createView(canvas, START, (now) => {
@@ -34,9 +34,9 @@ const createPlay = (stage, playables) => {
   });
   const steering = createSteering(stage, view.orbit), chase = createChase(view.orbit, canvas);
   const move = (now) => {
-    owed = Math.min(4, owed + (last === null ? 1 : (now - last) * .06));
+    due = Math.min(4, due + (last === null ? 1 : (now - last) * .06));
     last = now;
-    for (; owed >= 1; owed--) {
+    for (; due >= 1; due--) {
       wish = steering.wish();
       player.actors.forEach((actor) => actor.frame(wish, sliders.values));
     }

@@ -60,7 +60,7 @@ def limp(
     links: links to hurt, by default all.
 
     `sizes`: a row for each gait, link and severity with EFFECTS, as if the link's side were hurt, and the
-    recognised limp. `steady`: Spearman's rho of each effect with severity, and its size at 10. `named`:
+    recognised limp. `trends`: Spearman's rho of each effect with severity, and its size at 10. `named`:
     shares of windows by severity, over the links of the legs. `people`: mean and spread of each effect.
     `captured`: effects of captured clips. `held_out_limps`: see `compare_held_out`. `second`: see
     `second_injuries`.
@@ -93,7 +93,7 @@ def limp(
         "trained": [link for link in links if link in hurt_links(network)],
         "hurt_seconds": {"captured": hurt_seconds.captured, "made": hurt_seconds.made},
         "sizes": rows,
-        "steady": _steady(rows),
+        "trends": _trends(rows),
         "named": _named(rows),
         "people": {
             gait: {name: [round(v, 5) for v in pair] for name, pair in found.items()}
@@ -170,7 +170,7 @@ def _share(values: Sequence[bool]) -> float | None:
     return round(sum(values) / len(values), 5) if values else None
 
 
-def _steady(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def _trends(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """For each gait, link and effect: Spearman's rho with severity, and its size at 10."""
     out = []
     for gait, link in dict.fromkeys((row["gait"], row["link"]) for row in rows):
@@ -291,7 +291,7 @@ def run(given: Given, options: Options) -> Outcome:
         runtime=given.runtime,
         seconds=options.limp_seconds,
     )
-    tables = {name: result.get(name, []) for name in ("sizes", "steady", "named", "second", "together")}
+    tables = {name: result.get(name, []) for name in ("sizes", "trends", "named", "second", "together")}
     at_10 = next((row for row in result.get("named", []) if row["severity"] == SEVERITIES[-1]), None)
     says = f"legs at 10: called impaired in {at_10['impaired']} of windows" if at_10 else result["reason"]
     return Outcome(result, tables, says)

@@ -19,11 +19,11 @@ INJURY = {
     "speed_share": "share of the healthy speed at severity 10",
     "spearman_from_healthy": "ρ of pose and severity",
     "spearman_speed": "ρ of speed and severity",
-    "spearman_back_from_healthy": "ρ of pose and severity, healing",
+    "spearman_falling_from_healthy": "ρ of pose and severity, healing",
     "settle_seconds": "time to settle, s",
     "heal_seconds": "time to heal, s",
     "after_healing_cm": "remaining distance after healing, cm per joint",
-    "way_back_cm": "difference between rising and falling severity, cm per joint",
+    "hysteresis_cm": "difference between rising and falling severity, cm per joint",
     "acceleration_share": "largest acceleration, share of the healthy walk's",
     "clip_acceleration_share": "largest acceleration, share of the captured clips'",
 }

@@ -93,7 +93,7 @@ def _parts(found: Json, name: str) -> list[Part]:
     return [
         Part(0, Pair(overview(responses))),
         Part(10, response_table(name, responses)),
-        Part(20, curves(rows, found.get("back") or (), untrained) if rows else None),
+        Part(20, curves(rows, found.get("falling") or (), untrained) if rows else None),
         Part(40, cases.second_chart(second)),
         Part(50, cases.second_table(name, second)),
         Part(
@@ -261,7 +261,7 @@ def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
         Column.number("time to settle, s"),
         Column.number("time to heal, s"),
         Column.number("change left after healing, cm"),
-        Column.number("way back, cm"),
+        Column.number("difference between rising and falling severity, cm"),
         Column.number("largest acceleration, times healthy"),
         Column.number("ρ of pose"),
         Column.number("ρ of speed"),
@@ -276,7 +276,7 @@ def response_table(name: str, responses: Sequence[Mapping[str, Any]]) -> Table:
             r.get("settle_seconds"),
             r.get("heal_seconds"),
             r.get("after_healing_cm"),
-            r.get("way_back_cm"),
+            r.get("hysteresis_cm"),
             r.get("acceleration_share"),
             (r.get("spearman") or {}).get("from_healthy"),
             (r.get("spearman") or {}).get("speed"),

@@ -25,7 +25,7 @@ NO_SEVERITIES = "this network has no severity inputs"
 SUMMARY = (
     "from_healthy_cm",
     "after_healing_cm",
-    "way_back_cm",
+    "hysteresis_cm",
     "speed_share",
     "settle_seconds",
     "heal_seconds",
@@ -46,7 +46,7 @@ def injury_response(
     """The content of injury.json: a sweep of each of `links` (default: all).
 
     motion: the captured clips, whose largest accelerations are compared with the character's. seconds: time
-    at each severity. `rows`: one for each gait, link and rising severity. `back`: the same for falling
+    at each severity. `rows`: one for each gait, link and rising severity. `falling`: the same for falling
     severity. `responses`: for each gait and link (see `Sweep.response`). `second`, `into_a_jog`, `divided`:
     see `cases`. `summary`: means over the links that were hurt in training (`trained`) and over the others.
     `applies` is false for a network without severities.
@@ -57,14 +57,14 @@ def injury_response(
     trained = [link for link in links if link in hurt_links(network)]
     largest = largest_accelerations(motion, network)
     rows: list[dict[str, Any]] = []
-    back: list[dict[str, Any]] = []
+    falling: list[dict[str, Any]] = []
     responses = []
     for gait in GAITS:
         sweep = Sweep(network, links, gait, seconds, runtime)
         for figure, link in enumerate(links):
             found = sweep.rows(figure)
             rows += found[: len(SEVERITIES)]
-            back += found[len(SEVERITIES) :]
+            falling += found[len(SEVERITIES) :]
             response = sweep.response(figure, found)
             clips = largest.get((gait, link), largest.get((gait, None)))
             responses.append(
@@ -89,7 +89,7 @@ def injury_response(
         "links": links,
         "trained": trained,
         "rows": rows,
-        "back": back,
+        "falling": falling,
         "responses": responses,
         "second": second_injuries(network, trained, seconds, runtime),
         "into_a_jog": into_a_jog(network, links, seconds, runtime),
@@ -130,7 +130,7 @@ def _summary(responses: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             out[gait] = {
                 "spearman_from_healthy": _mean([r["spearman"]["from_healthy"] for r in some]),
                 "spearman_speed": _mean([r["spearman"]["speed"] for r in some]),
-                "spearman_back_from_healthy": _mean([r["spearman_back"]["from_healthy"] for r in some]),
+                "spearman_falling_from_healthy": _mean([r["spearman_falling"]["from_healthy"] for r in some]),
                 **{key: _mean([r[key] for r in some]) for key in SUMMARY},
             }
     return out
@@ -151,5 +151,5 @@ def run(given: Given, options: Options) -> Outcome:
         seconds=options.seconds,
     )
     tables = {name: result.get(name, []) for name in ("second", "into_a_jog", "divided")}
-    tables["sweep"] = [*result.get("rows", []), *result.get("back", [])]
+    tables["sweep"] = [*result.get("rows", []), *result.get("falling", [])]
     return Outcome(result, tables, str(result.get("summary", result.get("reason"))))

@@ -24,7 +24,7 @@ SEVERITIES = np.arange(11.0)
 WALK_IN = 0.75  # stretches until a figure has its speed
 HURT = 2  # stretches for which a figure is hurt at once, and then healed
 # Columns of a row that are not measures of the walk.
-NAMES = ("gait", "link", "way", "severity")
+NAMES = ("gait", "link", "direction", "severity")
 
 
 class Sweep:
@@ -63,7 +63,7 @@ class Sweep:
             row: dict[str, Any] = {
                 "gait": self.gait,
                 "link": self.links[figure],
-                "way": "worse" if step <= worst else "better",
+                "direction": "rising" if step <= worst else "falling",
                 "severity": float(severity),
             }
             row |= gait_measures(self.skeleton, local, walks.contacts[span, figure], walks.root[span, figure])
@@ -71,7 +71,7 @@ class Sweep:
             row["from_worst"] = float(np.mean(distance_to_cycle(local, phase, cycles[worst])))
             # Distance of the walk from that at the same severity while it rose.
             same = cycles[step if step <= worst else 2 * worst - step]
-            row["from_way_up"] = float(np.mean(distance_to_cycle(local, phase, same)))
+            row["from_rising"] = float(np.mean(distance_to_cycle(local, phase, same)))
             row["largest_acceleration"] = float(walks.acceleration[span, figure].max())
             rows.append({k: round(v, 5) if isinstance(v, float) else v for k, v in row.items()})
         return rows
@@ -86,18 +86,20 @@ class Sweep:
         walk's.
         """
         worst = len(SEVERITIES) - 1
-        up, back = rows[: worst + 1], rows[worst:]
-        names = [k for k in rows[0] if k not in (*NAMES, "from_way_up")]
+        rising, falling = rows[: worst + 1], rows[worst:]
+        names = [k for k in rows[0] if k not in (*NAMES, "from_rising")]
         own = rows[0]["from_healthy"]
         largest = float(self.walks.acceleration[int(self.walks.starts[1]) :, figure].max())
         hurt, healed = self._settling(figure)
         return {
-            "spearman": {n: spearman(SEVERITIES, [row[n] for row in up]) for n in names},
-            "spearman_back": {n: spearman(SEVERITIES[::-1], [row[n] for row in back]) for n in names},
-            "from_healthy_cm": round(up[-1]["from_healthy"] - own, 5),
+            "spearman": {n: spearman(SEVERITIES, [row[n] for row in rising]) for n in names},
+            "spearman_falling": {n: spearman(SEVERITIES[::-1], [row[n] for row in falling]) for n in names},
+            "from_healthy_cm": round(rising[-1]["from_healthy"] - own, 5),
             "after_healing_cm": round(rows[-1]["from_healthy"] - own, 5),
-            "way_back_cm": round(max(row["from_way_up"] for row in back[1:]) - own, 5),
-            "speed_share": round(up[-1]["speed"] / up[0]["speed"], 5) if up[0]["speed"] > 0 else None,
+            "hysteresis_cm": round(max(row["from_rising"] for row in falling[1:]) - own, 5),
+            "speed_share": round(rising[-1]["speed"] / rising[0]["speed"], 5)
+            if rising[0]["speed"] > 0
+            else None,
             "settle_seconds": hurt,
             "heal_seconds": healed,
             "largest_acceleration": round(largest, 5),
