@@ -190,13 +190,15 @@ def test_fits_its_window(tab: Any, width: int) -> None:
 
 def test_a_long_name_in_a_chooser_makes_no_phone_scroll_sideways(tab: Any) -> None:
     tab.size(390, 900)
-    added = """[...document.querySelectorAll('main select')].forEach((one) => {
-      one.append(new Option('a very long name of something that can be chosen here, '.repeat(3), 'long'));
-      one.value = 'long';
-    })"""
-    tab.run(added)
+    tab.run("""document.querySelectorAll('main .pair > *').forEach((one) => {
+      const chooser = document.createElement('select');
+      chooser.className = 'added';
+      chooser.append(new Option('a very long name of something that can be chosen, '.repeat(3)));
+      one.append(chooser);
+    })""")
+    assert tab.run("document.querySelectorAll('.added').length") >= 2
     assert tab.until("document.documentElement.scrollWidth <= 390")
-    tab.run("document.querySelectorAll('main select').forEach((one) => { one.lastChild.remove(); })")
+    tab.run("document.querySelectorAll('.added').forEach((one) => one.remove())")
     tab.size(1280, 900)
 
 

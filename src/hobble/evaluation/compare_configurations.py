@@ -70,7 +70,8 @@ def describe(measured: ConfigurationResults, found: Iterable[SideBySide]) -> dic
         "channels": list(model.get("channels") or ()),
         "hidden_layers": len(hidden) or None,
         "units": max(hidden, default=None),
-        "passes": model["training"]["passes"],
+        # Motion matching has no layers and is not trained, whatever the section says.
+        "passes": model["training"]["passes"] if hidden else None,
         **about,
     }
 

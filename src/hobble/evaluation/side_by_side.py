@@ -55,8 +55,8 @@ def published_row(
 ) -> dict[str, Any]:
     """A published figure (`theirs`) with ours, which is None if it was not measured.
 
-    row: has `configuration` and `source`, and may have the `table` in which it was printed and another
-    figure that the same publication gives `other_figure`.
+    row: has `configuration` and `source`, and may have the `table` in which it was printed and
+    `other_figure`, a different value in the same publication.
     """
     return {
         "measure": measure,

@@ -59,9 +59,9 @@ def stretches(minutes: float, seed: int = 1) -> Iterator[Stretch]:
 def stability(network: Network, minutes: float = 10.0, seed: int = 1, **options: Any) -> dict[str, Any]:
     """The worst values of `minutes` on flat ground, in all and by kind. options: of ProceduralAnimation.
 
-    `finite`: all numbers are. `hips_lowest_cm`, `hips_highest_cm`: above the ground. `largest_turn_degrees`:
-    of a joint in a frame, in the world. `foot_slide_cm`: mean of a step. `steps`: their number. `stable`:
-    whether all values are within LIMITS.
+    `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: above the ground.
+    `largest_turn_degrees`: of a joint in a frame, in the world. `foot_slide_cm`: mean of a step. `steps`:
+    their number. `stable`: whether all values are within LIMITS.
     """
     animation = ProceduralAnimation(network, **options)
     assert network.skeleton is not None

@@ -84,8 +84,8 @@ RATIOS = (
     "back",
     "head",
 )
-# The recordings count a slow ankle as stance, so an early landing shows only by half. The network smooths the
-# effect, too.
+# The recordings count a slow ankle as stance, so they show only half of an early landing. The network smooths
+# the effect, too.
 TIMING = 1.85
 STEP = {"thigh": 0.44, "shank": 0.38, "foot": 0.44}  # ratio for the hurt foot, instead of the mix's
 

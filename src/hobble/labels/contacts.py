@@ -35,7 +35,7 @@ def contacts(clip: Clip, options: Labels) -> np.ndarray:
 def still_joints(clip: Clip, threshold: float) -> np.ndarray:
     """(F, 4) bool: whether a joint moves less than the root of `threshold` (cm2) to the next frame.
 
-    This is the rule of the original (`pfnn-facts`, Labels). It ignores height, and depends on the size of the
+    This is the rule of the original. It ignores height, and depends on the size of the
     body and on capture noise. The last frame repeats the one before it.
     """
     feet = foot_positions(clip)

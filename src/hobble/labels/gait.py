@@ -51,7 +51,7 @@ LONGEST_PASSAGE = 75  # frames: of any other shorter walk, half counts as standi
 def overwrite_crouch(gait: Array, clip: Clip) -> Array:
     """Gait (F, 6) of a clip on flat ground, with crouch = 1 - clip((head height - 80) / 50, 0, 1).
 
-    The other columns do not change (`pfnn-facts`, Labels), so the sum may differ from 1.
+    As in the original, the other columns do not change, so the sum may differ from 1.
     """
     head = clip.positions[:, clip.skeleton.role("head"), 1]
     out = gait.copy()

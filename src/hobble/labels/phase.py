@@ -1,6 +1,6 @@
 """Converts footsteps to phase and back, and finds locomotion cycles.
 
-The right foot lands at phase 0 and the left one at .5 (`pfnn-facts`, Labels). `phase_zero="left"` shifts this
+The right foot lands at phase 0 and the left one at .5, as in the original. `phase_zero="left"` shifts this
 by half a cycle.
 """
 
@@ -14,7 +14,7 @@ from hobble.core.quat import Array
 from hobble.labels.files import whole_frame
 
 BREAK = (np.nan, np.nan, 1.0)
-IDLE_RATE = 0.0017
+IDLE_RATE = 0.0017  # cycles a frame, a tenth of the usual rate, as at run time for a standing character
 FASTEST = 0.25
 MARGINS = {"extend": 1, "drop": 60}  # least number of frames before a cycle; one more is needed after it
 
@@ -22,8 +22,7 @@ MARGINS = {"extend": 1, "drop": 60}  # least number of frames before a cycle; on
 def phase_of_footsteps(footsteps: Array, frames: int) -> tuple[Array, np.ndarray]:
     """Phase (frames,) in 0..1, linear between landings, right foot = 0; and where it is known.
 
-    Elsewhere it advances by about a tenth of the mean of .017 cycles a frame, as the runtime does for a
-    standing character, and by the extra that is needed to meet the next landing.
+    Elsewhere it advances by about IDLE_RATE, or a little faster so that it meets the next landing.
     """
     when, value, joined = _landings(footsteps)
     frame = np.arange(frames)
@@ -95,7 +94,7 @@ def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple
     """Cycles (C, 2) between landings of the foot `zero`, both frames included, and the number left out.
 
     Cycles with a marked line are left out, and cycles too near an end of the clip. With `margins` "drop", as
-    in the original (`pfnn-facts`, Labels), these start before frame 60 or end within 61 frames of the clip's
+    in the original, these start before frame 60 or end within 61 frames of the clip's
     end. With "extend", they have no frame before them or less than two after.
     """
     margin = MARGINS[margins]
@@ -116,8 +115,8 @@ def find_cycles(footsteps: Array, frames: int, zero: str, margins: str) -> tuple
 def mirrored_footsteps(footsteps: Array) -> Array:
     """The footsteps (M, 3) of the mirrored clip, with left and right exchanged.
 
-    A line goes from a landing of the left foot to the next of the right foot. It is marked if the line with
-    the left foot's landing is.
+    A line goes from a landing of the left foot to the next of the right foot. It is marked if the line
+    that had this landing of the left foot is marked.
     """
     landings: list[tuple[float, int]] = []
     marks: list[float] = []

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
+from hobble.motion.doubt import Doubt
 from hobble.motion.draft import draft, guessed
-from hobble.motion.find_body import Doubt, find_body
+from hobble.motion.find_body import find_body
 from hobble.motion.look import look, table
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.motion.body import SIDES
-from hobble.motion.find_body import Doubt
+from hobble.motion.doubt import Doubt
 from hobble.motion.names import limb_parts, part_of, side_of
 from hobble.motion.read import Bvh
 

@@ -43,19 +43,19 @@ CAPTURED_ERROR = np.radians(3.5)
 # rigs have any angle in the range.
 LIKE_TARGET = np.radians(4.5)
 ANY_FOOT = np.radians(42.0)
-APART = 10.0  # degrees: feet that stand more unlike are told of
+APART = 10.0  # degrees: a larger difference between the two standing feet is reported
 # A zero pose in which nobody could stand still shows the angle of the ankles, if that agrees with the motion.
 AGREE = np.radians(10.0)
 FORWARD, STRAIGHT = 35.0, 30.0  # degrees
-NOTED = 1.0  # cm: an uncertainty above this is told of (two standard deviations)
+NOTED = 1.0  # cm: a larger uncertainty (two standard deviations) is reported
 
 
 @dataclass(frozen=True)
 class Tilt:
     """How far the bone from ankle to ball points down when the feet stand flat.
 
-    Side -> radians, None without a ball. measured: of standing feet. flat: what is taken. error: standard
-    deviation of the mean of both, radians.
+    Side -> radians, None without a ball. measured: of standing feet. flat: the angle that is used. error:
+    standard deviation of the mean of both, radians.
     """
 
     measured: dict[str, float | None]

@@ -35,11 +35,11 @@ def level_heels(foot: Array, heel: Array, toe: Array, fps: float) -> Array:
     height = foot[:, 1]
     pitch = np.sum(missing * ahead, axis=1) * height**3 / (height**4 + LOW**4)
     yaw = np.sum(missing * side, axis=1) / np.maximum(across[:, 0], LOW)
-    tilt = quat.from_axis_angle(side, _held(pitch))
-    return quat.mul(quat.yaw(_held(yaw)), tilt)
+    tilt = quat.from_axis_angle(side, _limited(pitch))
+    return quat.mul(quat.yaw(_limited(yaw)), tilt)
 
 
-def _held(angle: Array) -> Array:
+def _limited(angle: Array) -> Array:
     """The angle, limited smoothly to MOST_TILT. Small angles do not change."""
     return angle / (1 + (angle / MOST_TILT) ** 6) ** (1 / 6)
 

@@ -30,7 +30,7 @@ RATES = (24, 25, 30, 60, 120, 240)  # usual frame rates of files
 STILL = 3.0  # cm a second: slower hips stand
 STANDING = 0.5  # seconds: a shorter rest does not count as standing
 STRIDE = 0.25  # leg lengths: least distance of the ankles in a step
-MANY = 5  # clips with the same warning: it is told once
+MANY = 5  # clips with the same warning, from which on it is printed once for all
 ENOUGH = {"mirrors of each other": "hold both out or neither"}
 
 
@@ -80,8 +80,8 @@ def look(folder: Path, skeleton: Path, maps: Path, options: ClipMotion | None = 
 
 
 def shared_warnings(clips: Sequence[Look]) -> tuple[list[Look], list[str]]:
-    """Moves a warning that at least MANY clips have from their lines to one sentence on the folder."""
-    count = Counter(warning for clip in clips for warning in clip.warnings)
+    """Moves a sentence that at least MANY clips have from their lines to the notes on the folder."""
+    count = Counter(warning for clip in clips for warning in clip.warnings if warning.endswith("."))
     common = {warning: times for warning, times in count.items() if times >= MANY}
     short = [replace(clip, warnings=tuple(w for w in clip.warnings if w not in common)) for clip in clips]
     return short, [f"{times} of {len(clips)} clips: {warning}" for warning, times in common.items()]

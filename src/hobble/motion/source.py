@@ -17,8 +17,9 @@ from hobble.motion.axes import Axes, straighten
 from hobble.motion.body import SIDES, Body, body_by_roles, pairs, with_fingers
 from hobble.motion.decode import Decoded, decode, frame_rate
 from hobble.motion.defects import Repaired, flips, repair
+from hobble.motion.doubt import Doubt, TwoFigures
 from hobble.motion.draft import refusal
-from hobble.motion.find_body import Doubt, Found, TwoFigures, find_body
+from hobble.motion.find_body import Found, find_body
 from hobble.motion.floor import on_floor
 from hobble.motion.four_legs import on_four_legs
 from hobble.motion.hips_root import below_hips, decode_below

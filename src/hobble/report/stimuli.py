@@ -39,13 +39,13 @@ VISIBLE = 0.1  # cm; a loop that is nearer to the neutral one looks the same
 class Loop:
     """A walk that can be repeated.
 
-    positions (F, J, 3), cm; rotations (F, J, 4); way (3,): translation of one round, cm; gap: mean distance
-    of joints between end and start before blending, cm.
+    positions (F, J, 3), cm; rotations (F, J, 4); travel (3,): translation of one round, cm; gap: mean
+    distance of joints between end and start before blending, cm.
     """
 
     positions: Array
     rotations: Array
-    way: Array
+    travel: Array
     gap: float
 
 
@@ -89,7 +89,7 @@ def write_stimuli(
                 "untrained": [column for column in wanted.values if column not in trained],
                 "from_plain_cm": round(apart(loop, plain), 2),
                 "seconds": seconds,
-                "metres_a_second": round(float(np.linalg.norm(loop.way)) / 100 / seconds, 3),
+                "metres_a_second": round(float(np.linalg.norm(loop.travel)) / 100 / seconds, 3),
                 "gap_cm": round(loop.gap, 2),
             }
         )
@@ -153,14 +153,14 @@ def walk(network: Network, values: Mapping[str, Mapping[str, float]], runtime: R
     positions, rotations = np.array([p.positions for p in poses]), np.array([p.rotations for p in poses])
     first, last, gap = cut(positions)
     kept, turned = positions[first:last].copy(), rotations[first:last].copy()
-    way = positions[last, 0] - positions[first, 0]
-    way[1] = 0.0
+    travel = positions[last, 0] - positions[first, 0]
+    travel[1] = 0.0
     for k in range(BLEND):
         share = (k + 1) / (BLEND + 1)
         here, before = last - BLEND + k, first - BLEND + k
-        kept[here - first] = (1 - share) * positions[here] + share * (positions[before] + way)
+        kept[here - first] = (1 - share) * positions[here] + share * (positions[before] + travel)
         turned[here - first] = _mixed(rotations[here], rotations[before], share)
-    return Loop(kept, turned, way, gap)
+    return Loop(kept, turned, travel, gap)
 
 
 def cut(positions: Array) -> tuple[int, int, float]:
@@ -190,15 +190,15 @@ def frames(
     """
     count, keep = len(loop.positions), body(skeleton).bones
     world, places = jointed(skeleton, loop.positions, loop.rotations)
-    start, yaw = loop.positions[0, 0], np.arctan2(loop.way[0], loop.way[2])
-    middle = loop.positions[:, 0].mean(axis=0) - loop.way * (count - 1) / count / 2 - start
-    length = float(np.linalg.norm(loop.way))
+    start, yaw = loop.positions[0, 0], np.arctan2(loop.travel[0], loop.travel[2])
+    middle = loop.positions[:, 0].mean(axis=0) - loop.travel * (count - 1) / count / 2 - start
+    length = float(np.linalg.norm(loop.travel))
     even = max(1, round(length / GRID)) * GRID / max(length, 1e-9)
     turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
     turns = quat.mul(quat.yaw(-yaw), world[:, keep])
     out = []
     for f in range(0, count - count % STRIDE, STRIDE):
-        gone = loop.way * f / count
+        gone = loop.travel * f / count
         points = (places[f, keep] - start - gone - middle * [1, 0, 1]) @ turn.T
         points[:, 1] = places[f, keep, 1]
         travelled = np.array([0.0, 0.0, length * f / count * even])
@@ -218,7 +218,7 @@ def save_loop(path: Path, pictures: list[NDArray[np.uint8]]) -> None:
 
 def _ahead(loop: Loop) -> Array:
     """Positions (F, J, 3) of a loop, with the root over the origin and the direction of travel along z."""
-    yaw = np.arctan2(loop.way[0], loop.way[2])
+    yaw = np.arctan2(loop.travel[0], loop.travel[2])
     turn = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
     return (loop.positions - loop.positions[:, :1] * [1, 0, 1]) @ turn.T
 

@@ -1,4 +1,4 @@
-"""What the rows of a clip are in a few numbers, so that clips can be chosen without reading their rows."""
+"""A summary of the rows of a clip, so that clips can be chosen without reading their rows."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hobble.rows.layout import GAITS
 
 @dataclass(frozen=True)
 class Facts:
-    """rows: how many. gait: the one with the largest share. speed: of the root, mean over the rows, cm a
+    """rows: their number. gait: the one with the largest share. speed: of the root, mean over the rows, cm a
     frame. channels: names of those with a value above 0 in some row."""
 
     clip: str
@@ -29,7 +29,7 @@ class Facts:
 
 
 def facts(rows: ClipRows) -> Facts:
-    """Of the rows of one clip."""
+    """The summary of the rows of one clip."""
     layout = rows.layout
     channels = tuple(name for name, values in rows.channels.items() if np.any(values != 0))
     if not len(rows):
@@ -41,12 +41,12 @@ def facts(rows: ClipRows) -> Facts:
 
 
 def save_facts(path: str | Path, found: Facts) -> None:
-    """Write them as JSON."""
+    """Write a summary as JSON."""
     write_json(Path(path), asdict(found))
 
 
 def load_facts(path: str | Path) -> Facts:
-    """Read them. Raises InputError where the file holds something else."""
+    """Read a summary. Raises InputError if the file holds something else."""
     values: Mapping[str, Any] = read_json(Path(path))
     try:
         return Facts(**{**values, "channels": tuple(values["channels"])})

@@ -83,7 +83,8 @@ def raise_heel(position: Any, hip: int, knee: int, heel: int, toe: int, shift: A
     if ahead >= 0.0:
         return
     most += max(1.0 + ahead / BEHIND, 0.0) * (needed - most)
-    # From the toe the heel is at (-along, high); turned by an angle, it is `most` away from the hip, squared.
+    # The heel is at (-along, high) from the toe. Find the angle about the toe at which its squared distance
+    # from the hip is `most`.
     cosine, sine = up * high - ahead * along, ahead * high + up * along
     share = 0.5 * (most - wx * wx - up * up - wz * wz - along * along - high * high)
     share = min(max(share / np.sqrt(cosine * cosine + sine * sine), -1.0), 1.0)

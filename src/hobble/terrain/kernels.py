@@ -130,9 +130,8 @@ def lowest_cone(x, z, place_x, place_z, heights, steepness):
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
 def _down_means(heights, rows, columns, a, points):
-    """Heights of the patch above feet in contact: the first, and mean and mean square of all minus it.
-
-    Subtracting the first keeps the numbers small, so that single precision is enough.
+    """Heights d of the patch above feet in contact: the first of them, and the means of d - first and of its
+    square. These are small numbers, so single precision is enough.
     """
     u, v, foot = points
     (ru, rv, r0), (cu, cv, c0) = a

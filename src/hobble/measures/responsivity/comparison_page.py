@@ -27,7 +27,7 @@ def columns(compared: Compared) -> Iterator[Overview]:
     yield Overview(30, Column.number("ms per frame, median"), frames)
     about = {entry["configuration"]: entry for entry in compared["configurations"]}
     counts = {name: (entry["computations"] or {}).get("true") for name, entry in about.items()}
-    yield Overview(40, Column.count("parameters"), counts)
+    yield Overview(40, Column.count("parameters of one frame"), counts)
     yield Overview(110, Column("in memory", lambda v: size(float(v)), "n"), _bytes(compared))
 
 

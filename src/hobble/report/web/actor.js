@@ -44,20 +44,20 @@ export const createActor = (view, spec, { place = [0, 0], tint = null, ghost = f
     actor.watch?.add(rig.places);
     if (!c.pose.every(Number.isFinite)) { actor.falls++; actor.start(floor); } // after too little training, predictions may grow without end
   };
-  const drawGround = (way) => {
-    if (way === null) return;
+  const drawGround = (withPath) => {
+    if (withPath === null) return;
     const c = actor.character, { paint, marks } = view;
     for (const { from, to, age } of trail) marks.print(from, to, paint.ink, (paint.dark ? .16 : .13) * (1 - age / 360));
-    if (!way) return;
+    if (!withPath) return;
     for (let i = 5; i < c.px.length; i += 5) {
       const [a, b] = [i - 5, i].map((t) => [c.px[t], floor(c.px[t], c.pz[t]) + .2, c.pz[t]]);
       marks.strip(a, b, 2.2, tint ? paint[tint] : paint.accent, i > c.px.length / 2 ? .85 : .35);
     }
   };
-  // way: whether the past and predicted path is drawn on the ground. With null, footprints are not drawn either.
-  actor.draw = (way = true) => {
+  // withPath: whether the past and predicted path is drawn on the ground. With null, footprints are not drawn either.
+  actor.draw = (withPath = true) => {
     const c = actor.character, { paint } = view, plain = tint ? paint[tint] : paint.body, one = placed(spec);
-    drawGround(way);
+    drawGround(withPath);
     if (view.inputs) drawInputs(view, c, spec);
     figure.take(rig);
     figure.pose((columns) => {

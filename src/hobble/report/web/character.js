@@ -335,7 +335,7 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     bend(joint(hip), joint(knee), joint(heel), shift, hip, knee, c.added[f]);
     carryFoot(f, before, by);
   };
-  // The heel of a held foot rises where the leg would stretch too far; the turn of the foot about its toe.
+  // If the leg of a held foot would stretch too far, its heel rises. Returns the turn of the foot about its toe.
   const raiseHeel = (hip, knee, heel, toe, shift) => {
     const flat = [1, 0, 0, 0], leg = minus(heel, hip);
     const whole = k.stretch * (hypot(...minus(knee, hip)) + hypot(...minus(heel, knee)));

@@ -16,7 +16,7 @@ export const median = (values) => {
   return n % 2 ? sorted[(n - 1) / 2] : (sorted[n / 2 - 1] + sorted[n / 2]) / 2;
 };
 
-// Weighted mean of vectors of three with a Gaussian of `sigma` frames, cut off at four of them, the ends held.
+// Weighted mean of vectors of three with a Gaussian of `sigma` frames, cut off at 4 sigma. Past the ends the first and last value repeat.
 export const gaussian = (rows, sigma) => {
   const reach = Math.floor(4 * sigma + .5), n = rows.length, padded = new Float64Array(3 * (n + 2 * reach)), weights = new Float64Array(2 * reach + 1);
   let whole = 0;
@@ -34,7 +34,7 @@ export const gaussian = (rows, sigma) => {
   });
 };
 
-// Change from frame to frame: half of that over two frames inside, of one frame at the ends.
+// Change per frame: half the difference of the frames on both sides; at the ends, the difference to the next frame.
 const gradient = (rows) => rows.map((row, f) => {
   const a = Math.max(0, f - 1), b = Math.min(rows.length - 1, f + 1);
   return row.map((_, k) => (rows[b][k] - rows[a][k]) / (b - a));

@@ -1,0 +1,53 @@
+"""Finds the head of a rig, and its neck."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.motion.doubt import Doubt
+from hobble.motion.moving_rig import Pair, Rig
+from hobble.motion.names import is_end, part_of, side_of
+from hobble.motion.orient import unit
+from hobble.motion.tree import above, path
+
+
+def find_head(rig: Rig, legs: Pair, arms: Pair) -> tuple[int, tuple[int, ...]]:
+    """The head, and the joints between it and the chest."""
+    limbs = set(sum(legs.chains, ())) | set(sum(arms.chains, ()))
+    named = [
+        j for j, n in enumerate(rig.names) if part_of(n) == "head" and not is_end(n) and side_of(n) is None
+    ]
+    named = [j for j in named if arms.hub in above(rig.parents, j) and not limbs & set(above(rig.parents, j))]
+    spine = path(rig.parents, legs.hub, arms.hub)
+    first = min(named, key=lambda j: len(above(rig.parents, j)), default=None)
+    head = _highest(rig, legs, arms, limbs) if first is None else first
+    way = path(rig.parents, arms.hub, head)[1:-1]
+    return head, tuple(j for j in way if j not in spine)
+
+
+def _highest(rig: Rig, legs: Pair, arms: Pair, limbs: set[int]) -> int:
+    """The end of the chain that goes furthest from the trunk.
+
+    Joints that only mark the head's end do not count.
+    """
+    trunk = unit(rig.at[:, arms.hub] - rig.at[:, legs.hub])
+    base = sum(rig.at[:, chain[0]] for chain in arms.chains) / 2
+
+    def height(j: int) -> float:
+        return float(np.mean(np.sum((rig.at[:, j] - base) * trunk, axis=-1)))
+
+    below = [j for j in range(len(rig.names)) if arms.hub in above(rig.parents, j)[1:]]
+    below = [j for j in below if not limbs & set(above(rig.parents, j))]
+    # Hair, ears and wings have a left and a right, and a head has not.
+    pairs = [set(sum(pair.chains, ())) for pair in rig.pairs()]
+    twins = set().union(*(pair for pair in pairs if not pair & limbs))
+    single = [j for j in below if not twins & set(above(rig.parents, j)) and not side_of(rig.names[j])]
+    below = single or below
+    if not below:
+        raise Doubt("there is no joint for the head above the arms")
+    top = max(below, key=height)
+    chain = [j for j in above(rig.parents, top) if j in below][::-1]
+    leg = rig.chord(legs.chains[0][0], legs.chains[0][-1])[0]
+    while len(chain) > 1 and (height(chain[-1]) > 0.42 * leg or rig.lengths[chain[-1]] < 0.01 * rig.size):
+        chain.pop()
+    return chain[-1]

@@ -1,0 +1,67 @@
+"""Finds which leg and which arm of a rig are the left ones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.motion.doubt import Doubt
+from hobble.motion.find_limbs import toe
+from hobble.motion.moving_rig import Pair, Rig
+from hobble.motion.names import side_of, side_of_pair
+from hobble.motion.orient import unit
+
+
+def left_leg(
+    rig: Rig, pair: Pair, leg: list[tuple[int, int, int]], legs: list, arm: list, head: int
+) -> tuple[int, bool]:
+    """Which of the two legs is the left one, and whether names say so."""
+    named = _named_sides(rig, pair)
+    if named[0] * named[1] < 0:
+        return (0 if named[0] > 0 else 1), True
+    up = unit(rig.at[:, head] - sum(rig.at[:, j[2]] for j in leg) / 2)
+    ahead = _ahead(rig, pair, leg)
+    across = rig.at[:, leg[0][0]] - rig.at[:, leg[1][0]]
+    turn = float(np.mean(np.sum(np.cross(up, ahead) * unit(across), axis=-1)))
+    if abs(turn) < 0.3:
+        raise Doubt("neither names nor feet and knees show which side is left")
+    return (0 if turn > 0 else 1), False
+
+
+def _named_sides(rig: Rig, pair: Pair) -> tuple[int, int]:
+    """For both chains how many more joints have left than right names."""
+    votes = []
+    for chain, across in (pair.chains, pair.chains[::-1]):
+        sides = [side_of(rig.names[j]) for j in chain]
+        if not any(sides):
+            sides = [side_of_pair(rig.names[a], rig.names[b]) for a, b in zip(chain, across, strict=False)]
+        votes.append(sides.count("left") - sides.count("right"))
+    return votes[0], votes[1]
+
+
+def _ahead(rig: Rig, pair: Pair, leg: list[tuple[int, int, int]]) -> Array:
+    """(S, 3) direction of the feet and, with less weight, of the knees."""
+    out = np.zeros((len(rig.at), 3))
+    for k, (hip, knee, heel) in enumerate(leg):
+        ball = toe(rig, pair, k, heel)
+        line = rig.at[:, heel] - rig.at[:, hip]
+        share = np.sum((rig.at[:, knee] - rig.at[:, hip]) * line, axis=-1, keepdims=True)
+        bend = rig.at[:, knee] - rig.at[:, hip] - line * share / np.sum(line**2, axis=-1, keepdims=True)
+        out += bend
+        if ball is not None:
+            out += 3 * (rig.at[:, ball] - rig.at[:, heel])
+    return unit(out)
+
+
+def left_arm(
+    rig: Rig, leg: list[tuple[int, int, int]], left: int, arm: list[tuple[int, int, int]], pair: Pair
+) -> int:
+    """Which of the two arms is the left one, on the side of the left leg."""
+    across = rig.at[:, leg[left][0]] - rig.at[:, leg[1 - left][0]]
+    arms = rig.at[:, arm[0][0]] - rig.at[:, arm[1][0]]
+    side = float(np.mean(np.sum(unit(across) * unit(arms), axis=-1)))
+    named = _named_sides(rig, pair)
+    place = 0 if side > 0 else 1
+    if abs(side) < 0.2 or (named[0] * named[1] < 0 and (named[0] > 0) != (place == 0)):
+        raise Doubt("its left arm and its left leg are not on the same side")
+    return place

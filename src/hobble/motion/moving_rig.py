@@ -1,0 +1,111 @@
+"""Measures an unknown rig in motion: bones, bends, and pairs of equal chains of bones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from hobble.core.quat import Array
+from hobble.motion.body import SIDES
+from hobble.motion.names import side_of
+from hobble.motion.orient import unit
+
+SAMPLES = 150
+ALIKE = 0.15  # relative difference of length that a bone and its counterpart may have
+FEWEST = 3  # joints of a limb
+LEAST = 0.15  # least length of a limb, relative to the size of the body
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two equal chains of joints below one joint, from the trunk outward, `sides` (a, b)."""
+
+    hub: int
+    chains: tuple[tuple[int, ...], tuple[int, ...]]
+    length: float
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Joints and where they are: positions (F, J, 3) in the world, any unit, any axes."""
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    positions: Array = field(repr=False)
+
+    @cached_property
+    def at(self) -> Array:
+        """(S, J, 3): a sample of frames that is large enough to see what moves."""
+        every = np.unique(np.linspace(0, len(self.positions) - 1, SAMPLES).round().astype(int))
+        return self.positions[every]
+
+    @cached_property
+    def lengths(self) -> Array:
+        """(J,) length from each joint to its parent."""
+        up = [max(p, 0) for p in self.parents]
+        return np.median(np.linalg.norm(self.at - self.at[:, up], axis=-1), axis=0)
+
+    @cached_property
+    def size(self) -> float:
+        """The largest extent of the body, in the file's unit."""
+        return float(np.median(np.linalg.norm(np.ptp(self.at, axis=1), axis=-1)))
+
+    @cached_property
+    def children(self) -> list[list[int]]:
+        """The joints below each joint."""
+        out: list[list[int]] = [[] for _ in self.names]
+        for j, p in enumerate(self.parents):
+            if p >= 0:
+                out[p].append(j)
+        return out
+
+    def alike(self, a: int, b: int) -> bool:
+        """Whether two bones can be each other's counterparts."""
+        sides = {side_of(self.names[a]), side_of(self.names[b])}
+        if None not in sides and len(sides) == 1:
+            return False
+        longer = max(self.lengths[a], self.lengths[b])
+        share = 2 * ALIKE if sides == set(SIDES) else ALIKE
+        return bool(abs(self.lengths[a] - self.lengths[b]) <= share * longer + 0.01 * self.size)
+
+    def match(self, a: int, b: int) -> tuple[float, tuple[int, ...], tuple[int, ...]]:
+        """The longest equal chains of bones from a and b on: their length and joints."""
+        best: tuple[float, tuple[int, ...], tuple[int, ...]] = (0.0, (), ())
+        for c in self.children[a]:
+            for d in self.children[b]:
+                if self.alike(c, d):
+                    found = self.match(c, d)
+                    if found[0] > best[0] or not best[1]:
+                        best = found
+        own = float(min(self.lengths[a], self.lengths[b]))
+        return own + best[0], (a, *best[1]), (b, *best[2])
+
+    def pairs(self) -> list[Pair]:
+        """All pairs of chains that can be legs or arms."""
+        out = []
+        for hub, below in enumerate(self.children):
+            for i, a in enumerate(below):
+                for b in below[i + 1 :]:
+                    if not self.alike(a, b):
+                        continue
+                    length, one, other = self.match(a, b)
+                    length -= float(min(self.lengths[a], self.lengths[b]))
+                    if length > LEAST * self.size and len(one) >= FEWEST:
+                        out.append(Pair(hub, (one, other), length))
+        return out
+
+    def chord(self, a: int, b: int) -> tuple[float, float]:
+        """Median distance of two joints, and its relative change."""
+        apart = np.linalg.norm(self.at[:, b] - self.at[:, a], axis=-1)
+        middle = float(np.median(apart))
+        low, high = np.percentile(apart, [3, 97])
+        return middle, float(high - low) / max(middle, 1e-9)
+
+    def bend(self, chain: Sequence[int], i: int, j: int, k: int) -> Array:
+        """(S,) degrees between the bones before and after the middle one of three joints of a chain."""
+        upper = unit(self.at[:, chain[j]] - self.at[:, chain[i]])
+        lower = unit(self.at[:, chain[k]] - self.at[:, chain[j]])
+        return np.degrees(np.arccos(np.clip(np.sum(upper * lower, axis=-1), -1, 1)))
