@@ -13,7 +13,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.clip import Clip
-from hobble.core.skeleton import Skeleton
+from hobble.core.skeleton import Skeleton, local_rotations
 from tests.motion.scramble import SYLLABLES, Rig, Scramble, _as_clip
 
 X = np.array([1.0, 0.0, 0.0])
@@ -120,6 +120,19 @@ def rigged(clip: Clip, text: str, **how: Any) -> tuple[Clip, dict[str, str]]:
         rig.add(name, -1 if parent == "-" else rig.names.index(parent), place, turn)
     plain = {"rest": "own", "unit": "cm", "rate": 60.0, "z_up": False, "left_handed": False, "six": False}
     return _as_clip(rig, clip, replace(Scramble.drawn(3), **plain | how), np.random.default_rng(5)), names
+
+
+def rezeroed(clip: Clip, joints: tuple[str, ...], turn: np.ndarray) -> Clip:
+    """The same motion on a rig whose joints with these first letters are turned in the zero pose."""
+    turned, places = clip.global_rotations.copy(), clip.positions
+    for j, name in enumerate(clip.skeleton.joints):
+        if name.startswith(joints):
+            turned[:, j] = quat.mul(turned[:, j], turn)
+    parents = [max(p, 0) for p in clip.skeleton.parents]
+    arms = quat.rotate(quat.inv(turned[:, parents]), places - places[:, parents])
+    skeleton = replace(clip.skeleton, offsets=np.median(arms, axis=0))
+    rotations = quat.continuous(local_rotations(skeleton, turned))
+    return Clip(clip.name, skeleton, clip.fps, rotations, places[:, 0])
 
 
 def dog() -> Clip:

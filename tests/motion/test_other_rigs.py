@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from hobble.core import quat
 from hobble.core.bvh import write_bvh
 from hobble.core.errors import InputError
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
 from hobble.motion.source import load_source
-from tests.motion.other_rigs import CLOTHES, GAME, PLAIN, ROLLS, TRUNK, crawling, dog, human, nameless, rigged
+from tests.motion.other_rigs import (
+    CLOTHES,
+    GAME,
+    PLAIN,
+    ROLLS,
+    TRUNK,
+    crawling,
+    dog,
+    human,
+    nameless,
+    rezeroed,
+    rigged,
+)
 from tests.motion.scramble import compare
 
 PELVIS = PLAIN.replace("thigh_l|hips", "thigh_l|pelvis").replace("thigh_r|hips", "thigh_r|pelvis")
@@ -141,3 +156,12 @@ def test_a_figure_on_four_legs_is_refused(tmp_path, make):
     write_bvh(tmp_path / "dog.bvh", dog())
     with pytest.raises(InputError, match=r"dog.bvh: the figure goes on four legs"):
         make(tmp_path / "dog.bvh")
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize(("down", "told"), [(0, None), (-20, "18 degrees flatter.*3.7 cm"), (-70, "nobody")])
+def test_a_zero_pose_on_tiptoe_is_told_of(clip, tmp_path, make, down, told):
+    turn = quat.from_axis_angle(np.array([1.0, 0, 0]), np.radians(down))
+    write_bvh(tmp_path / "a.bvh", rezeroed(rigged(clip, PLAIN)[0], ("foot", "toe"), turn), decimals=8)
+    unsure = " ".join(make(tmp_path / "a.bvh")[1]["unsure"])
+    assert re.search(told, unsure) if told else not unsure

@@ -10,12 +10,14 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES
 from hobble.motion.body_sample import LEFT, BodySample
-from hobble.motion.flat_feet import stands
+from hobble.motion.flat_feet import RAISED, feet_tilt, runs, stands
 from hobble.motion.orient import apart, frame, off, pointed, snapped, unit
 
 UP = np.array([0.0, 1.0, 0.0])
 # Degrees: if zero pose and motion differ by more for a joint, the motion counts.
 TRUSTED = 30.0
+# Feet that stand more unlike the zero pose are told of. Those of `patients` differ by 9 degrees at most.
+UNLIKE_ZERO = np.radians(12.0)
 SHRUG = 12.0  # degrees: mean angle to the chest up to which the zero pose counts for clavicles
 LIMP = 60.0  # degrees: the same for hands and their forearms
 
@@ -67,6 +69,29 @@ def add_rest(frames: dict[int, Array], zero: dict[int, Array], seen: BodySample)
         frames[heel] = _foot(frames[heel], zero[heel], seen, side)
         if toe is not None:
             frames[toe] = _foot(frames[toe], zero[toe], seen, side)
+
+
+def zero_doubt(seen: BodySample, zero: dict[int, Array]) -> str | None:
+    """A sentence if the feet stand at another angle than in the zero pose. None if they agree.
+
+    zero: frames of `from_rest`. A person's zero pose may stand on its toes or lean.
+    """
+    measured = feet_tilt(seen).measured
+    off, lengths = [], []
+    for side in SIDES:
+        heel, toe = seen.body.legs[side][2:]
+        if toe is not None and (tilt := measured[side]) is not None and stands(seen, side):
+            x, y, z = quat.rotate(quat.inv(zero[heel]), seen.bone(heel, toe))
+            off.append(tilt - (RAISED if runs(seen) else 0.0) - np.arctan2(-y, np.hypot(x, z)))
+            lengths.append(seen.length(heel, toe))
+    if not off or abs(np.mean(off)) < UNLIKE_ZERO:
+        return None
+    degrees, more = np.degrees(abs(np.mean(off))), "steeper" if np.mean(off) > 0 else "flatter"
+    said = f"Its feet stand {degrees:.0f} degrees {more} than in its zero pose"
+    if degrees > TRUSTED:
+        return f"{said}: the motion was believed, so feet may be tilted by some degrees."
+    high = np.radians(degrees) * np.mean(lengths)
+    return f"{said}: if that pose is no stance, the figure stands {high:.1f} cm too high or low."
 
 
 def _foot(standing: Array, zero: Array, seen: BodySample, side: str) -> Array:

@@ -36,8 +36,9 @@ from hobble.runtime.options import Runtime
 PACES = (0.85, 1.0, 1.15)  # of the median speed of captured neutral walks; the same for every manner
 ASKED = 120.0  # cm a second, if there are no captured neutral walks
 HALF, FULL = 0.5, 1.0  # values of a manner
-# Of the covariance towards its diagonal. The one that is best for left-out people is taken. The fewer clips,
-# the more of it helps: .6 recognises 69 % of moods and 51 % of diagnoses, .02 recognises 54 % and 63 %.
+# Shrinkages of the covariance towards its diagonal. The one that names most windows of left-out people right
+# is used. With fewer clips a larger one is better: .6 recognises 69 % of moods and 51 % of diagnoses, .02
+# 54 % and 63 %.
 SHRINKAGES = (0.02, 0.1, 0.3, 0.6)
 REASON = "none of this network's inputs is a manner of walking"
 TOO_FEW = "there are walking clips of fewer than two manners"
