@@ -4,7 +4,7 @@
         [--parts 1] [--training-nodes 1] [--batch 0] [--passes 0]
 
 FOLDER is the folder in which Snakemake ran. Seconds and bytes of jobs over clips are scaled with the amount
-of motion that the configuration uses; all else is unchanged. Each clip pays for the start of its jobs, so
+of motion that the configuration uses; all else is unchanged. Each batch pays for the start of its jobs, so
 longer clips take fewer hours than estimated. Mirrored clips count as motion: with them, the hours double.
 Under `synthetic` the bytes are those of the BVH files, which are the user's own.
 
@@ -27,6 +27,8 @@ import numpy as np
 import yaml
 
 from hobble.measures.sampling import Sampling
+from hobble.workflow.batches import batch_count
+from hobble.workflow.costs import BATCH_RULES
 
 ROOT = Path(__file__).resolve().parents[1]
 # Rules of one job each whose work grows with the motion; the others of one job do always the same.
@@ -35,13 +37,6 @@ SAMPLED = {"accuracy", "rollouts"}  # whose work grows up to so many frames
 FPS = 60
 LINK, DELAY = 1.25e9, 30e-6  # bytes and seconds of a message between machines
 CONSTANT_BYTES = {"training", "runtime", "evaluation"}
-
-
-def groups() -> tuple[set[str], int]:
-    """The rules that make one job of many clips, and of how many, as the SLURM profile says."""
-    profile = yaml.safe_load((ROOT / "profiles/slurm/config.v9+.yaml").read_text())
-    size = int(profile["group-components"][0].split("=")[1])
-    return {group.split("=")[0] for group in profile["groups"]}, size
 
 
 def motion_seconds(folder: Path, configuration: str) -> float:
@@ -75,18 +70,19 @@ class Plan:
 def scaled(stage: dict[str, Any], plan: Plan) -> dict[str, float]:
     """One line of the table: jobs, hours of processors, hours on the clock, longest job, bytes.
 
-    The clips of a stage go side by side over the nodes; the jobs of all its other rules go one after another.
+    The batches of a stage go side by side over the nodes; the jobs of its other rules go one after another.
     """
-    per_clip, size = groups()
-    batches = math.ceil(plan.clips / size)
+    per_clip = {rule for rules in BATCH_RULES.values() for rule in rules}
+    batches = batch_count(plan.clips)
     line = {"jobs": 0, "work": 0.0, "clock": 0.0, "longest": 0.0, "bytes": stage["bytes"]}
     for rule in stage["rules"]:
         name = rule["rule"]
         hours = rule["seconds"] / 3600 * plan.growth(name, per_clip)
         line["work"] += hours
         if name in per_clip:
-            line["clock"] += hours / min(plan.nodes, batches) / 2
-            line["longest"] += hours / batches / 2
+            line["jobs"] += batches
+            line["clock"] += hours / min(2 * plan.nodes, batches)
+            line["longest"] = max(line["longest"], hours / batches)
             continue
         # A merge in parts is two jobs for each part, one after the other, and one that joins them.
         jobs = 2 * plan.parts + 1 if name == "database_merge" and plan.parts > 1 else 1
@@ -123,7 +119,7 @@ def main() -> None:
     parser.add_argument("--configuration", default="holden")
     parser.add_argument("--hours", type=float, default=1000.0, help="of motion")
     parser.add_argument("--clips", type=int, default=2500)
-    parser.add_argument("--nodes", type=int, default=79, help="that take two jobs of a clip at once each")
+    parser.add_argument("--nodes", type=int, default=79, help="that run two jobs at once each")
     parser.add_argument("--parts", type=int, default=1, help="jobs that merge the database side by side")
     parser.add_argument("--training-nodes", type=int, default=1)
     parser.add_argument("--batch", type=int, default=0, help="samples of a step; 0: that of the run")
@@ -133,7 +129,7 @@ def main() -> None:
     seconds = motion_seconds(options.folder, options.configuration)
     factor = options.hours * 3600 / seconds
     print(f"from {seconds:.0f} s of motion of `{options.configuration}` to {options.hours:g} hours\n")
-    print("| stage | jobs beside the batches | hours of work | on the clock | longest job | GB |")
+    print("| stage | jobs | hours of work | on the clock | longest job | GB |")
     print("|---|---|---|---|---|---|")
     total = {"jobs": 0.0, "work": 0.0, "clock": 0.0, "longest": 0.0, "bytes": 0.0}
     sampled = min(factor, max(1.0, Sampling().sample_frames / (FPS * seconds)))
@@ -145,8 +141,7 @@ def main() -> None:
         total = {key: total[key] + line[key] for key in total} | {"longest": longest}
         show(stage["stage"], line)
     show("all", total)
-    batches = math.ceil(options.clips / groups()[1])
-    print(f"\n{options.clips} clips: {batches} batches, {batches + total['jobs']:.0f} jobs with all others")
+    print(f"\n{options.clips} clips in {batch_count(options.clips)} batches")
 
 
 def show(name: str, line: dict[str, float]) -> None:

@@ -39,7 +39,7 @@ fail() {
     exit 1
 }
 
-# SLURM kills what runs: waits until a job whose comment holds $1 has written the log $2 of one of its rules.
+# SLURM kills what runs: waits until a job whose comment holds $1 has written the log $2.
 kill_job() {
     local job deadline=$((SECONDS + 900))
     until compgen -G "$folder/cluster/$2" >/dev/null; do
@@ -77,7 +77,7 @@ say "SLURM $(slurmctld -V | awk '{print $2}') is up on one node, memory and time
 setsid "${through_slurm[@]}" >"$log" 2>&1 &
 cluster=$!
 running+=("$cluster")
-kill_job clips 'results/datasets/tiny/logs/labels/labels_clip/*.log'
+kill_job labels_clips 'results/datasets/tiny/logs/labels/labels_clips/*.log'
 kill_job training 'results/test/logs/training/training.log'
 wait "$cluster"
 [ -e "$folder/cluster/$target" ] || fail "the run through SLURM failed"

@@ -22,6 +22,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hobble.workflow.batches import family_of
+
 from .same import same
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -261,9 +263,8 @@ def _job(source: str) -> Job:
     exec(source[: source.index(PREAMBLE_END)], names)
     sys.path[:] = path
     given = names["snakemake"]
-    return Job(
-        given.rule, source, tuple(map(str, given.input)), tuple(map(str, given.output)), str(given.log[0])
-    )
+    rule = family_of(given.rule)
+    return Job(rule, source, tuple(map(str, given.input)), tuple(map(str, given.output)), str(given.log[0]))
 
 
 def _import(source: str) -> None:

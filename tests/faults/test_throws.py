@@ -29,7 +29,7 @@ def lab() -> Iterator[Lab]:
         made = Lab(Path(folder) / "lab")
         made.undisturbed(*TARGETS)
         rules = {job.rule for job in made.jobs}
-        assert rules >= {"synthetic_clip", "motion_clip", "terrain_fits", "database_clip"}
+        assert rules >= {"synthetic_clips", "motion_clips", "terrain_fits", "database_clips"}
         yield made
 
 
@@ -49,7 +49,7 @@ def test_faults_at_jobs(lab: Lab, throw, times: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "rule", ["motion_clip", "labels_clip", "channel_clip", "terrain_fits", "database_clip"]
+    "rule", ["motion_clips", "labels_clips", "channel_clips", "terrain_fits", "database_clips"]
 )
 def test_harm_to_what_a_job_reads(lab: Lab, rule: str) -> None:
     thrown = [throws.harm(lab, Random(f"{SEED}-{number}"), rule) for number in range(8)]

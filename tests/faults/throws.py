@@ -282,7 +282,7 @@ def changing_clip(lab: Lab, rng: Random) -> Throw:
 
     The old one's result is right only where Snakemake will see that the clip is newer and make it again.
     """
-    clips = [job for job in lab.jobs if job.rule == "motion_clip"]
+    clips = [job for job in lab.jobs if job.rule == "motion_clips"]
     job, other = rng.sample(clips, 2)
     how = rng.choice(("written over", "emptied and written", "replaced"))
     with lab.bench(job) as bench:

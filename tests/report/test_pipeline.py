@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -18,8 +19,8 @@ def benchmark(path: Path, seconds: float, memory: str = "120.5") -> Path:
 
 def test_adds_up_jobs_rules_and_bytes(tmp_path: Path) -> None:
     folder = tmp_path / "benchmarks" / "motion"
-    benchmark(folder / "motion_clip" / "a.tsv", 2.0)
-    benchmark(folder / "motion_clip" / "b.tsv", 3.0, memory="300.25")
+    benchmark(folder / "motion_clips" / "a.tsv", 2.0)
+    benchmark(folder / "motion_clips" / "b.tsv", 3.0, memory="300.25")
     benchmark(folder / "motion_mirror.tsv", 0.5, memory="-")
     (tmp_path / "motion").mkdir()
     (tmp_path / "motion" / "a.npz").write_bytes(b"x" * 100)
@@ -34,7 +35,7 @@ def test_adds_up_jobs_rules_and_bytes(tmp_path: Path) -> None:
     assert (motion["jobs"], motion["seconds"], motion["longest"]) == (3, 5.5, 3.0)
     assert (motion["max_rss_mb"], motion["cpu_seconds"]) == (300.2, 2.75)
     assert (motion["files"], motion["bytes"]) == (2, 105)
-    assert {r["rule"]: r["jobs"] for r in motion["rules"]} == {"motion_clip": 2, "motion_mirror": 1}
+    assert {r["rule"]: r["jobs"] for r in motion["rules"]} == {"motion_clips": 2, "motion_mirror": 1}
     assert (found["total_seconds"], found["total_bytes"], found["missing"]) == (5.5, 105, [])
 
 
@@ -58,6 +59,22 @@ def test_a_resumed_training_took_all_its_calls(tmp_path: Path, seen: float, took
     assert training["cpu_seconds"] == seen / 2
     assert evaluation["seconds"] == 10.0
     assert found["total_seconds"] == took + 10.0
+
+
+def test_clips_of_earlier_calls_and_of_other_batches(tmp_path: Path) -> None:
+    """The last call made one clip of two, and there were fewer batches before a clip was added."""
+    folder, made = tmp_path / "benchmarks/motion", tmp_path / ".made/motion_clips"
+    benchmark(folder / "motion_clips/00.tsv", 2.0)
+    benchmark(folder / "motion_clips/walk.tsv", 7.0)
+    benchmark(folder / "other/walk.tsv", 1.0)
+    (made / "motion").mkdir(parents=True)
+    for clip, seconds in (("a", 3.0), ("b", 1.5)):
+        record = {"fingerprint": "x", "files": [1], "seconds": seconds}
+        (made / f"motion/.{clip}.kept").write_text(json.dumps(record))
+    places = {"benchmarks": [str(folder)], "files": [], "batches": ["00"], "made": [str(made)]}
+    (motion,) = summarise("c", {"motion": places})["stages"]
+    assert {rule["rule"]: rule["seconds"] for rule in motion["rules"]} == {"motion_clips": 4.5, "other": 1.0}
+    assert (motion["jobs"], motion["seconds"]) == (2, 5.5)
 
 
 def test_lists_what_is_missing(tmp_path: Path) -> None:

@@ -29,7 +29,14 @@ def test_a_clip_more_makes_its_own_rows_and_the_merge(clips: list[Path], workflo
     first = workflow.folder / f"results/datasets/mine/database/clips/{clips[0].stem}.npz"
     before, rows = first.stat().st_mtime_ns, first.read_bytes()
     put(clips[1], folder)
-    own = ("motion_clip", "labels_clip", "channel_clip", "terrain_fits", "database_clip", "database_merge")
+    own = (
+        "motion_clips",
+        "labels_clips",
+        "channel_clips",
+        "terrain_fits",
+        "database_clips",
+        "database_merge",
+    )
     assert workflow.planned(*asked) == dict.fromkeys(own, 1)
     workflow.run("-c2", *asked)
     assert (first.stat().st_mtime_ns, first.read_bytes()) == (before, rows)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import collections
-import math
 import re
 from pathlib import Path
 
 import pytest
 import yaml
 
+from hobble.workflow.batches import SMALLEST, Batch, batch_of
 from hobble.workflow.demands import ENGINE_MB, WEEK_MINUTES, Demands, bvh_seconds
 from hobble.workflow.project import Project
 from hobble.workflow.resource_use import planned_jobs, with_use
@@ -34,7 +33,7 @@ def bvh(path: Path, rows: int, promised: int, frame_time: str = "0.01") -> Path:
 
 
 @pytest.mark.workflow
-def test_thousands_of_clips_make_a_hundred_jobs(root, workflow, tmp_path) -> None:
+def test_a_stage_has_a_job_for_each_batch_of_clips(workflow, tmp_path) -> None:
     (workflow.checkout / "config/datasets/many.yaml").write_text(MANY)
     (workflow.checkout / "config/many.yaml").write_text(
         "extends: holden\ndataset: many\nchannels: [injury]\n"
@@ -42,19 +41,28 @@ def test_thousands_of_clips_make_a_hundred_jobs(root, workflow, tmp_path) -> Non
     (tmp_path / "many").mkdir()
     for number in range(CLIPS):
         bvh(tmp_path / f"many/clip-{number:02}.bvh", 100, 100, frame_time=f"0.0100{number:02}")
-    options = profile(root, "slurm")
-    groups = ["--groups", *options["groups"], "--group-components", *options["group-components"]]
-    plan = workflow.run("-np", *groups, "--config", f"mocap={tmp_path}", "--", "results/many/report.html")
-    batches = len(re.findall("Group job clips ", plan))
-    alone = collections.Counter(re.findall(r"^rule (\w+):", plan, re.M))
-    size = int(options["group-components"][0].split("=")[1])
-    assert batches == math.ceil(CLIPS / size)
+    asked = ("--config", f"mocap={tmp_path}", "--", "results/many/report.html")
+    planned = workflow.planned(*asked)
+    stages = ("motion_clips", "labels_clips", "channel_clips", "terrain_fits", "database_clips")
+    used = len({batch_of(f"clip-{number:02}", SMALLEST) for number in range(CLIPS)})
+    assert {rule: planned.pop(rule) for rule in stages} == dict.fromkeys(stages, used)
     # Whatever is not in a batch is there once for the data set, the configuration or a measurement, not once
     # for each clip.
-    assert alone["training"] == 1
-    assert [rule for rule, count in alone.items() if count > 1] == ["measure"], alone
-    assert math.ceil(2500 / size) + sum(alone.values()) <= 100
-    assert len(re.findall(r"^ +rule database_clip:", plan, re.M)) == 2 * CLIPS
+    assert [rule for rule, count in planned.items() if count > 1] == ["measure"], planned
+    made = re.findall(
+        r"database/clips/[^/,]+\.npz", workflow.run("-np", *asked).partition("rule database_merge")[0]
+    )
+    assert len(set(made)) == 2 * CLIPS
+
+
+@pytest.mark.workflow
+def test_a_job_on_another_machine_has_the_rules_of_its_batch_only(workflow) -> None:
+    """Snakemake starts it with the name of its rule in place of a target."""
+    batch = "motion_clips__tiny__1"
+    workflow.run("-c2", "results/datasets/tiny/motion/walk-straight-2.npz")
+    job = ("-c1", "--allowed-rules", batch, "--target-jobs", f"{batch}:", "--force")
+    workflow.run(*job, "--mode", "remote")
+    assert "motion_clips__tiny__0" not in workflow.run("--list-rules", "--target-jobs", f"{batch}:")
 
 
 @pytest.mark.parametrize("name", ["slurm", "kubernetes", "s3"])
@@ -66,9 +74,8 @@ def test_a_profile_keeps_what_the_default_one_says(root, name: str) -> None:
     assert ours["default-resources"].items() >= asked.items()
 
 
-def test_a_pod_gets_the_requests_of_its_job(root) -> None:
-    for key in ("groups", "group-components", "cores", "retries"):
-        assert profile(root, "kubernetes")[key] == profile(root, "slurm")[key]
+def test_a_pod_is_tried_as_often_as_a_job_of_slurm(root) -> None:
+    assert profile(root, "kubernetes")["retries"] == profile(root, "slurm")["retries"] == 2
 
 
 @pytest.mark.workflow
@@ -88,17 +95,29 @@ def test_a_gpu_is_asked_for_where_training_is_told_to_use_one(workflow) -> None:
     assert "gpu=1" not in workflow.run("-np", weights)
 
 
+def alone(dataset: str, clip: str) -> Batch:
+    return Batch(dataset, 0, clip, (clip,), mirrored=True)
+
+
 def test_requests_grow_with_motion_and_attempt(demands) -> None:
-    short, long = (demands.memory("synthetic", clip, 20) for clip in ("jog-2", "jog-1"))
+    short, long = (demands.batch_memory(alone("synthetic", clip), 20) for clip in ("jog-2", "jog-1"))
     assert short < long
-    assert demands.memory("synthetic", "jog-1", 20, attempt=2) == pytest.approx(2 * long, abs=1)
-    assert demands.memory("synthetic", "jog-1_mirror", 20) == long
-    assert demands.memory("synthetic-ava", "jog-1", 20) > long
-    assert demands.minutes("synthetic", "jog-1", 600.0, attempt=3) == 3 * demands.minutes(
-        "synthetic", "jog-1", 600.0
-    )
+    assert demands.batch_memory(alone("synthetic", "jog-1"), 20, attempt=2) == pytest.approx(2 * long, abs=1)
+    assert demands.batch_memory(alone("synthetic", "jog-1_hurt1"), 20) == long
+    assert demands.batch_memory(alone("synthetic-ava", "jog-1"), 20) > long
+    minutes = [demands.batch_minutes(alone("synthetic", "jog-1"), 600.0, attempt) for attempt in (1, 3)]
+    assert minutes[1] == 3 * minutes[0]
     assert demands.training_memory("ava") > demands.training_memory("holden")
     assert demands.training_minutes("ava", attempt=10_000) == WEEK_MINUTES
+
+
+def test_a_batch_requests_the_memory_of_its_longest_clip_and_the_time_of_all(demands) -> None:
+    both = Batch("synthetic", 0, "0", ("jog-1", "jog-2"), mirrored=True)
+    each = [alone("synthetic", clip) for clip in both.clips]
+    assert demands.batch_memory(both, 200) == max(demands.batch_memory(one, 200) for one in each)
+    assert demands.batch_minutes(both, 6000) == pytest.approx(
+        sum(demands.batch_minutes(one, 6000) for one in each), abs=1
+    )
 
 
 def test_the_length_of_a_clip_is_that_of_its_rows_not_what_its_header_promises(tmp_path) -> None:
@@ -111,16 +130,16 @@ def test_the_length_of_a_clip_is_that_of_its_rows_not_what_its_header_promises(t
 
 def test_used_and_requested_resources_of_a_job(tmp_path) -> None:
     plan = (
-        "rule motion_clip:\n    input: a\n    log: results/x/logs/motion/motion_clip/a.log\n"
+        "rule motion_clips__x__0:\n    input: a\n    log: results/x/logs/motion/motion_clips/a.log\n"
         "    resources: tmpdir=/tmp, mem_mb=1000, mem=1 GB, runtime=2, gpu=0\n[now]\n"
         "rule later:\n    log: results/x/logs/later.log\n    resources: mem_mb=500, runtime=1\n"
     )
-    log = tmp_path / "results/x/logs/motion/motion_clip/a.log"
-    benchmark = tmp_path / "results/x/benchmarks/motion/motion_clip/a.tsv"
+    log = tmp_path / "results/x/logs/motion/motion_clips/a.log"
+    benchmark = tmp_path / "results/x/benchmarks/motion/motion_clips/a.tsv"
     for path, text in ((log, "took 500 MB of memory at most\n"), (benchmark, "s\tmax_rss\n30.0\t7.1\n")):
         path.parent.mkdir(parents=True)
         path.write_text(text)
     (job,) = with_use(planned_jobs(plan), tmp_path)
-    assert job.rule == "motion_clip"
+    assert job.rule == "motion_clips"
     assert job.memory_share == pytest.approx((500 + ENGINE_MB) / 1000)
     assert job.time_share == pytest.approx(0.25)

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from hobble.workflow.batches import SMALLEST, batch_of
+
 pytestmark = pytest.mark.workflow
 
 # A figure of one bone, whatever its joints are called.
@@ -53,7 +55,7 @@ def make(workflow, *targets: str, ok: bool) -> str:
 def refused(workflow, stage: str, *pieces: str) -> None:
     """The job of the bad clip ends with one message that contains `pieces`. The good clip's job succeeds."""
     text = make(workflow, f"{stage}/{workflow.clip}.npz", f"{stage}/{workflow.other}.npz", ok=False)
-    rule = "channel_clip" if stage.startswith("channels/") else f"{stage}_clip"
+    rule = "channel_clips" if stage.startswith("channels/") else f"{stage}_clips"
     message = [line for line in text.splitlines() if line.startswith(f"{rule}: ")]
     assert len(message) == 1, text
     for piece in pieces:
@@ -158,3 +160,33 @@ def test_a_disk_that_fills(workflow, small_disk: Path) -> None:
     subprocess.run(["mount", "-o", "remount,size=300m", str(small_disk)], check=True)
     workflow.run("-c2", target)
     assert {p: p.read_bytes() for p in whole} == whole
+
+
+def test_one_bad_clip_of_a_batch_fails_alone(clips: list[Path], workflow) -> None:
+    """More clips than have a batch each: three of them share a batch, and only this is asked for."""
+    names = [f"clip-{number}" for number in range(200)]
+    together = [name for name in names if batch_of(name, SMALLEST) == 5][:3]
+    others = [name for name in names if name not in together][: SMALLEST - 2]
+    folder = workflow.folder / "mocap" / "mine"
+    folder.mkdir(parents=True)
+    for number, name in enumerate([*together, *others]):
+        # A line end more for each, because identical files are refused on both sides of the split.
+        (folder / f"{name}.bvh").write_bytes(clips[1].read_bytes() + b"\n" * number)
+    (workflow.checkout / "config/datasets/mine.yaml").write_text(DATASET)
+    workflow.mine, (workflow.clip, *_) = folder, together
+    path = folder / f"{together[0]}.bvh"
+    whole = path.read_text()
+    path.write_text(spoil(whole.splitlines(), "nan"))
+    asked = [f"motion/{name}.npz" for name in together]
+    text = make(workflow, *asked, ok=False)
+    said = [line for line in text.splitlines() if line.startswith("motion_clips: ")]
+    assert len(said) == 1, text
+    assert path.name in said[0]
+    assert "0 of 1 jobs done" in text
+    path.write_text(whole)
+    make(workflow, *asked, ok=True)
+    log = (workflow.folder / "results/datasets/mine/logs/motion/motion_clips/05.log").read_text()
+    assert "3 pieces, 2 of them kept from before, 0 failed" in log
+    one, two, three = (workflow.folder / "results/datasets/mine" / name for name in asked)
+    assert {path.stat().st_nlink for path in (one, two, three)} == {2}
+    assert make(workflow, *asked, ok=True).count("Nothing to be done") == 1

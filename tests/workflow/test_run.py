@@ -83,15 +83,15 @@ def test_more_passes_retrain_and_leave_the_database(finished) -> None:
     assert planned["training"] == 1
     assert {"measure", "generate", "report"} <= set(planned)
     assert planned["measure"] == len(MEASURES)
-    assert not {"database_merge", "database_clip", "motion_clip", "terrain_fits"} & set(planned)
+    assert not {"database_merge", "database_clips", "motion_clips", "terrain_fits"} & set(planned)
 
 
 def test_editing_labels_reruns_from_labels_on(copied) -> None:
     module = copied.own_source() / "labels/contacts.py"
     module.write_text(module.read_text() + "\n_EDITED = 1\n")
     planned = copied.planned(TARGET)
-    assert {"labels_clip", "terrain_fits", "database_clip", "database_merge", "training"} <= set(planned)
-    assert not {"synthetic_clip", "motion_clip", "channel_clip", "terrain_patches"} & set(planned)
+    assert {"labels_clips", "terrain_fits", "database_clips", "database_merge", "training"} <= set(planned)
+    assert not {"synthetic_clips", "motion_clips", "channel_clips", "terrain_patches"} & set(planned)
 
 
 def test_editing_a_comment_of_the_page_remakes_only_the_report(copied) -> None:
@@ -152,7 +152,7 @@ def test_a_configuration_that_continues_another_starts_at_its_end(copied) -> Non
 
 def test_no_job_used_more_than_its_rule_requests(finished) -> None:
     jobs = list(with_use(planned_jobs(finished.run("-np", "-F", TARGET)), finished.folder))
-    assert {"motion_clip", "terrain_fits", "training", "report"} <= {job.rule for job in jobs if job.used_mb}
+    assert {"motion_clips", "terrain_fits", "training", "report"} <= {job.rule for job in jobs if job.used_mb}
     assert [
         (job.log, job.memory_share, job.time_share)
         for job in jobs

@@ -50,27 +50,27 @@ def test_a_run_prints_its_plan_some_progress_and_a_summary() -> None:
     run = Run()
     run.say("workflow_started", "SNAKEMAKE\n=====")
     run.say(None, "Building DAG of jobs...")
-    run.say("run_info", "Job stats:\n...", stats={"motion_clip": 30, "training": 1, "total": 31})
+    run.say("run_info", "Job stats:\n...", stats={"motion_clips": 30, "training": 1, "total": 31})
     for number in range(30):
         run.clock += 1
-        run.job(number, "motion_clip", clip=f"walk-{number}")
+        run.job(number, "motion_clips", clip=f"walk-{number}")
         run.finish(number, number + 1, 31)
     run.job(30, "training", configuration="holden")
     run.clock += 170
     run.finish(30, 31, 31)
     run.terminal.close()
     run.terminal.close()
-    assert run.lines[0] == "31 jobs: 30 motion_clip, 1 training"
+    assert run.lines[0] == "31 jobs: 30 motion_clips, 1 training"
     assert run.lines[-1] == "31 of 31 jobs done in 3 min 20 s."
     assert len([line for line in run.lines if "jobs done in" in line]) == 1
-    assert run.lines[1].startswith("9/31 jobs, 10 s: motion_clip")
+    assert run.lines[1].startswith("9/31 jobs, 10 s: motion_clips")
     assert len(run.lines) <= 2 + 200 / 10
 
 
 def test_on_a_terminal_one_line_is_overwritten_and_cleared() -> None:
     run = Run(live=True)
-    run.say("run_info", "", stats={"motion_clip": 2, "total": 2})
-    run.job(1, "motion_clip", clip="a")
+    run.say("run_info", "", stats={"motion_clips": 2, "total": 2})
+    run.job(1, "motion_clips", clip="a")
     run.finish(1, 1, 2)
     assert run.out.getvalue().count("\n") == 1
     run.say(None, "something odd", logging.WARNING)
@@ -82,18 +82,20 @@ def test_a_failure_is_printed_once_and_listed_in_the_summary(tmp_path: Path) -> 
     said.write_text("2026-01-01 00:00:00,000 INFO x\n2026-01-01 00:00:00,000 ERROR a.bvh: is torn\n")
     silent.write_text("2026-01-01 00:00:00,000 INFO x\n")
     run = Run()
-    run.say("run_info", "", stats={"motion_clip": 2, "total": 2})
+    run.say("run_info", "", stats={"motion_clips": 2, "total": 2})
     for number, log in enumerate((said, silent)):
-        run.job(number, "motion_clip", str(log), clip="ab"[number])
+        run.job(number, "motion_clips", str(log), clip="ab"[number])
         run.say("error", CALLED, logging.ERROR)
-        run.say("job_error", "Error in rule", logging.ERROR, jobid=number, rule_name="motion_clip", log=[log])
+        run.say(
+            "job_error", "Error in rule", logging.ERROR, jobid=number, rule_name="motion_clips", log=[log]
+        )
     run.say(None, "Exiting because a job execution failed. Look below for error messages", logging.ERROR)
     run.terminal.close()
     assert run.lines[1:] == [
-        f"motion_clip b: ended without a message; it may have been killed. Its log: {silent}",
+        f"motion_clips b: ended without a message; it may have been killed. Its log: {silent}",
         "0 of 2 jobs done in 0 s, 2 failed:",
-        f"  motion_clip a: {said}",
-        f"  motion_clip b: {silent}",
+        f"  motion_clips a: {said}",
+        f"  motion_clips b: {silent}",
         "When this is fixed, the same command continues from here.",
     ]
 
@@ -123,11 +125,46 @@ def test_jobs_of_a_stopped_run_do_not_count_as_failed() -> None:
 def test_a_dry_run_prints_its_table_once_and_the_reasons() -> None:
     run = Run(dryrun=True)
     for _ in range(2):
-        run.say("run_info", "Job stats:\njob  count", stats={"total": 1})
+        run.say("run_info", "Job stats: ...", stats={"training": 1, "total": 1})
         run.job(1, "training")
     run.say(None, "Reasons:\n    (check individual jobs above for details)\n    code: training")
     run.terminal.close()
-    assert run.lines == ["Job stats:", "job  count", "Reasons:", "    code: training"]
+    assert run.lines == [
+        "Job stats:",
+        "job         count",
+        "--------  -------",
+        "training        1",
+        "total           1",
+        "Reasons:",
+        "    code: training",
+    ]
+
+
+def test_the_batches_of_a_rule_are_one_line() -> None:
+    stats = {f"motion_clips__cmu-ava__{n}": 1 for n in range(12)} | {"training": 1, "total": 13}
+    run = Run(dryrun=True)
+    run.say("run_info", "Job stats: ...", stats=stats)
+    run.say(
+        None,
+        "Reasons:\n    code:\n        motion_clips__cmu-ava__0, motion_clips__cmu-ava__11, training\nx, y",
+    )
+    assert run.lines[3:] == [
+        "motion_clips       12",
+        "training            1",
+        "total              13",
+        "Reasons:",
+        "    code:",
+        "        motion_clips, training",
+        "x, y",
+    ]
+    run = Run()
+    run.say("run_info", "", stats=stats)
+    log = "results/datasets/cmu-ava/logs/motion/motion_clips/07.log"
+    run.job(1, "motion_clips__cmu-ava__7", log)
+    run.say("job_error", "", logging.ERROR, jobid=1, rule_name="motion_clips__cmu-ava__7", log=[log])
+    run.terminal.close()
+    assert run.lines[0] == "13 jobs: 12 motion_clips, 1 training"
+    assert f"  motion_clips cmu-ava 07: {log}" in run.lines
 
 
 @pytest.mark.workflow
@@ -137,11 +174,11 @@ def test_a_whole_run_takes_few_lines(workflow) -> None:
     assert len(dry.splitlines()) < 20
     text = workflow.run("-c2", target)
     lines = [line for line in text.splitlines() if not line.startswith("Using workflow specific profile")]
-    assert lines[0] == "3 jobs: 1 synthetic_clip, 1 motion_clip, 1 channel_clip"
+    assert lines[0] == "3 jobs: 1 synthetic_clips, 1 motion_clips, 1 channel_clips"
     assert re.fullmatch(r"3 of 3 jobs done in .*\.", lines[-1])
     assert len([line for line in lines if not line.startswith(("0/3 ", "1/3 ", "2/3 ", "3/3 "))]) == 2
     assert "Error in rule" not in text
-    assert "rule synthetic_clip:" in workflow.run("-np", "-F", target)
+    assert "rule synthetic_clips__tiny__0:" in workflow.run("-np", "-F", target)
 
 
 @pytest.mark.workflow
@@ -164,7 +201,7 @@ def test_on_a_terminal_a_failure_has_its_own_line(workflow) -> None:
         pass  # the other side is closed
     assert process.wait() == 1
     shown = [line.rpartition("\x1b[K")[2] for line in said.decode().splitlines()]
-    assert len([line for line in shown if line.startswith("motion_clip: ") and "torn.bvh" in line]) == 1, (
+    assert len([line for line in shown if line.startswith("motion_clips: ") and "torn.bvh" in line]) == 1, (
         shown
     )
     assert "0 of 1 jobs done in" in said.decode()

@@ -1,51 +1,72 @@
-rule channel_clip:
-    """The values of one channel in each frame of a clip."""
-    input:
-        clip="results/datasets/{dataset}/motion/{clip}.npz",
-        report="results/datasets/{dataset}/motion/{clip}.json",
-        files=lambda w: keep_local(
-            datasets.channel_sources.files(w.dataset, w.clip, w.channel)
-        ),
-    output:
-        values="results/datasets/{dataset}/channels/{channel}/{clip}.npz",
-        report="results/datasets/{dataset}/channels/{channel}/{clip}.json",
-    log:
-        "results/datasets/{dataset}/logs/channels/channel_clip/{channel}/{clip}.log",
-    benchmark:
-        "results/datasets/{dataset}/benchmarks/channels/channel_clip/{channel}/{clip}.tsv"
-    threads: 1
-    resources:
-        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 4, attempt),
-        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.1, attempt),
-    params:
-        clip=lambda w: w.clip,
-        channel=lambda w: w.channel,
-        source=lambda w: datasets.channel_sources.source(w.dataset, w.clip, w.channel),
-        code=lambda w: package.code("channel_clip", f"hobble.channels.{w.channel}"),
-    script:
-        "../scripts/channel_clip.py"
+def channels_of(batch):
+    """The channels whose values are read for a batch: those of hurt versions are made with them."""
+    there = datasets.channel_sources.channels(batch.dataset)
+    return [name for name in there if not (batch.hurt and name == clips.hurt_channel)]
 
 
-rule channel_mirror:
-    """The values of one channel in each frame of a mirrored clip."""
-    input:
-        values="results/datasets/{dataset}/channels/{channel}/{clip}.npz",
-        report="results/datasets/{dataset}/channels/{channel}/{clip}.json",
-        clip="results/datasets/{dataset}/motion/{clip}_mirror.npz",
-    output:
-        values="results/datasets/{dataset}/channels/{channel}/{clip}_mirror.npz",
-        report="results/datasets/{dataset}/channels/{channel}/{clip}_mirror.json",
-    log:
-        "results/datasets/{dataset}/logs/channels/channel_mirror/{channel}/{clip}.log",
-    benchmark:
-        "results/datasets/{dataset}/benchmarks/channels/channel_mirror/{channel}/{clip}.tsv"
-    threads: 1
-    resources:
-        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 4, attempt),
-        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.1, attempt),
-    params:
-        clip=lambda w: f"{w.clip}_mirror",
-        channel=lambda w: w.channel,
-        code=lambda w: package.code("channel_mirror", f"hobble.channels.{w.channel}"),
-    script:
-        "../scripts/channel_mirror.py"
+def of_channels(batch, paths):
+    """Paths with {channel}, for each channel of a batch."""
+    return [
+        path.replace("{channel}", name) for name in channels_of(batch) for path in paths
+    ]
+
+
+def channel_files(batch):
+    """The files that each channel reads for each clip."""
+    return [
+        datasets.channel_sources.files(batch.dataset, clip, name)
+        for name in channels_of(batch)
+        for clip in batch.clips
+    ]
+
+
+for batch in filter(channels_of, [*batches_of_clips, *batches_of_versions]):
+
+    rule:
+        """The values of the data set's channels in each frame of clips and their mirrors."""
+        name:
+            batch.rule("channel_clips")
+        input:
+            clip=of_channels(batch, batch.of_clips("motion/{clip}.npz")),
+            report=of_channels(batch, batch.of_clips("motion/{clip}.json")),
+            mirror=of_channels(batch, batch.of_mirrors("motion/{clip}.npz")),
+            files=lambda w, batch=batch: keep_local(
+                [file for files in channel_files(batch) for file in files]
+            ),
+        output:
+            values=of_channels(batch, batch.of_clips("channels/{channel}/{clip}.npz")),
+            report=of_channels(batch, batch.of_clips("channels/{channel}/{clip}.json")),
+            mirror=of_channels(batch, batch.of_mirrors("channels/{channel}/{clip}.npz")),
+            mirror_report=of_channels(
+                batch, batch.of_mirrors("channels/{channel}/{clip}.json")
+            ),
+        log:
+            batch.log("channels", "channel_clips"),
+        benchmark:
+            batch.benchmark("channels", "channel_clips")
+        threads: 1
+        resources:
+            mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
+                batch, 4, attempt
+            ),
+            runtime=lambda w, attempt, batch=batch: demands.batch_minutes(
+                batch, 0.2 * len(channels_of(batch)), attempt
+            ),
+        params:
+            each=lambda w, batch=batch: [
+                {
+                    "clip": clip,
+                    "channel": name,
+                    "source": datasets.channel_sources.source(
+                        batch.dataset, clip, name
+                    ),
+                    "code": package.code("channel_clips", f"hobble.channels.{name}"),
+                }
+                for name in channels_of(batch)
+                for clip in batch.clips
+            ],
+            counts=lambda w, batch=batch: {
+                "files": [len(files) for files in channel_files(batch)]
+            },
+        script:
+            "../scripts/channel_clips.py"

@@ -1,37 +1,55 @@
 from hobble.database.options import Merging, Rows
 from hobble.workflow.datasets import shard_of
 
+for batch in [*batches_of_clips, *batches_of_versions]:
 
-rule database_clip:
-    """The rows of X, Y and P of one clip."""
-    input:
-        clip="results/datasets/{dataset}/motion/{rows}.npz",
-        labels="results/datasets/{dataset}/labels/{rows}.npz",
-        channels=lambda w: [
-            f"results/datasets/{w.dataset}/channels/{channel}/{w.rows}.npz"
-            for channel in datasets.channel_sources.channels(w.dataset)
-        ],
-        terrain="results/datasets/{dataset}/terrain/clips/{rows}.npz",
-    output:
-        rows="results/datasets/{dataset}/database/clips/{rows}.npz",
-        facts="results/datasets/{dataset}/database/clips/{rows}.json",
-    log:
-        "results/datasets/{dataset}/logs/database/database_clip/{rows}.log",
-    benchmark:
-        "results/datasets/{dataset}/benchmarks/database/database_clip/{rows}.tsv"
-    threads: 1
-    resources:
-        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.rows, 22, attempt),
-        runtime=lambda w, attempt: demands.minutes(w.dataset, w.rows, 0.15, attempt),
-    params:
-        clip=lambda w: w.rows,
-        channels=lambda w: datasets.channel_sources.channels(w.dataset),
-        options=lambda w: datasets.part(w.dataset, "database", Rows),
-        code=lambda w: package.code(
-            "database_clip", *modules_of(datasets.channel_sources.channels(w.dataset))
-        ),
-    script:
-        "../scripts/database_clip.py"
+    rule:
+        """The rows of X, Y and P of clips."""
+        name:
+            batch.rule("database_clips")
+        input:
+            clip=batch.of_names("motion/{clip}.npz"),
+            labels=batch.of_names("labels/{clip}.npz"),
+            # Those of the first clip, then those of the second, ...
+            channels=[
+                f"results/datasets/{batch.dataset}/channels/{channel}/{name}.npz"
+                for name in batch.names
+                for channel in datasets.channel_sources.channels(batch.dataset)
+            ],
+            terrain=batch.of_names("terrain/clips/{clip}.npz"),
+        output:
+            rows=batch.of_names("database/clips/{clip}.npz"),
+            facts=batch.of_names("database/clips/{clip}.json"),
+        log:
+            batch.log("database", "database_clips"),
+        benchmark:
+            batch.benchmark("database", "database_clips")
+        threads: 1
+        resources:
+            mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
+                batch, 22, attempt
+            ),
+            runtime=lambda w, attempt, batch=batch: demands.batch_minutes(
+                batch, 0.15 * (1 + batch.mirrored), attempt
+            ),
+        params:
+            each=lambda w, batch=batch: [{"clip": name} for name in batch.names],
+            counts=lambda w, batch=batch: {
+                "channels": [len(datasets.channel_sources.channels(batch.dataset))]
+                * len(batch.names)
+            },
+            channels=lambda w, batch=batch: datasets.channel_sources.channels(
+                batch.dataset
+            ),
+            options=lambda w, batch=batch: datasets.part(
+                batch.dataset, "database", Rows
+            ),
+            code=lambda w, batch=batch: package.code(
+                "database_clips",
+                *modules_of(datasets.channel_sources.channels(batch.dataset)),
+            ),
+        script:
+            "../scripts/database_clips.py"
 
 
 def clips_of(dataset, channels, file):

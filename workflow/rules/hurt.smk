@@ -1,33 +1,49 @@
-rule hurt_clip:
-    """A hurt version of a healthy clip, with its labels and severities."""
-    input:
-        clip="results/datasets/{dataset}/motion/{clip}.npz",
-        report="results/datasets/{dataset}/motion/{clip}.json",
-        labels="results/datasets/{dataset}/labels/{clip}.npz",
-        label_report="results/datasets/{dataset}/labels/{clip}.json",
-    output:
-        clip="results/datasets/{dataset}/motion/{clip}_hurt{version}.npz",
-        report="results/datasets/{dataset}/motion/{clip}_hurt{version}.json",
-        labels="results/datasets/{dataset}/labels/{clip}_hurt{version}.npz",
-        label_report="results/datasets/{dataset}/labels/{clip}_hurt{version}.json",
-        injury="results/datasets/{dataset}/channels/injury/{clip}_hurt{version}.npz",
-        injury_report="results/datasets/{dataset}/channels/injury/{clip}_hurt{version}.json",
-    log:
-        "results/datasets/{dataset}/logs/motion/hurt_clip/{clip}_hurt{version}.log",
-    benchmark:
-        "results/datasets/{dataset}/benchmarks/motion/hurt_clip/{clip}_hurt{version}.tsv"
-    wildcard_constraints:
-        clip=LISTED_CLIP,
-        version="[1-9]",
-    threads: 1
-    resources:
-        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 20, attempt),
-        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.4, attempt),
-    params:
-        clip=lambda w: f"{w.clip}_hurt{w.version}",
-        turn=lambda w: clips.hurt_versions(w.dataset)[f"{w.clip}_hurt{w.version}"],
-        ground=lambda w: clips.entry(w.dataset, w.clip).ground,
-        options=lambda w: clips.hurt(w.dataset, w.clip).model_dump(mode="json"),
-        code=package.code("hurt_clip"),
-    script:
-        "../scripts/hurt_clip.py"
+for batch in batches_of_versions:
+
+    rule:
+        """Hurt versions of healthy clips, with their labels and severities, and their mirrors."""
+        name:
+            batch.rule("hurt_clips")
+        input:
+            clip=batch.of_originals("motion/{clip}.npz"),
+            report=batch.of_originals("motion/{clip}.json"),
+            labels=batch.of_originals("labels/{clip}.npz"),
+            label_report=batch.of_originals("labels/{clip}.json"),
+        output:
+            clip=batch.of_clips("motion/{clip}.npz"),
+            report=batch.of_clips("motion/{clip}.json"),
+            labels=batch.of_clips("labels/{clip}.npz"),
+            label_report=batch.of_clips("labels/{clip}.json"),
+            injury=batch.of_clips("channels/injury/{clip}.npz"),
+            injury_report=batch.of_clips("channels/injury/{clip}.json"),
+            mirror_clip=batch.of_mirrors("motion/{clip}.npz"),
+            mirror_report=batch.of_mirrors("motion/{clip}.json"),
+            mirror_labels=batch.of_mirrors("labels/{clip}.npz"),
+            mirror_label_report=batch.of_mirrors("labels/{clip}.json"),
+            mirror_injury=batch.of_mirrors("channels/injury/{clip}.npz"),
+            mirror_injury_report=batch.of_mirrors("channels/injury/{clip}.json"),
+        log:
+            batch.log("motion", "hurt_clips"),
+        benchmark:
+            batch.benchmark("motion", "hurt_clips")
+        threads: 1
+        resources:
+            mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
+                batch, 20, attempt
+            ),
+            runtime=lambda w, attempt, batch=batch: demands.batch_minutes(
+                batch, 0.7, attempt
+            ),
+        params:
+            each=lambda w, batch=batch: [
+                {
+                    "clip": clip,
+                    "turn": clips.hurt_versions(batch.dataset)[clip],
+                    "ground": clips.entry(batch.dataset, clip).ground,
+                    "options": clips.hurt(batch.dataset, clip).model_dump(mode="json"),
+                }
+                for clip in batch.clips
+            ],
+            code=lambda w: package.code("hurt_clips", *modules_of([clips.hurt_channel])),
+        script:
+            "../scripts/hurt_clips.py"

@@ -6,58 +6,48 @@ def for_listed_clips(dataset, file):
     ]
 
 
-rule labels_clip:
-    """Contacts, phase and gait of a clip, from label files beside it if there are any."""
-    input:
-        clip="results/datasets/{dataset}/motion/{clip}.npz",
-        report="results/datasets/{dataset}/motion/{clip}.json",
-        files=lambda w: keep_local(clips.label_files(w.dataset, w.clip)),
-    output:
-        labels="results/datasets/{dataset}/labels/{clip}.npz",
-        report="results/datasets/{dataset}/labels/{clip}.json",
-    log:
-        "results/datasets/{dataset}/logs/labels/labels_clip/{clip}.log",
-    benchmark:
-        "results/datasets/{dataset}/benchmarks/labels/labels_clip/{clip}.tsv"
-    wildcard_constraints:
-        clip=LISTED_CLIP,
-    threads: 1
-    resources:
-        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 5, attempt),
-        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.15, attempt),
-    params:
-        clip=lambda w: w.clip,
-        gait=lambda w: clips.entry(w.dataset, w.clip).gait,
-        ground=lambda w: clips.entry(w.dataset, w.clip).ground,
-        options=lambda w: datasets.options(w.dataset, "labels"),
-        code=package.code("labels_clip"),
-    script:
-        "../scripts/labels_clip.py"
+for batch in batches_of_clips:
 
-
-rule labels_mirror:
-    """The labels of a mirrored clip: feet swapped, phase shifted by half a cycle."""
-    input:
-        labels="results/datasets/{dataset}/labels/{clip}.npz",
-        report="results/datasets/{dataset}/labels/{clip}.json",
-        clip="results/datasets/{dataset}/motion/{clip}_mirror.npz",
-    output:
-        labels="results/datasets/{dataset}/labels/{clip}_mirror.npz",
-        report="results/datasets/{dataset}/labels/{clip}_mirror.json",
-    log:
-        "results/datasets/{dataset}/logs/labels/labels_mirror/{clip}.log",
-    benchmark:
-        "results/datasets/{dataset}/benchmarks/labels/labels_mirror/{clip}.tsv"
-    threads: 1
-    resources:
-        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 4, attempt),
-        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.1, attempt),
-    params:
-        clip=lambda w: f"{w.clip}_mirror",
-        options=lambda w: datasets.options(w.dataset, "labels"),
-        code=package.code("labels_mirror"),
-    script:
-        "../scripts/labels_mirror.py"
+    rule:
+        """Contacts, phase and gait of clips, from label files beside them if there are any. For a mirror the feet are swapped and the phase is shifted by half a cycle."""
+        name:
+            batch.rule("labels_clips")
+        input:
+            clip=batch.of_clips("motion/{clip}.npz"),
+            report=batch.of_clips("motion/{clip}.json"),
+            mirror=batch.of_mirrors("motion/{clip}.npz"),
+            files=lambda w, batch=batch: for_each(batch, clips.label_files),
+        output:
+            labels=batch.of_clips("labels/{clip}.npz"),
+            report=batch.of_clips("labels/{clip}.json"),
+            mirror=batch.of_mirrors("labels/{clip}.npz"),
+            mirror_report=batch.of_mirrors("labels/{clip}.json"),
+        log:
+            batch.log("labels", "labels_clips"),
+        benchmark:
+            batch.benchmark("labels", "labels_clips")
+        threads: 1
+        resources:
+            mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
+                batch, 5, attempt
+            ),
+            runtime=lambda w, attempt, batch=batch: demands.batch_minutes(
+                batch, 0.25, attempt
+            ),
+        params:
+            each=lambda w, batch=batch: [
+                {
+                    "clip": clip,
+                    "gait": clips.entry(batch.dataset, clip).gait,
+                    "ground": clips.entry(batch.dataset, clip).ground,
+                }
+                for clip in batch.clips
+            ],
+            counts=lambda w, batch=batch: {"files": counted(batch, clips.label_files)},
+            options=lambda w, batch=batch: datasets.options(batch.dataset, "labels"),
+            code=lambda w: package.code("labels_clips"),
+        script:
+            "../scripts/labels_clips.py"
 
 
 rule look_page:
@@ -67,6 +57,14 @@ rule look_page:
         reports=lambda w: for_listed_clips(w.dataset, "motion/{clip}.json"),
         labels=lambda w: for_listed_clips(w.dataset, "labels/{clip}.json"),
         contacts=lambda w: for_listed_clips(w.dataset, "labels/{clip}.npz"),
+        # Not shown, but read and checked, so that this page is the check of a folder of clips.
+        channels=lambda w: [
+            file
+            for channel in datasets.channel_sources.channels(w.dataset)
+            for file in for_listed_clips(
+                w.dataset, f"channels/{channel}/{{clip}}.json"
+            )
+        ],
     output:
         html="results/datasets/{dataset}/look.html",
     log:

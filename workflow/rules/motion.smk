@@ -17,53 +17,50 @@ rule download_clip:
         "../scripts/download_clip.py"
 
 
-rule motion_clip:
-    """A clip from its BVH file: checked, on the data set's skeleton, at 60 Hz."""
-    input:
-        bvh=lambda w: keep_local(clips.source(w.dataset, w.clip)),
-        skeleton=lambda w: keep_local(clips.skeleton_file(w.dataset)),
-        rig=lambda w: clips.rig_files(w.dataset, w.clip),
-    output:
-        clip="results/datasets/{dataset}/motion/{clip}.npz",
-        report="results/datasets/{dataset}/motion/{clip}.json",
-    log:
-        "results/datasets/{dataset}/logs/motion/motion_clip/{clip}.log",
-    benchmark:
-        "results/datasets/{dataset}/benchmarks/motion/motion_clip/{clip}.tsv"
-    wildcard_constraints:
-        clip=LISTED_CLIP,
-    threads: 1
-    resources:
-        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 13, attempt),
-        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.2, attempt),
-    params:
-        clip=lambda w: w.clip,
-        skeleton_name=lambda w: catalogue.dataset(w.dataset).skeleton,
-        maps=clips.skeletons,
-        options=lambda w: datasets.motion_options(w.dataset, w.clip),
-        code=package.code("motion_clip"),
-    script:
-        "../scripts/motion_clip.py"
+for batch in batches_of_clips:
 
-
-rule motion_mirror:
-    """The clip with left and right swapped."""
-    input:
-        clip="results/datasets/{dataset}/motion/{clip}.npz",
-        report="results/datasets/{dataset}/motion/{clip}.json",
-    output:
-        clip="results/datasets/{dataset}/motion/{clip}_mirror.npz",
-        report="results/datasets/{dataset}/motion/{clip}_mirror.json",
-    log:
-        "results/datasets/{dataset}/logs/motion/motion_mirror/{clip}.log",
-    benchmark:
-        "results/datasets/{dataset}/benchmarks/motion/motion_mirror/{clip}.tsv"
-    threads: 1
-    resources:
-        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 4, attempt),
-        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.1, attempt),
-    params:
-        clip=lambda w: f"{w.clip}_mirror",
-        code=package.code("motion_mirror"),
-    script:
-        "../scripts/motion_mirror.py"
+    rule:
+        """Clips from their BVH files: checked, on the data set's skeleton, at 60 Hz; and with left and right swapped."""
+        name:
+            batch.rule("motion_clips")
+        input:
+            bvh=lambda w, batch=batch: keep_local(
+                [clips.source(batch.dataset, clip) for clip in batch.clips]
+            ),
+            skeleton=lambda w, batch=batch: keep_local(
+                clips.skeleton_file(batch.dataset)
+            ),
+            rigs=lambda w, batch=batch: for_each(batch, clips.rig_files),
+        output:
+            clip=batch.of_clips("motion/{clip}.npz"),
+            report=batch.of_clips("motion/{clip}.json"),
+            mirror=batch.of_mirrors("motion/{clip}.npz"),
+            mirror_report=batch.of_mirrors("motion/{clip}.json"),
+        log:
+            batch.log("motion", "motion_clips"),
+        benchmark:
+            batch.benchmark("motion", "motion_clips")
+        threads: 1
+        resources:
+            mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
+                batch, 13, attempt
+            ),
+            runtime=lambda w, attempt, batch=batch: demands.batch_minutes(
+                batch, 0.3, attempt
+            ),
+        params:
+            each=lambda w, batch=batch: [
+                {
+                    "clip": clip,
+                    "options": datasets.motion_options(batch.dataset, clip),
+                }
+                for clip in batch.clips
+            ],
+            counts=lambda w, batch=batch: {"rigs": counted(batch, clips.rig_files)},
+            skeleton_name=lambda w, batch=batch: catalogue.dataset(
+                batch.dataset
+            ).skeleton,
+            maps=clips.skeletons,
+            code=lambda w: package.code("motion_clips"),
+        script:
+            "../scripts/motion_clips.py"

@@ -67,7 +67,7 @@ rule pipeline_summary:
         runtime=5,
     params:
         configuration=lambda w: w.configuration,
-        stages=lambda w: stages(configurations, w.configuration),
+        stages=lambda w: stages(configurations, project.batches, w.configuration),
         code=package.code("pipeline_summary"),
     script:
         "../scripts/pipeline_summary.py"

@@ -1,27 +1,40 @@
-rule synthetic_clip:
-    """One clip of the embedded walker, in the same form as a user's clip."""
-    input:
-        skeleton=lambda w: keep_local(clips.skeleton_file(w.dataset)),
-    output:
-        bvh="results/datasets/{dataset}/synthetic/{clip}.bvh",
-        footsteps="results/datasets/{dataset}/synthetic/{clip}_footsteps.txt",
-        gait="results/datasets/{dataset}/synthetic/{clip}_gait.txt",
-    log:
-        "results/datasets/{dataset}/logs/synthetic/synthetic_clip/{clip}.log",
-    benchmark:
-        "results/datasets/{dataset}/benchmarks/synthetic/synthetic_clip/{clip}.tsv"
-    wildcard_constraints:
-        clip=LISTED_CLIP,
-    threads: 1
-    resources:
-        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.clip, 13, attempt),
-        runtime=lambda w, attempt: demands.minutes(w.dataset, w.clip, 0.2, attempt),
-    params:
-        clip=lambda w: w.clip,
-        frames=lambda w: datasets.frames(w.dataset, w.clip),
-        recipe=lambda w: clips.entry(w.dataset, w.clip).recipe,
-        ground=lambda w: clips.entry(w.dataset, w.clip).ground,
-        options=lambda w: datasets.options(w.dataset, "synthetic"),
-        code=package.code("synthetic_clip"),
-    script:
-        "../scripts/synthetic_clip.py"
+for batch in batches_of_walker:
+
+    rule:
+        """Clips of the embedded walker, in the same form as a user's clips."""
+        name:
+            batch.rule("synthetic_clips")
+        input:
+            skeleton=lambda w, batch=batch: keep_local(
+                clips.skeleton_file(batch.dataset)
+            ),
+        output:
+            bvh=batch.of_clips("synthetic/{clip}.bvh"),
+            footsteps=batch.of_clips("synthetic/{clip}_footsteps.txt"),
+            gait=batch.of_clips("synthetic/{clip}_gait.txt"),
+        log:
+            batch.log("synthetic", "synthetic_clips"),
+        benchmark:
+            batch.benchmark("synthetic", "synthetic_clips")
+        threads: 1
+        resources:
+            mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
+                batch, 13, attempt
+            ),
+            runtime=lambda w, attempt, batch=batch: demands.batch_minutes(
+                batch, 0.2, attempt
+            ),
+        params:
+            each=lambda w, batch=batch: [
+                {
+                    "clip": clip,
+                    "frames": datasets.frames(batch.dataset, clip),
+                    "recipe": clips.entry(batch.dataset, clip).recipe,
+                    "ground": clips.entry(batch.dataset, clip).ground,
+                }
+                for clip in batch.clips
+            ],
+            options=lambda w, batch=batch: datasets.options(batch.dataset, "synthetic"),
+            code=lambda w: package.code("synthetic_clips"),
+        script:
+            "../scripts/synthetic_clips.py"

@@ -22,29 +22,41 @@ rule terrain_patches:
         "../scripts/terrain_patches.py"
 
 
-rule terrain_fits:
-    """The ten patches that fit each cycle of a clip best, and their heights under it."""
-    input:
-        clip="results/datasets/{dataset}/motion/{rows}.npz",
-        labels="results/datasets/{dataset}/labels/{rows}.npz",
-        patches="results/datasets/{dataset}/terrain/patches.npz",
-    output:
-        fits="results/datasets/{dataset}/terrain/clips/{rows}.npz",
-    log:
-        "results/datasets/{dataset}/logs/terrain/terrain_fits/{rows}.log",
-    benchmark:
-        "results/datasets/{dataset}/benchmarks/terrain/terrain_fits/{rows}.tsv"
-    threads: 1
-    resources:
-        mem_mb=lambda w, attempt: demands.memory(w.dataset, w.rows, 15, attempt),
-        runtime=lambda w, attempt: demands.minutes(
-            w.dataset, w.rows, 0.3, attempt, least=3
-        ),
-    params:
-        clip=lambda w: w.rows,
-        ground=lambda w: clips.entry(w.dataset, w.rows).ground,
-        options=lambda w: datasets.part(w.dataset, "terrain", Fitting),
-        sampling=lambda w: datasets.part(w.dataset, "database", Sampling),
-        code=package.code("terrain_fits"),
-    script:
-        "../scripts/terrain_fits.py"
+for batch in [*batches_of_clips, *batches_of_versions]:
+
+    rule:
+        """The ten patches that fit each cycle of a clip best, and their heights under it."""
+        name:
+            batch.rule("terrain_fits")
+        input:
+            clip=batch.of_names("motion/{clip}.npz"),
+            labels=batch.of_names("labels/{clip}.npz"),
+            patches=f"results/datasets/{batch.dataset}/terrain/patches.npz",
+        output:
+            fits=batch.of_names("terrain/clips/{clip}.npz"),
+        log:
+            batch.log("terrain", "terrain_fits"),
+        benchmark:
+            batch.benchmark("terrain", "terrain_fits")
+        threads: 1
+        resources:
+            mem_mb=lambda w, attempt, batch=batch: demands.batch_memory(
+                batch, 15, attempt
+            ),
+            runtime=lambda w, attempt, batch=batch: demands.batch_minutes(
+                batch, 0.3 * (1 + batch.mirrored), attempt, least=3
+            ),
+        params:
+            each=lambda w, batch=batch: [
+                {"clip": name, "ground": clips.entry(batch.dataset, name).ground}
+                for name in batch.names
+            ],
+            options=lambda w, batch=batch: datasets.part(
+                batch.dataset, "terrain", Fitting
+            ),
+            sampling=lambda w, batch=batch: datasets.part(
+                batch.dataset, "database", Sampling
+            ),
+            code=lambda w: package.code("terrain_fits"),
+        script:
+            "../scripts/terrain_fits.py"

@@ -1,20 +1,29 @@
-"""Creates the terrain under the cycles of one clip from its motion, its labels and the patches."""
+"""Creates the terrain under the cycles of clips from their motion, their labels and the patches."""
+
+import functools
 
 from hobble.core.clip import load_clip
 from hobble.core.files import load_npz
 from hobble.terrain.clip_fits import clip_fits, save_fits
 from hobble.terrain.options import Fitting, Sampling
 from hobble.terrain.patches import load_patches
-from hobble.workflow.job import job
+from hobble.workflow.batch_job import make_each
 
-with job(snakemake) as log:
+patches = functools.cache(load_patches)
+
+
+def make(piece, log):
+    """Fit the ground under a clip."""
     fits = clip_fits(
-        load_clip(snakemake.input.clip),
-        load_npz(snakemake.input.labels),
-        load_patches(snakemake.input.patches),
-        snakemake.params.ground,
-        Fitting.model_validate(snakemake.params.options),
-        Sampling.model_validate(snakemake.params.sampling),
+        load_clip(piece.input["clip"]),
+        load_npz(piece.input["labels"]),
+        patches(piece.input["patches"]),
+        piece.params["ground"],
+        Fitting.model_validate(piece.params["options"]),
+        Sampling.model_validate(piece.params["sampling"]),
     )
-    save_fits(snakemake.output.fits, fits)
+    save_fits(piece.output["fits"], fits)
     log.info("%d rows in %d cycles, %d fits", len(fits.frame), len(fits.patch), len(fits.heights))
+
+
+make_each(snakemake, make)

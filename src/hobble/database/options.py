@@ -10,7 +10,7 @@ from hobble.core.section import Positive, PositiveFloat, Section
 
 
 class Rows(Section):
-    """The content of a row; read by the rule `database_clip`."""
+    """The content of a row; read by the rule `database_clips`."""
 
     window: Annotated[int, Field(gt=0, le=3600)] = Field(
         60, description="frames before and after the present one"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +14,27 @@ from hobble.database.manifest import Manifest
 from hobble.database.sizes import sizes
 from hobble.evaluation.tables import read_numbers
 from hobble.report.provenance import machine, versions
+from hobble.workflow.kept import recorded_seconds
 
 
 def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]) -> dict[str, Any]:
     """The content of `pipeline.json`.
 
     stages: in the order of the pipeline, stage -> {"benchmarks": tsv files or folders of them, "files":
-    artefacts or folders of them}. A missing file is listed under `missing` and is no error: a stage may have
-    been copied from another machine without its benchmarks. The time of training comes from its history,
-    because Snakemake measures only the last of several calls. Returns `stages` (one entry each:
-    jobs, seconds and longest in seconds, max_rss_mb, cpu_seconds, files, bytes, and the same for each rule),
-    `total_seconds`, `total_bytes`, `database` (see `hobble.database.sizes`; None without a database),
-    `missing`, `machine`, `versions`. Raises InputError for a malformed benchmark or history.
+    artefacts or folders of them}. For the stages of a data set also "made": folders, each called as a rule,
+    with the records of its finished clips; and "batches": of these rules only the benchmarks with these names
+    count. A missing file is listed under `missing` and is no error: a stage may have been copied from another
+    machine without its benchmarks. The time of training comes from its history, and that of clips from their
+    records if these say more, because Snakemake measures only the last of several calls. Returns `stages`
+    (one entry each: jobs, seconds and longest in seconds, max_rss_mb, cpu_seconds, files, bytes, and the same
+    for each rule), `total_seconds`, `total_bytes`, `database` (see `hobble.database.sizes`; None without a
+    database), `missing`, `machine`, `versions`. Raises InputError for a malformed benchmark or history.
     """
     missing: list[str] = []
     entries = []
     for stage, paths in stages.items():
-        jobs = _jobs(paths.get("benchmarks", ()), missing)
+        made = {Path(folder).name: recorded_seconds(Path(folder)) for folder in paths.get("made", ())}
+        jobs = _jobs(paths.get("benchmarks", ()), missing, made, set(paths.get("batches", ())))
         trained = _trained(paths.get("files", ()))
         sizes = _sizes(paths.get("files", ()), missing)
         by_rule: dict[str, list[dict[str, float]]] = defaultdict(list)
@@ -38,13 +42,15 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
             if rule == "training":
                 row["s"] = max(row.get("s", 0.0), trained)
             by_rule[rule].append(row)
+        for rule, seconds in made.items():
+            _add_earlier_calls(by_rule[rule], seconds)
         entries.append(
             {
                 "stage": stage,
                 **_total([row for _, row in jobs]),
                 "files": len(sizes),
                 "bytes": sum(sizes),
-                "rules": [{"rule": rule, **_total(rows)} for rule, rows in sorted(by_rule.items())],
+                "rules": [{"rule": rule, **_total(rows)} for rule, rows in sorted(by_rule.items()) if rows],
             }
         )
     return {
@@ -80,8 +86,13 @@ def _number(text: str | None) -> float | None:
         return None
 
 
-def _jobs(paths: Iterable[str], missing: list[str]) -> list[tuple[str, dict[str, float]]]:
-    """(rule, row) of every benchmark in `paths`: <rule>.tsv or <rule>/<clip>.tsv."""
+def _jobs(
+    paths: Iterable[str], missing: list[str], made: Container[str], batches: Container[str]
+) -> list[tuple[str, dict[str, float]]]:
+    """(rule, row) of every benchmark in `paths`: <rule>.tsv or <rule>/<name>.tsv.
+
+    Of the rules in `made` only those whose name is in `batches`.
+    """
     found = []
     for root in map(Path, paths):
         if root.is_dir():
@@ -93,8 +104,20 @@ def _jobs(paths: Iterable[str], missing: list[str]) -> list[tuple[str, dict[str,
         else:
             missing.append(str(root))
             continue
+        files = [(rule, path) for rule, path in files if rule not in made or path.stem in batches]
         found += [(rule, row) for rule, path in files for row in read_benchmark(path)]
     return found
+
+
+def _add_earlier_calls(rows: list[dict[str, float]], seconds: float) -> None:
+    """Scale the times of a rule's jobs to the seconds that all its clips took.
+
+    They are less where clips were made by earlier calls of the jobs.
+    """
+    last = sum(row.get("s", 0.0) for row in rows)
+    if seconds > last > 0:
+        for row in rows:
+            row["s"] = row.get("s", 0.0) * seconds / last
 
 
 def _sizes(paths: Iterable[str], missing: list[str]) -> list[int]:

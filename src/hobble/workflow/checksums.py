@@ -93,12 +93,17 @@ def _files(path: Path) -> list[Path]:
     return sorted(file for file in path.iterdir() if file.is_file() and not file.name.startswith("."))
 
 
-def _checksum(path: Path) -> int:
+def file_crc32(path: Path) -> int:
+    """CRC-32 of a file. Raises OSError if it cannot be read."""
     crc = 0
+    with open(path, "rb") as file:
+        while block := file.read(BLOCK_BYTES):
+            crc = zlib.crc32(block, crc)
+    return crc
+
+
+def _checksum(path: Path) -> int:
     try:
-        with open(path, "rb") as file:
-            while block := file.read(BLOCK_BYTES):
-                crc = zlib.crc32(block, crc)
+        return file_crc32(path)
     except OSError as error:
         raise InputError(path, f"cannot be read: {error.strerror}") from error
-    return crc

@@ -171,6 +171,7 @@ class Clips:
             "folder": str(self.mocap / (model.folder or "")),
         }
 
+    @functools.cache  # noqa: B019
     def label_files(self, dataset: str, clip: str) -> list[str]:
         """Hand-made label files beside the clip."""
         if self.catalogue.dataset(dataset).synthetic is not None:
@@ -202,6 +203,7 @@ class Clips:
         """Path of the data set's skeleton."""
         return self._skeleton(self.catalogue.dataset(dataset).skeleton)
 
+    @functools.cache  # noqa: B019
     def rig_files(self, dataset: str, clip: str) -> list[str]:
         """The skeleton file of the clip's rig, if this is not the skeleton of the data set."""
         model = self.catalogue.dataset(dataset)

@@ -4,26 +4,52 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hobble.workflow.batches import Batches
 from hobble.workflow.clips import DATASETS
 from hobble.workflow.configurations import Configurations
+from hobble.workflow.kept import FOLDER
 
-DATASET_STAGES = ("synthetic", "motion", "labels", "channels", "terrain", "database")
+# Stages of a data set, and of each the rules that have a job for each batch of clips.
+BATCH_RULES = {
+    "synthetic": ("synthetic_clips",),
+    "motion": ("motion_clips", "hurt_clips"),
+    "labels": ("labels_clips",),
+    "channels": ("channel_clips",),
+    "terrain": ("terrain_fits",),
+    "database": ("database_clips",),
+}
+DATASET_STAGES = tuple(BATCH_RULES)
 
 Places = dict[str, list[str]]
 
 
-def stages(configurations: Configurations, name: str) -> dict[str, Places]:
-    """Stage -> folders of its "benchmarks" and its "files", for configuration `name`."""
+def stages(configurations: Configurations, batches: Batches, name: str) -> dict[str, Places]:
+    """Where the costs of each stage of configuration `name` are found.
+
+    Stage -> `benchmarks`, `files`: folders; `batches`: names of the benchmark files of batches, since a
+    folder may have others from before a clip was added; `made`: folders in which finished clips are kept.
+    """
     dataset = configurations.dataset(name)
-    root, own = Path(DATASETS, dataset), Path("results", name)
-    source = Path(DATASETS, configurations.catalogue.dataset(dataset).source or dataset)
-    out = {stage: _places(root, stage, stage) for stage in DATASET_STAGES}
-    out["synthetic"] = _places(source, "synthetic", "synthetic")
-    out["database"]["files"] = [str(root / "database/clips"), configurations.database(name)]
+    source = configurations.catalogue.dataset(dataset).source or dataset
+    out = {
+        stage: _of_dataset(batches, source if stage == "synthetic" else dataset, stage)
+        for stage in DATASET_STAGES
+    }
+    out["database"]["files"] = [f"{DATASETS}/{dataset}/database/clips", configurations.database(name)]
+    own = Path("results", name)
     out["training"] = _places(Path("results", configurations.owner(name)), "training", "network")
     out["runtime"] = _places(own, "runtime", "runtime")
     out["evaluation"] = _places(own, "evaluation", "evaluation")
     return out
+
+
+def _of_dataset(batches: Batches, dataset: str, stage: str) -> Places:
+    root = Path(DATASETS, dataset)
+    return {
+        **_places(root, stage, stage),
+        "batches": [batch.label for batch in batches.all_of(dataset)],
+        "made": [str(root / FOLDER / rule) for rule in BATCH_RULES[stage]],
+    }
 
 
 def _places(home: Path, stage: str, folder: str) -> Places:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from hobble.config.load import Catalogue
@@ -43,6 +43,12 @@ class Datasets:
         assert synthetic is not None
         total = sum(entry.share for entry in self.clips.listed(dataset).values())
         return round(synthetic.frames * self.clips.entry(dataset, clip).share / total)
+
+    def walkers(self, names: Iterable[str]) -> list[str]:
+        """The data sets that make the embedded walker's clips for the data sets `names`."""
+        models = {name: self.catalogue.dataset(name) for name in names}
+        made = [model.source or name for name, model in models.items() if model.synthetic is not None]
+        return list(dict.fromkeys(made))
 
     def selected(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
         """Clip -> "train" or "held_out", for the clips whose other channels are all 0.

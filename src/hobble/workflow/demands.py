@@ -19,6 +19,7 @@ from hobble.models import model
 from hobble.models.model import Trained
 from hobble.rows.layout import RowLayout
 from hobble.training.options import Machines
+from hobble.workflow.batches import Batch
 from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 
@@ -27,6 +28,7 @@ PYTHON_MB = 400  # Python with numpy, scipy and the package
 MEMORY_MARGIN = 1.5  # requested memory / measured memory
 TIME_MARGIN = 10  # requested time / measured time, for an old and busy machine
 MEASURED_JOINTS = 31  # of the figure in the measurements
+CLIP_SECONDS = 0.1  # of a job for each clip, however short
 ASSUMED_FRAMES = 20_000  # of a clip that is not downloaded yet
 VISITS_PER_PASS = 10  # how often a pass of training uses a row
 HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
@@ -40,13 +42,13 @@ class Demands:
     def __init__(self, project: Project) -> None:
         self.project = project
 
-    def memory(self, dataset: str, clip: str, each: float, attempt: int = 1) -> int:
-        """MB for a job of one clip that takes `each` MB for a thousand frames of 31 joints."""
-        return _megabytes(each * self.thousands(dataset, clip), attempt)
+    def batch_memory(self, batch: Batch, each: float, attempt: int = 1) -> int:
+        """MB for a job of a batch, whose longest clip takes `each` MB for a thousand frames of 31 joints."""
+        return _megabytes(each * max(self._thousands_of(batch)), attempt)
 
-    def minutes(self, dataset: str, clip: str, each: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes (at least `least`) for a job of one clip that takes `each` seconds for 1,000 frames."""
-        return _minutes(each * self.thousands(dataset, clip), attempt, least)
+    def batch_minutes(self, batch: Batch, each: float, attempt: int = 1, least: int = 1) -> int:
+        """Minutes (at least `least`) for a job of a batch that takes `each` seconds for 1,000 frames."""
+        return _minutes(sum(each * some + CLIP_SECONDS for some in self._thousands_of(batch)), attempt, least)
 
     def memory_of_longest(self, dataset: str, each: float, rows: float = 0.0, attempt: int = 1) -> int:
         """MB for a job that reads clip after clip and keeps `rows` bytes for each frame of all clips."""
@@ -153,6 +155,9 @@ class Demands:
     def thousands(self, dataset: str, clip: str) -> float:
         """Thousands of frames of a clip, scaled by the number of joints / 31."""
         return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / MEASURED_JOINTS
+
+    def _thousands_of(self, batch: Batch) -> list[float]:
+        return [self.thousands(batch.dataset, clip) for clip in batch.clips]
 
     def weights(self, configuration: str) -> float:
         """Number of trained parameters."""

@@ -12,6 +12,7 @@ from typing import Any
 
 from hobble.core.errors import HobbleError
 from hobble.workflow import checksums
+from hobble.workflow.batches import family_of
 from hobble.workflow.lifetime import ends_with_run
 from hobble.workflow.usage import peak_memory_mb
 
@@ -22,60 +23,87 @@ BUG = "This is a bug in Hobble, not a fault in your data. Please report it with 
 def job(snakemake: Any) -> Iterator[logging.Logger]:
     """Run a script with logging, checks of its files, and clear errors.
 
-    Everything is logged to the rule's log file; warnings and errors also go to the terminal. Inputs that
-    differ from what their jobs wrote, or that change while the job runs, raise HobbleError.
-    Every exception ends the process with status 1. A HobbleError prints its message. Other exceptions print
-    one line and write the traceback to the log.
+    Inputs that differ from what their jobs wrote, or that change while the job runs, raise HobbleError.
+    Otherwise as `reporting`.
     """
-    path = snakemake.log[0]
-    with contextlib.suppress(OSError):
-        os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
-        open(path, "w").close()
-    logger = logging.getLogger("hobble")
-    logger.setLevel(logging.INFO)
-    to_file = _LogFile(path, encoding="utf-8", delay=True)
-    to_file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
-    to_terminal = logging.StreamHandler(sys.stderr)
-    to_terminal.setLevel(logging.WARNING)
-    # On a terminal, first clear the line of progress.
-    wiped = "\r\x1b[K" if sys.stderr.isatty() else ""
-    to_terminal.setFormatter(logging.Formatter(f"{wiped}{snakemake.rule}: %(message)s"))
-    logger.handlers = [to_file, to_terminal]
-    logging.captureWarnings(True)
-    inputs, outputs = getattr(snakemake, "input", ()), getattr(snakemake, "output", ())
+    with reporting(snakemake) as report:
+        checksums.forget(getattr(snakemake, "output", ()))
+        with checked(getattr(snakemake, "input", ()), getattr(snakemake, "output", ())):
+            yield report.logger
+
+
+@contextlib.contextmanager
+def checked(inputs: Any, outputs: Any) -> Iterator[None]:
+    """Check inputs before and after the work in this context, then write the checksums of its outputs."""
+    before = checksums.stamps(inputs)
+    checksums.verify(inputs)
+    yield
+    checksums.check_unchanged(before)
+    checksums.record(outputs)
+
+
+@contextlib.contextmanager
+def reporting(snakemake: Any) -> Iterator[Report]:
+    """Run a script with logging and clear errors, until its run ends.
+
+    Everything is logged to the rule's log file; warnings and errors also go to the terminal. Every exception
+    ends the process with status 1.
+    """
+    report = Report(str(snakemake.log[0]), family_of(snakemake.rule))
     try:
-        checksums.forget(outputs)
         with ends_with_run():
-            before = checksums.stamps(inputs)
-            checksums.verify(inputs)
-            yield logger
-            checksums.check_unchanged(before)
-            checksums.record(outputs)
-        logger.info("took %.0f MB of memory at most", peak_memory_mb())
-    except HobbleError as error:
-        logger.error("%s", error)
-        sys.exit(1)
-    except MemoryError:
-        logger.error("out of memory. Give the job more memory, or use a smaller data set or batch.")
-        sys.exit(1)
-    except OSError as error:
-        # An error of the disk or of permissions that no other code has explained.
-        place, reason = error.filename or "a file", error.strerror or error
-        logger.error("%s: %s. See %s", place, reason, path)
-        _to_log_only(logger, to_terminal)
-        sys.exit(1)
+            yield report
+        report.logger.info("took %.0f MB of memory at most", peak_memory_mb())
     except Exception as error:
-        logger.error("%s: %s. %s See %s", type(error).__name__, error, BUG, path)
-        _to_log_only(logger, to_terminal)
+        report.error(error)
         sys.exit(1)
     finally:
         logging.shutdown()
 
 
-def _to_log_only(logger: logging.Logger, terminal: logging.Handler) -> None:
-    """Write the traceback to the log, not to the terminal."""
-    logger.removeHandler(terminal)
-    logger.error("%s", traceback.format_exc())
+class Report:
+    """A job's log file and its messages on the terminal, which begin with the name of its rule."""
+
+    def __init__(self, path: str, rule: str) -> None:
+        self.path = path
+        with contextlib.suppress(OSError):
+            os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+            open(path, "w").close()
+        self.logger = logging.getLogger("hobble")
+        self.logger.setLevel(logging.INFO)
+        to_file = _LogFile(path, encoding="utf-8", delay=True)
+        to_file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+        self.terminal = logging.StreamHandler(sys.stderr)
+        self.terminal.setLevel(logging.WARNING)
+        # On a terminal, first clear the line of progress.
+        wiped = "\r\x1b[K" if sys.stderr.isatty() else ""
+        self.terminal.setFormatter(logging.Formatter(f"{wiped}{rule}: %(message)s"))
+        self.logger.handlers = [to_file, self.terminal]
+        logging.captureWarnings(True)
+
+    def error(self, error: Exception) -> None:
+        """Say what went wrong. A HobbleError is its message.
+
+        Others are one line on the terminal, and their traceback is in the log.
+        """
+        if isinstance(error, HobbleError):
+            self.logger.error("%s", error)
+        elif isinstance(error, MemoryError):
+            self.logger.error("out of memory. Give the job more memory, or use a smaller data set or batch.")
+        elif isinstance(error, OSError):
+            # An error of the disk or of permissions that no other code has explained.
+            place, reason = error.filename or "a file", error.strerror or error
+            self.logger.error("%s: %s. See %s", place, reason, self.path)
+            self._trace(error)
+        else:
+            self.logger.error("%s: %s. %s See %s", type(error).__name__, error, BUG, self.path)
+            self._trace(error)
+
+    def _trace(self, error: Exception) -> None:
+        """Write the traceback to the log, not to the terminal."""
+        self.logger.removeHandler(self.terminal)
+        self.logger.error("%s", "".join(traceback.format_exception(error)))
+        self.logger.addHandler(self.terminal)
 
 
 class _LogFile(logging.FileHandler):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 from hobble.workflow.fingerprint import fingerprint
@@ -14,6 +15,7 @@ class Package:
         self.base = base
         self.folder = base / "src" / "hobble"
 
+    @functools.cache  # noqa: B019 - one project lives as long as the process
     def code(self, script: str, *modules: str) -> str:
         """Fingerprint of a rule's script and of everything that it imports from the package.
 

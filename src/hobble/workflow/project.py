@@ -9,6 +9,7 @@ from typing import Any
 from hobble.config.load import Catalogue
 from hobble.config.sections import COMPARED
 from hobble.core.errors import HobbleError
+from hobble.workflow.batches import Batches
 from hobble.workflow.clips import Clips
 from hobble.workflow.comparison import COMPARE, Comparison
 from hobble.workflow.configurations import Configurations
@@ -37,6 +38,7 @@ class Project:
                 f"no configuration can be called {name}: Hobble uses results/{name} for something else"
             )
         self.clips = Clips(base, _folder(config.get(MOCAP, base / "data")), self.catalogue)
+        self.batches = Batches(self.clips)
         self.datasets = Datasets(self.catalogue, self.clips)
         self.configurations = Configurations(self.catalogue, self.datasets)
         self.comparison = Comparison(self.configurations, config.get(COMPARE, list(COMPARED)))

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hobble.report.pipeline import read_benchmark
+from hobble.workflow.batches import family_of
 from hobble.workflow.demands import ENGINE_MB
 
-JOB_BLOCK = re.compile(r"^ *(?:local)?rule (\w+):\n((?: +\w+: .*\n)+)", re.M)
+JOB_BLOCK = re.compile(r"^ *(?:local)?rule ([^\n]+):\n((?: +\w+: .*\n)+)", re.M)
 MEMORY_LINE = re.compile(r"took (\d+) MB of memory at most")
 
 
@@ -48,7 +49,7 @@ def planned_jobs(plan: str) -> Iterator[JobResources]:
     for rule, block in JOB_BLOCK.findall(plan):
         of = dict(line.strip().split(": ", 1) for line in block.splitlines())
         asks = dict(part.split("=", 1) for part in of["resources"].split(", "))
-        yield JobResources(rule, of["log"], int(asks["mem_mb"]), 60 * int(asks["runtime"]))
+        yield JobResources(family_of(rule), of["log"], int(asks["mem_mb"]), 60 * int(asks["runtime"]))
 
 
 def with_use(jobs: Iterator[JobResources], run: Path) -> Iterator[JobResources]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, get_args
 from hobble.channels import every
 from hobble.config.sections import PhaseMode
 from hobble.core.errors import HobbleError, InputError
+from hobble.workflow.batches import dataset_of, rules_of_job
 from hobble.workflow.comparison import COMPARE
 from hobble.workflow.copies import refuse_copies
 from hobble.workflow.project import Project
@@ -24,7 +25,7 @@ def check(project: Project, targets: Iterable[str]) -> None:
 
     Raises HobbleError for the first mistake.
     """
-    for target in list(targets) or ["results/holden/report.html"]:
+    for target in targets_or_default(targets):
         _, name, folder, file, *_ = (*Path(target).parts, "", "", "")
         if name == "datasets":
             _check_dataset(project, folder)
@@ -38,16 +39,46 @@ def check(project: Project, targets: Iterable[str]) -> None:
 
 def notes(project: Project, targets: Iterable[str]) -> list[str]:
     """Notes on unused files in the folders of the data sets that the targets need."""
-    names = []
-    for target in list(targets) or ["results/holden/report.html"]:
+    names = datasets_of(project, targets)
+    return [f"data set {name}: {note}" for name in names for note in project.clips.notes(name)]
+
+
+def needed_datasets(project: Project, arguments: Sequence[str]) -> list[str]:
+    """The data sets that a command line needs. arguments: of Snakemake, also of a job on another machine.
+
+    With those of configurations whose networks are used or continued.
+    """
+    if rules := rules_of_job(arguments):
+        return [name for name in dict.fromkeys(map(dataset_of, rules)) if name]
+    return datasets_of(project, [argument for argument in arguments if argument.startswith("results/")])
+
+
+def datasets_of(project: Project, targets: Iterable[str]) -> list[str]:
+    """The data sets that the targets need."""
+    names: list[str] = []
+    waiting: list[str] = []
+    for target in targets_or_default(targets):
         _, name, folder, *_ = (*Path(target).parts, "", "")
         if name == "datasets":
             names.append(folder)
         elif name == COMPARE:
-            names += [project.catalogue.configuration(one).dataset for one in project.comparison.names()]
+            waiting += project.comparison.names()
         elif name and name != PAGE:
-            names.append(project.catalogue.configuration(name).dataset)
-    return [f"data set {name}: {note}" for name in dict.fromkeys(names) for note in project.clips.notes(name)]
+            waiting.append(name)
+    seen = set()
+    while waiting:
+        name = waiting.pop(0)
+        if name not in seen:
+            seen.add(name)
+            model = project.catalogue.configuration(name)
+            names.append(model.dataset)
+            waiting += filter(None, (model.network_of, model.training.continues))
+    return list(dict.fromkeys(names))
+
+
+def targets_or_default(targets: Iterable[str]) -> list[str]:
+    """The targets, or what Snakemake makes without any."""
+    return list(targets) or ["results/holden/report.html"]
 
 
 def _check_configuration(project: Project, name: str) -> None:

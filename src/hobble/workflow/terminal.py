@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
+from hobble.workflow.batches import MARK, dataset_of, family_of
+
 PROGRESS_SECONDS = 10.0  # between lines of progress in a file
 WIDTH = 100  # columns of the line of progress on a terminal
 MAX_FAILURES_LISTED = 20  # in the summary
@@ -25,6 +27,9 @@ SUPERFLUOUS = re.compile(
     r"Exiting because a job execution failed|Look below for error messages|^Shutting down|"
     r"^At least one job did not complete|^WorkflowError:\s*At least one job did not complete"
 )
+BATCH_RULES = re.compile(
+    rf"(?<=^        )\w+(?:{MARK}[^,\n]+)?(?:, [^,\n]+)*$", re.M
+)  # in Snakemake's reasons
 PASSED_ON = re.compile(r"^Nothing to be done|^Reasons:|^This was a dry-run|^Unlocking|^Touching|^Error")
 STOP_MESSAGE = "Terminating processes on user request"
 JOB_HINT = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
@@ -32,7 +37,7 @@ JOB_HINT = re.compile(r"^ *\(check individual jobs above for details\)\n", re.M)
 
 @dataclass(frozen=True)
 class Job:
-    """The names of a job that are printed. about: its wildcards."""
+    """The names of a job that are printed. about: its wildcards, or its data set and batch."""
 
     rule: str
     about: str
@@ -40,7 +45,7 @@ class Job:
 
     @property
     def name(self) -> str:
-        """Rule and wildcards."""
+        """Rule and what it is about."""
         return f"{self.rule} {self.about}".strip()
 
 
@@ -95,18 +100,19 @@ class Terminal:
     def _run_info(self, data: Mapping[str, Any]) -> None:
         stats = data.get("stats") or {}
         self.total = stats.get("total", self.total)
+        rules: Counter[str] = Counter()
+        for rule, n in stats.items():
+            if rule != "total":
+                rules[family_of(rule)] += n
         if self.dryrun and not self.announced:
-            self._line(str(data["msg"]))
+            self._line(_table(rules))
         elif not self.announced:
-            rules = Counter({rule: n for rule, n in stats.items() if rule != "total"})
             most = ", ".join(f"{n} {rule}" for rule, n in rules.most_common(6))
             self._line(f"{self.total} jobs: {most}{', ...' if len(rules) > 6 else ''}")
         self.announced = True
 
     def _job_info(self, data: Mapping[str, Any]) -> None:
-        about = " ".join(str(value) for value in dict(data.get("wildcards") or {}).values())
-        log = ", ".join(map(str, data.get("log") or ()))
-        job = Job(str(data["rule_name"]), about, log)
+        job = _job(data)
         self.jobs[data["jobid"]] = self.running[data["jobid"]] = job
         self._progress({})
 
@@ -129,9 +135,7 @@ class Terminal:
             self._line(line)
 
     def _job_error(self, data: Mapping[str, Any]) -> None:
-        job = self.jobs.get(data["jobid"]) or Job(
-            str(data["rule_name"]), "", ", ".join(map(str, data["log"] or ()))
-        )
+        job = self.jobs.get(data["jobid"]) or _job(data)
         self.running.pop(data["jobid"], None)
         if self.stopped:
             return
@@ -148,7 +152,7 @@ class Terminal:
             if not (JOB_ENDED.search(text) or SUPERFLUOUS.search(text)) and text:
                 self._line(text)
         elif record.levelno >= logging.WARNING or PASSED_ON.search(text):
-            self._line(JOB_HINT.sub("", text))
+            self._line(JOB_HINT.sub("", BATCH_RULES.sub(_folded, text)))
 
     def _line(self, text: str) -> None:
         self._wipe()
@@ -159,6 +163,27 @@ class Terminal:
         if self.shown:
             self.stream.write("\r\x1b[K")
             self.shown = False
+
+
+def _job(data: Mapping[str, Any]) -> Job:
+    """The job of one of Snakemake's events."""
+    rule, logs = str(data["rule_name"]), [str(log) for log in data.get("log") or ()]
+    words = [str(value) for value in dict(data.get("wildcards") or {}).values()]
+    if (dataset := dataset_of(rule)) and logs:
+        words = [dataset, Path(logs[0]).stem]
+    return Job(family_of(rule), " ".join(words), ", ".join(logs))
+
+
+def _table(rules: Mapping[str, int]) -> str:
+    """How many jobs of each rule there are, in Snakemake's form."""
+    width = max(map(len, [*rules, "total"]))
+    lines = [f"{rule:<{width}}  {n:>7}" for rule, n in [*rules.items(), ("total", sum(rules.values()))]]
+    return "\n".join(["Job stats:", f"{'job':<{width}}    count", f"{'-' * width}  -------", *lines])
+
+
+def _folded(found: re.Match[str]) -> str:
+    """The rules of batches in a list of rules, each stage once."""
+    return ", ".join(dict.fromkeys(family_of(rule) for rule in found[0].split(", ")))
 
 
 def _message(log: str) -> str:

@@ -1,0 +1,157 @@
+"""Runs a job that makes one clip after another.
+
+What is kept from an earlier try is not made again, and a bad clip fails alone.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import logging
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hobble.core.errors import InputError
+from hobble.workflow import checksums
+from hobble.workflow.batches import family_of
+from hobble.workflow.job import Report, checked, reporting
+from hobble.workflow.kept import Kept, fingerprint
+
+# Errors that every further clip would meet too.
+DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What is made at a time, such as a clip and its mirror.
+
+    name: the clip. params: of the rule, and those of this clip. input: by name, a file, or a list of files
+    where the rule says how many each clip has. output: by name, a file.
+    """
+
+    name: str
+    params: Mapping[str, Any]
+    input: Mapping[str, Any]
+    output: Mapping[str, str]
+
+    @property
+    def files(self) -> list[str]:
+        """Every input, in order."""
+        found = [
+            [files] if isinstance(files, str) else list(files) for _, files in sorted(self.input.items())
+        ]
+        return [file for some in found for file in some]
+
+
+def pieces(snakemake: Any) -> list[Piece]:
+    """The pieces of a job.
+
+    params.each: for each piece its own params, with the name as `clip`. params.counts, optional: by name of
+    an input, how many files each piece has. Other inputs and outputs have a file for each piece, or one for
+    all. A name without files is left out.
+    """
+    common = {name: value for name, value in snakemake.params.items() if name not in ("each", "counts")}
+    each, counts = snakemake.params.each, snakemake.params.get("counts", {})
+    inputs = {
+        name: _dealt(_many(files), len(each), counts.get(name)) for name, files in snakemake.input.items()
+    }
+    outputs = {name: _dealt(_many(files), len(each)) for name, files in snakemake.output.items()}
+    return [
+        Piece(
+            own["clip"],
+            {**common, **own},
+            {name: dealt[n] for name, dealt in inputs.items() if dealt},
+            {name: dealt[n] for name, dealt in outputs.items() if dealt},
+        )
+        for n, own in enumerate(each)
+    ]
+
+
+def make_each(snakemake: Any, make: Callable[[Piece, logging.Logger], None]) -> None:
+    """Call `make` for each piece of a job, except those of which whole files are kept.
+
+    If a piece fails, its error is reported and the others are made, unless the disk is full. Then the process
+    ends with status 1. Snakemake deletes the outputs of such a job; the next try takes what is kept.
+    """
+    with reporting(snakemake) as report:
+        checksums.forget(snakemake.output)
+        kept, digests = Kept(family_of(snakemake.rule)), _Digests()
+        all_pieces = pieces(snakemake)
+        taken = failed = 0
+        for piece in all_pieces:
+            try:
+                taken += _made(piece, make, kept, digests, report)
+            except Exception as error:
+                report.error(error)
+                failed += 1
+                if _is_of_disk(error):
+                    break
+        if len(all_pieces) > 1 or taken:
+            report.logger.info(
+                "%d pieces, %d of them kept from before, %d failed", len(all_pieces), taken, failed
+            )
+        if failed:
+            sys.exit(1)
+
+
+def _made(
+    piece: Piece, make: Callable[[Piece, logging.Logger], None], kept: Kept, digests: _Digests, report: Report
+) -> bool:
+    """Make a piece or take what is kept of it. Returns whether it was kept."""
+    outputs, began = list(piece.output.values()), time.monotonic()
+    with checked(piece.files, outputs):
+        mark = fingerprint(piece.params, digests.of(piece.files), outputs)
+        if kept.take(mark, outputs):
+            return True
+        report.logger.info("%s:", piece.name)
+        make(piece, report.logger)
+    kept.keep(mark, outputs, time.monotonic() - began)
+    return False
+
+
+class _Digests:
+    """Names and SHA-256 of files. A file that several pieces read is read once."""
+
+    def __init__(self) -> None:
+        self.known: dict[tuple[str, checksums.Stamp], str] = {}
+
+    def of(self, files: list[str]) -> list[tuple[str, str]]:
+        found = []
+        for file, stamp in checksums.stamps(files).items():
+            if (file, stamp) not in self.known:
+                self.known[file, stamp] = _sha256(file)
+            found.append((Path(file).name, self.known[file, stamp]))
+        return found
+
+
+def _sha256(file: str) -> str:
+    try:
+        with open(file, "rb") as opened:
+            return hashlib.file_digest(opened, "sha256").hexdigest()
+    except OSError:
+        return "cannot be read"  # who reads it next says why
+
+
+def _many(files: Any) -> list[str]:
+    return [files] if isinstance(files, str) else list(files)
+
+
+def _dealt(files: list[str], pieces: int, counts: list[int] | None = None) -> list[Any]:
+    """The file or files of each piece; [] if no piece has any."""
+    if counts is not None:
+        assert sum(counts) == len(files), f"{files} are not {counts}"
+        starts = [sum(counts[:n]) for n in range(pieces)]
+        return [files[start : start + count] for start, count in zip(starts, counts, strict=True)]
+    if len(files) == 1:
+        return files * pieces
+    assert len(files) in (0, pieces), f"{files} are not for {pieces}"
+    return files
+
+
+def _is_of_disk(error: Exception) -> bool:
+    cause = error.__cause__ if isinstance(error, InputError) else error
+    return isinstance(cause, OSError) and cause.errno in DISK_ERRORS

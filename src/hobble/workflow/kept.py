@@ -1,0 +1,125 @@
+"""Keeps what a job has made of each clip, so that the job makes only what is missing or has changed.
+
+Snakemake deletes the outputs of a job before it runs and after it fails. So each finished file gets a second
+name (a hard link, which takes no space) in results/datasets/<dataset>/.made/<rule>/, and for each clip a
+record is written there: a fingerprint of all that the files depend on, their checksums and the seconds that
+they took. The folder can be deleted at any time. It costs only time then.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from hobble.core.files import write_error
+from hobble.workflow.checksums import file_crc32
+
+FOLDER = ".made"
+
+
+def fingerprint(params: Mapping[str, Any], inputs: Iterable[tuple[str, str]], outputs: Iterable[str]) -> str:
+    """Hash of all that some files depend on.
+
+    params: plain values, with the fingerprint of the code. inputs: (file name, SHA-256) of each input, in
+    order. outputs: the paths of the files.
+    """
+    asked = [params, list(inputs), [str(_place(Path(path), "")[1]) for path in outputs]]
+    return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
+
+
+class Kept:
+    """What jobs of one rule have made. rule: without data set and number, such as motion_clips."""
+
+    def __init__(self, rule: str) -> None:
+        self.rule = rule
+
+    def take(self, mark: str, outputs: Iterable[str]) -> bool:
+        """Put the outputs in their places if they were kept with this fingerprint and are whole.
+
+        Returns whether they were. Raises HobbleError if they cannot be put there.
+        """
+        pairs = [(self._kept(path), Path(path)) for path in outputs]
+        record = _read(_record(pairs[0][0]))
+        if record.get("fingerprint") != mark:
+            return False
+        with contextlib.suppress(OSError):
+            if record["files"] == [file_crc32(kept) for kept, _ in pairs]:
+                for kept, path in pairs:
+                    try:
+                        _link(kept, path)
+                    except OSError as error:
+                        raise write_error(error, path) from error
+                return True
+        return False
+
+    def keep(self, mark: str, outputs: Iterable[str], seconds: float) -> None:
+        """Keep finished outputs. On a full disk nothing is kept, which is no error."""
+        pairs = [(self._kept(path), Path(path)) for path in outputs]
+        place = _record(pairs[0][0])
+        with contextlib.suppress(OSError):
+            place.unlink(missing_ok=True)
+            for kept, path in pairs:
+                _link(path, kept)
+            files = [file_crc32(path) for _, path in pairs]
+            record = {"fingerprint": mark, "files": files, "seconds": round(seconds, 3)}
+            with _replaced(place) as temporary:
+                temporary.write_text(json.dumps(record), encoding="utf-8")
+
+    def _kept(self, path: str) -> Path:
+        root, below = _place(Path(path), self.rule)
+        return root / below
+
+
+def recorded_seconds(folder: Path) -> float:
+    """Seconds that the kept files of a rule took to make. folder: results/.../.made/<rule>."""
+    return sum(float(_read(path).get("seconds", 0.0)) for path in folder.rglob(".*.kept"))
+
+
+def _place(path: Path, rule: str) -> tuple[Path, Path]:
+    """The folder in which files of a path's data set are kept, and the path below the data set."""
+    parts = path.parts
+    root = max(n for n in range(1, len(parts)) if parts[n - 1 : n + 1] == ("results", "datasets")) + 2
+    return Path(*parts[:root], FOLDER, rule), Path(*parts[root:])
+
+
+def _record(kept: Path) -> Path:
+    return kept.with_name(f".{kept.stem}.kept")
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) and {"fingerprint", "files"} <= found.keys() else {}
+
+
+def _link(source: Path, target: Path) -> None:
+    """Give a file a second name, or copy it where the file system has no hard links."""
+    with _replaced(target) as temporary:
+        try:
+            os.link(source, temporary)
+        except FileNotFoundError:
+            raise
+        except OSError:
+            shutil.copyfile(source, temporary)
+
+
+@contextlib.contextmanager
+def _replaced(target: Path) -> Iterator[Path]:
+    """Yield a temporary path that takes the place of `target`. A process that is killed leaves no half."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    temporary.unlink(missing_ok=True)
+    try:
+        yield temporary
+        os.replace(temporary, target)
+    finally:
+        # It is still there if both names were of one file already.
+        temporary.unlink(missing_ok=True)

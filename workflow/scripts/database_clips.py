@@ -1,0 +1,32 @@
+"""Creates the rows of clips from their motion, labels, channel values and terrain fits."""
+
+from hobble.channels.files import load_values
+from hobble.core.clip import load_clip
+from hobble.core.files import load_npz
+from hobble.database.options import Rows
+from hobble.rows.build import clip_rows
+from hobble.rows.clip_rows import save_clip_rows
+from hobble.rows.facts import facts, save_facts
+from hobble.workflow.batch_job import make_each
+
+
+def make(piece, log):
+    """Make the rows of a clip."""
+    options = Rows.model_validate(piece.params["options"])
+    channels = zip(piece.params["channels"], piece.input.get("channels", []), strict=True)
+    rows = clip_rows(
+        piece.name,
+        load_clip(piece.input["clip"]),
+        load_npz(piece.input["labels"]),
+        {name: load_values(file)[0] for name, file in channels},
+        load_npz(piece.input["terrain"]),
+        window=options.window,
+        step=options.step,
+        facing_sigma=options.facing_sigma,
+    )
+    save_clip_rows(piece.output["rows"], rows)
+    save_facts(piece.output["facts"], facts(rows))
+    log.info("%d rows, %d fits", len(rows), rows.fits.sum())
+
+
+make_each(snakemake, make)

@@ -1,0 +1,57 @@
+"""Creates hurt versions of healthy clips and their mirrors: motion, labels, severities and reports."""
+
+from hobble.channels import channel
+from hobble.channels.files import load_values, save_values
+from hobble.channels.files import write_report as write_channel_report
+from hobble.core.clip import load_clip, save_clip
+from hobble.core.files import read_json, write_json
+from hobble.hurt.options import HURT_CHANNEL, Hurt
+from hobble.hurt.version import hurt_version
+from hobble.labels.label import mirror_labels, write_report
+from hobble.labels.model import LabelReport, load_labels, save_labels
+from hobble.motion.mirror import mirror_clip, mirror_report
+from hobble.workflow.batch_job import make_each
+
+
+def make(piece, log):
+    """Make a hurt version and its mirror."""
+    clip = load_clip(piece.input["clip"])
+    hurt, report = hurt_version(
+        clip,
+        load_labels(piece.input["labels"]),
+        LabelReport.from_dict(read_json(piece.input["label_report"])),
+        Hurt.model_validate(piece.params["options"]),
+        name=piece.name,
+        turn=piece.params["turn"],
+        ground=piece.params["ground"],
+    )
+    motion = {**read_json(piece.input["report"]), "clip": hurt.clip.name, "hurt_of": clip.name}
+    save(piece.output, "", hurt.clip, motion, hurt.labels, report, hurt.severity)
+    log.info("%s: %d frames from %d of %s", hurt.clip.name, len(hurt.clip), len(clip), clip.name)
+    if "mirror_clip" in piece.output:
+        mirror(piece.output)
+
+
+def mirror(output):
+    """Make the mirror of a hurt version from its files."""
+    clip = load_clip(output["clip"])
+    clip = mirror_clip(clip, f"{clip.name}_mirror")
+    motion = mirror_report(read_json(output["report"]), clip.name)
+    report = LabelReport.from_dict(read_json(output["label_report"]))
+    labels, report = mirror_labels(load_labels(output["labels"]), report, clip)
+    severity = channel(HURT_CHANNEL).mirror(load_values(output["injury"])[0], clip.skeleton)
+    save(output, "mirror_", clip, motion, labels, report, severity)
+
+
+def save(output, prefix, clip, motion, labels, report, severity):
+    """Write all files of a hurt version, or of its mirror."""
+    links = clip.skeleton.link_names
+    save_clip(output[f"{prefix}clip"], clip)
+    write_json(output[f"{prefix}report"], motion)
+    save_labels(output[f"{prefix}labels"], labels)
+    write_report(output[f"{prefix}label_report"], report, labels, clip)
+    save_values(output[f"{prefix}injury"], severity, links)
+    write_channel_report(output[f"{prefix}injury_report"], HURT_CHANNEL, clip, severity, links, [])
+
+
+make_each(snakemake, make)

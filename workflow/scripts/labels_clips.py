@@ -1,0 +1,34 @@
+"""Creates contacts, phase and gait of clips and their mirrors, from motion and hand-made files."""
+
+from hobble.core.clip import load_clip
+from hobble.core.files import read_json
+from hobble.labels.label import label_clip, mirror_labels, write_report
+from hobble.labels.model import LabelReport, load_labels, save_labels
+from hobble.labels.options import Labels
+from hobble.workflow.batch_job import make_each
+
+
+def make(piece, log):
+    """Label a clip and its mirror."""
+    clip = load_clip(piece.input["clip"])
+    labels, report = label_clip(
+        clip,
+        piece.input.get("files", []),
+        read_json(piece.input["report"]),
+        piece.params["gait"],
+        piece.params["ground"],
+        Labels.model_validate(piece.params["options"]),
+    )
+    for warning in report.warnings:
+        log.info("%s: %s", report.clip, warning)
+    save_labels(piece.output["labels"], labels)
+    write_report(piece.output["report"], report, labels, clip)
+    if "mirror" in piece.output:
+        clip = load_clip(piece.input["mirror"])
+        report = LabelReport.from_dict(read_json(piece.output["report"]))
+        labels, report = mirror_labels(load_labels(piece.output["labels"]), report, clip)
+        save_labels(piece.output["mirror"], labels)
+        write_report(piece.output["mirror_report"], report, labels, clip)
+
+
+make_each(snakemake, make)

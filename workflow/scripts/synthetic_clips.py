@@ -1,0 +1,26 @@
+"""Creates clips of the embedded data set (BVH, footsteps, gait) from their recipes and a skeleton."""
+
+from pathlib import Path
+
+from hobble.core.untrusted import read_yaml
+from hobble.synthetic.clip import write_clip
+from hobble.synthetic.options import Synthetic
+from hobble.workflow.batch_job import make_each
+
+
+def make(piece, log):
+    """Write a clip and the files beside it."""
+    source = Path(piece.input["skeleton"])
+    write_clip(
+        piece.name,
+        {"name": source.stem, **read_yaml(source)},
+        piece.params["frames"],
+        piece.params["recipe"],
+        Synthetic.model_validate(piece.params["options"]),
+        bvh=piece.output["bvh"],
+        footsteps=piece.output["footsteps"],
+        gait=piece.output["gait"],
+    )
+
+
+make_each(snakemake, make)
