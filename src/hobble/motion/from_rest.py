@@ -16,8 +16,8 @@ from hobble.motion.orient import apart, frame, off, pointed, snapped, unit
 UP = np.array([0.0, 1.0, 0.0])
 # Degrees: if zero pose and motion differ by more for a joint, the motion counts.
 TRUSTED = 30.0
-# A larger difference between standing feet and those of the zero pose is reported. In `patients` it is 9 degrees
-# at most.
+# A larger difference between standing feet and those of the zero pose is reported. In `patients` it is at
+# most 9 degrees.
 UNLIKE_ZERO = np.radians(12.0)
 SHRUG = 12.0  # degrees: mean angle to the chest up to which the zero pose counts for clavicles
 LIMP = 60.0  # degrees: the same for hands and their forearms

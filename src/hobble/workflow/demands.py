@@ -42,27 +42,27 @@ class Demands:
     def __init__(self, project: Project) -> None:
         self.project = project
 
-    def batch_memory(self, batch: Batch, each: float, attempt: int = 1) -> int:
-        """MB for a job of a batch, whose longest clip takes `each` MB for a thousand frames of 31 joints."""
-        return _megabytes(each * max(self._thousands_of(batch)), attempt)
+    def batch_memory(self, batch: Batch, rate: float, attempt: int = 1) -> int:
+        """MB for a job of a batch, whose longest clip takes `rate` MB for a thousand frames of 31 joints."""
+        return _megabytes(rate * max(self._thousands_of(batch)), attempt)
 
-    def batch_minutes(self, batch: Batch, each: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes (at least `least`) for a job of a batch that takes `each` seconds for 1,000 frames."""
-        return _minutes(sum(each * some + CLIP_SECONDS for some in self._thousands_of(batch)), attempt, least)
+    def batch_minutes(self, batch: Batch, rate: float, attempt: int = 1, least: int = 1) -> int:
+        """Minutes (at least `least`) for a job of a batch that takes `rate` seconds for 1,000 frames."""
+        return _minutes(sum(rate * some + CLIP_SECONDS for some in self._thousands_of(batch)), attempt, least)
 
-    def memory_of_longest(self, dataset: str, each: float, rows: float = 0.0, attempt: int = 1) -> int:
+    def memory_of_longest(self, dataset: str, rate: float, rows: float = 0.0, attempt: int = 1) -> int:
         """MB for a job that reads clip after clip and keeps `rows` bytes for each frame of all clips."""
         longest = max(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
-        return _megabytes(each * longest + rows * self.all_thousands(dataset) / 1e3, attempt)
+        return _megabytes(rate * longest + rows * self.all_thousands(dataset) / 1e3, attempt)
 
-    def minutes_of_all(self, dataset: str, each: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes for a job that takes `each` seconds for a thousand frames, over all clips and mirrors."""
-        return _minutes(each * self.all_thousands(dataset), attempt, least)
+    def minutes_of_all(self, dataset: str, rate: float, attempt: int = 1, least: int = 1) -> int:
+        """Minutes for a job that takes `rate` seconds for a thousand frames, over all clips and mirrors."""
+        return _minutes(rate * self.all_thousands(dataset), attempt, least)
 
-    def minutes_of_part(self, dataset: str, each: float, attempt: int = 1) -> int:
-        """Minutes for a job that takes `each` seconds for a thousand frames of its part of a database."""
+    def minutes_of_part(self, dataset: str, rate: float, attempt: int = 1) -> int:
+        """Minutes for a job that takes `rate` seconds for a thousand frames of its part of a database."""
         thousands = self.all_thousands(dataset) / self.project.datasets.parts(dataset)
-        return _minutes(each * thousands, attempt, least=5)
+        return _minutes(rate * thousands, attempt, least=5)
 
     def part_memory(self, dataset: str, attempt: int = 1) -> int:
         """MB for a job that orders a part of a database. It holds the rows of one shard for it at a time."""
@@ -78,8 +78,8 @@ class Demands:
     def measure_minutes(self, configuration: str, name: str, attempt: int = 1) -> int:
         """Minutes for the measurement `name`."""
         cost = measure(name).cost
-        each = cost.seconds_each * self._measured_share(configuration, name)
-        return self.evaluation_minutes(configuration, each, attempt, cost.minutes)
+        rate = cost.seconds_each * self._measured_share(configuration, name)
+        return self.evaluation_minutes(configuration, rate, attempt, cost.minutes)
 
     def _measured_share(self, configuration: str, name: str) -> float:
         """The share of a data set's frames that a measurement reads: all, or those of a sample."""
@@ -90,14 +90,14 @@ class Demands:
         frames = 1e3 * self.all_thousands(dataset) * MEASURED_JOINTS / self._joints(dataset)
         return min(1.0, section["sample_frames"] / max(frames, 1.0))
 
-    def evaluation_memory(self, configuration: str, each: float, attempt: int = 1) -> int:
+    def evaluation_memory(self, configuration: str, rate: float, attempt: int = 1) -> int:
         """MB for a measurement that reads one clip of the data set after another."""
-        return self.memory_of_longest(self.project.configurations.dataset(configuration), each, 0.0, attempt)
+        return self.memory_of_longest(self.project.configurations.dataset(configuration), rate, 0.0, attempt)
 
-    def evaluation_minutes(self, configuration: str, each: float, attempt: int = 1, least: int = 1) -> int:
-        """Minutes for a measurement that takes `each` seconds for a thousand frames of the data set."""
+    def evaluation_minutes(self, configuration: str, rate: float, attempt: int = 1, least: int = 1) -> int:
+        """Minutes for a measurement that takes `rate` seconds for a thousand frames of the data set."""
         dataset = self.project.configurations.dataset(configuration)
-        return self.minutes_of_all(dataset, each, attempt, least)
+        return self.minutes_of_all(dataset, rate, attempt, least)
 
     def training_memory(self, configuration: str, attempt: int = 1) -> int:
         """MB on each machine for a training.
@@ -106,11 +106,11 @@ class Demands:
         network is built and not trained, the process holds up to three copies of all rows.
         """
         training = self.project.configurations.section(configuration, "training")
-        each = 500 + training["memory_mb"] + 32e-6 * self.weights(configuration)
+        needed = 500 + training["memory_mb"] + 32e-6 * self.weights(configuration)
         if self.project.configurations.is_built(configuration):
             layout, dataset = self.layout(configuration), self.project.configurations.dataset(configuration)
-            each += 3 * 4e-3 * (layout.x_size + layout.y_size) * self.all_thousands(dataset)
-        return _megabytes(self.machines(configuration).each * each, attempt)
+            needed += 3 * 4e-3 * (layout.x_size + layout.y_size) * self.all_thousands(dataset)
+        return _megabytes(self.machines(configuration).each * needed, attempt)
 
     def training_minutes(self, configuration: str, attempt: int = 1) -> int:
         """Minutes for a training, at most a week. After a kill it continues from its last checkpoint.
