@@ -16,8 +16,8 @@ from hobble.workflow.project import Project
 from hobble.workflow.targets import check, needed_datasets, notes
 from hobble.workflow.channel_sources import channels_of_folder
 
-# Planning makes millions of small objects that stay. To look for garbage among them less often saves an eighth of
-# its time for 2,500 clips.
+# Planning makes millions of small objects that stay. Running the garbage collector less often saves an eighth of the
+# time for 2,500 clips.
 gc.set_threshold(200_000, 50, 1000)
 ensure_user_name()
 try:

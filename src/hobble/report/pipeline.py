@@ -112,7 +112,7 @@ def _jobs(
 def _add_earlier_calls(rows: list[dict[str, float]], seconds: float) -> None:
     """Scale the times of a rule's jobs to the seconds that all its clips took.
 
-    They are less where clips were made by earlier calls of the jobs.
+    The jobs took less time if earlier calls of them had made some of the clips.
     """
     last = sum(row.get("s", 0.0) for row in rows)
     if seconds > last > 0:

@@ -21,13 +21,13 @@ from hobble.workflow.batches import family_of
 from hobble.workflow.job import Report, checked, reporting
 from hobble.workflow.kept import Kept, fingerprint
 
-# Errors that every further clip would meet too.
+# Errors that would also stop every further clip.
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
 
 @dataclass(frozen=True)
 class Piece:
-    """What is made at a time, such as a clip and its mirror.
+    """A piece of the work of a job: usually a clip and its mirror.
 
     name: the clip. params: of the rule, and those of this clip. input: by name, a file, or a list of files
     where the rule says how many each clip has. output: by name, a file.
@@ -72,7 +72,7 @@ def pieces(snakemake: Any) -> list[Piece]:
 
 
 def make_each(snakemake: Any, make: Callable[[Piece, logging.Logger], None]) -> None:
-    """Call `make` for each piece of a job, except those of which whole files are kept.
+    """Call `make` for each piece of a job, except those whose files are kept undamaged.
 
     If a piece fails, its error is reported and the others are made, unless the disk is full. Then the process
     ends with status 1. Snakemake deletes the outputs of such a job; the next try takes what is kept.
@@ -133,7 +133,7 @@ def _sha256(file: str) -> str:
         with open(file, "rb") as opened:
             return hashlib.file_digest(opened, "sha256").hexdigest()
     except OSError:
-        return "cannot be read"  # who reads it next says why
+        return "cannot be read"  # the job that reads it reports why
 
 
 def _many(files: Any) -> list[str]:

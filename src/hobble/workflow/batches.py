@@ -150,7 +150,7 @@ def rules_of_job(arguments: Sequence[str]) -> list[str]:
 
 
 def batch_count(clips: int) -> int:
-    """The number of batches of a data set with so many clips; as many as clips for up to SMALLEST."""
+    """The number of batches of a data set with so many clips. Up to SMALLEST clips have one each."""
     count = min(clips, SMALLEST)
     while clips > count * LARGEST:
         count *= 2

@@ -40,7 +40,7 @@ class Kept:
         self.rule = rule
 
     def take(self, mark: str, outputs: Iterable[str]) -> bool:
-        """Put the outputs in their places if they were kept with this fingerprint and are whole.
+        """Put the outputs in their places if they were kept with this fingerprint and are undamaged.
 
         Returns whether they were. Raises HobbleError if they cannot be put there.
         """
@@ -113,7 +113,7 @@ def _link(source: Path, target: Path) -> None:
 
 @contextlib.contextmanager
 def _replaced(target: Path) -> Iterator[Path]:
-    """Yield a temporary path that takes the place of `target`. A process that is killed leaves no half."""
+    """Yield a temporary path that replaces `target`. A killed process leaves no half-written file."""
     target.parent.mkdir(parents=True, exist_ok=True)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
     temporary.unlink(missing_ok=True)
@@ -121,5 +121,5 @@ def _replaced(target: Path) -> Iterator[Path]:
         yield temporary
         os.replace(temporary, target)
     finally:
-        # It is still there if both names were of one file already.
+        # os.replace does nothing if both are names of the same file.
         temporary.unlink(missing_ok=True)

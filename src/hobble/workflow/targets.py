@@ -46,7 +46,7 @@ def notes(project: Project, targets: Iterable[str]) -> list[str]:
 def needed_datasets(project: Project, arguments: Sequence[str]) -> list[str]:
     """The data sets that a command line needs. arguments: of Snakemake, also of a job on another machine.
 
-    With those of configurations whose networks are used or continued.
+    Includes the data sets of configurations whose networks are used or continued.
     """
     if rules := rules_of_job(arguments):
         return [name for name in dict.fromkeys(map(dataset_of, rules)) if name]
