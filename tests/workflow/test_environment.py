@@ -68,3 +68,13 @@ def test_it_needs_nothing_that_is_not_in_python() -> None:
 
 def test_it_fetches_the_torch_that_the_project_names(root: Path) -> None:
     assert f'"{environment.STEPS[0][0]}"' in (root / "pyproject.toml").read_text()
+
+
+def test_a_sound_environment_is_not_made_anew(tmp_path: Path) -> None:
+    """venv copies the interpreter, which fails while a program runs in the environment."""
+    assert environment.is_sound(Path(sys.executable))
+    assert not environment.is_sound(tmp_path / "bin" / "python")
+    other = tmp_path / "python"
+    other.write_text("#!/bin/sh\necho '3.9.1 (another one)'\n")
+    other.chmod(0o755)
+    assert not environment.is_sound(other)

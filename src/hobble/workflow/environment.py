@@ -84,6 +84,16 @@ def install(python: Path, arguments: list[str], line: Line) -> None:
         sys.exit("".join(words) + f"\nThe environment could not be made: {' '.join(command)}")
 
 
+def is_sound(python: Path) -> bool:
+    """Whether this is the interpreter of an environment with pip, of the Python that runs this."""
+    version = "import sys, pip; print(sys.version)"
+    try:
+        told = subprocess.run([python, "-c", version], capture_output=True, text=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError):
+        return False
+    return told.strip() == sys.version
+
+
 def main(folder: Path) -> None:
     """Make the environment in `folder`, or complete an existing one."""
     if sys.version_info < OLDEST_PYTHON:
@@ -91,8 +101,10 @@ def main(folder: Path) -> None:
     print(f"Making the environment in {folder}: PyTorch, Snakemake, SciPy and their dependencies.")
     print(f"This downloads packages and takes {DISK_SPACE} of disk, and a few minutes with a fast network.")
     began = time.monotonic()
-    venv.create(folder, with_pip=True)
     python, line = folder / "bin" / "python", Line(sys.stdout)
+    # venv copies the interpreter anew, which fails while one of its programs runs.
+    if not is_sound(python):
+        venv.create(folder, with_pip=True)
     install(python, ["--quiet", "--upgrade", "pip>=25"], line)  # older versions do not print progress
     for packages in STEPS:
         install(python, ["--progress-bar", "raw", "--constraint", "constraints.txt", *packages], line)
