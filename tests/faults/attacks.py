@@ -19,7 +19,7 @@ ATTACKS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         (
             "tests/models/test_load.py::test_a_malformed_network_is_refused",
             "tests/models/test_load.py::test_a_malformed_folder_of_bins_is_refused",
-            "tests/models/test_load.py::test_what_is_no_file_is_refused_and_not_waited_for",
+            "tests/models/test_load.py::test_what_is_not_a_regular_file_is_refused",
             "tests/models/test_load.py::test_entries_that_overlap_take_no_memory",
             "tests/models/test_kinds.py::test_a_malformed_array_is_refused",
         ),
@@ -31,8 +31,8 @@ ATTACKS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "`next_pose`",
         REFUSED,
         (
-            "tests/runtime/test_animation.py::test_what_no_body_can_do_is_refused_and_changes_nothing",
-            "tests/runtime/test_animation.py::test_wishes_that_make_no_sense",
+            "tests/runtime/test_animation.py::test_impossible_wishes_are_refused_and_change_nothing",
+            "tests/runtime/test_animation.py::test_invalid_wishes_are_refused",
             "tests/runtime/test_animation.py::test_severities_of_another_shape",
             "tests/runtime/test_animation.py::test_a_severity_out_of_range",
             "tests/runtime/test_animation.py::test_a_terrain_that_raises_leaves_the_state_as_it_was",
@@ -41,7 +41,7 @@ ATTACKS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "a state that is not finite": (
         "a character",
         UNHARMED,
-        ("tests/runtime/test_bounds.py::test_a_state_that_is_no_number_is_made_anew_and_said_once",),
+        ("tests/runtime/test_bounds.py::test_a_state_that_is_not_finite_restarts_and_warns_once",),
     ),
     "a cache or folder that cannot be written": (
         "an import",

@@ -9,10 +9,10 @@ from random import Random
 
 import pytest
 
-from . import bvh_grammar, runs, status_grammar, texts, throws
+from . import attacks, bvh_grammar, runs, status_grammar, texts, throws
 from .damage import DAMAGES
 from .grammar import Case, mutated
-from .lab import Lab
+from .lab import ROOT, Lab
 from .same import same
 from .throws import FAULT, REFUSED, REMADE, UNHARMED
 
@@ -131,3 +131,12 @@ def test_same_forgives_times_and_nothing_else(tmp_path: Path) -> None:
     b.write_text('{"milliseconds": {"total": 1}, "laps": 3}')
     assert not same(a, b)
     assert not same(a.parent, b.parent)
+
+
+def test_every_attack_names_tests_that_exist() -> None:
+    """A test that is renamed must not drop out of `make faults`."""
+    for _, _, tests in attacks.ATTACKS.values():
+        for test in tests:
+            path, _, name = test.partition("::")
+            assert not name or f"def {name}(" in (ROOT / path).read_text(), test
+            assert (ROOT / path).exists(), test
