@@ -13,7 +13,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-OF_THE_RUN = {"logs", "benchmarks", "checkpoints", "page", "checksums"}
+# .made has links to the artefacts, and notes of how long each took.
+OF_THE_RUN = {"logs", "benchmarks", "checkpoints", "page", "checksums", ".made"}
 ACCOUNTS = {"pipeline.json", "report.html", "checkpoint.npz"}
 
 
