@@ -308,16 +308,22 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
         print(f"disk / memory {np.median(ratios):.3f}, {ratios.min():.3f} to {ratios.max():.3f} (goal: 0.95)")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def arguments(description: str, rounds: int) -> argparse.ArgumentParser:
+    """The arguments of a benchmark that runs its tasks in processes of their own (`child`)."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--size-mb", type=int, default=1280)
     parser.add_argument("--memory-mb", type=int, default=128)
-    parser.add_argument("--joints", type=int, default=31)
-    parser.add_argument("--rounds", type=int, default=7, help="of training from memory and from disk")
-    parser.add_argument("--only", choices=["reading", "training"], help="leave the other out")
+    parser.add_argument("--rounds", type=int, default=rounds, help="of measuring each way")
     parser.add_argument("--folder", type=Path)
     parser.add_argument("--task", help=argparse.SUPPRESS)
     parser.add_argument("--argument", help=argparse.SUPPRESS)
+    return parser
+
+
+def main() -> None:
+    parser = arguments(__doc__.splitlines()[0], rounds=7)
+    parser.add_argument("--joints", type=int, default=31)
+    parser.add_argument("--only", choices=["reading", "training"], help="leave the other out")
     args = parser.parse_args()
     if args.task:
         globals()[f"task_{args.task}"](args.folder, args.argument)

@@ -10,7 +10,6 @@ in a memory cgroup of `memory-mb` plus the program's own memory, if one can be m
 
 from __future__ import annotations
 
-import argparse
 import inspect
 import shutil
 import tempfile
@@ -173,14 +172,7 @@ def measure(folder: Path, memory_mb: int, rounds: int) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--size-mb", type=int, default=1280)
-    parser.add_argument("--memory-mb", type=int, default=128)
-    parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--folder", type=Path)
-    parser.add_argument("--task", help=argparse.SUPPRESS)
-    parser.add_argument("--argument", help=argparse.SUPPRESS)
-    args = parser.parse_args()
+    args = of_files.arguments(__doc__.splitlines()[0], rounds=5).parse_args()
     if args.task:
         globals()[f"task_{args.task}"](args.folder, args.argument)
         return

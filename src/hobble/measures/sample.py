@@ -122,10 +122,15 @@ def _kinds(clips: Iterable[Facts], splits: Mapping[str, str]) -> dict[tuple[Any,
     return kinds
 
 
+def shuffle_key(name: str) -> bytes:
+    """Sort names by this for an order that looks random, is always the same, and stays if one is added."""
+    return hashlib.sha256(name.encode()).digest()
+
+
 def _first(members: Sequence[Facts], rows: float) -> dict[str, int]:
     """A random choice of `LEAST` clips of a stratum, and more until they have `rows` rows."""
     out: dict[str, int] = {}
-    for one in sorted(members, key=lambda one: hashlib.sha256(one.clip.encode()).digest()):
+    for one in sorted(members, key=lambda one: shuffle_key(one.clip)):
         if len(out) >= LEAST and sum(out.values()) >= rows:
             break
         out[one.clip] = one.rows

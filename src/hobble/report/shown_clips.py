@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from hobble.measures.sample import shuffle_key
 from hobble.report.gather import Material
 
 MOST = 150  # clips with a strip, a row of the table and ground of their own
@@ -26,20 +26,17 @@ def shown(material: Material, most: int = MOST) -> frozenset[str]:
         kinds.setdefault((material.split(clip), gait, clip in changed), []).append(clip)
     if sum(map(len, kinds.values())) <= most:
         return frozenset(name for names in kinds.values() for name in names)
-    turns = [(turn, kind, name) for kind in kinds for turn, name in enumerate(shuffled(kinds[kind]))]
+    turns = [
+        (turn, kind, name) for kind in kinds for turn, name in enumerate(sorted(kinds[kind], key=shuffle_key))
+    ]
     return frozenset(name for *_, name in sorted(turns)[:most])
-
-
-def shuffled(names: Iterable[str]) -> list[str]:
-    """The names in an order that looks random, is always the same, and stays as it is if one is added."""
-    return sorted(names, key=lambda name: hashlib.sha256(name.encode()).digest())
 
 
 def counted(paths: Sequence[str], most: int = MOST_COUNTED) -> list[str]:
     """At most `most` of the clips' files: each clip is as likely as any other."""
     if len(paths) <= most:
         return list(paths)
-    chosen = set(shuffled(Path(path).stem for path in paths)[:most])
+    chosen = set(sorted((Path(path).stem for path in paths), key=shuffle_key)[:most])
     return [path for path in paths if Path(path).stem in chosen]
 
 

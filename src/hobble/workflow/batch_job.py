@@ -6,7 +6,6 @@ What is kept from an earlier try is not made again, and a bad clip fails alone.
 from __future__ import annotations
 
 import errno
-import hashlib
 import logging
 import sys
 import time
@@ -130,8 +129,7 @@ class _Digests:
 
 def _sha256(file: str) -> str:
     try:
-        with open(file, "rb") as opened:
-            return hashlib.file_digest(opened, "sha256").hexdigest()
+        return checksums.file_sha256(file)
     except OSError:
         return "cannot be read"  # the job that reads it reports why
 

@@ -7,6 +7,7 @@ reads such a file verifies them.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import time
 import zlib
@@ -100,6 +101,12 @@ def file_crc32(path: Path) -> int:
         while block := file.read(BLOCK_BYTES):
             crc = zlib.crc32(block, crc)
     return crc
+
+
+def file_sha256(path: str | Path) -> str:
+    """SHA-256 of a file. Raises OSError if it cannot be read."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _checksum(path: Path) -> int:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import defaultdict
 from itertools import combinations
 from pathlib import Path
 
 from hobble.database.sides import refuse_both_sides
+from hobble.workflow.checksums import file_sha256
 from hobble.workflow.clips import Clips, original
 from hobble.workflow.datasets import Datasets
 
@@ -22,7 +22,7 @@ def same_files(clips: Clips, dataset: str) -> list[tuple[str, str, str]]:
     out = []
     for files in sizes.values():
         if len(files) > 1:
-            digests = {clip: _sha256(path) for clip, path in files}
+            digests = {clip: file_sha256(path) for clip, path in files}
             out += [(a, b, "the same file") for a, b in combinations(digests, 2) if digests[a] == digests[b]]
     return out
 
@@ -33,8 +33,3 @@ def refuse_copies(clips: Clips, datasets: Datasets, dataset: str, channels: tupl
     if model.synthetic is None and model.held_out:
         splits = {original(name): side for name, side in datasets.selected(dataset, channels).items()}
         refuse_both_sides(f"data set {dataset}", same_files(clips, dataset), splits)
-
-
-def _sha256(path: Path) -> str:
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

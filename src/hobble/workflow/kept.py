@@ -113,7 +113,10 @@ def _link(source: Path, target: Path) -> None:
 
 @contextlib.contextmanager
 def _replaced(target: Path) -> Iterator[Path]:
-    """Yield a temporary path that replaces `target`. A killed process leaves no half-written file."""
+    """Yield a temporary path that replaces `target`. A killed process leaves no half-written file.
+
+    Unlike `core.files.atomic_path` it flushes nothing to disk: what is lost in a power cut is made again.
+    """
     target.parent.mkdir(parents=True, exist_ok=True)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
     temporary.unlink(missing_ok=True)

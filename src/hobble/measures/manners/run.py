@@ -82,8 +82,7 @@ def of_channel(
     manner and value the share of `windows` recognised with what was learnt from the training clips. For two
     manners together: the share recognised as either, and how far the walk is `between` the two single ones.
     together: the same for each manner at 1 together with each column of another channel at its highest.
-    effects: of each manner, captured and generated, minus the
-    neutral walk's.
+    effects: of each manner, captured and generated, minus the neutral walk's.
     """
     known = [w for w in windows if splits[w.clip] == "train"]
     seen = sorted({w.manner for w in known} - {NONE})
