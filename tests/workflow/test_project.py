@@ -159,7 +159,10 @@ def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
     [
         ("results/one/stimuli", "configuration one has no `channels`"),
         ("results/eyes/stimuli/", "configuration one has no `channels`"),
-        ("results/one/questionnaire", r"configuration one has no channel injury.*\[injury\]"),
+        (
+            "results/one/questionnaire/questionnaire.html",
+            r"configuration one has no channel injury.*\[injury\]",
+        ),
         ("results/hurt/export/cubik.onnx", "export/cubik.onnx: the phase modes are constant, linear, cubic"),
     ],
 )
@@ -172,7 +175,7 @@ def test_impossible_targets_are_reported_before_training(
         check(Project(base, {}), [target])
     fine = (
         "results/hurt/stimuli",
-        "results/hurt/questionnaire",
+        "results/hurt/questionnaire/questionnaire.html",
         "results/one/export/pfnn",
         "results/one/export/cubic.onnx",
     )
