@@ -1,4 +1,4 @@
-"""Example inputs, and the page made from them once."""
+"""Example inputs, and the page made of them, once for all tests."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def tools() -> ModuleType:
 
 @pytest.fixture(scope="session")
 def pictures(root: Path) -> Path:
-    """Where pictures of the page's sections are kept for a person to look at; not tracked."""
+    """The folder in which pictures of the page's sections are saved for people to look at; not tracked."""
     folder = root / "build" / "report-sections"
     folder.mkdir(parents=True, exist_ok=True)
     return folder

@@ -143,7 +143,8 @@ def test_a_hostile_clip_name_is_only_text(
 
 def test_a_network_that_cannot_be_hurt(examples: ModuleType, holden31: Skeleton, tmp_path: Path) -> None:
     text = render(gather(**examples.write_all(tmp_path, holden31, injury=False)))
-    assert "nothing can hurt it" in text
+    assert 'id="injury"' not in text
+    assert "Injury response" not in text
     assert 'data-chart="sweep-pose"' not in text
     assert 'id="walking"' not in text
     assert 'id="play"' not in text

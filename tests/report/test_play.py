@@ -1,4 +1,4 @@
-"""The network in the page: the same numbers as in Python, and keys, clicks and buttons that work."""
+"""The network in the page gives the same numbers as in Python, and keys, clicks and buttons work."""
 
 from __future__ import annotations
 
@@ -68,7 +68,9 @@ def test_inputs_that_weigh_nothing_are_left_out(
 
 
 def wish(frame: int) -> dict[str, Any]:
-    """Walk ahead, turn, strafe, stop and turn on the spot, crouch; hurt from the second third on."""
+    """The target in each frame: walk ahead, turn, strafe, stop, turn on the spot, crouch; hurt in the last
+    two thirds.
+    """
     angle = 0.03 * max(0, frame - 20)
     velocity, facing, gait = [2.5 * np.sin(angle), 2.5 * np.cos(angle)], None, "walk"
     if 40 <= frame < 60:
@@ -81,7 +83,7 @@ def wish(frame: int) -> dict[str, Any]:
 
 
 def hills(x: Any, z: Any) -> Any:
-    """The ground that the page calls rolling."""
+    """The ground that is called "rolling" in the page."""
     return 14 * np.sin(x / 170) * np.cos(z / 140) + 8 * np.sin((x + z) / 260)
 
 
@@ -283,9 +285,8 @@ def test_presets_sliders_and_the_link_to_them(tab: Any) -> None:
 
 
 def test_the_page_moves_the_body_as_python_does(tab: Any, holden31: Skeleton) -> None:
-    """Corners of the body for random rotations of the bones.
-
-    The page stores integers, so they agree to a tenth.
+    """Corners of the body for random rotations of the bones, equal to a tenth, because the page stores
+    integers.
     """
     mesh, rng = body(holden31), np.random.default_rng(3)
     places = mesh.positions + rng.normal(0, 2, mesh.positions.shape)
@@ -393,7 +394,7 @@ def test_a_link_pasted_into_the_open_page_is_followed_and_taken_with_care(tab: A
 
 
 def test_the_camera_comes_round_behind_at_any_rate_of_pictures(tab: Any) -> None:
-    """The camera's path depends on the time and not on the number of pictures."""
+    """The path of the camera depends on the time and not on the number of frames drawn."""
     script = """((rate) => {
       const orbit = { yaw: 0 }, chase = Hobble.chase(orbit, document.createElement("canvas"));
       let eye;
@@ -457,7 +458,7 @@ def test_playing_says_nothing_and_asks_for_nothing(tab: Any) -> None:
 def test_the_largest_network_leaves_room_in_the_page(
     examples: ModuleType, root: Path, tmp_path: Path, page: str
 ) -> None:
-    """191 joints and two layers of 512: with plotly.js and everything else the page is to be under 20 MB."""
+    """With 191 joints, two layers of 512, plotly.js and everything else the page stays under 20 MB."""
     data = yaml.safe_load((root / "config/skeletons/ava191.yaml").read_text())
     skeleton = Skeleton.from_dict({"name": "ava191", **{k: v for k, v in data.items() if k != "maps"}})
     examples.weights(tmp_path / "weights.npz", skeleton, units=512)
