@@ -91,7 +91,7 @@ const createHero = (spec, asked) => {
       words.much.textContent = `${dial.value} of 10`;
       if (!one.on) find("hero-on").textContent = part;
       const same = "One neural network moves both figures, and both have the same target speed. ";
-      if (dial.value) line.replaceChildren(`${same}For the solid one, the network also gets the input ${before}`, words.part, `${after}, `, words.much, ".");
+      if (dial.value) line.replaceChildren(`${same}The solid one also gets the input ${before}`, words.part, `${after}, `, words.much, ".");
       else line.replaceChildren(`${same}At 0 they walk alike.`);
       chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
     };
