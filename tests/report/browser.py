@@ -84,10 +84,11 @@ class Browser:
             self._keep(answer)
 
     def open(self, url: str) -> None:
-        """Go to a page and wait until it is loaded."""
+        """Go to a page and wait until it is loaded and all its parts have started."""
         self.send("Page.navigate", url=url)
         while self.run("document.readyState + location.href.startsWith('about:')") != "completefalse":
             time.sleep(0.05)
+        self.until("globalThis.Hobble?.ready ?? true", 60)
 
     def run(self, expression: str) -> Any:
         """The value of a JavaScript expression, awaited if it is a promise. Raises if it throws."""

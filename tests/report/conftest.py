@@ -22,6 +22,7 @@ from hobble.report.gather import Material, gather
 from hobble.report.page import render
 from hobble.report.playable import playable
 from hobble.report.scenes import scenes
+from hobble.report.walked import opened
 
 
 def beside(name: str) -> ModuleType:
@@ -88,6 +89,14 @@ def character(network: Network, examples: ModuleType) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="session")
+def hero(
+    network: Network, character: dict[str, Any], material: Material, examples: ModuleType
+) -> dict[str, Any]:
+    """The figures at the top of the page."""
+    return opened(network, examples.RUNTIME, character, material.measured.values())
+
+
+@pytest.fixture(scope="session")
 def compared(
     network: Network, examples: ModuleType, holden31: Skeleton, tmp_path_factory: pytest.TempPathFactory
 ) -> dict[str, Any]:
@@ -130,6 +139,7 @@ def page(
     character: dict[str, Any],
     compared: dict[str, Any],
     script: str,
+    hero: dict[str, Any],
 ) -> str:
     """The report of the examples."""
-    return render(material, play, character, compared, script)
+    return render(material, play, character, compared, script, hero)

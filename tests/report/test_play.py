@@ -22,6 +22,7 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.motion.decode import decode, frame_rate
 from hobble.motion.read import read_bvh
+from hobble.report import walked
 from hobble.report.formats import embedded
 from hobble.report.playable import playable
 from hobble.runtime.animation import ProceduralAnimation
@@ -166,7 +167,26 @@ def test_the_top_of_the_page_has_a_hurt_figure_and_a_healthy_one_beside_it(tab: 
     assert "5 of 10" in tab.run(line)
     assert max(tab.run(f"{of}({hero}.ghost)")) == 0.0
     tab.press("Home")
-    assert "At 0 they walk alike." in tab.run(line)
+    assert "at 0 they walk alike." in tab.run(line)
+
+
+def test_the_figures_at_the_top_go_on_as_the_python_runtime_does(
+    tab: Any, network: Network, examples: ModuleType, character: dict[str, Any], hero: dict[str, Any]
+) -> None:
+    """The page has their states at the moment when it opens. Both go on alike for half a second."""
+    (one,) = [c for c in character["channels"] if c["name"] == "injury"]
+    column = one["columns"][one["sliders"][hero["part"]]]
+    for i, values in enumerate(({column: 7.0}, {})):
+        animation = ProceduralAnimation(network, **dict(examples.RUNTIME))
+        for _ in range(walked.FRAMES + 30):
+            pose = animation.next_pose(walked.AHEAD, None, "walk", injury=values)
+        seen = tab.run(f"""(() => {{
+          const c = Hobble.character(Hobble.material.playable.example);
+          c.follow(Hobble.material.hero.walked[{i}]);
+          for (let f = 0; f < 30; f++) c.frame({json.dumps(walked.AHEAD)}, null, "walk", () => 0);
+          return Array.from(c.pose);
+        }})()""")
+        np.testing.assert_allclose(np.reshape(seen, (-1, 3)), pose.positions, atol=0.05)
 
 
 def test_keys_move_the_figure(tab: Any) -> None:

@@ -14,7 +14,7 @@ class Runtime(Section):
 
     mode: PhaseMode = Field(
         "cubic",
-        description="how the weights of a phase are found; cubic: exactly, linear: from 10 tables, constant: from 50",
+        description="how the weights of a phase are found; cubic is exact, linear uses 10 tables, constant 50",
     )
     rates: dict[str, PositiveFloat] = Field(
         {}, description="channel: largest change of its values per second; default: the channel's own rate"
