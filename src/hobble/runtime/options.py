@@ -14,7 +14,7 @@ class Runtime(Section):
 
     mode: PhaseMode = Field(
         "cubic",
-        description="how the weights of a phase are found; cubic is exact, linear uses 10 tables, constant 50",
+        description="how a phase gets its weights: cubic is exact, linear has 10 tables, constant 50",
     )
     rates: dict[str, PositiveFloat] = Field(
         {}, description="channel: largest change of its values per second; default: the channel's own rate"
