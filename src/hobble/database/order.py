@@ -51,7 +51,7 @@ def groups(shards: np.ndarray, window: int, seed: int, pass_index: int, layer: i
     draw = generator(seed, CHUNKS, pass_index, layer)
     order = draw.permutation(len(shards))
     of_each = np.bincount(shards)
-    if (count := np.count_nonzero(of_each)) > 1:
+    if (count := int(np.count_nonzero(of_each))) > 1:
         order = order[np.argsort(_places(shards[order], of_each, draw.random(len(of_each))), kind="stable")]
     out, start, size = [], 0, min(count, window)
     while start < len(order):

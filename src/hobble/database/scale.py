@@ -56,10 +56,10 @@ def scale_to(whole: Statistics, own: Statistics, terrain: slice) -> Scale | None
     """From a shard's statistics to those of the database; None if they are equal. terrain: columns of X."""
     if all(np.array_equal(vars(own)[name], values) for name, values in vars(whole).items()):
         return None
-    x = _line(own.x_mean, own.x_std, whole.x_mean, whole.x_std)
-    rows = tuple(np.delete(part, terrain) for part in x)
+    factor, summand = _line(own.x_mean, own.x_std, whole.x_mean, whole.x_std)
+    rows = np.delete(factor, terrain), np.delete(summand, terrain)
     # The last column of the fits is a height in cm.
-    fits = tuple(np.append(part[terrain], np.float32(last)) for part, last in zip(x, (1, 0), strict=True))
+    fits = np.append(factor[terrain], np.float32(1)), np.append(summand[terrain], np.float32(0))
     return Scale(rows, _line(own.y_mean, own.y_std, whole.y_mean, whole.y_std), fits)
 
 

@@ -140,5 +140,5 @@ class Shard:
             for key, values in data.items():
                 number, _, name = key.partition(".")
                 cycles.setdefault(int(number), {})[name] = values
-            for number, arrays in sorted(cycles.items()):
-                pace.add_arrays(self.plan.clips[number]["clip"], arrays)
+            for place, arrays in sorted(cycles.items()):
+                pace.add_arrays(self.plan.clips[place]["clip"], arrays)
