@@ -188,7 +188,9 @@ def test_renewed_contact_holds_the_foot_where_it_is_shown(holden31: Skeleton) ->
     np.testing.assert_allclose(again, seen, atol=1e-9)
 
 
-def glide(feet: Feet, speed: float, frames: int, **contacts: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def glide(
+    feet: Feet, speed: float, frames: int, **contacts: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The left toe (F, 3), where the network has it (F, 3), and whether it counts as standing (F,).
 
     The figure moves forward by `speed` cm a frame, and the network says that its feet stand.
