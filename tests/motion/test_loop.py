@@ -1,4 +1,4 @@
-"""Short cycles repeated: on and on in one direction, with no jerk where one begins after another."""
+"""Repeated short cycles go on in one direction, without a jerk at the seams."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ def changed(material: Material, **changes: Any) -> Material:
 
 
 def heads(material: Material, **changes: Any) -> dict[str, str]:
-    """Head of each hint -> its kind."""
+    """Title of each hint -> its kind."""
     return {hint.head: hint.kind for hint in hints(changed(material, **changes))}
 
 

@@ -26,6 +26,13 @@ def test_sections_of_one_name_are_one_with_the_parts_of_all_in_their_order() -> 
     assert [part.kind for part in second.parts] == ["words", "chart", "table"]
 
 
+def test_a_section_of_words_alone_is_left_out() -> None:
+    introduction = Section("s", [Part(0, Words("Each bar is a lap.")), Part(5, None)], title="S")
+    assert joined([introduction, Section("s", [Part(10, Pair([None, None]))])]) == []
+    [shown] = joined([introduction, Section("s", [Part(10, Pair([None, chart("a")]))])])
+    assert [part.kind for part in shown.parts] == ["words", "pair"]
+
+
 def test_charts_are_found_wherever_they_stand() -> None:
     pair, family = Pair([chart("a"), None]), Family("f", "F", "", [chart("b"), chart("c")])
     section = Section("s", [Part(0, pair), Part(1, family), Part(2, Words("w")), Part(3, chart("d"))])
@@ -34,13 +41,13 @@ def test_charts_are_found_wherever_they_stand() -> None:
 
 def test_words_are_escaped_and_every_kind_is_drawn() -> None:
     parts = [
-        Part(0, Words("<b>", empty=True)),
+        Part(0, Words("<b>")),
         Part(1, Pair([chart("a"), None])),
         Part(2, chart("b"), tall=True),
     ]
     section = joined([Section("s", parts, title="<S>")])
     text = template("measured.html.j2").render(measured=section)
-    assert '<p class="empty">&lt;b&gt;</p>' in text
+    assert "<p>&lt;b&gt;</p>" in text
     assert "<h2>&lt;S&gt;</h2>" in text
     assert text.count("<figure") == 2
     assert 'class="plot tall" tabindex="0" data-chart="b"' in text

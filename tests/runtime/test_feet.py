@@ -1,4 +1,4 @@
-"""Feet: legs that reach, feet that stay where they stand and out of the ground."""
+"""Foot placement: legs that reach their targets, feet that stay where they stand and above the ground."""
 
 from __future__ import annotations
 
@@ -332,7 +332,9 @@ def test_standing_feet_raise_and_lower_the_body(holden31: Skeleton) -> None:
     soles = [min(base[leg[2], 1] - sole[0], base[leg[3], 1] - sole[1]) for leg in legs]
 
     def carried_to(left: float, right: float, contacts: list[float], low: float, high: float) -> float:
-        """Where the figure comes to; left, right: the ground under its feet, its hips over their mean."""
+        """How far the figure is raised, cm. left, right: height of the ground under each foot. low, high:
+        range of the hips.
+        """
         ground = np.array([[left, left, right, right, (left + right) / 2]])
         lift = np.zeros(1)
         for _ in range(80):

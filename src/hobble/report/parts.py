@@ -17,7 +17,6 @@ class Words:
     """A paragraph. Only text from the code may be Markup; everything else is escaped."""
 
     text: str | Markup
-    empty: bool = False  # the text says that there is nothing to show
 
 
 @dataclass(frozen=True)
@@ -90,18 +89,26 @@ class Section:
 
 
 def joined(sections: Iterable[Section]) -> list[Section]:
-    """Sections in order. Sections of the same name become one with all their parts; empty ones are left out.
+    """Sections in order. Sections of the same name become one with all their parts.
 
-    Title and place come from the first section that has a title.
+    Title and place come from the first section that has a title. A section with nothing but words is left
+    out, because words introduce what a measurement found.
     """
     by_name: dict[str, list[Section]] = {}
     for section in sections:
         by_name.setdefault(section.name, []).append(section)
     out = []
     for name, some in by_name.items():
-        parts = sorted((p for s in some for p in s.parts if p.content is not None), key=lambda part: part.at)
+        parts = sorted((p for s in some for p in s.parts if _shows(p.content)), key=lambda part: part.at)
         owner = next((s for s in some if s.title), some[0])
         title = owner.title or name.replace("_", " ").capitalize()
-        if parts:
+        if any(not isinstance(part.content, Words) for part in parts):
             out.append(replace(owner, parts=parts, title=title, nav=owner.nav or title))
     return sorted(out, key=lambda section: section.at)
+
+
+def _shows(content: Content | None) -> bool:
+    """Whether there is anything to show."""
+    if isinstance(content, Pair):
+        return any(chart is not None for chart in content.charts)
+    return content is not None

@@ -82,7 +82,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
     skeleton, out, first = network.skeleton, [], 0
     assert skeleton is not None
     for name, columns in network.channels.items():
-        one, said, at = channel(name), words(name), list(columns).index
+        one, wording, at = channel(name), words(name), list(columns).index
         limits = network.limits.get(name)
         face = shown(name, skeleton, columns, network.trained(name))
         presets = [
@@ -93,7 +93,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
             {
                 "name": name,
                 "title": one.title,
-                "key": said.key or name,
+                "key": wording.key or name,
                 "first": first,
                 "columns": list(columns),
                 "trained": list(network.trained(name)),
@@ -102,12 +102,12 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
                 "presets": presets,
                 "regions": [list(some) for some in face.regions],
                 "highest": one.highest,
-                "sliderStep": said.step,
-                "rest": said.rest,
-                "never": said.never,
-                "headline": said.headline,
-                "says": said.says,
-                "on": said.on,
+                "sliderStep": wording.step,
+                "rest": wording.rest,
+                "never": wording.never,
+                "headline": wording.headline,
+                "says": wording.says,
+                "on": wording.on,
                 "rate": runtime.rates.get(name, one.rate) / 60,
                 "scale": runtime.scales.get(name, 1.0),
                 "limits": limits.to_dict() if runtime.limits and limits is not None else None,

@@ -181,7 +181,9 @@ def published_table(found: Json, material: Material) -> Table:
 
 
 def section(found: Json, material: Material) -> Section:
-    """The charts and tables, and the view of captured and predicted motion."""
+    """The charts and tables, and the view of captured and predicted motion. Empty if it was not measured."""
+    if not found:
+        return Section("accuracy", [])
     return Section(
         "accuracy",
         [

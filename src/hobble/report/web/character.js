@@ -5,9 +5,16 @@ import { createFeet } from "./feet.js";
 import { bytes } from "./numbers.js";
 import { at4, multiply } from "./turns.js";
 
+// Characters of one network share it. It remembers nothing between two predictions.
+const predictors = new WeakMap();
+const predictor = (spec) => {
+  if (!predictors.has(spec)) predictors.set(spec, networks[spec.network.kind](spec));
+  return predictors.get(spec);
+};
+
 export const createCharacter = (spec, place = [0, 0], heading = 0) => {
   const { joints: J, step, x: X, y: Y, gaits, constants: k } = spec, T = 2 * spec.window, M = spec.window;
-  const S = T / step, F = M / step, G = gaits.length, predict = networks[spec.network.kind](spec);
+  const S = T / step, F = M / step, G = gaits.length, predict = predictor(spec);
   const { atan2, sin, cos, hypot, floor, min, max, abs, sqrt, PI } = Math;
   const wrap = (angle) => angle - 2 * PI * floor((angle + PI) / (2 * PI));
   // The columns of all channels in order: the place of each in X, and how far its value may change in a frame.
@@ -292,10 +299,10 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     c.phase = phase - floor(phase);
   };
 
-  // Copies the state of another character, moved by [x, z] cm.
+  // Copies the state of another character (or one from the data of the page), moved by [x, z] cm.
   c.follow = (other, by = [0, 0]) => {
     for (const [name, value] of Object.entries(other)) {
-      if (ArrayBuffer.isView(value)) c[name].set(value);
+      if (ArrayBuffer.isView(c[name])) c[name].set(value);
       else if (typeof value !== "function") c[name] = structuredClone(value);
     }
     for (let t = 0; t < T; t++) { c.px[t] += by[0]; c.pz[t] += by[1]; }
