@@ -25,6 +25,7 @@ import numpy as np
 import yaml
 from numba import njit
 
+from hobble.core.processors import processor
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.models.load import load_network
@@ -32,7 +33,6 @@ from hobble.models.network import STORAGES
 from hobble.models.pfnn.network import Pfnn
 from hobble.models.pfnn.predictor import MODES, PfnnPredictor
 from hobble.models.tiles import PANELS_FOR_3_ROWS, PANELS_FOR_6_ROWS
-from hobble.report.provenance import processor
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
 

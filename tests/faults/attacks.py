@@ -1,4 +1,4 @@
-"""Attacks that are tests of their own, each with one file, server or call: run, and counted."""
+"""Attacks that are tests of their own, each with one file, server or call. They are run and counted."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ ATTACKS: dict[str, tuple[str, str, tuple[str, ...]]] = {
 
 
 def thrown(scratch: Path) -> list[Throw]:
-    """Run every attack; each test that passes is one that ended as it should."""
+    """Run every attack. A test that passes is an attack that ended as it should."""
     return [throw for what in ATTACKS for throw in _one(what, scratch)]
 
 

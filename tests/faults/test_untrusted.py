@@ -1,4 +1,4 @@
-"""Files from a stranger: they run no code, stay in their folders, and take no more memory than they may."""
+"""Files from strangers run no code, stay in their folders and take limited memory."""
 
 from __future__ import annotations
 
@@ -46,7 +46,9 @@ HEADER = "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 1 Xposition\n"
 
 
 def refused(read: Callable[[], Any], *pieces: str, mb: int = 300, letters: int = 2000) -> None:
-    """`read` ends in a HobbleError that holds the pieces, in `mb` of memory and fewer than `letters`."""
+    """`read` raises a HobbleError with these pieces, takes less than `mb` of memory and fewer than
+    `letters`.
+    """
     read_end, write_end = os.pipe()
     pid = os.fork()
     if not pid:
@@ -231,7 +233,7 @@ def test_a_header_that_python_trips_over_is_refused(tmp_path: Path, what: str) -
 
 
 def test_bytes_do_not_become_eight_times_as_much_as_numbers(tmp_path: Path) -> None:
-    """A megabyte of compressed bytes, which is a gigabyte of heights or weights of one byte."""
+    """A megabyte of compressed bytes that unpacks to a gigabyte of one-byte heights or weights."""
     path = tmp_path / "a.npz"
     side = 9000
     np.savez_compressed(path, heights=np.zeros((side, side), np.int8), W0=np.zeros((1, side, side), np.int8))
@@ -242,7 +244,7 @@ def test_bytes_do_not_become_eight_times_as_much_as_numbers(tmp_path: Path) -> N
 
 
 def test_a_layer_of_the_release_is_no_larger_than_it_may_be(tmp_path: Path) -> None:
-    """Files of many gigabytes that take no room on the disk."""
+    """Sparse files of many gigabytes."""
     for name in ("Xmean", "Xstd", "Ymean", "Ystd", "b0_000"):
         write(tmp_path / f"{name}.bin", bytes(4 << 16))
     with open(tmp_path / "W0_000.bin", "wb") as file:
@@ -269,7 +271,7 @@ def test_what_stands_for_no_data_may_be_anything(tmp_path: Path, kind: int, valu
 
 
 def test_a_zip_bomb_is_not_unpacked(tmp_path: Path) -> None:
-    """Six gigabytes of zeros in six megabytes, deflated once and listed six times."""
+    """Six megabytes that unpack to six gigabytes of zeros: one entry, listed six times."""
     gigabyte = npy((1 << 27,))[:-1] + b"\n"
     squeeze = zlib.compressobj(9, zlib.DEFLATED, -15)
     block = bytes(MB)
@@ -292,7 +294,7 @@ def test_a_zip_bomb_is_not_unpacked(tmp_path: Path) -> None:
 
 
 def test_entries_that_share_bytes_are_not_read_as_often_as_they_are_listed(tmp_path: Path) -> None:
-    """8 MB of one array, listed 400 times over: 3.2 GB."""
+    """One array of 8 MB, listed 400 times: 3.2 GB."""
     path = zipped(tmp_path / "a.npz", {"heights.npy": npy((MB,), bytes(8 * MB))})
     data = path.read_bytes()
     start, end = data.rindex(b"PK\x01\x02"), data.rindex(b"PK\x05\x06")
@@ -407,7 +409,7 @@ def test_json_that_is_too_deep_is_refused(tmp_path: Path) -> None:
 
 
 class Payload:
-    """Unpickled, it leaves a file."""
+    """An object that writes a file when it is unpickled."""
 
     def __reduce__(self) -> Any:
         return os.mkdir, ("pwned",)
@@ -482,7 +484,9 @@ def test_the_source_has_no_way_to_run_what_it_reads(root: Path, folder: str) -> 
 
 @pytest.fixture
 def catalogue(root: Path, tmp_path: Path) -> Path:
-    """A folder of configurations inside another, with a configuration outside that must not be reached."""
+    """A folder of configurations inside another one, with a configuration outside that must not be
+    reachable.
+    """
     folder = tmp_path / "checkout/config"
     (folder / "datasets").mkdir(parents=True)
     (folder / "skeletons").mkdir()

@@ -89,7 +89,7 @@ def window(who: str, manner: str, *values: float) -> Window:
 
 
 def test_whole_people_are_left_out() -> None:
-    """Each clip looks like its person, and nothing else. The person's other clip gives its manner away."""
+    """Each clip is like the other clip of its person and unlike all others."""
     rng = np.random.default_rng(2)
     windows, people = [], {}
     for person in range(12):
@@ -139,7 +139,9 @@ def test_a_manner_of_one_person_is_never_named_without_that_person() -> None:
 def test_each_manner_is_tried_with_each_column_of_another_channel(
     both: Network, motion: list[Captured], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Captured windows take the place of the generated figures: of the right mood, of none at one link."""
+    """Captured windows stand for the generated figures: those of the right mood, and at one link those of no
+    mood.
+    """
     real = {m: captured_windows(clip(both, f"{m}-9", m, lean=lean), both, "mood") for m, lean in LEANS}
     asked: list[Figure] = []
     broken = both.channels["injury"][3]

@@ -55,7 +55,7 @@ def _drawn(made: np.ndarray, compared: dict[str, Any], skeleton: Skeleton) -> np
 
 
 def test_the_error_is_the_distance_of_what_is_drawn(compared: dict[str, Any], network: Network) -> None:
-    """The mean is over all joints, placed by their rotations; most of them are drawn."""
+    """The mean over all joints, most of which are drawn, placed by their rotations."""
     clip = compared["clips"][0]
     apart = np.linalg.norm(
         positions(clip, "captured", compared["joints"]) - positions(clip, "predicted", compared["joints"]),

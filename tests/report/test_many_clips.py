@@ -1,4 +1,4 @@
-"""A data set of many clips: the page shows some of them, counts some, and says so."""
+"""With many clips the page shows some of them, estimates from some, and says so."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ def test_strips_carry_what_hurts(material: Material) -> None:
 
 
 def test_stages_beside_the_published(material: Material) -> None:
-    """A published time or size is shown only for the configuration that it belongs to."""
+    """A published time or size is shown only for its own configuration."""
     nothing, patches = [None, None], [1680, 606.0e6]
     known = {
         "holden": {"terrain": patches, "database": [5400, 7.12e9], "training": [43 * 3600, 122.0e6]},

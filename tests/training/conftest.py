@@ -1,4 +1,4 @@
-"""A small database with something to learn in it, built as the database stage builds one."""
+"""A small database from which a network can learn, built as in the database stage."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def network() -> PfnnOptions:
 
 
 class Recipe(Training):
-    """A training section that a test changes with `|`, as one does with mappings."""
+    """A training section that tests change with `|`, as with mappings."""
 
     def __or__(self, changes: Mapping[str, Any]) -> Recipe:
         return Recipe.model_validate(self.model_dump() | dict(changes))

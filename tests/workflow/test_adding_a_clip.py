@@ -14,7 +14,7 @@ DATASET = "skeleton: holden31\nfolder: mine\nmirror: false\nterrain: {patches: 1
 
 
 def put(clip: Path, folder: Path) -> None:
-    """A clip with the files beside it, as a user copies it into the data folder."""
+    """A clip with its other files, as a user would copy them into the data folder."""
     for file in clip.parent.glob(f"{clip.stem}[._]*"):
         shutil.copy2(file, folder)
 

@@ -1,4 +1,4 @@
-"""With `database.parts`, several jobs merge a data set; the result is the same database and nothing else."""
+"""With `database.parts` several jobs merge the database. The result is the same database and nothing else."""
 
 from __future__ import annotations
 

@@ -352,7 +352,7 @@ def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(bas
 
 
 def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path) -> None:
-    """A linked collection is found, even if one of its links leads back to it."""
+    """A linked collection is found once, even if one of its links leads back to it."""
     kept = base / "kept/day 1"
     kept.mkdir(parents=True)
     (kept / "d.bvh").write_text("")

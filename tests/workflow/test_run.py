@@ -30,7 +30,7 @@ def without_times(value: Any) -> Any:
 
 
 def artefacts(folder: Path) -> dict[str, bytes]:
-    """Every data file of a run that must come out the same, by its path."""
+    """The path and content of every data file of a run that must be the same in each run."""
     root = folder / "results"
     files = [p for p in root.rglob("*") if p.suffix in {".npz", ".npy", ".bvh", ".txt", ".bin"}]
     files = [

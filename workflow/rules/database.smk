@@ -33,8 +33,8 @@ for batch in [*batches_of_clips, *batches_of_versions]:
                 batch, 0.15 * (1 + batch.mirrored), attempt
             ),
         params:
-            each=lambda w, batch=batch: [{"clip": name} for name in batch.names],
-            counts=lambda w, batch=batch: {
+            per_clip=lambda w, batch=batch: [{"clip": name} for name in batch.names],
+            files_per_clip=lambda w, batch=batch: {
                 "channels": [len(datasets.channel_sources.channels(batch.dataset))]
                 * len(batch.names)
             },

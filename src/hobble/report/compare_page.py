@@ -50,7 +50,7 @@ def render_compared(
         title=" and ".join(names) if len(names) < 3 else f"{len(names)} configurations",
         eyebrow="Hobble report · comparison of configurations",
         lead="The same measurements of " + ", ".join(names) + ", compared with published results.",
-        embedded=embedded(data),
+        embedded={name: embedded(part) for name, part in data.items()},
         playable=list(kept),
         left_out=left_out,
         hurts=any(placed(spec) for spec in kept.values()),

@@ -35,11 +35,13 @@ def render(
     playable: Mapping[str, Any] | None = None,
     compared: Mapping[str, Any] | None = None,
     bundle: str = "",
+    hero: Mapping[str, Any] | None = None,
 ) -> str:
     """The report as one HTML document.
 
     scenes: from `scenes.scenes`; playable: from `playable.playable`; compared: from `compare.comparisons`. A
-    part without data is left out. bundle: the page's scripts, from `bundle.bundle`.
+    part without data is left out. bundle: the page's scripts, from `bundle.bundle`. hero: from
+    `walked.opened`; without it the figures at the top start from a stand.
 
     The template escapes every value. Data for the scripts is JSON without any "<".
     """
@@ -59,7 +61,7 @@ def render(
     data = {
         "charts": specs([sections, shown]),
         "bodies": {key(figure): packed_body(figure)} if figure else {},
-        "hero": opening(playable or {}, material.measured.values()),
+        "hero": hero or opening(playable or {}, material.measured.values()),
         "scenes": scenes,
         "strips": strips,
         "grounds": grounds,
@@ -77,7 +79,7 @@ def render(
         figures=findings.key_figures(material),
         hints=findings.hints(material, found["turns"]),
         lead=findings.lead(material),
-        embedded=embedded(data),
+        embedded={name: embedded(part) for name, part in data.items()},
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable={material.name: playable} if playable else {},
         hurts=placed(playable or {}) is not None,
