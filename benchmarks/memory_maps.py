@@ -60,6 +60,7 @@ class Mapped:
             setattr(self, name, np.load(folder / f"{name}.npy", mmap_mode="r"))
         self.first = order.starts(self.count)
         self.chunk_rows = [c.rows for c in db.manifest.chunks["train"]]
+        self.shards = db.manifest.shard_of_chunk("train")
         self.starts = np.cumsum(self.chunk_rows) - self.chunk_rows
 
     def blocks(self, section: int, seed: int, block_rows: int, window: int) -> Iterator[Block]:
@@ -74,7 +75,7 @@ class Mapped:
     def parts(self, of: tuple[int, int, int], start: int, stop: int, window: int) -> Iterator[tuple]:
         """Rows and fits of the places start to stop of a layer, as indices into the whole tables."""
         every = range(len(self.chunk_rows))
-        some = [np.array(every)] if window >= len(every) else order.groups(self.chunk_rows, window, *of)
+        some = [np.array(every)] if window >= len(every) else order.groups(self.shards, window, *of)
         done = 0
         for group, members in enumerate(some):
             own = np.concatenate([np.arange(n) + s for n, s in self.pieces(members)])
