@@ -11,60 +11,53 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import flat_feet
+from hobble.motion.no_neck import has_neck, neck_bone
 from hobble.motion.orient import frame, mean, unit
 from hobble.motion.spine import SHORT, spine_shares
 
 UP, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-# Standard deviation of the chest's lean if the head shows it and no neck does: seven subjects of CMU, whose
-# necks show it as well.
-LEAN_ERROR = np.radians(3.8)
 AGREE = np.radians(25.0)  # trunk joints that differ by less have the same rest pose
 
 
-def from_motion(seen: BodySample) -> dict[int, Array]:
-    """Frames of all joints from the directions of the bones while the figure moves."""
+def from_motion(seen: BodySample, zero: Array | None) -> dict[int, Array]:
+    """Frames of all joints from the directions of the bones while the figure moves.
+
+    zero: (4,) frame of the chest in a standing zero pose, which counts if the rig has no neck. None if the zero
+    pose does not stand.
+    """
     frames: dict[int, Array] = {}
-    _trunk(seen, frames)
+    _trunk(seen, frames, zero)
     for side, sign in (("left", 1.0), ("right", -1.0)):
         _arm(seen, frames, side, sign)
         _leg(seen, frames, side)
     return frames | flat_feet(seen)
 
 
-def bends(seen: BodySample) -> dict[int, Array]:
-    """Hips and chest -> how the bone above each is turned. Without those that have a joint for it."""
+def bends(seen: BodySample, zero: Array | None) -> dict[int, Array]:
+    """Hips and chest -> how the bone above each is turned. Without those that have a joint for it.
+
+    zero: as for `from_motion`.
+    """
     body, out = seen.body, {}
     for joint, following in ((body.hips, body.trunk), (body.chest, (*body.neck, body.head))):
         if following and seen.length(joint, following[0]) > SHORT:
-            bone, axis, left = _bone(seen, joint)
+            bone, axis, left = _bone(seen, joint, zero)
             out[joint] = frame(bone, axis, left, LEFT)
     return out
 
 
-def lean_doubt(seen: BodySample) -> str | None:
-    """A sentence on how far the chest leans, on a rig without a neck. None if that is known."""
-    body = seen.body
-    if body.neck:
-        return None
-    arm = float(np.mean([seen.length(body.chest, arm[1]) for arm in body.arms.values()]))
-    return (
-        "It has no joint for the neck, so how far the chest leans is uncertain: arms may lie "
-        f"{2 * LEAN_ERROR * arm:.0f} cm too far forward or back."
-    )
-
-
-def _trunk(seen: BodySample, frames: dict[int, Array]) -> None:
+def _trunk(seen: BodySample, frames: dict[int, Array], zero: Array | None) -> None:
     body = seen.body
     chain = (body.hips, *body.trunk, *body.neck)
     for joint in chain:
-        bone, axis, left = _bone(seen, joint)
+        bone, axis, left = _bone(seen, joint, zero)
         # Hips and chest are level where limbs begin. Spines of captured rigs bend sideways by some degrees.
         carries = joint in (body.hips, body.chest)
         frames[joint] = frame(left, LEFT, bone, axis) if carries else frame(bone, axis, left, LEFT)
     frames[body.head] = _head(seen, frames, chain)
 
 
-def _bone(seen: BodySample, joint: int) -> tuple[Array, Array, Array]:
+def _bone(seen: BodySample, joint: int, zero: Array | None) -> tuple[Array, Array, Array]:
     """(3,) the bone above a joint of trunk or neck, its direction in a standing rest pose, and left."""
     body = seen.body
     trunk = (body.hips, *body.trunk)
@@ -77,7 +70,10 @@ def _bone(seen: BodySample, joint: int) -> tuple[Array, Array, Array]:
         left = seen.hips_left
     elif joint in trunk and joint != body.chest:
         left = unit(seen.hips_left + seen.chest_left)
-    return bone, seen.spine.direction(share[joint], share[end]), seen.local(joint, left)
+    own_left = seen.local(joint, left)
+    if body.trunk and joint == body.chest and not has_neck(seen):
+        return neck_bone(seen, own_left, zero), seen.spine.neck, own_left
+    return bone, seen.spine.direction(share[joint], share[end]), own_left
 
 
 def _head(seen: BodySample, frames: dict[int, Array], chain: Sequence[int]) -> Array:

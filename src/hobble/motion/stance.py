@@ -21,8 +21,9 @@ from hobble.motion.added_joints import with_balls, with_bends
 from hobble.motion.body import Body, body_by_roles
 from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import doubt, rest_tilt
-from hobble.motion.from_motion import bends, from_motion, lean_doubt
+from hobble.motion.from_motion import bends, from_motion
 from hobble.motion.from_rest import TRUSTED, add_rest, from_rest, zero_doubt
+from hobble.motion.no_neck import lean_doubt
 from hobble.motion.orient import apart, mean, pointed
 from hobble.motion.rebase import rebased
 from hobble.motion.spine import SHORT, Spine
@@ -72,21 +73,23 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
         Spine.of(target, theirs),
         rest_tilt(target, theirs),
     )
-    frames, problem = from_motion(seen), stands(body, rest)
-    unsure = [lean_doubt(seen)]
-    if problem is None:
-        zero = from_rest(seen)
-        if max(apart(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED:
-            problem = "the trunk is twisted"
-        else:
-            add_rest(frames, zero, seen)
-            unsure.append(zero_doubt(seen, zero))
+    problem = stands(body, rest)
+    zero = from_rest(seen) if problem is None else None
+    frames = from_motion(seen, zero and zero[body.chest])
+    if zero and max(apart(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED:
+        problem, zero = "the trunk is twisted", None
+        frames = from_motion(seen, None)
+    chest = zero and zero[body.chest]
+    unsure = [lean_doubt(seen, chest)]
+    if zero:
+        add_rest(frames, zero, seen)
+        unsure.append(zero_doubt(seen, zero))
     said = "its zero pose" if problem is None else f"its motion, because in its zero pose {problem}"
     unsure.append(doubt(seen, problem is None))
     kept = _kept(clip, seen, others, frames)
     clip, body = with_balls(clip, body, frames)
     roles = body.roles(clip.skeleton.joints)
-    clip, body = with_bends(clip, body, frames, bends(seen))
+    clip, body = with_bends(clip, body, frames, bends(seen, chest))
     made = rebased(clip, body, [*body.joints, *kept], frames, roles)
     return Upright(*made, said, [note for note in unsure if note])
 
