@@ -33,15 +33,12 @@ def from_motion(seen: BodySample, zero: Array | None) -> dict[int, Array]:
     return frames | flat_feet(seen)
 
 
-def bends(seen: BodySample, zero: Array | None) -> dict[int, Array]:
-    """Hips and chest -> how the bone above each is turned. Without those that have a joint for it.
-
-    zero: as for `from_motion`.
-    """
+def bends(seen: BodySample) -> dict[int, Array]:
+    """Hips and chest -> how the bone above each is turned. Without those that have a joint for it."""
     body, out = seen.body, {}
     for joint, following in ((body.hips, body.trunk), (body.chest, (*body.neck, body.head))):
         if following and seen.length(joint, following[0]) > SHORT:
-            bone, axis, left = _bone(seen, joint, zero)
+            bone, axis, left = _bone(seen, joint)
             out[joint] = frame(bone, axis, left, LEFT)
     return out
 
@@ -50,14 +47,16 @@ def _trunk(seen: BodySample, frames: dict[int, Array], zero: Array | None) -> No
     body = seen.body
     chain = (body.hips, *body.trunk, *body.neck)
     for joint in chain:
-        bone, axis, left = _bone(seen, joint, zero)
+        bone, axis, left = _bone(seen, joint)
+        if body.trunk and joint == body.chest and not has_neck(seen):
+            bone, axis = neck_bone(seen, left, zero), seen.spine.neck
         # Hips and chest are level where limbs begin. Spines of captured rigs bend sideways by some degrees.
         carries = joint in (body.hips, body.chest)
         frames[joint] = frame(left, LEFT, bone, axis) if carries else frame(bone, axis, left, LEFT)
     frames[body.head] = _head(seen, frames, chain)
 
 
-def _bone(seen: BodySample, joint: int, zero: Array | None) -> tuple[Array, Array, Array]:
+def _bone(seen: BodySample, joint: int) -> tuple[Array, Array, Array]:
     """(3,) the bone above a joint of trunk or neck, its direction in a standing rest pose, and left."""
     body = seen.body
     trunk = (body.hips, *body.trunk)
@@ -70,10 +69,7 @@ def _bone(seen: BodySample, joint: int, zero: Array | None) -> tuple[Array, Arra
         left = seen.hips_left
     elif joint in trunk and joint != body.chest:
         left = unit(seen.hips_left + seen.chest_left)
-    own_left = seen.local(joint, left)
-    if body.trunk and joint == body.chest and not has_neck(seen):
-        return neck_bone(seen, own_left, zero), seen.spine.neck, own_left
-    return bone, seen.spine.direction(share[joint], share[end]), own_left
+    return bone, seen.spine.direction(share[joint], share[end]), seen.local(joint, left)
 
 
 def _head(seen: BodySample, frames: dict[int, Array], chain: Sequence[int]) -> Array:

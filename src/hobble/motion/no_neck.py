@@ -34,11 +34,14 @@ def neck_bone(seen: BodySample, left: Array, zero: Array | None) -> Array:
     return quat.rotate(quat.from_axis_angle(unit(left), np.array(AHEAD_OF_HEAD)), unit(head))
 
 
-def lean_doubt(seen: BodySample, zero: Array | None) -> str | None:
-    """A sentence on how far the chest leans, on a rig without a neck. None if that is known."""
+def lean_doubt(seen: BodySample, zero: bool) -> str | None:
+    """A sentence on how far the chest leans, on a rig without a neck. None if that is known.
+
+    zero: whether a person could stand in the zero pose.
+    """
     if has_neck(seen):
         return None
-    body, error = seen.body, AHEAD_OF_HEAD_ERROR if zero is None else AHEAD_ERROR
+    body, error = seen.body, AHEAD_ERROR if zero else AHEAD_OF_HEAD_ERROR
     arm = float(np.mean([seen.length(body.chest, arm[1]) for arm in body.arms.values()]))
     return (
         "It has no joint for the neck, so how far the chest leans is uncertain: arms may lie "

@@ -79,8 +79,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     if zero and max(apart(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED:
         problem, zero = "the trunk is twisted", None
         frames = from_motion(seen, None)
-    chest = zero and zero[body.chest]
-    unsure = [lean_doubt(seen, chest)]
+    unsure = [lean_doubt(seen, zero is not None)]
     if zero:
         add_rest(frames, zero, seen)
         unsure.append(zero_doubt(seen, zero))
@@ -89,7 +88,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     kept = _kept(clip, seen, others, frames)
     clip, body = with_balls(clip, body, frames)
     roles = body.roles(clip.skeleton.joints)
-    clip, body = with_bends(clip, body, frames, bends(seen, chest))
+    clip, body = with_bends(clip, body, frames, bends(seen))
     made = rebased(clip, body, [*body.joints, *kept], frames, roles)
     return Upright(*made, said, [note for note in unsure if note])
 
