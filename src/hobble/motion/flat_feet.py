@@ -88,7 +88,9 @@ def feet_tilt(seen: BodySample) -> Tilt:
         return Tilt(sides, sides, 0.0)
     if exact := [tilt for side, tilt in sides.items() if tilt is not None and _exact(seen, side)]:
         return Tilt(sides, _both(sides, float(np.mean(exact))), EXACT_ERROR)
-    measured = float(np.mean(known)) - (RAISED if runs(seen) else 0.0)
+    unlike = np.ptp(known) > np.radians(APART)
+    # A foot that limps or stands on a slope hardly comes down. The other one is nearer to flat.
+    measured = float(np.min(known) if unlike else np.mean(known)) - (RAISED if runs(seen) else 0.0)
     zero = {side: _zero_tilt(seen, side) for side in SIDES}
     there = [tilt for tilt in zero.values() if tilt is not None]
     if len(there) == len(SIDES) and max(abs(np.mean(there) - measured), np.ptp(there)) < AGREE:
