@@ -22,8 +22,8 @@ AGREE = np.radians(25.0)  # trunk joints that differ by less have the same rest 
 def from_motion(seen: BodySample, zero: Array | None) -> dict[int, Array]:
     """Frames of all joints from the directions of the bones while the figure moves.
 
-    zero: (4,) frame of the chest in a standing zero pose, which counts if the rig has no neck. None if the zero
-    pose does not stand.
+    zero: (4,) frame of the chest in the zero pose, which counts if the rig has no neck. None if nobody could
+    stand in that pose.
     """
     frames: dict[int, Array] = {}
     _trunk(seen, frames, zero)

@@ -9,8 +9,9 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.motion.body_sample import LEFT, BodySample
+from hobble.motion.body_sample import BodySample
 from hobble.motion.orient import unit
+from hobble.motion.spine import SHORT
 
 # Radians by which the first bone of a person's neck leans forward: against the vertical in a standing zero
 # pose, and against the line from chest to head. Means and standard deviations over seven subjects of CMU.
@@ -19,8 +20,12 @@ AHEAD_OF_HEAD, AHEAD_OF_HEAD_ERROR = np.radians(5.6), np.radians(3.9)
 
 
 def has_neck(seen: BodySample) -> bool:
-    """Whether the rig has a neck, or the target has none either, so that both can be compared as they are."""
-    return bool(seen.body.neck) or not seen.spine.has_neck
+    """Whether the rig has a neck, or the target has none either, so that both can be compared as they are.
+
+    A joint at the same place as the chest is no neck.
+    """
+    body = seen.body
+    return not seen.spine.has_neck or any(seen.length(body.chest, joint) > SHORT for joint in body.neck)
 
 
 def neck_bone(seen: BodySample, left: Array, zero: Array | None) -> Array:

@@ -75,7 +75,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     )
     problem = stands(body, rest)
     zero = from_rest(seen) if problem is None else None
-    frames = from_motion(seen, zero and zero[body.chest])
+    frames = from_motion(seen, zero[body.chest] if zero else None)
     if zero and max(apart(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED:
         problem, zero = "the trunk is twisted", None
         frames = from_motion(seen, None)
