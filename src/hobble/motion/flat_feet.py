@@ -88,13 +88,15 @@ def feet_tilt(seen: BodySample) -> Tilt:
         return Tilt(sides, sides, 0.0)
     if exact := [tilt for side, tilt in sides.items() if tilt is not None and _exact(seen, side)]:
         return Tilt(sides, _both(sides, float(np.mean(exact))), EXACT_ERROR)
-    unlike = np.ptp(known) > np.radians(APART)
-    # A foot that limps or stands on a slope hardly comes down. The other one is nearer to flat.
-    measured = float(np.min(known) if unlike else np.mean(known)) - (RAISED if runs(seen) else 0.0)
+    raised = RAISED if runs(seen) else 0.0
+    measured = float(np.mean(known)) - raised
     zero = {side: _zero_tilt(seen, side) for side in SIDES}
     there = [tilt for tilt in zero.values() if tilt is not None]
-    if len(there) == len(SIDES) and max(abs(np.mean(there) - measured), np.ptp(there)) < AGREE:
-        return Tilt(sides, zero, EXACT_ERROR)
+    if len(there) == len(SIDES) and np.ptp(there) < AGREE:
+        # A foot that limps or stands on a slope may never come down, so one foot that agrees is enough.
+        one = min(abs(a - b + raised) for a, b in zip(there, known, strict=True))
+        if min(abs(np.mean(there) - measured), 2 * one) < AGREE:
+            return Tilt(sides, zero, EXACT_ERROR)
     error = float(np.hypot(CAPTURED_ERROR, 0.25 * np.ptp(known)))
     angle, error = _likeliest(measured, error, seen.target_tilt)
     return Tilt(sides, _both(sides, angle), error)
