@@ -1,7 +1,7 @@
 """Compares how fast the hips go with how fast the feet step.
 
-A foot that stands moves backward, seen from the hips, as fast as they go forward. If the root's positions are in
-another unit than the bones, the two speeds differ.
+A foot that stands moves backward, seen from the hips, as fast as they go forward. If the root's positions are
+in another unit than the bones, the two speeds differ.
 """
 
 from __future__ import annotations
@@ -58,9 +58,10 @@ def check_pace(path: Path, clip: Clip, leave: bool) -> str | None:
         return (
             "The legs walk and the hips stay in place, so the feet slide. The file has no path of the hips."
         )
+    times = f"{found:.{2 if found < 10 else 0}f}"
     raise InputError(
         path,
-        f"the hips go {found:.{2 if found < 10 else 0}f} times as fast as the feet step, so the root's positions seem to be in another "
+        f"the hips go {times} times as fast as the feet step, so the root's positions seem to be in another "
         "unit than the OFFSETs",
         fix="Export the clip again with one unit. If the feet really slide (a skater, a vehicle), set "
         "motion.defects: leave.",

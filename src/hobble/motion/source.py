@@ -17,7 +17,7 @@ from hobble.motion.axes import Axes, straighten
 from hobble.motion.body import SIDES, Body, body_by_roles, pairs, with_fingers
 from hobble.motion.decode import Decoded, check_angles, decode, frame_rate
 from hobble.motion.defects import Repaired, flips, repair
-from hobble.motion.doubt import Doubt, TwoFigures
+from hobble.motion.doubt import Doubt, TwoFigures, check_height
 from hobble.motion.draft import refusal
 from hobble.motion.find_body import Found, find_body
 from hobble.motion.floor import on_floor
@@ -139,6 +139,7 @@ def _unknown(
     named = known.sources if known is not None and known.rig == target.skeleton.name else {}
     wanted = [rig.index(joint) for joint in named.values()]
     standing_clip = upright(straight.clip, body, target.skeleton, wanted)
+    check_height(file.path, standing_clip.height_error, standing_clip.notes, options.accept_doubt)
     match = Match(
         known.rig if known else FOUND,
         standing_clip.clip.skeleton.roles,

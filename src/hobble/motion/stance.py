@@ -20,7 +20,7 @@ from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.added_joints import with_balls, with_bends
 from hobble.motion.body import Body, body_by_roles
 from hobble.motion.body_sample import LEFT, BodySample
-from hobble.motion.flat_feet import doubt, rest_tilt
+from hobble.motion.flat_feet import doubt, height_error, rest_tilt
 from hobble.motion.from_motion import bends, from_motion
 from hobble.motion.from_rest import TRUSTED, add_rest, from_rest, zero_doubt
 from hobble.motion.no_neck import lean_doubt
@@ -38,13 +38,14 @@ class Upright:
     """A clip with a standing rest pose that faces +Z with the arms out. Its joints are those of the body.
 
     rest: where the stance comes from, in words. body: the parts by their new indices. notes: sentences on
-    what is uncertain.
+    what is uncertain. height_error: cm that the figure may stand too high or low.
     """
 
     clip: Clip = field(repr=False)
     body: Body
     rest: str
     notes: list[str] = field(default_factory=list)
+    height_error: float = 0.0
 
 
 def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = ()) -> Upright:
@@ -72,6 +73,7 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
         ends,
         Spine.of(target, theirs),
         rest_tilt(target, theirs),
+        len(clip) / clip.fps,
     )
     problem = stands(body, rest)
     zero = from_rest(seen) if problem is None else None
@@ -90,7 +92,8 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     roles = body.roles(clip.skeleton.joints)
     clip, body = with_bends(clip, body, frames, bends(seen))
     made = rebased(clip, body, [*body.joints, *kept], frames, roles)
-    return Upright(*made, said, [note for note in unsure if note])
+    notes = [note for note in unsure if note]
+    return Upright(*made, said, notes, height_error(seen, problem is None))
 
 
 def _speeds(clip: Clip) -> Array:
