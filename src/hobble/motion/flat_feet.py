@@ -43,8 +43,9 @@ CAPTURED_ERROR = np.radians(3.5)
 # rigs have any angle in the range.
 LIKE_TARGET = np.radians(4.5)
 ANY_FOOT = np.radians(42.0)
-# A foot that is not seen to stand may have any angle. Clips of .03 to .67 s were 10 to 15 degrees off.
-BRIEF, BRIEF_ERROR = 1.0, np.radians(12.0)  # seconds, and radians
+# A foot that is not seen to stand may have any angle. Clips of a third of a second or less were 10 to 15
+# degrees off.
+BRIEF, BRIEF_ERROR = 0.5, np.radians(12.0)  # seconds, and radians
 APART = 10.0  # degrees: a larger difference between the two standing feet is reported
 # A zero pose in which nobody could stand still shows the angle of the ankles, if that agrees with the motion.
 AGREE = np.radians(10.0)

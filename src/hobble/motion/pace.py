@@ -16,7 +16,7 @@ from hobble.motion.rig import leg_length
 
 # Speed of the hips / speed of the lower foot seen from the hips, both medians. In 172 clips of CMU, styles,
 # patients, Ferre et al. and the original release it is .88 to 1.30 (fast runs).
-LEAST, MOST = 0.7, 1.6
+LEAST, MOST = 0.5, 1.6
 IN_PLACE = 0.15
 SLOW = 0.5  # leg lengths a second: slower movements say nothing
 UPRIGHT = 0.6  # least height of the hips above the lower foot, in leg lengths
