@@ -30,7 +30,7 @@ def root() -> Path:
 
 @pytest.fixture(scope="session")
 def shared() -> Path:
-    """The project's shared reference data (motion, original rows, released network), where it is."""
+    """The folder with the reference data (motion, original rows, released network), if it is there."""
     folder = Path(os.environ.get("HOBBLE_SHARED", ROOT.parent / "shared"))
     if not (folder / "mocap" / "clips.csv").is_file():
         pytest.skip(f"no shared reference data at {folder} (set HOBBLE_SHARED to its folder)")
@@ -62,7 +62,7 @@ class Server:
 
 @pytest.fixture
 def server() -> Iterator[Server]:
-    """Such a server, on a port of its own."""
+    """A server on a port of its own."""
     told = Server()
 
     class Handler(BaseHTTPRequestHandler):
@@ -103,7 +103,7 @@ def server() -> Iterator[Server]:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say which tests of the report did not run for want of a browser, and where its pictures lie."""
+    """Say which report tests were skipped because there is no browser, and where pictures were saved."""
     skipped = terminalreporter.getreports("skipped")
     missed = [report.nodeid for report in skipped if "the page was not opened" in str(report.longrepr)]
     if missed:

@@ -47,10 +47,7 @@ def test_two_are_as_slow_as_the_worse_one() -> None:
 
 
 def test_a_version_is_set_beside_its_own_source() -> None:
-    """The source of the hurt version is slow.
-
-    Compared with all healthy clips the version would seem slower than it is.
-    """
+    """The source walks slowly. Compared with all healthy clips, the version would seem slower than it is."""
     found = pace()
     speeds = np.linspace(1.0, 3.0, 41)
     found.add("healthy", **rows(speeds, np.zeros((41, 2))))
@@ -111,7 +108,7 @@ def test_channels_multiply_what_they_leave_of_the_usual_speed() -> None:
 
 
 def test_a_channel_takes_no_blame_for_another() -> None:
-    """A neutral clip goes at 2, a sad one at 1, and their hurt versions at .6 of that."""
+    """A neutral clip moves at 2, a sad one at 1, and their hurt versions at .6 of that."""
     mood, injury = pace(), pace()
     none, sad = np.zeros((60, 2)), np.tile([10.0, 0.0], (60, 1))
     for name, speed, feels in (("plain", 2.0, none), ("sad", 1.0, sad)):

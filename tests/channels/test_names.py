@@ -1,4 +1,4 @@
-"""The name of a channel occurs only in its own folder."""
+"""The name of a channel may occur only in its own folder."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ALLOWED = ("channels/__init__.py", "hurt/", "synthetic/")
 
 
 def words(path: Path) -> Iterator[str]:
-    """All text of a script or template; for Python only names and strings, without docstrings."""
+    """The text of a script or template. Of Python only names and strings, without docstrings."""
     text = path.read_text(encoding="utf-8")
     if path.suffix != ".py":
         yield text
@@ -35,7 +35,7 @@ def words(path: Path) -> Iterator[str]:
 
 
 def naming(name: str, folder: Path = SRC) -> list[str]:
-    """Files under a folder that name a channel outside its own."""
+    """The files under a folder that name a channel, without those of the channel itself."""
     found = []
     for path in sorted(folder.rglob("*")):
         at = path.relative_to(folder).as_posix()

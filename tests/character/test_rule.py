@@ -1,4 +1,4 @@
-"""The frame rule, and that compiled and plain callers get the same results."""
+"""The rule for a frame. Compiled and plain callers get the same results."""
 
 from __future__ import annotations
 

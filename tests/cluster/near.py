@@ -1,8 +1,4 @@
-"""Tells whether two networks learnt the same but for rounding: `near.py WEIGHTS WEIGHTS`.
-
-Sums over processes round differently. Prints by how much the held-out errors differ; status 1 above .01 of
-them, or where steps or samples are not the same.
-"""
+"""Checks that two networks learnt the same apart from rounding: near.py WEIGHTS WEIGHTS"""
 
 from __future__ import annotations
 
@@ -16,7 +12,7 @@ MOST = 0.01
 
 
 def told(path: str) -> dict[str, Any]:
-    """What a file of weights says of its training."""
+    """What a file of weights says about its training."""
     with np.load(path) as file:
         return dict(json.loads(str(file["meta"])))
 

@@ -1,9 +1,4 @@
-"""Tells whether two runs made the same: `same.py FOLDER FOLDER` compares what lies under their results/.
-
-Bit for bit, but for the values of keys named `milliseconds` and what is an account of the run itself: logs,
-benchmarks, pipeline.json and the page that shows it, the seconds of a training.
-Prints what differs, and ends with status 1 then.
-"""
+"""Checks that two runs have the same results: same.py FOLDER FOLDER compares their results/ folders."""
 
 from __future__ import annotations
 
@@ -19,7 +14,7 @@ ACCOUNTS = {"pipeline.json", "report.html", "checkpoint.npz"}
 
 
 def artefacts(run: Path) -> dict[str, Path]:
-    """Name -> file of everything that has to be the same."""
+    """Name -> file, for every file that must be the same."""
     results = run / "results"
     files = {str(p.relative_to(results)): p for p in sorted(results.rglob("*")) if p.is_file()}
     return {
@@ -30,7 +25,7 @@ def artefacts(run: Path) -> dict[str, Path]:
 
 
 def content(path: Path) -> Any:
-    """What has to be the same of a file."""
+    """The part of a file that must be the same."""
     if path.suffix == ".json":
         return without_times(json.loads(path.read_text()))
     if path.suffix == ".csv":
@@ -43,14 +38,14 @@ def content(path: Path) -> Any:
 
 
 def without_times(value: Any) -> Any:
-    """A JSON value without what stands under `milliseconds`."""
+    """A JSON value without the values of `milliseconds`."""
     if isinstance(value, dict):
         return {k: without_times(v) for k, v in value.items() if k != "milliseconds"}
     return [without_times(v) for v in value] if isinstance(value, list) else value
 
 
 def differences(first: Path, second: Path) -> list[str]:
-    """Files that only one of the runs has, or that differ."""
+    """Files that only one of the runs has, and files that differ."""
     a, b = artefacts(first), artefacts(second)
     one_sided = sorted(a.keys() ^ b.keys())
     return one_sided + [name for name in sorted(a.keys() & b.keys()) if content(a[name]) != content(b[name])]

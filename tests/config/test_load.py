@@ -1,4 +1,4 @@
-"""Layers, validation and the errors that name file, key and what is allowed."""
+"""Layers, validation, and errors that name the file, the key and the allowed values."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ def test_shipped_configurations_are_the_published_ones(root: Path) -> None:
 
 
 def test_the_release_has_its_forty_clips_on_their_ground(root: Path) -> None:
-    """Like the list of the original database: 40 clips and their mirrors."""
+    """The 40 clips of the original database and their mirrors."""
     release = Catalogue(root / "config").dataset("pfnn")
     grounds = Counter(entry.ground if entry else "flat" for entry in release.clips.values())
     assert grounds == {"flat": 19, "rocky": 15, "jumpy": 5, "beam": 1}

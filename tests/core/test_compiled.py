@@ -51,7 +51,7 @@ def test_compiled_code_is_cached(tmp_path):
 
 
 def test_no_writable_folder_gives_one_warning(tmp_path):
-    """Nobody, not even root, can make a folder inside a file."""
+    """The cache folder lies below a file, so not even root can make it."""
     (tmp_path / "file").write_text("")
     (tmp_path / "__pycache__").write_text("")
     below = str(tmp_path / "file" / "cache")
@@ -83,7 +83,7 @@ def test_a_cache_that_is_a_folder_of_folders_is_a_miss(tmp_path):
 
 
 def test_every_compiled_function_works_without_its_cache():
-    """numba's own `njit(cache=True)` ends the program if it can write nowhere."""
+    """numba's own `njit(cache=True)` raises if it finds no folder that it can write."""
     source = Path(__file__).resolve().parents[2] / "src"
     own = [path for path in source.rglob("*.py") if path.name != "compiled.py"]
     assert len(own) > 100

@@ -1,4 +1,4 @@
-"""A module of a package takes the place of a function of the same name once it is imported."""
+"""Importing a module of a package hides a function of the package with the same name."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def test_no_function_of_a_package_is_hidden_by_a_module(root: Path) -> None:
-    """Unless the package imports that module itself, before it defines the function."""
+    """A package may import that module itself before it defines the function."""
     found = []
     for init in (root / "src").rglob("__init__.py"):
         body = ast.parse(init.read_text(encoding="utf-8")).body

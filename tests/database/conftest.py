@@ -1,4 +1,4 @@
-"""Made-up rows: small enough to expand and compare in full."""
+"""Made-up rows, few enough to compare all of them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MakeRows = Callable[..., ClipRows]
 
 
 def make_rows(clip: str = "a", rows: int = 50, fits: int | None = 1, seed: int = 0) -> ClipRows:
-    """Random rows of one clip, `fits` of each row, or 1 or 10 at random for None."""
+    """Random rows of one clip, with `fits` fits each; with None, each row has 1 or 10 at random."""
     rng = np.random.default_rng(seed)
     count = np.full(rows, fits) if fits else rng.choice([1, 10], rows)
     total = int(count.sum())

@@ -1,4 +1,4 @@
-"""Building: reproducible, atomic, small, in bounded memory."""
+"""Merging: reproducible, complete or absent, small, in limited memory."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def contents(path: Path) -> dict[str, bytes]:
 
 
 def read_all(path: Path) -> np.ndarray:
-    """Every row of a database, checksums and all, in the order of clip and frame."""
+    """Every row of a database, in the order of clip and frame. Verifies the checksums."""
     db = Database.open(path, 4096)
     parts = [b for split in ("train", "held_out") for b in db.blocks(split, 0, 0, 10, 1)]
     rows = np.concatenate([np.column_stack([b.clip, b.frame]) for b in parts])
@@ -186,7 +186,7 @@ def test_a_half_removed_build_is_completed(rows_of, tmp_path):
     rows, splits = {"a": rows_of("a", 60)}, {"a": "train"}
     manifest = write_database(tmp_path / "db", rows, splits, **OPTIONS)
     before = contents(tmp_path / "db")
-    shutil.rmtree(tmp_path / "db" / manifest.folder / "train")
+    shutil.rmtree(tmp_path / "db" / manifest.folder / "0" / "train")
     write_database(tmp_path / "db", rows, splits, **OPTIONS)
     assert contents(tmp_path / "db") == before
 

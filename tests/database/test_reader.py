@@ -1,4 +1,4 @@
-"""Reading: each pair once a pass, well mixed, in bounded memory, with checksums."""
+"""Reading: each pair once in a pass, well mixed, in limited memory, with checksums."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def whole_pass(
 
 
 def keys(block: Block) -> list[tuple[int, int, bytes]]:
-    """What tells pairs apart: the clip, the frame and the terrain under it."""
+    """What identifies a pair: the clip, the frame and the ground under it."""
     return [
         (int(c), int(f), row.tobytes())
         for c, f, row in zip(block.clip, block.frame, block.x.round(4), strict=True)
@@ -115,7 +115,9 @@ def test_passes_share_no_order_and_a_section_does_not_depend_on_what_was_read(pa
 
 
 def test_rows_are_mixed_like_independent_draws(rows_of, tmp_path):
-    """A feature that is constant per clip: variance of batch means, and correlation from row to row."""
+    """A feature that is constant in a clip: variance of the batch means, and correlation of consecutive
+    rows.
+    """
     clips = {f"c{i:02d}": rows_of(f"c{i:02d}", 400, 1, seed=i) for i in range(40)}
     splits = dict.fromkeys(clips, "train")
     write_database(tmp_path / "db", clips, splits, channels=[], joint_weight=0.1, chunk_bytes=200_000)
@@ -261,7 +263,7 @@ def test_ahead_keeps_order_and_passes_errors_on():
 
 
 def test_a_chunk_is_a_file_that_other_tools_open(path):
-    """By the description of safetensors: header length, header, arrays."""
+    """As the description of safetensors says: header length, header, arrays."""
     db = Database.open(path)
     chunk = db.manifest.chunks["train"][0]
     data = (path / db.manifest.folder / chunk.file).read_bytes()

@@ -1,4 +1,4 @@
-"""Sizes: those of the files, and estimates for the released data."""
+"""Sizes of the files, and estimates for the released data."""
 
 from __future__ import annotations
 

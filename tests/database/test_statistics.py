@@ -1,4 +1,4 @@
-"""Statistics against plain numpy on every pair written out, and the grouping of the original."""
+"""Statistics compared with plain numpy on all pairs, and the original's groups of columns."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hobble.rows.layout import RowLayout
 
 
 def written_out(rows: ClipRows) -> tuple[np.ndarray, np.ndarray]:
-    """Every pair as often as the original has it: a flat row's one fit ten times."""
+    """Every pair as often as in the original, where a flat row has its one fit ten times."""
     x, y = [], []
     for pairs in expanded(rows, rows.layout, batch=7):
         times = rows.visits // rows.fits[pairs.row]

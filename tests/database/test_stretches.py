@@ -11,7 +11,7 @@ from hobble.database.stretches import Sharing, Stretch
 
 
 def read(sharing: Sharing) -> list[list[int]]:
-    """The samples, by their number in the section, that a process reads for each batch."""
+    """The numbers of the samples in the section that a process reads for each batch."""
     pieces = []
     for stretch in sharing.read():
         numbers = np.arange(stretch.start, stretch.stop)[stretch.kept(0, stretch.stop - stretch.start)]

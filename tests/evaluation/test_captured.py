@@ -27,13 +27,13 @@ def world() -> dict[str, np.ndarray]:
 
 
 def level(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """World vectors (..., 3) as a root of this yaw sees them."""
+    """World vectors (..., 3), relative to a root with this yaw."""
     return in_root_frame(vectors, np.zeros((*vectors.shape[:-2], 3)), yaw)
 
 
 @pytest.fixture
 def rows(world) -> ClipRows:
-    """Rows by the definition of the format. The first fit's ground is 3 cm below the world's zero."""
+    """Rows as the format defines them. The ground of the first fit is 3 cm below the world's zero."""
     yaw, root, joints = world["yaw"], world["root"], world["joints"]
     y = np.zeros((FRAMES, LAYOUT.y_size))
     here = yaw[:-1]

@@ -62,7 +62,9 @@ def timed(ms: float) -> dict[str, Any]:
 
 
 def left_behind(folder: Path, name: str, clips: dict[str, float], sizes: tuple[int, ...]) -> dict[str, Path]:
-    """Files of one configuration with a frame time of exactly .1 ms plus 1 ns per computation."""
+    """The result files of one configuration whose frame time is exactly .1 ms plus 1 ns for each
+    computation.
+    """
     counts = parameter_counts(sizes)
     modes = []
     for k, mode in enumerate(MODES, 1):
@@ -250,7 +252,9 @@ def test_published_clips_stand_beside_ours_of_the_same_name(tmp_path, published)
 
 
 def test_published_times_and_sizes_stand_beside_what_they_are_of(compared) -> None:
-    """Sizes are compared with the database that training reads; its stage writes more, and has the times."""
+    """The published size is compared with the database that training reads, the time with that of the
+    stage.
+    """
     ours = {(r["measure"], r["configuration"]): r["ours"] for r in compared["against_published"]}
     assert ours["database", "holden"] == 300
     times = {

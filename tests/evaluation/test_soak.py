@@ -17,7 +17,7 @@ HIPS = 93.0  # cm above the ground, of the figures of `mean_output`
 
 
 def on_its_feet(network: Pfnn) -> Pfnn:
-    """The network with the bounds of figures whose hips move by at most 8 cm, feet in contact."""
+    """The network, with bounds of figures whose hips move by at most 8 cm and whose feet are in contact."""
     mean = network.y_mean.copy()
     mean[network.layout.y_contacts] = 1.0
     x = np.zeros(network.layout.x_size, np.float32)
@@ -29,7 +29,7 @@ def on_its_feet(network: Pfnn) -> Pfnn:
 
 
 def test_hips_stay_above_the_ground_under_them(hurtable: Pfnn) -> None:
-    """On hills, of which these networks know nothing but the mean height of the path."""
+    """The networks know only the mean height of the path, not the hills."""
     found = soak(on_its_feet(hurtable), 20, 150)
     assert found["frames"] == 3000
     assert HIPS - 8.1 <= found["hips_lowest_cm"] <= found["hips_highest_cm"] <= HIPS + 8.1

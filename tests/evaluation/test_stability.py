@@ -1,4 +1,4 @@
-"""The measure of stability, and ten minutes of the released network."""
+"""The measurement of stability, and ten minutes of the released network."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Throw faults at the workflow: `make faults N=200`, or python -m tests.faults --rounds 200 --seed 7.
-
-Every round draws from its own generator, made of the seed and its number, so that `--only` one number does it
-again.
-"""
+"""Make faults in the workflow: `make faults N=200`, or python -m tests.faults --rounds 200 --seed 7."""
 
 from __future__ import annotations
 
@@ -42,7 +38,7 @@ BEGIN, END = "<!-- what was thrown -->", "<!-- end of what was thrown -->"
 
 
 def main() -> int:
-    """Make the faults, print the results, write the table. Exit status 1 if Hobble did wrong."""
+    """Make the faults, print the results, write the table. Exit status 1 if Hobble failed at one."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0], prog="python -m tests.faults")
     parser.add_argument("--rounds", type=int, default=100)
     parser.add_argument("--seed", type=int, default=secrets.randbelow(10**6))

@@ -1,4 +1,4 @@
-"""Attacks that are tests of their own, each with one file, server or call: run, and counted."""
+"""Attacks that are tests of their own, each with one file, server or call. They are run and counted."""
 
 from __future__ import annotations
 
@@ -25,7 +25,16 @@ ATTACKS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         ),
     ),
     "a bad download server": ("a clip's download", UNHARMED, ("tests/motion/test_download.py",)),
-    "a hostile file or name": ("its reader", REFUSED, ("tests/faults/test_untrusted.py",)),
+    "a hostile file or name": (
+        "its reader",
+        REFUSED,
+        (
+            "tests/faults/test_hostile_bvh.py",
+            "tests/faults/test_hostile_arrays.py",
+            "tests/faults/test_hostile_names.py",
+            "tests/faults/test_no_code_runs.py",
+        ),
+    ),
     "clips with awkward names": ("a whole run", UNHARMED, ("tests/faults/test_names.py",)),
     "a misuse of the runtime": (
         "`next_pose`",
@@ -57,7 +66,7 @@ ATTACKS: dict[str, tuple[str, str, tuple[str, ...]]] = {
 
 
 def thrown(scratch: Path) -> list[Throw]:
-    """Run every attack; each test that passes is one that ended as it should."""
+    """Run every attack. A test that passes is an attack that ended as it should."""
     return [throw for what in ATTACKS for throw in _one(what, scratch)]
 
 

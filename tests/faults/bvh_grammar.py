@@ -21,7 +21,7 @@ KEYWORDS = (
 
 
 def _line(start: str):
-    """A random line that begins with `start`; -1 where there is none."""
+    """A random line that begins with `start`, or -1 if there is none."""
 
     def choose(rng: Random, lines: list[str]) -> int:
         found = [i for i, line in enumerate(lines) if line.strip().startswith(start)]
@@ -31,13 +31,13 @@ def _line(start: str):
 
 
 def _row(rng: Random, lines: list[str]) -> int:
-    """A line of the motion, not the last."""
+    """A line of the motion, but not the last one."""
     head = [i for i, line in enumerate(lines) if line.strip().startswith("Frame Time:")]
     return rng.randrange(head[0] + 1, len(lines) - 2) if head and head[0] + 4 < len(lines) else -1
 
 
 def _within(pattern: str, group: int = 1):
-    """A random match of a pattern: where its group stands."""
+    """The place of the group in a random match of a pattern."""
 
     def find(rng: Random, text: str) -> tuple[int, int]:
         found = list(re.finditer(pattern, text, re.M))
@@ -111,13 +111,13 @@ def _few_rows(rng: Random, text: str) -> str:
 
 
 def _deep(rng: Random, text: str) -> str:
-    """Ten thousand joints, each in the one before."""
+    """Ten thousand joints, each a child of the one before."""
     chain = "".join(f"JOINT j{i}\n{{\nOFFSET 0 1 0\n" for i in range(10_000)) + "}\n" * 10_000
     return text.replace("End Site", chain + "End Site", 1)
 
 
 def _wide(rng: Random, text: str) -> str:
-    """Five thousand joints beside each other."""
+    """Five thousand children of one joint."""
     joints = "".join(f"JOINT j{i}\n{{\nOFFSET 0 1 0\n}}\n" for i in range(5_000))
     return text.replace("End Site", joints + "End Site", 1)
 

@@ -1,4 +1,4 @@
-"""What the tests of faults share."""
+"""Fixtures of the fault tests."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .texts import base_bvh
 
 @pytest.fixture(scope="session")
 def tiny_bvh(holden31: Skeleton, tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A BVH of a second and a half."""
+    """A BVH file of a second and a half."""
     folder = tmp_path_factory.mktemp("walk")
     names = {"bvh": "a.bvh", "footsteps": "f.txt", "gait": "g.txt"}
     paths = {key: folder / name for key, name in names.items()}

@@ -1,4 +1,4 @@
-"""Ways in which the bytes of a file come to harm on a disk, in a copy or in a crash."""
+"""Damage to the bytes of a file, as on a disk, in a copy or in a crash."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def flip_bytes(rng: Random, data: bytes) -> bytes:
 
 
 def flip_digit(rng: Random, data: bytes) -> bytes:
-    """The harm that nobody sees: a text file stays one, with another number in it."""
+    """Change a digit. A text file stays readable, with another number in it."""
     digits = [i for i in range(len(data)) if data[i : i + 1].isdigit()]
     if not digits:
         return flip_bit(rng, data)
@@ -34,7 +34,7 @@ def flip_digit(rng: Random, data: bytes) -> bytes:
 
 
 def zero(rng: Random, data: bytes) -> bytes:
-    """A run of zeros, as a block that never reached the disk."""
+    """Set a run of bytes to zero, like a block that was never written to the disk."""
     at = rng.randrange(len(data))
     length = min(len(data) - at, rng.choice((1, 16, 512, 4096)))
     return data[:at] + bytes(length) + data[at + length :]
@@ -45,20 +45,20 @@ def zero_all(rng: Random, data: bytes) -> bytes:
 
 
 def lose(rng: Random, data: bytes) -> bytes:
-    """A run of bytes that is missing."""
+    """Remove a run of bytes."""
     at = rng.randrange(len(data))
     return data[:at] + data[at + rng.randint(1, 2000) :]
 
 
 def repeat(rng: Random, data: bytes) -> bytes:
-    """A run of bytes that stands twice."""
+    """Repeat a run of bytes."""
     at = rng.randrange(len(data))
     length = rng.randint(1, 2000)
     return data[: at + length] + data[at:]
 
 
 def swap(rng: Random, data: bytes) -> bytes:
-    """Two neighbouring runs that changed places."""
+    """Swap two neighbouring runs of bytes."""
     length = min(rng.choice((1, 64, 512)), len(data) // 2)
     at = rng.randrange(len(data) - 2 * length + 1)
     a, b = data[at : at + length], data[at + length : at + 2 * length]
@@ -94,12 +94,12 @@ GROUPS = {
 
 
 def group_of(name: str) -> str:
-    """What a harm by name is counted as."""
+    """The group under which damage of this name is counted."""
     return next(group for group, names in GROUPS.items() if name in names)
 
 
 def damaged(rng: Random, name: str, data: bytes) -> bytes:
-    """The bytes after a harm by name, other than before."""
+    """The bytes after damage of this name. They always differ from the bytes before."""
     for _ in range(50):
         if (out := DAMAGES[name](rng, data)) != data:
             return out

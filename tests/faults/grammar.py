@@ -45,7 +45,7 @@ NUMBERS: dict[str, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class Mutation:
-    """One way in which a file goes wrong."""
+    """One way to change a file."""
 
     name: str
     change: Change
@@ -64,7 +64,7 @@ class Case:
 
 
 def number_at(find: Find, word: str) -> Change:
-    """Put `word` where `find` says that a number stands."""
+    """Put `word` at a place of a number, which `find` finds."""
 
     def change(rng: Random, text: str) -> str:
         start, end = find(rng, text)
@@ -76,7 +76,9 @@ def number_at(find: Find, word: str) -> Change:
 def numbers(
     places: Mapping[str, tuple[Find, Mapping[str, str]]], exceptions: Mapping[tuple[str, str], str]
 ) -> dict[str, Mutation]:
-    """Every word of NUMBERS in every place; a place, and then a pair, may expect otherwise than usual."""
+    """A mutation for every word of NUMBERS at every place. A place, or a place and a word, may expect
+    something else than usual.
+    """
     out = {}
     for place, (find, special) in places.items():
         for word, (text, usual) in NUMBERS.items():
@@ -87,7 +89,7 @@ def numbers(
 
 
 def on_line(choose: Callable[[Random, list[str]], int], edit: Callable[[str], str]) -> Change:
-    """Edit one line; an empty result takes it out."""
+    """A mutation that edits one line; an empty result removes the line."""
 
     def change(rng: Random, text: str) -> str:
         lines = text.split("\n")
@@ -113,7 +115,7 @@ def cases(base: str, table: Mapping[str, Mutation]) -> st.SearchStrategy[Case]:
 
 
 def mutated(base: str, table: Mapping[str, Mutation], names: list[str], seed: int) -> Case:
-    """The file after mutations by name."""
+    """The file after the mutations of these names."""
     rng, text = Random(seed), base
     for name in names:
         text = table[name].change(rng, text)

@@ -55,7 +55,7 @@ class Job:
 
 @dataclass(frozen=True)
 class End:
-    """How a job ended: its status (negative: the signal), what it said, and how long it took."""
+    """How a job ended: its status (negative: the signal), its output, and how long it took."""
 
     status: int
     said: str
@@ -63,7 +63,7 @@ class End:
 
 
 def tracked() -> list[Path]:
-    """The files of the checkout that git knows, relative to it: what a fresh clone consists of."""
+    """The tracked files of the checkout, relative to it. A fresh clone consists of them."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True)
     return [Path(name) for name in listed.stdout.split("\0") if name and (ROOT / name).is_file()]
 
@@ -101,11 +101,11 @@ class Lab:
         (folder / "site/sitecustomize.py").write_text(KEEP)
 
     def command(self, *arguments: str) -> list[str]:
-        """The README's own, with the environment's programs on the path: `snakemake -c2 results/...`."""
+        """The README's command, with the environment's programs on the path: `snakemake -c2 results/...`."""
         return ["snakemake", *arguments]
 
     def environment(self, keep: bool = False) -> dict[str, str]:
-        """A user's: the environment's programs on the path, whose package is that of the clone."""
+        """A user's environment variables: the programs on the path use the package of the clone."""
         path = [str(self.run / "src"), *([str(self.folder / "site")] if keep else [])]
         programs = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
         own = {"PYTHONPATH": os.pathsep.join(path), "PYTHONDONTWRITEBYTECODE": "1", "PATH": programs}
@@ -119,7 +119,9 @@ class Lab:
         return End(done.returncode, done.stdout + done.stderr, time.monotonic() - began)
 
     def undisturbed(self, *targets: str) -> None:
-        """Run the workflow once and keep its jobs; each is then run again alone and must end the same."""
+        """Run the workflow once and keep its jobs. Then each job is run again alone and must give the
+        same.
+        """
         self.targets = targets
         end = self.snakemake(self.run, "-c2", *targets, keep=True)
         assert end.status == 0, end.said
@@ -146,7 +148,7 @@ class Lab:
 
     @contextmanager
     def bench(self, job: Job) -> Iterator[Bench]:
-        """A folder of its own with the job's inputs, its checksums included; gone afterwards."""
+        """A folder of its own with the job's inputs and their checksums. It is removed afterwards."""
         folder = Path(tempfile.mkdtemp(prefix="bench-", dir=self.folder))
         try:
             clone(folder / "run", self.run / "src")
@@ -158,7 +160,7 @@ class Lab:
 
 
 class Bench:
-    """One job and what it reads, in a folder where it may come to harm."""
+    """One job and its inputs, in a folder where they may be damaged."""
 
     def __init__(self, lab: Lab, job: Job, folder: Path) -> None:
         self.lab, self.job, self.folder = lab, job, folder
@@ -178,11 +180,11 @@ class Bench:
         return [path for path in self.job.inputs if path.startswith("results/")]
 
     def run(self, **how: Any) -> End:
-        """Run the job to its end; `how` as for `forked`."""
+        """Run the job to its end. how: as in `forked`."""
         return forked(self.job, self.folder, **how)
 
     def unlike(self) -> list[str]:
-        """Outputs that differ from those of the undisturbed run, but for times."""
+        """Outputs that differ from those of the undisturbed run in more than times."""
         pairs = ((path, self.folder / path, self.lab.run / path) for path in self.job.outputs)
         return [path for path, here, there in pairs if not same(here, there)]
 

@@ -1,4 +1,4 @@
-"""Faults thrown at whole runs of the workflow: kills, and two at once in the same folder."""
+"""Faults in whole runs of the workflow: kills, and two runs at once in the same folder."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LOCKED = "cannot be locked"  # Snakemake's own words
 
 @contextmanager
 def _started(lab: Lab, rng: Random) -> Iterator[tuple[Path, list[Job]]]:
-    """A copy of the undisturbed run that lacks some jobs' outputs: those, and what follows, are to do."""
+    """A copy of the undisturbed run without the outputs of some jobs and of all jobs after them."""
     folder = Path(tempfile.mkdtemp(prefix="run-", dir=lab.folder))
     try:
         shutil.copytree(lab.run, folder, symlinks=True, dirs_exist_ok=True)
@@ -40,7 +40,9 @@ def _started(lab: Lab, rng: Random) -> Iterator[tuple[Path, list[Job]]]:
 
 
 def _following(lab: Lab, jobs: list[Job]) -> set[str]:
-    """Outputs of some jobs and of all that follow: Snakemake makes nothing that no job to be done needs."""
+    """The outputs of some jobs and of all jobs after them. Snakemake makes a missing file only if a job that
+    has to run needs it.
+    """
     gone = {path for job in jobs for path in job.outputs}
     before = 0
     while len(gone) > before:
@@ -62,7 +64,7 @@ def _start(lab: Lab, folder: Path, said: Path) -> subprocess.Popen[bytes]:
 
 
 def _tree(root: int) -> list[int]:
-    """Processes below one, from /proc."""
+    """The descendants of a process, from /proc."""
     children: dict[int, list[int]] = {}
     for entry in Path("/proc").iterdir():
         with suppress(OSError, ValueError, IndexError):
@@ -77,7 +79,7 @@ def _tree(root: int) -> list[int]:
 
 
 def kill_run(lab: Lab, rng: Random) -> Throw:
-    """SIGKILL of a process of a whole run at a random moment, then the same command again."""
+    """Kill a process of a whole run with SIGKILL at a random moment, then give the same command again."""
     victim = rng.choice(("a job", "snakemake", "snakemake and its jobs"))
     what = f"SIGKILL of {victim}, then the same command"
     with _started(lab, rng) as (folder, lacking):
@@ -134,7 +136,7 @@ def _compared(lab: Lab, folder: Path, what: str, at: str, happened: str, end: En
 
 
 def touched(lab: Lab, rng: Random) -> Throw:
-    """Every tracked file gets a new time, as after a fresh checkout: nothing may run again."""
+    """Give every tracked file a new time, as in a fresh checkout. Nothing may run again."""
     what, at = "every tracked file touched", "a whole run"
     folder = Path(tempfile.mkdtemp(prefix="run-", dir=lab.folder))
     try:
@@ -159,9 +161,8 @@ def _times(lab: Lab, folder: Path) -> dict[str, int]:
 
 
 def stale_lock(lab: Lab, rng: Random) -> Throw:
-    """A run that was killed leaves its lock, of this machine or of another one.
-
-    Of this machine, the same command goes on. Of another, it says how the lock is cleared, and that helps.
+    """Kill a run, so that its lock stays. If the lock is of this machine, the same command continues. If it
+    is of another machine, the message says how to remove it, and that works.
     """
     elsewhere = rng.random() < 0.5
     what, at = f"a stale lock of {'another' if elsewhere else 'this'} machine", "a whole run"
@@ -190,7 +191,9 @@ def stale_lock(lab: Lab, rng: Random) -> Throw:
 
 
 def two_runs(lab: Lab, rng: Random) -> Throw:
-    """Two snakemake processes on the same folder: one does the work, the other says that it may not."""
+    """Start Snakemake twice in the same folder: one does the work, the other says that the folder is
+    locked.
+    """
     with _started(lab, rng) as (folder, _):
         said = [folder / "said-1", folder / "said-2"]
         first = _start(lab, folder, said[0])

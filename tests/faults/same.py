@@ -1,4 +1,4 @@
-"""Whether two artefacts are the same, but for what a clock measured."""
+"""Compares two artefacts without measured times."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HISTORY_SECONDS = 3  # the column of a checkpoint's history
 
 
 def same(a: Path, b: Path) -> bool:
-    """Equal bytes; in files that hold times, equal but for those. Folders: all the files in them."""
+    """Whether the bytes are equal, in files with times apart from those. Folders: all files in them."""
     if not a.exists() or not b.exists():
         return a.exists() == b.exists()
     if a.name == "pipeline.json":  # all that it holds is what was measured

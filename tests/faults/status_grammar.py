@@ -1,4 +1,4 @@
-"""A hundred and more ways in which a status file can be wrong, or only look different."""
+"""More than a hundred ways to make a status file wrong, or to write the same content differently."""
 
 from __future__ import annotations
 

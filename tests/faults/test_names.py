@@ -29,7 +29,7 @@ NAMES = (
 
 @pytest.fixture
 def lab(tmp_path: Path) -> Lab:
-    """A checkout with a data set of a user's own, whose clips lie in run/mocap/mine."""
+    """A checkout with a user's data set whose clips are in run/mocap/mine."""
     made = Lab(tmp_path / "lab")
     (made.run / "config/datasets/mine.yaml").write_text(DATASET)
     (made.run / "mocap/mine").mkdir(parents=True)
@@ -70,7 +70,7 @@ def test_a_configuration_makes_no_objects(lab: Lab) -> None:
 
 @pytest.fixture
 def reachable() -> Iterator[Path]:
-    """A folder that nobody may enter, as the user of that name."""
+    """A folder into which the user with that name cannot go."""
     if os.getuid():
         pytest.skip("not root, so that nothing can be read as somebody else")
     with tempfile.TemporaryDirectory(prefix="reachable-") as folder:

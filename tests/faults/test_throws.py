@@ -1,4 +1,4 @@
-"""A few faults of every kind, at the jobs that make two clips' rows; `make faults N=200` throws more."""
+"""A few faults of every kind in the jobs that make the rows of two clips; `make faults N=200` makes more."""
 
 from __future__ import annotations
 
@@ -63,7 +63,9 @@ def test_two_snakemakes_at_once(lab: Lab) -> None:
 
 
 def test_a_stale_lock_of_either_kind_is_no_end(lab: Lab) -> None:
-    """Of this machine it is taken away; of another the message says how, and that helps."""
+    """A lock of this machine is removed. For one of another machine the message says what to do, and that
+    works.
+    """
     kinds = {}
     for number in range(8):
         if (Random(number).random() < 0.5) not in kinds:

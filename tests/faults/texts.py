@@ -1,4 +1,4 @@
-"""BVH and status files from the grammars, through the real readers, and what became of them."""
+"""BVH and status files from the grammars are read by the real readers, and the outcome is checked."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Reader = Callable[[Path], Arrays]
 
 
 def read_clip(path: Path) -> Arrays:
-    """The clip that is made of a BVH file."""
+    """The clip made from a BVH file."""
     clip, report = make_clip(path, SKELETON, SKELETON.parent, "clip", "holden31", OPTIONS)
     assert all(math.isfinite(v) for v in report.values() if isinstance(v, float)), report
     turns = np.linalg.norm(clip.rotations, axis=-1)
@@ -38,7 +38,7 @@ def read_clip(path: Path) -> Arrays:
 
 
 def read_severity(path: Path) -> Arrays:
-    """The severities that a status file says, for a clip of as many frames."""
+    """The severities of a status file, for a clip with as many frames."""
     links = load_skeleton(SKELETON).skeleton.link_names
     status = read_status(path, links)
     if status.frames > 100_000:  # the stage compares this with the clip before it makes room for it
@@ -51,7 +51,7 @@ def read_severity(path: Path) -> Arrays:
 
 
 def judge(case: Case, path: Path, read: Reader, whole: Arrays) -> str:
-    """What became of a mutated file: "refused", "same" or "read". Raises AssertionError where it is wrong."""
+    """The outcome for a mutated file: "refused", "same" or "read". Raises AssertionError if it is wrong."""
     path.write_text(case.text, encoding="utf-8", newline="")
     try:
         found = read(path)
@@ -80,7 +80,7 @@ def _judge_read(case: Case, found: Arrays, whole: Arrays) -> str:
 
 
 def base_bvh(path: Path) -> str:
-    """A BVH of a second and a half."""
+    """A BVH file of a second and a half."""
     head, _, rest = path.read_text().partition("Frames:")
     _, time, *rows = rest.strip().split("\n")
     return f"{head}Frames: 180\n{time}\n" + "\n".join(rows[:180]) + "\n"
@@ -89,7 +89,7 @@ def base_bvh(path: Path) -> str:
 def throw(
     which: str, base: str, folder: Path, examples: int, seed_: int, told: Callable[[Case, str], Any]
 ) -> None:
-    """Files of a grammar ("bvh" or "status"), drawn by hypothesis from a seed, each read and judged."""
+    """Read and judge files of a grammar ("bvh" or "status") that hypothesis generates from a seed."""
     grammar = bvh_grammar if which == "bvh" else status_grammar
     read = read_clip if which == "bvh" else read_severity
     path = folder / ("clip.bvh" if which == "bvh" else "clip_injuries.txt")

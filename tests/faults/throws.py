@@ -1,4 +1,4 @@
-"""Faults thrown at single jobs, and whether what happened is what should happen."""
+"""Faults in single jobs, and whether what happened is what should happen."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ REFUSED, UNHARMED, REMADE, SKIPPED, FAULT = "refused", "unharmed", "made again",
 
 @dataclass(frozen=True)
 class Throw:
-    """A fault that was made, and what happened. detail: more about it if Hobble did wrong."""
+    """A fault and what happened. detail: more about it if Hobble failed."""
 
     what: str
     at: str
@@ -56,9 +56,8 @@ def refusal(end: End, job: Job, *pieces: str) -> str:
 
 
 def kill(lab: Lab, rng: Random) -> Throw:
-    """Kill a job at a random moment, or while it writes.
-
-    Older artefacts, there half the time, stay or are replaced whole.
+    """Kill a job at a random moment, or while it writes. Half of the time there are older artefacts; they
+    stay or are replaced completely.
     """
     job = rng.choice(lab.jobs)
     after = rng.uniform(0, 1.1 * lab.seconds[job.name])
@@ -83,7 +82,7 @@ def kill(lab: Lab, rng: Random) -> Throw:
 
 
 def _die_writing(n: int, seconds: float) -> Callable[[], None]:
-    """End this process so soon after it opens the n-th file to write in, by a signal that it does not see."""
+    """Kill this process shortly after it opens the n-th file for writing."""
 
     def prepare() -> None:
         left = n
@@ -114,7 +113,7 @@ def _half_a_database(bench: Bench) -> bool:
 
 
 def _again(bench: Bench, what: str, at: str, happened: str) -> Throw:
-    """Run the job once more with whole inputs: it must end with the undisturbed run's artefacts."""
+    """Run the job again with undamaged inputs. It must give the artefacts of the undisturbed run."""
     for path in bench.job.outputs:  # as Snakemake does before a job
         if (bench.folder / path).is_dir():
             shutil.rmtree(bench.folder / path)
@@ -129,7 +128,7 @@ def _again(bench: Bench, what: str, at: str, happened: str) -> Throw:
 
 
 def harm(lab: Lab, rng: Random, only: str | None = None) -> Throw:
-    """Bytes of one input that another job made are cut, flipped, zeroed, ...; its time stays as it was."""
+    """Cut, flip or zero bytes of one input that another job made. The file's time stays the same."""
     there = [(job, path) for job in lab.jobs for path in _files_read(lab, job) if only in (None, job.rule)]
     wanted = rng.choice(sorted({kind(path) for _, path in there}))  # each kind of file as often
     job, path = rng.choice([(job, path) for job, path in there if kind(path) == wanted])
@@ -145,14 +144,14 @@ def harm(lab: Lab, rng: Random, only: str | None = None) -> Throw:
 
 
 def _files_read(lab: Lab, job: Job) -> list[str]:
-    """What a job reads that others made; of folders, the files in them."""
+    """The files that a job reads and other jobs made, including those in folders."""
     roots = [lab.run / path for path in job.inputs if path.startswith("results/")]
     files = [file for root in roots for file in _files(root) if not file.name.startswith(".")]
     return sorted(str(file.relative_to(lab.run)) for file in files)
 
 
 def gone(lab: Lab, rng: Random) -> Throw:
-    """An input that is not there any more, or a folder where it was."""
+    """Remove an input, or put a folder in its place."""
     job = rng.choice([job for job in lab.jobs if any(p.startswith("results/") for p in job.inputs)])
     with lab.bench(job) as bench:
         target = _some_file(bench, rng)
@@ -191,7 +190,7 @@ def _judged(bench: Bench, what: str, target: Path, rng: Random) -> Throw:
 
 
 def full_disk(lab: Lab, rng: Random) -> Throw:
-    """The results lie on a disk that has room for a part of what the job makes."""
+    """The disk of the results has room for only part of the job's output."""
     if os.getuid():
         return Throw("a full disk", "-", SKIPPED, "not root, so that no small disk can be mounted")
     job = rng.choice(lab.jobs)
@@ -241,7 +240,7 @@ def _files(root: Path) -> list[Path]:
 
 
 def no_permission(lab: Lab, rng: Random) -> Throw:
-    """An input that may not be read, or a folder that may not be written in, for a user who is not root."""
+    """For a user who is not root, forbid reading an input or writing in a folder."""
     what = rng.choice(("an input that may not be read", "a folder that may not be written in"))
     if os.getuid():
         return Throw(what, "-", SKIPPED, "not root, so that no job can be run as somebody else")
@@ -270,7 +269,7 @@ def no_permission(lab: Lab, rng: Random) -> Throw:
 
 
 def become_nobody() -> None:
-    """Give up root, for whom no permission counts."""
+    """Give up root, because permissions do not bind root."""
     os.setgroups([])
     os.setgid(NOBODY)
     os.setuid(NOBODY)
@@ -278,9 +277,8 @@ def become_nobody() -> None:
 
 
 def changing_clip(lab: Lab, rng: Random) -> Throw:
-    """A clip is written anew while its job reads it: the old one's result, the new one's, or a refusal.
-
-    The old one's result is right only where Snakemake will see that the clip is newer and make it again.
+    """A clip is rewritten while its job reads it. The result is that of the old clip, that of the new one, or
+    a refusal. That of the old clip is right only if Snakemake sees that the clip is newer and makes it again.
     """
     clips = [job for job in lab.jobs if job.rule == "motion_clips"]
     job, other = rng.sample(clips, 2)
@@ -338,7 +336,7 @@ def _write_anew(clip: Path, new: bytes, how: str, pause: float) -> None:
 
 
 def spoilt_checkpoint(lab: Lab, rng: Random) -> Throw:
-    """Training that was killed finds its own checkpoint damaged."""
+    """A killed training finds its own checkpoint damaged."""
     job = next((job for job in lab.jobs if job.rule == "training"), None)
     there = sorted(lab.run.glob("results/*/checkpoints/*/*.npz"))
     if job is None or not there:

@@ -1,4 +1,4 @@
-"""The page's npm packages, for those tests that open what was written in other programs."""
+"""The page's npm packages, for tests that open our files with other programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The glTF file: without an error to the Khronos validator, loaded by three.js, and moving as it should."""
+"""The glTF file has no error in the Khronos validator, is loaded by three.js, and moves as it should."""
 
 from __future__ import annotations
 

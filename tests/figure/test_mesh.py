@@ -1,4 +1,4 @@
-"""The body: closed, smooth, of a grown person's size, and moved by its bones and by nothing else."""
+"""The body is closed, smooth and of an adult's size. Only its bones move it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def edges(mesh: Mesh) -> np.ndarray:
 
 
 def closed(mesh: Mesh) -> bool:
-    """Every edge is walked once each way."""
+    """Each edge is in two triangles, once in each direction."""
     walked = edges(mesh)
     return len(np.unique(walked, axis=0)) == len(walked) and {tuple(e) for e in walked.tolist()} == {
         tuple(e[::-1]) for e in walked.tolist()
@@ -61,7 +61,9 @@ def test_every_rig_gets_a_body(root: Path, name: str) -> None:
 
 
 def test_the_surface_is_smooth(mesh: Mesh, holden31: Skeleton) -> None:
-    """The normals at the ends of an edge differ little, but for fingers, the edges of soles and the face."""
+    """The normals at the two ends of an edge are similar, except on fingers, at the edges of soles and in the
+    face.
+    """
     a, b = edges(mesh).T
     turn = np.degrees(np.arccos(np.clip((mesh.normals[a] * mesh.normals[b]).sum(axis=1), -1, 1)))
     fine = [
@@ -100,7 +102,7 @@ def test_it_goes_where_its_bones_go_as_a_whole(mesh: Mesh) -> None:
 
 
 def test_no_corner_goes_further_than_its_bones_carry_it(mesh: Mesh, holden31: Skeleton) -> None:
-    """Also where hands turn by half a turn: a corner is a mean of where its bones would take it."""
+    """A corner is a mean of the places where its bones would move it, even if a hand turns by half a turn."""
     rng = np.random.default_rng(4)
     wild = quat.normalize(rng.normal(size=(2, len(holden31.joints), 4)))
     world, places = forward_kinematics(holden31, wild, np.zeros((2, 3)))

@@ -1,4 +1,4 @@
-"""Walkers made joint by joint, so that what is to be measured of them is known exactly."""
+"""Walkers made joint by joint, so that their measures are known exactly."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SIDES = {"left": 1.0, "right": -1.0}  # +X is the left
 
 
 def place(skeleton: Skeleton, at: Mapping[str, Array]) -> Array:
-    """(F, J, 3) with the joints of the roles where they are told, all others at the hips."""
+    """(F, J, 3) with the joints of these roles at these places, and all others at the hips."""
     positions = np.repeat(at["hips"][:, None], len(skeleton.joints), axis=1)
     for role, points in at.items():
         positions[:, skeleton.role(role)] = points
@@ -31,7 +31,9 @@ def place(skeleton: Skeleton, at: Mapping[str, Array]) -> Array:
 
 
 def body(frames: int, speed: float, height: float = 72.0) -> dict[str, Array]:
-    """An upright figure that goes ahead at `speed` cm a frame, its arms hanging, without knees and ankles."""
+    """An upright figure that moves ahead at `speed` cm a frame with hanging arms, without knees and
+    ankles.
+    """
 
     def up(height: float, left: float = 0.0) -> Array:
         return np.array([left, height, 0.0])

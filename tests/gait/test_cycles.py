@@ -121,7 +121,7 @@ def backward(positions):
 
 
 def on_a_circle(positions):
-    """Bent onto a circle that is gone round in four cycles."""
+    """The walk bent onto a circle of four cycles."""
     radius = 4 * 90 / (2 * np.pi)
     angle, out = positions[..., 2] / radius, positions[..., 0] + radius
     return np.stack([out * np.cos(angle) - radius, positions[..., 1], out * np.sin(angle)], axis=-1)

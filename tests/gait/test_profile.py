@@ -1,4 +1,4 @@
-"""A walk in numbers, and the same walk seen in a mirror."""
+"""The numbers of a walk, and those of its mirror image."""
 
 from __future__ import annotations
 

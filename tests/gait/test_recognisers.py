@@ -1,4 +1,4 @@
-"""The classifier of people's limps and the recogniser of mild ones, on people left out and captured walks."""
+"""The classifier of strong limps and the recogniser of mild limps, on left-out people and captured walks."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ NORMAL_WALKS = ("105_29", "105_31", "105_34", "105_36")
 
 
 def limps(person: int, strength: float = 1.0) -> Iterator[tuple[str, str, dict, dict]]:
-    """(gait, side, walk, healthy) of one person, the walk as far from normal as `strength` says."""
+    """(gait, side, walk, healthy) of one person. strength: how far the walk is from normal to impaired."""
     healthy = dict(people().profile(NORMAL, person))
     for gait in GAITS[1:]:
         full = people().profile(gait, person)
@@ -36,7 +36,7 @@ def limps(person: int, strength: float = 1.0) -> Iterator[tuple[str, str, dict, 
 
 @pytest.fixture(scope="module")
 def left_out():
-    """For each person the classifier and the grader that have not seen them."""
+    """For each person, the classifier and the recogniser that were not trained on that person."""
     out = []
     for person in range(people().count):
         rest = [other for other in range(people().count) if other != person]
@@ -130,7 +130,7 @@ def test_an_arm_that_keeps_still_and_a_trunk_that_leans_are_seen():
 
 
 def test_slow_and_quick_even_walks_are_normal():
-    """Speed alone, and what goes with it on both sides, is no limp."""
+    """A change of speed alone is no limp, nor is a change that is equal on both sides."""
     healthy = dict(people().normal())
     for speed, swing in ((0.55, 0.85), (1.6, 1.15)):
         walk = dict(healthy)
@@ -261,7 +261,7 @@ def test_a_hurt_stomach_is_a_trunk_that_leans(cmu, healthy_105):
     ],
 )
 def test_the_limps_of_ferre_are_those_of_the_leg_that_was_hurt(cmu, healthy_105, name, side, part):
-    """Beside another walker's healthy walks, since there are none of theirs."""
+    """They are compared with another walker's healthy walks, because the performers' own are missing."""
     seen = compare(cmu(name), healthy_105())
     assert seen.answer.side == seen.grade.side == side
     assert part in seen.grade.parts

@@ -1,4 +1,4 @@
-"""Healthy clips, made and captured, with their labels."""
+"""Healthy clips, generated and captured, with their labels."""
 
 from __future__ import annotations
 

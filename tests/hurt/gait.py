@@ -1,4 +1,4 @@
-"""What a walk looks like, measured from positions and contacts alone."""
+"""Measures of a walk, computed from positions and contacts alone."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _degrees(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def knee(clip: Clip, side: str) -> np.ndarray:
-    """(F,) degrees of knee flexion, negative where it is bent to the other side than a knee bends."""
+    """(F,) knee flexion in degrees; negative if the knee is bent backwards."""
     hip, joint, ankle = (
         clip.positions[:, clip.skeleton.role(f"{side}_{r}")] for r in ("hip", "knee", "heel")
     )
@@ -95,12 +95,12 @@ def toe_heights(clip: Clip, labels: Labels) -> np.ndarray:
 
 
 def fastest(clip: Clip) -> float:
-    """Degrees a second of the joint that turns fastest."""
+    """Degrees a second of the fastest turning joint."""
     return float(np.degrees(quat.angle(clip.rotations[:-1], clip.rotations[1:]).max()) * clip.fps)
 
 
 def effects(healthy: dict[str, float], hurt: HurtClip, side: str) -> dict[str, float]:
-    """Sizes relative to healthy, as the table of goals has them, if `side` is hurt."""
+    """Sizes relative to the healthy walk, as in the table of goals, if `side` is hurt."""
     other = SIDES[1 - SIDES.index(side)]
     seen = measures(hurt.clip, hurt.labels)
     return {

@@ -1,4 +1,4 @@
-"""A hurt clip is the same body with its feet on the ground; nothing hurt is nothing changed."""
+"""A hurt clip has the same body and its feet on the ground. Without an injury nothing changes."""
 
 from __future__ import annotations
 

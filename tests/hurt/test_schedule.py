@@ -1,4 +1,4 @@
-"""What hurts when: every link in a clip that is trained on, always the same, within the options."""
+"""When each link hurts: every link in some training clip, always at the same times, within the options."""
 
 from __future__ import annotations
 

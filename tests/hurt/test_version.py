@@ -1,4 +1,6 @@
-"""A version of a clip: its severities are those that it shows, and none in between where none is wanted."""
+"""The severities of a hurt version match its motion. Without `in_between` no cycle has a changing
+severity.
+"""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def options() -> Labels:
 
 
 def feet_only(skeleton: Skeleton, right: np.ndarray, left: np.ndarray, hips: np.ndarray, name: str) -> Clip:
-    """A clip whose ankles stand at given places (F, 3): joint translations do it, no rotation."""
+    """A clip whose ankles are at given places (F, 3), by joint translations and without rotations."""
     frames = len(hips)
     rotations = np.tile(quat.IDENTITY, (frames, len(skeleton.joints), 1))
     translations = np.tile(skeleton.offsets, (frames, 1, 1))

@@ -64,7 +64,7 @@ def landings(labels: Labels) -> list[tuple[float, int]]:
 
 
 def matched(by_hand: Labels, automatic: Labels, first: float, last: float) -> tuple[list, list]:
-    """The landings of both between two frames, in order: foot after foot must be the same."""
+    """The landings of both between two frames, in order. Both must have the same feet."""
     ours, theirs = landings(automatic), landings(by_hand)
     theirs = [x for x in theirs if first <= x[0] <= last]
     begin = min(
@@ -126,7 +126,9 @@ def test_a_run_flies(shared: Path, read, name):
 @pytest.mark.shared
 @pytest.mark.parametrize("name", ["105_16", "105_25", "105_26", "105_15", "03_04"])
 def test_limps_and_rough_ground_lose_no_step(shared: Path, read, options, name):
-    """Nobody labelled these: steps take turns at a human pace, all the while that the body moves."""
+    """These clips have no labels by hand: left and right steps must alternate at a human rate for as long as
+    the body moves.
+    """
     clip, motion = read(shared / "mocap/cmu" / f"{name}.bvh")
     labels, _ = label_clip(clip, [], motion, "walk", "flat", options)
     strides = np.diff(labels.cycles, axis=1)

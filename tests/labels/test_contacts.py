@@ -1,4 +1,4 @@
-"""Contacts of made walks, whose stances are known to the frame, and of bodies of other sizes."""
+"""Contacts of generated walks, whose stances are known to the frame, and of bodies of other sizes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hobble.labels.options import Labels
 
 
 def truth(half: int, swing: int, frames: int, start: int) -> np.ndarray:
-    """(F,) whether the right foot of `walker` stands."""
+    """(F,) whether the right foot of `walker` is on the ground."""
     t = np.arange(frames)
     in_the_air = [(t > landing - swing) & (t < landing) for landing in range(start, frames - 10, 2 * half)]
     return ~np.any(in_the_air, axis=0)

@@ -1,4 +1,4 @@
-"""Hand-made label files: what they mean, and what is refused with file and line."""
+"""The meaning of hand-made label files. Wrong files are refused with file and line."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_frames_of_other_rates_keep_their_moment(fps, number, frame):
 
 @pytest.mark.parametrize("fps", [23.976, 1 / 0.00833, 1 / 0.01667])
 def test_a_rate_that_is_not_whole_is_taken_as_it_stands(fps):
-    """As the motion is: labels and frames lie at the same moments after ten minutes too."""
+    """Labels and frames are at the same moments even after ten minutes."""
     times = sample_times(72_000, fps, 60.0)
     time = SourceTime(72_000, fps)
     np.testing.assert_allclose(time.at_clip_frames(len(times)), times, atol=1e-6)

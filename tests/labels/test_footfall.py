@@ -1,4 +1,4 @@
-"""Landings from the motion alone: exact on generated walks, and none too many on limps and pauses."""
+"""Landings found from the motion alone: exact on generated walks, and no extra ones on limps and pauses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Gaits of a clip that nobody labelled, and the crouch of flat clips."""
+"""Gaits of clips without gait files, and crouching in flat clips."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def automatic(clip, dominant=None):
 
 
 def clearly(gait):
-    """Log odds that leave no doubt of walking."""
+    """Log odds that clearly mean walking."""
     return np.full(len(gait), -9.0)
 
 
@@ -35,7 +35,7 @@ def test_a_walk_after_a_stand(walker):
 
 
 def bouncing(clip, height):
-    """The clip with hips that bounce by `height` cm over feet that stay where they are."""
+    """The clip with hips that move up and down by `height` cm over feet that stay."""
     root, feet = clip.root.copy(), clip.translations.copy()
     root[:, 1] += height * np.cos(2 * np.pi * np.arange(len(clip)) / 20)
     for role in ("left_heel", "right_heel"):

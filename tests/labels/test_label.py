@@ -1,4 +1,4 @@
-"""A clip's labels as a whole: files before motion, mirrors, reports, and the original's own numbers."""
+"""All labels of a clip: files have priority over motion, mirrors, reports, and the original's own numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Phase, footsteps and cycles: exact where they are given, and the same whichever is made from the other."""
+"""Phase, footsteps and cycles: exact if given, and the same in both directions of conversion."""
 
 from __future__ import annotations
 

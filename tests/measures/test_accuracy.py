@@ -1,4 +1,4 @@
-"""Accuracy of the published network on the published rows, and of the formula on made-up rows."""
+"""Accuracy of the published network on the published rows, and the formula on made-up rows."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def weights(tmp_path: Path) -> Path:
 
 
 def slow(network: Network, x: np.ndarray, phase: float) -> np.ndarray:
-    """One row at a time, the weights blended first."""
+    """Row by row, with weights that are blended first."""
     h = (x.astype(float) - network.x_mean) / network.x_std
     for i in range(len(network.weights)):
         h = weights_at(network.weights[i], phase)[0] @ h + weights_at(network.biases[i], phase)[0]

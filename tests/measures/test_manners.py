@@ -11,7 +11,9 @@ import pytest
 
 from hobble.channels import channel
 from hobble.evaluation.captured import Captured
+from hobble.measures.manners import left_out as module
 from hobble.measures.manners import page, run
+from hobble.measures.manners.left_out import SHRINKAGES, left_out
 from hobble.measures.manners.windows import (
     EFFECTS,
     NONE,
@@ -87,7 +89,7 @@ def window(who: str, manner: str, *values: float) -> Window:
 
 
 def test_whole_people_are_left_out() -> None:
-    """Each clip looks like its person, and nothing else. The person's other clip gives its manner away."""
+    """Each clip is like the other clip of its person and unlike all others."""
     rng = np.random.default_rng(2)
     windows, people = [], {}
     for person in range(12):
@@ -96,13 +98,28 @@ def test_whole_people_are_left_out() -> None:
             name = f"{person}-{take}"
             people[name] = str(person)
             windows += [window(name, manner, *(own + rng.normal(0, 0.02, 6))) for _ in range(20)]
-    by_clip = run.left_out(windows, {name: name for name in people}, 0.6)
-    by_person = run.left_out(windows, people, 0.6)
+    by_clip = left_out(windows, {name: name for name in people}, [0.6])
+    by_person = left_out(windows, people, [0.6])
     assert by_clip["people"] == 24
     assert by_person["people"] == 12
     assert by_person["people_of"] == {NONE: 6, "sad": 6}
     assert by_clip["windows"] == by_person["windows"] == 480
     assert by_clip["right"] > by_person["right"] + 0.2
+
+
+def test_the_features_are_read_once_and_the_best_shrinkage_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(4)
+    windows = [window(f"{k}", "sad" if k % 2 else NONE, *rng.normal(k % 2, 1, 4)) for k in range(30)]
+    people = {w.clip: w.clip for w in windows}
+    counted: list[int] = []
+    plain = module.table
+    monkeypatch.setattr(module, "table", lambda some: counted.append(len(some)) or plain(some))
+    best = left_out(windows, people)
+    assert counted == [30]
+    alone = [left_out(windows, people, [shrinkage]) for shrinkage in SHRINKAGES]
+    assert best in alone
+    assert best["right"] == max(one["right"] for one in alone)
+    assert min(one["right"] for one in alone) < best["right"]
 
 
 def test_a_manner_of_one_person_is_never_named_without_that_person() -> None:
@@ -113,7 +130,7 @@ def test_a_manner_of_one_person_is_never_named_without_that_person() -> None:
         for n in range(1 if m == "sad" else 3)
         for _ in range(10)
     ]
-    found = run.left_out(windows, {w.clip: w.clip for w in windows}, 0.02)
+    found = left_out(windows, {w.clip: w.clip for w in windows}, [0.02])
     assert found["by_manner"] == {NONE: 1.0, "old": 1.0, "sad": 0.0}
     assert found["right"] == round(60 / 70, 5)
     assert found["presence_right"] == 1.0, "but that it is not the neutral walk is seen"
@@ -122,7 +139,9 @@ def test_a_manner_of_one_person_is_never_named_without_that_person() -> None:
 def test_each_manner_is_tried_with_each_column_of_another_channel(
     both: Network, motion: list[Captured], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Captured windows take the place of the generated figures: of the right mood, of none at one link."""
+    """Captured windows stand for the generated figures: those of the right mood, and at one link those of no
+    mood.
+    """
     real = {m: captured_windows(clip(both, f"{m}-9", m, lean=lean), both, "mood") for m, lean in LEANS}
     asked: list[Figure] = []
     broken = both.channels["injury"][3]

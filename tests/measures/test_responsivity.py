@@ -142,7 +142,7 @@ def test_modes_beside_the_own_run_fewer_laps(network) -> None:
 
 
 def test_times_of_steps_that_are_known() -> None:
-    """Two frames, of steps 1 .. 6 ms and of twice that; the whole call takes 1 ms more."""
+    """Two frames: steps of 1 to 6 ms, and of twice that. The whole call takes 1 ms more."""
     steps = np.arange(1.0, 7.0)
     times = np.array([[*steps, 22.0], [*(2 * steps), 43.0]]) / 1000
     found = module._milliseconds(times)

@@ -1,4 +1,4 @@
-"""Roll-outs: they give the runtime's own frames, cover every frame, and compute the errors that they name."""
+"""Roll-outs give the same frames as the runtime, cover every frame, and report the right errors."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[Inputs, np.nda
 
 @pytest.mark.parametrize("ground", [None, hills])
 def test_a_roll_out_is_what_the_runtime_does(hurtable: Network, ground: Any) -> None:
-    """With the runtime's inputs, joints and phase are those of the runtime."""
+    """With the runtime's inputs, joints and phase equal those of the runtime."""
     scale = hurtable.x_std.copy()  # one that feels its own velocities and its phase
     scale[hurtable.layout.x_joint_velocity] = 1.0
     hurtable = replace(hurtable, x_std=scale, y_std=np.full_like(hurtable.y_std, 0.2))

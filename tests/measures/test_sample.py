@@ -27,7 +27,7 @@ make_rows, make_network = _of_accuracy.make_rows, _of_accuracy.make_network
 
 
 def population(seed: int, count: int = 600) -> tuple[list[Facts], dict[str, str], dict[str, float]]:
-    """Clips of four kinds and any length, one in twelve held out, and the mean error of each."""
+    """Clips of four kinds and of any length, one in twelve held out, and the mean error of each clip."""
     rng = np.random.default_rng(seed)
     clips, values = [], {}
     for number in range(count):

@@ -1,4 +1,6 @@
-"""Every trained kind: trained, read, compiled, page and ONNX network give the same prediction."""
+"""Of every kind: the network in training, from its file, compiled, in the page and as ONNX give the same
+prediction.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,7 @@ def test_every_kind_is_tested_here() -> None:
 
 @pytest.fixture(params=KINDS)
 def made(request: pytest.FixtureRequest, holden31: Skeleton) -> Made:
-    """A network that was never trained, the arrays of its file, and what is read from them."""
+    """An untrained network, the arrays of its file, and the network read from them."""
     kind = request.param
     layout = RowLayout(len(holden31.joints), channels=(("injury", 30),))
     options = model(kind).options().model_validate({"kind": kind, **OPTIONS[kind]})
@@ -68,7 +70,7 @@ def asked(network: Network, rows: int = 7) -> tuple[np.ndarray, np.ndarray]:
 
 
 def near(network: Network, y: np.ndarray, expected: np.ndarray, within: float) -> None:
-    """Compared in standard deviations."""
+    """Whether two outputs are nearly equal, compared in standard deviations."""
     np.testing.assert_allclose((y - expected) / network.y_std, 0, atol=within)
 
 
@@ -97,7 +99,9 @@ def test_the_predictor_is_the_plain_prediction(made: Made, rows: int) -> None:
 
 @pytest.mark.parametrize("storage", STORAGES)
 def test_a_crowd_has_the_bits_of_single_characters(made: Made, storage: str) -> None:
-    """Some characters give an expert no share, so that not all rows of a product are neighbours."""
+    """For some characters the share of an expert is 0, so that the rows of a product are not all
+    consecutive.
+    """
     network = made[2]
     x, phase = asked(network, 29)
     x[::3] = network.x_mean + 30 * (x[::3] - network.x_mean)
@@ -116,7 +120,7 @@ def test_a_network_without_phase_ignores_it(made: Made) -> None:
 
 
 def test_the_page_computes_the_same(made: Made, tmp_path: Path) -> None:
-    """The first input weighs nothing and is not there; outputs are chosen, out of order."""
+    """The page lacks the first input, which has no weight, and has some outputs only, in another order."""
     network = made[2]
     object.__setattr__(network, "x_std", np.where(np.arange(len(network.x_std)) == 0, 0, network.x_std))
     seen, rows = np.arange(1, len(network.x_mean)), np.array([5, 0, 310, 17])

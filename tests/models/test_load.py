@@ -1,4 +1,4 @@
-"""Reading networks: sound files are read, all others are refused with a message that names the file."""
+"""Reading networks: valid files are read, all others are refused with a message that names the file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Change = Callable[[Content], None]
 
 
 def content(skeleton: Skeleton, links: int = 30) -> Content:
-    """The arrays and the meta (still a mapping) of a sound file."""
+    """The arrays and the meta (as a mapping) of a valid file."""
     layout = RowLayout(len(skeleton.joints), channels=(("injury", links),) if links else ())
     rng = np.random.default_rng(1)
     sizes = (layout.x_size, 6, 5, layout.y_size)
@@ -232,7 +232,7 @@ def test_a_malformed_network_is_refused(name: str, tmp_path: Path, holden31: Ske
 
 
 def released(folder: Path, made: Content) -> None:
-    """The same network as a folder of .bin files: every phase has the first control point's weights."""
+    """The same network as a folder of .bin files: at every phase the weights of the first control point."""
     for name, values in made.items():
         if name[0] in "Wb":
             for k in range(PHASES):
@@ -291,7 +291,7 @@ def test_what_is_not_a_regular_file_is_refused(name: str, tmp_path: Path, holden
 
 
 def test_entries_that_overlap_take_no_memory(tmp_path: Path, holden31: Skeleton) -> None:
-    """Many names for the same bytes: a small file that would fill the memory."""
+    """Many entries for the same bytes: a small file that would fill the memory."""
     path, one = tmp_path / "weights.npz", io.BytesIO()
     np.save(one, np.zeros(1 << 18, np.float32))
     with zipfile.ZipFile(path, "w") as archive:
@@ -308,7 +308,7 @@ def test_entries_that_overlap_take_no_memory(tmp_path: Path, holden31: Skeleton)
 
 
 def test_the_ground_is_looked_up_where_it_was_in_training(tmp_path: Path, holden31: Skeleton) -> None:
-    """By the runtime and by the page, as far aside as the file says, and 25 cm where it says nothing."""
+    """The runtime and the page look as far to the side as the file says, or 25 cm if it does not say."""
     for side in (40.0, None):
         made = content(holden31)
         if side is None:

@@ -1,4 +1,4 @@
-"""Products of a few rows are right, and a row has the same bits beside any other rows."""
+"""Products of a few rows are right, and a row has the same bits next to any other rows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def product(weights, panels, inputs, x, rows, y, places):
 
 
 def times(weights: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """x W' through tiles; rows of sums lie in the opposite order, to see that `places` are looked at."""
+    """x W' computed in tiles. The sums are stored in reverse order, to check that `places` is used."""
     outputs, inputs = weights.shape
     panels = panels_of(outputs)
     flat = aligned(panels * WIDTH * inputs, weights.dtype)
@@ -28,7 +28,7 @@ def times(weights: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def in_order(weights: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The running sums as they are defined; a product of two float32 is exact in float64."""
+    """The running sums by definition. A product of two float32 numbers is exact in float64."""
     y = np.zeros((len(x), len(weights)), np.float32)
     for k in range(x.shape[1]):
         y = (x[:, k : k + 1].astype(float) * weights[:, k].astype(float) + y).astype(np.float32)

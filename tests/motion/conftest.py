@@ -1,4 +1,4 @@
-"""A small walk made from scratch, exact enough to measure sliding feet on, and ways to write it as files."""
+"""A small made-up walk, exact enough to measure sliding feet, and functions that write it to files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OPTIONS: dict[str, Any] = ClipMotion().model_dump()
 
 
 def make_walk(skeleton: Skeleton, frames: int, fps: float, name: str = "walk") -> Clip:
-    """A walk along +Z at 1 m/s on any rig with a T-pose: feet stand still, swing, and never slide."""
+    """A walk along +Z at 1 m/s on any rig with a T-pose. Feet on the ground do not slide."""
     time = np.arange(frames) / fps
     rest = np.zeros((len(skeleton.joints), 3))
     for j, p in enumerate(skeleton.parents):
@@ -124,7 +124,7 @@ def walker() -> Callable[..., Clip]:
 
 @pytest.fixture(scope="session")
 def scaled() -> Callable[[Clip, float], Clip]:
-    """The same motion counted in other units."""
+    """The same motion in other units."""
 
     def scale(clip: Clip, factor: float) -> Clip:
         skeleton = replace(clip.skeleton, offsets=clip.skeleton.offsets * factor)

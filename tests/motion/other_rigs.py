@@ -104,7 +104,7 @@ ROLLS = "hips|-|Hips\nspine|hips|LowerBack\nspine1|spine|Spine\nspine2|spine1|Sp
 
 
 def nameless(rig: str) -> str:
-    """The rig with names that say no more than the side."""
+    """The rig with names that only tell the side."""
     rng, new = np.random.default_rng(2), {"-": "-"}
 
     def word(name: str) -> str:

@@ -36,7 +36,7 @@ LEG = ("HipJoint", "UpLeg", "Leg", "Foot", "ToeBase")
 def _names(
     trunk: Sequence[str | None], limb: Sequence[str | None], leg: Sequence[str | None], side: Callable
 ):
-    """Joint of the 31 -> its name in another program; what has none is left out."""
+    """Joint of the 31 -> its name in another program. Joints without a name are left out."""
     out = dict(zip(TRUNK, trunk, strict=True))
     for mine, letter in SIDES:
         prefix = {"HipJoint": letter, "Thumb": letter}
@@ -112,7 +112,9 @@ UNITS = {"cm": 1.0, "m": 100.0, "mm": 0.1, "inch": 2.54, "CMU": 5.6444}
 
 @dataclass(frozen=True)
 class Scramble:
-    """How a clip is rewritten; everything that is drawn is here, so that a failure can be looked at again."""
+    """How a clip is rewritten. It holds everything that was chosen at random, so that a failure can be
+    repeated.
+    """
 
     seed: int
     style: str
@@ -133,7 +135,7 @@ class Scramble:
 
     @classmethod
     def drawn(cls, seed: int) -> Scramble:
-        """One of all there are; styles and rest poses take turns."""
+        """One of all scrambles at random, so that names and rest poses alternate."""
         rng = np.random.default_rng(seed)
         style = tuple(STYLES)[seed % len(STYLES)]
         return cls(
@@ -158,7 +160,7 @@ class Scramble:
 
 @dataclass
 class Rig:
-    """Joints as they are written: where each is and how it is turned in the world, frame by frame."""
+    """The joints that are written: position and rotation of each in the world, in every frame."""
 
     names: list[str]
     parents: list[int]
@@ -175,7 +177,9 @@ class Rig:
 
 
 def stretched(clip: Clip, how: Scramble) -> Clip:
-    """The clip with other bone lengths, alike on both sides, and a neck that does not bend where it will go."""  # noqa: E501
+    """The clip with other bone lengths, the same on both sides, and with a straight neck if the neck joint
+    will be removed.
+    """
     rng = np.random.default_rng(how.seed + 1)
     skeleton = clip.skeleton
     offsets, rotations = skeleton.offsets.copy(), clip.rotations.copy()
@@ -195,7 +199,9 @@ def stretched(clip: Clip, how: Scramble) -> Clip:
 
 
 def written(clip: Clip, how: Scramble) -> tuple[Clip, dict[str, str]]:
-    """The clip as the other program has it, ready for `write_bvh`; and joint of the 31 -> its name there."""
+    """The clip in the form of the other program, ready for `write_bvh`, and joint of the 31 -> its name
+    there.
+    """
     rng = np.random.default_rng(how.seed + 2)
     names = _style(clip, how, rng)
     rig = _told(clip, names)
@@ -249,7 +255,7 @@ def _told(clip: Clip, names: dict[str, str]) -> Rig:
 
 
 def _extras(rig: Rig, names: dict[str, str], clip: Clip, how: Scramble, rng: np.random.Generator) -> None:
-    """Twist joints beside and along bones, fingers, a thing in one hand."""
+    """Adds twist joints along bones, fingers, and a thing in one hand."""
     place = {joint: rig.names.index(name) for joint, name in names.items()}
     for side, _ in SIDES:
         hand, arm, fore, knee = (place[side + part] for part in ("Hand", "Arm", "ForeArm", "Leg"))
@@ -282,7 +288,9 @@ def _extras(rig: Rig, names: dict[str, str], clip: Clip, how: Scramble, rng: np.
 
 
 def _lifted(rig: Rig, names: dict[str, str], how: Scramble) -> None:
-    """A joint above the hips, which stands, or moves along below them; or hips of the legs beside a spine."""
+    """Adds a joint above the hips, which stands or moves along on the floor, or separate hips for legs and
+    spine.
+    """
     hips = rig.places[0]
     frames = len(hips)
     still = np.broadcast_to(quat.IDENTITY, (frames, 4))
@@ -343,7 +351,7 @@ def _sampled(places: Array, turns: Array, every: Array) -> tuple[Array, Array]:
 
 
 def _sorted(rig: Rig) -> list[int]:
-    """Parents first, children in the order in which they came."""
+    """Joints with parents first, and children in their order."""
     out: list[int] = []
 
     def add(j: int) -> None:
@@ -359,7 +367,7 @@ def _sorted(rig: Rig) -> list[int]:
 def _zero(
     places: Array, turns: Array, parents: Sequence[int], names: Sequence[str], how: Scramble, rng
 ) -> Array:
-    """(J, 4) by how much more each joint is turned than in the clip, so that another pose is the zero pose."""  # noqa: E501
+    """(J, 4) additional rotation of each joint, which gives the rig another zero pose."""
     n = len(parents)
     none = np.broadcast_to(quat.IDENTITY, (n, 4)).copy()
     x, z = np.eye(3)[0], np.eye(3)[2]
@@ -407,7 +415,7 @@ def _local(places: Array, turns: Array, j: int, k: int) -> Array:
 
 
 def _thighs(parents: Sequence[int], places: Array, turns: Array) -> list[int]:
-    """Joints whose long bone points down in the clip's own zero pose and whose child's does, too."""
+    """Joints that point down in the clip's own zero pose, as do their children."""
     out = []
     for j in range(len(parents)):
         for k in (k for k in range(len(parents)) if parents[k] == j):
@@ -420,7 +428,7 @@ def _thighs(parents: Sequence[int], places: Array, turns: Array) -> list[int]:
 def _arm_of(
     names: Sequence[str], parents: Sequence[int], places: Array, turns: Array, side: str
 ) -> list[int]:
-    """The joints of one arm from the shoulder outward: those whose bones point out in the own zero pose."""
+    """The joints of one arm from the shoulder on, if they point outward in the clip's own zero pose."""
     sign = 1 if side == "Left" else -1
     out: list[int] = []
     for j in range(len(parents)):
@@ -434,9 +442,8 @@ def _arm_of(
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a scrambled file: `off`, (N,) cm of each of `names`, or why it was refused.
-
-    said: the note on what is uncertain of it.
+    """The result for a scrambled file: `off`, (N,) cm for each of `names`, or why it was refused. said: the
+    note about what is uncertain.
     """
 
     how: Scramble
@@ -494,7 +501,7 @@ def outcome(file: Path, seed: int, folder: Path, frames: int | None = None) -> O
 
 
 def floor_of(report: Mapping[str, Any]) -> float:
-    """The height at which a clip's floor was found, if it was put at 0."""
+    """The height at which a clip's floor was found, if it was moved to 0."""
     found = (
         re.match(r"The floor lies at (-?[\d.]+) cm; the clip was moved", text) for text in report["repairs"]
     )
@@ -502,7 +509,7 @@ def floor_of(report: Mapping[str, Any]) -> float:
 
 
 def main() -> None:
-    """Scramble as many clips as asked for, and say what came of each that is not right."""
+    """Scramble as many clips as requested, and print the outcome of each that is not right."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("folder", type=Path, help="clips of the 31 joints")
     parser.add_argument("--count", type=int, default=240)

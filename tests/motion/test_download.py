@@ -1,4 +1,4 @@
-"""Downloads from a server on the loopback address that does what servers in the wild do."""
+"""Downloads from a server on the loopback address that fails like real servers."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ ANSWER = b"HTTP/1.1 200 OK\r\n"
 
 
 class Babbler(threading.Thread):
-    """A server that says `begin`, then `more` a hundred times a second until the other side is gone."""
+    """A server that sends `begin`, and then `more` a hundred times a second until the client closes."""
 
     def __init__(self, begin: bytes, more: bytes) -> None:
         super().__init__(daemon=True)

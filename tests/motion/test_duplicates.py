@@ -1,4 +1,4 @@
-"""Clips with the same motion are found under any name, and cannot be both trained on and held out."""
+"""Clips with the same motion are found under any name, and cannot be in both parts of the split."""
 
 from __future__ import annotations
 

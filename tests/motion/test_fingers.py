@@ -1,4 +1,4 @@
-"""The finger that tells where a hand points, by name and by length."""
+"""The finger that shows the direction of the hand, by name and by length."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hobble.motion.fingers import pointing_fingers
 
 
 def hand(wrist: str, *fingers: tuple[str, float]) -> Skeleton:
-    """An elbow, a wrist 25 cm from it, and joints that all hang from the wrist."""
+    """An elbow, a wrist 25 cm from it, and joints that are all children of the wrist."""
     joints = ("Elbow", wrist, *(name for name, _ in fingers))
     offsets = np.array([[0, 0, 0], [25, 0, 0], *([length, 0, 0] for _, length in fingers)], float)
     return Skeleton("hand", joints, (-1, 0, *(1 for _ in fingers)), offsets)

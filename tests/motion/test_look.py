@@ -1,4 +1,4 @@
-"""What a folder says about itself before anything is trained on it."""
+"""The lines about the clips of a folder."""
 
 from __future__ import annotations
 

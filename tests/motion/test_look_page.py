@@ -1,4 +1,4 @@
-"""The page that a data set shows of itself."""
+"""The page about the clips of a data set."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ def test_a_rig_of_no_known_size_is_refused(walk, bvh, make, scaled):
 
 
 def z_up(clip):
-    """As a program with Z up writes it: its rest pose along Z, too."""
+    """The walk as a program with Z up writes it, with the rest pose along Z, too."""
     turn = quat.from_axis_angle(np.array([1.0, 0, 0]), np.pi / 2)
     rotations = quat.mul(quat.mul(turn, clip.rotations), quat.inv(turn))
     skeleton = replace(clip.skeleton, offsets=quat.rotate(turn, clip.skeleton.offsets))
@@ -105,7 +105,7 @@ def test_axes_are_found_said_and_put_right(walk, bvh, make, change, said):
 
 
 def crawl(skeleton, heading, seconds=3):
-    """On all fours at 36 cm/s, degrees from +Z towards +X."""
+    """A figure that crawls at 36 cm/s, in a direction in degrees from +Z towards +X."""
     time = np.arange(60 * seconds + 1) / 60
     swing = 0.26 * np.sin(2 * np.pi * time)[:, None]
     rotations = np.tile(quat.IDENTITY, (len(time), len(skeleton.joints), 1))
@@ -132,7 +132,7 @@ def test_a_figure_that_crawls_is_not_stood_on_end(holden31, bvh, make, heading):
 
 
 def turned_upright(clip):
-    """In a world with Z up, on a rig whose rest pose stands along Y."""
+    """The clip in a world with Z up, on a rig whose rest pose stands along Y."""
     turn = quat.from_axis_angle(np.array([1.0, 0, 0]), np.pi / 2)
     rotations = clip.rotations.copy()
     rotations[:, 0] = quat.mul(turn, rotations[:, 0])
@@ -141,7 +141,7 @@ def turned_upright(clip):
 
 @pytest.mark.parametrize("rise", [0.0, 0.6])
 def test_a_rest_pose_that_lies_in_its_world_does_not_lay_the_figure_down(walk, bvh, make, rise):
-    """Even on stairs, or where it jumps."""
+    """Even on stairs, or in a jump."""
     time = np.arange(len(walk)) / walk.fps
     up = np.stack([0 * time, rise * walk.root[:, 2] + 40 * np.maximum(np.sin(4 * time), 0), 0 * time], axis=1)
     climbing = replace(walk, root=walk.root + up)
@@ -179,7 +179,7 @@ def test_a_floor_that_is_not_at_zero_is_put_there_and_said(walker, bvh, make, ro
 @pytest.mark.shared
 @pytest.mark.parametrize("every", [1, 4, 5])
 def test_the_floor_of_a_short_run_is_found_at_any_rate(shared, bvh, make, root, every):
-    """One second of a run at 120, 30 and 24 frames a second: a foot stands in few of them."""
+    """In one second of a run at 120, 30 and 24 frames a second a foot stands in few frames."""
     source = load_source(
         read_bvh(shared / "mocap/cmu/09_08.bvh"),
         load_skeleton(root / "config/skeletons/holden31.yaml"),
@@ -389,7 +389,7 @@ def test_prefixes_of_names_do_not_matter(walk, bvh, make):
 
 
 def carried(clip, turn, place):
-    """The clip below a "Reference" that turns (F, 4) and moves (F, 3), with a camera hanging from it too."""
+    """The clip below a joint "Reference" that turns (F, 4) and moves (F, 3) and also carries a camera."""
     own, n = clip.skeleton, len(clip)
     joints, parents = ("Reference", *own.joints, "Camera"), (-1, *(p + 1 for p in own.parents), 0)
     offsets = np.concatenate([np.zeros((1, 3)), own.offsets, [[0, 180, 300]]])

@@ -1,4 +1,6 @@
-"""Rigs of other programs, studios and languages come out as the clip itself does, or are refused."""
+"""Clips on rigs of other programs, studios and languages give the same result as the original clip, or are
+refused.
+"""
 
 from __future__ import annotations
 
@@ -99,7 +101,7 @@ def clip(root, shared):
 
 @pytest.fixture
 def outcome(clip, tmp_path, make):
-    """What comes of a clip on another rig, and of the clip itself: both clips, and the joints' names."""
+    """The results for a clip on another rig and for the original clip: both clips, and the joints' names."""
 
     def run(rig, source=None, **how):
         told, names = rigged(source or clip, rig, **how)

@@ -1,4 +1,4 @@
-"""Reading BVH: files of many programs are read; broken files are refused with file and line."""
+"""Files of many programs are read; broken files are refused with file and line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""From rig to rig: bones point the same way, standing feet stand, and known figures come out exactly."""
+"""Retargeting: bones point the same way, feet on the ground stay, and known figures are reproduced
+exactly.
+"""
 
 from __future__ import annotations
 
@@ -82,7 +84,7 @@ def test_the_same_proportions_come_out_exactly(walk, rigs):
 
 
 def test_191_joints_carry_the_31_exactly(walk, rigs):
-    """ava191 has holden31's proportions: every equivalent joint is where the 31-joint figure has it."""
+    """ava191 has the proportions of holden31, so the 31 joints are at the same places in both."""
     assert sorted(rigs["ava191"].maps["holden31"].values()) == sorted(walk.skeleton.joints)
     neck = quat.from_axis_angle(np.array([1.0, 0, 0]), np.full(len(walk), 0.4))
     walk = replace(walk, rotations=walk.rotations.copy())
@@ -156,7 +158,9 @@ def test_the_path_is_scaled_by_the_legs(walk, rigs):
 
 
 def test_a_splayed_rest_pose_does_not_splay_the_legs(walk, holden31):
-    """The CMU rigs' legs stand apart at rest; the motion knows, and so must the retargeting."""
+    """In the rest pose of CMU's rigs the legs are apart. The retargeted legs must follow the motion and not
+    that pose.
+    """
     offsets = holden31.offsets.copy()
     for side, sign in (("Left", 1), ("Right", -1)):
         turn = quat.from_axis_angle(np.array([0, 0, 1.0]), 0.35 * sign)
@@ -268,7 +272,9 @@ def test_a_real_walk_keeps_its_look(shared, root, rigs, options):
 @pytest.mark.shared
 @pytest.mark.parametrize("file", ["105_10", "105_29", "105_16", "105_26", "08_03"])
 def test_knees_do_not_snap_where_legs_are_nearly_straight(shared, make, file):
-    """Feet of other proportions ask the leg to be longer than it is; the hips come down rather than that."""
+    """With other feet, the leg is too short for the target of the ankle. The hips come down instead of
+    straightening the knee.
+    """
     source, _ = make(shared / f"mocap/cmu/{file}.bvh", proportions="clip")
     made, report = make(shared / f"mocap/cmu/{file}.bvh")
     for side in ("left", "right"):

@@ -1,4 +1,4 @@
-"""The root frame, against the original's rows and against what it must be by construction."""
+"""The root frame, compared with the original's rows and with exact cases."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from hobble.motion.root import (
 
 
 def turned(clip, angle, shift):
-    """The whole clip turned about the vertical and moved over the ground."""
+    """The whole clip, turned about the vertical and moved on the ground."""
     turn = quat.yaw(angle)
     rotations = clip.rotations.copy()
     rotations[:, 0] = quat.mul(turn, rotations[:, 0])
@@ -64,7 +64,9 @@ def test_rotation_takes_the_facing_direction_to_z(walk):
 
 
 def test_turning_left_has_the_sign_of_the_facts_page(walk):
-    """Turning left by d a frame, q[i+1] q[i]^-1 turns by -d, so that the runtime applies the negative."""
+    """If the figure turns left by d in a frame, q[i+1] q[i]^-1 turns by -d, so the runtime applies the
+    negative.
+    """
     clip = replace(walk, rotations=np.tile(quat.IDENTITY, (5, 31, 1)), root=np.zeros((5, 3)))
     clip.rotations[:, 0] = quat.yaw(0.1 * np.arange(5))
     np.testing.assert_allclose(root_frames(clip, 0).turn, -0.1, atol=1e-12)
@@ -97,7 +99,7 @@ def test_helpers_agree_with_their_formulas(walk):
 
 @pytest.mark.shared
 def test_rows_of_the_original_come_out(shared, make):
-    """Frame 95 is the first of the original's rows: line 1 of the footsteps begins at 191 of 120 Hz."""
+    """Frame 95 is the first of the original's rows: line 1 of the footsteps begins at frame 191 at 120 Hz."""
     clip, report = make(shared / "mocap/pfnn/LocomotionFlat09_000.bvh", proportions="clip")
     assert report["repairs"] == []
     assert len(clip) == 925

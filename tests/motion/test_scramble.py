@@ -1,4 +1,6 @@
-"""Real clips rewritten as other programs' rigs come out as they do themselves (more: see `scramble.py`)."""
+"""Real clips on other programs' rigs give the same result as the original clips (`scramble.py` tests
+more).
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,7 @@ DOUBTFUL = {24: "ankles", 50: "neck", 104: "balls of the feet"}
 @pytest.mark.shared
 @pytest.mark.parametrize("seed", DOUBTFUL)
 def test_what_a_rig_does_not_show_is_told(shared, tmp_path, seed):
-    """Files that are more than 1 cm off, because they do not contain the missing information."""
+    """Files that are more than 1 cm off because information is missing in them have a note."""
     files = sorted((shared / "mocap/cmu").glob("*.bvh"))
     one = outcome(files[seed * 7 % len(files)], seed, tmp_path, 900)
     assert DOUBTFUL[seed] in one.said, one

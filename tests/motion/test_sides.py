@@ -20,7 +20,7 @@ def original(shared):
 
 
 def renamed(path, folder, names):
-    """A file with other names of its joints, cut to a second and a half."""
+    """A file of a second and a half with other joint names."""
     text, rows = path.read_text().split("Frame Time:")
     words = text.split()
     for joint in (b for a, b in pairwise(words) if a in ("ROOT", "JOINT")):
@@ -32,13 +32,13 @@ def renamed(path, folder, names):
 
 
 def word(joint: str) -> str:
-    """A name that says neither what a joint is nor on which side."""
+    """A name that tells neither the joint nor the side."""
     seed = sum(ord(letter) * (i + 1) for i, letter in enumerate(joint))
     return "".join("kmnptvz"[seed // 7**k % 7] + "aeiou"[seed // 5**k % 5] for k in range(4))
 
 
 def asf(joint: str) -> str:
-    """`lUpLeg` in small letters, as in the names of the Acclaim format."""
+    """`lUpLeg` in small letters, as in the Acclaim format."""
     return joint.replace("Left", "L").replace("Right", "R").lower()
 
 

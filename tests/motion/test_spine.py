@@ -1,4 +1,4 @@
-"""Bones of trunk and neck get the directions of the target's spine, whatever joints a rig lacks."""
+"""Bones of trunk and neck get the directions of the target's spine, even if the rig lacks joints."""
 
 from __future__ import annotations
 

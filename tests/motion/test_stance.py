@@ -1,4 +1,4 @@
-"""Real rigs that no skeleton file describes, and one whose zero pose nobody could stand in."""
+"""Real rigs without a skeleton file, and one whose zero pose nobody could stand in."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LIMBS = {"arm": ("shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "heel")}
 
 
 def seen(path) -> dict[str, np.ndarray]:
-    """Where the file's own joints are, by its own numbers alone, at its own rate."""
+    """Positions of the file's own joints at its own rate, computed without our reader."""
     file = read_bvh(path)
     decoded = decode(file, 1e-3)
     skeleton = Skeleton("seen", file.names, file.parents, decoded.offsets)
@@ -36,13 +36,13 @@ def seen(path) -> dict[str, np.ndarray]:
 
 
 def bend(a, b, c):
-    """Degrees by which a limb is bent at b."""
+    """The bend of a limb at b, in degrees."""
     u, v = b - a, c - b
     return np.degrees(np.arccos(np.sum(u * v, -1) / np.linalg.norm(u, axis=-1) / np.linalg.norm(v, axis=-1)))
 
 
 def same_bends(path, clip: Clip, names: dict[str, str]) -> None:
-    """Knees and elbows bend as they do in the file: in the middle of their range, and how far."""
+    """Whether knees and elbows bend as in the file: the middle of their range, and its size."""
     places, fps = seen(path), 1 / read_bvh(path).frame_time
     at = np.minimum(np.round(np.arange(len(clip)) / 60 * fps).astype(int), len(places[names["hips"]]) - 1)
     for side in ("left", "right"):
@@ -79,7 +79,7 @@ def test_a_rig_without_a_file_is_found(shared, make, name):
 @pytest.mark.shared
 @pytest.mark.parametrize("name", ["03_04", "07_04", "105_16"])
 def test_hips_and_shoulders_are_as_level_as_in_the_file(shared, make, name):
-    """Captured rigs have spines that are bent sideways in their zero pose; what they carry is not."""
+    """The spines of captured rigs are bent sideways in the zero pose; hips and shoulders are not."""
     path = shared / f"mocap/cmu/{name}.bvh"
     clip, report = make(path)
     places, fps = seen(path), 1 / read_bvh(path).frame_time
@@ -97,7 +97,7 @@ def test_hips_and_shoulders_are_as_level_as_in_the_file(shared, make, name):
 
 @pytest.mark.shared
 def test_feet_that_only_stand_unlike_are_told_of(shared, tmp_path):
-    """Uneven ground, and a zero pose in which nobody could stand: how feet are turned is a guess."""
+    """On uneven ground, with a zero pose in which nobody could stand, the tilt of the feet is a guess."""
     one = outcome(shared / "mocap/cmu/03_02.bvh", 100, tmp_path, 420)
     assert one.how.rest == "heap"
     assert "feet stand at different angles" in one.said + one.refused
@@ -128,7 +128,9 @@ def test_one_foot_that_agrees_with_the_zero_pose_is_enough(shared, tmp_path):
 
 @pytest.mark.shared
 def test_feet_that_were_animated_are_as_steep_in_a_run_as_in_a_walk(shared, make):
-    """They stand at exactly one angle, 39.6 degrees, so a run needs no correction for raised heels."""
+    """They always stand at exactly one angle, 39.6 degrees, so the run needs no correction for raised
+    heels.
+    """
     for name in ("walk_angry_001", "run_angry_001", "dash_happy_001"):
         path = shared / f"mocap/styles/dataset-1_{name}.bvh"
         source = load_source(

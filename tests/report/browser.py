@@ -1,4 +1,4 @@
-"""A browser to look at pages with: chromium, headless, over the DevTools protocol on a pair of pipes."""
+"""A headless chromium to test pages with, controlled over the DevTools protocol."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Browser:
             self.send(f"{domain}.enable")
 
     def send(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """Send a command and return its result; events that arrive in between are kept."""
+        """Send a command and return its result. Events that arrive meanwhile are kept."""
         self._last += 1
         message: dict[str, Any] = {"id": self._last, "method": method, "params": parameters}
         if self._session:
@@ -84,10 +84,11 @@ class Browser:
             self._keep(answer)
 
     def open(self, url: str) -> None:
-        """Go to a page and wait until it is loaded."""
+        """Go to a page and wait until it is loaded and all its parts have started."""
         self.send("Page.navigate", url=url)
         while self.run("document.readyState + location.href.startsWith('about:')") != "completefalse":
             time.sleep(0.05)
+        self.until("globalThis.Hobble?.ready ?? true", 60)
 
     def run(self, expression: str) -> Any:
         """The value of a JavaScript expression, awaited if it is a promise. Raises if it throws."""

@@ -1,4 +1,4 @@
-"""Example inputs, and the page made from them once."""
+"""Example inputs, and the page made of them, once for all tests."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.report.bundle import WEB, bundle, install
-from hobble.report.compare import comparisons
+from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import Material, gather
 from hobble.report.page import render
 from hobble.report.playable import playable
 from hobble.report.scenes import scenes
+from hobble.report.walked import opened
 
 
 def beside(name: str) -> ModuleType:
@@ -50,7 +51,7 @@ def tools() -> ModuleType:
 
 @pytest.fixture(scope="session")
 def pictures(root: Path) -> Path:
-    """Where pictures of the page's sections are kept for a person to look at; not tracked."""
+    """The folder in which pictures of the page's sections are saved for people to look at; not tracked."""
     folder = root / "build" / "report-sections"
     folder.mkdir(parents=True, exist_ok=True)
     return folder
@@ -85,6 +86,14 @@ def network(inputs: dict[str, Any]) -> Network:
 @pytest.fixture(scope="session")
 def character(network: Network, examples: ModuleType) -> dict[str, Any]:
     return playable(network, examples.RUNTIME)
+
+
+@pytest.fixture(scope="session")
+def hero(
+    network: Network, character: dict[str, Any], material: Material, examples: ModuleType
+) -> dict[str, Any]:
+    """The figures at the top of the page."""
+    return opened(network, examples.RUNTIME, character, material.measured.values())
 
 
 @pytest.fixture(scope="session")
@@ -130,6 +139,7 @@ def page(
     character: dict[str, Any],
     compared: dict[str, Any],
     script: str,
+    hero: dict[str, Any],
 ) -> str:
     """The report of the examples."""
-    return render(material, play, character, compared, script)
+    return render(material, play, character, compared, script, hero)

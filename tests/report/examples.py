@@ -1,4 +1,4 @@
-"""Made-up artefacts in the documented formats: a walker by formula, and plausible numbers, from a seed."""
+"""Made-up artefacts in the documented formats: a walker made by formulas, and plausible numbers."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ HELD_OUT = ("walk_turns", "hurt_back")
 
 
 def walker(skeleton: Skeleton, frames: int, speed: float, limp: float = 0.0) -> dict[str, np.ndarray]:
-    """Positions (F, J, 3), contacts (F, 4) and phase (F,) of a figure that walks an arc."""
+    """Positions (F, J, 3), contacts (F, 4) and phase (F,) of a figure that walks along an arc."""
     t = np.arange(frames)
     phase = (t * 0.017) % 1.0
     angle = 2 * np.pi * phase
@@ -192,7 +192,7 @@ def history(path: Path, passes: int = 20, sections: int = 10) -> None:
 
 
 def strip(seconds: float) -> dict[str, Any]:
-    """The label strip of a clip that stands a second, then walks."""
+    """The label strip of a clip in which a figure stands for a second and then walks."""
     t = np.linspace(0, seconds, 300)
     phase = [None if s < 1 else round((s * 1.02) % 1, 3) for s in t]
     walk = np.clip((t - 1) * 2, 0, 1)
@@ -420,7 +420,7 @@ def injury_sweep(rng: np.random.Generator, links: tuple[str, ...] = LINKS) -> di
 
 
 def terrain(path: Path, skeleton: Skeleton, rng: np.random.Generator, flat: bool, frames: int = 300) -> str:
-    """terrain/clips/<clip>.npz: ten grounds that meet where a foot stands, or one that is flat."""
+    """terrain/clips/<clip>.npz: ten grounds that agree where a foot stands, or one flat ground."""
     fits = 1 if flat else 10
     t = np.arange(frames)[:, None] / 60
     wave = 15 * np.sin(0.8 * t) + 4 * np.arange(fits) * np.sin(2 * np.pi * t) ** 2 * (not flat)

@@ -1,4 +1,4 @@
-"""The page in a real browser: what a reader can do, and what happens without a click."""
+"""The page in a real browser: what a reader can do, and what the page does by itself."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ INK = """(() => {{
 
 @pytest.fixture(scope="module")
 def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """The page, open in a browser; each test leaves it usable for the next."""
+    """The page, opened in a browser. Each test leaves it in a usable state for the next."""
     yield from tools.opened(page, tmp_path_factory.mktemp("browser"))
 
 
@@ -254,14 +254,16 @@ def test_prints_every_chart_in_light(tab: Any) -> None:
 
 
 def test_says_nothing_and_asks_for_nothing(tab: Any) -> None:
-    """Runs last, after all tests above have used the page."""
+    """No console message and no request. Runs last, after all tests above have used the page."""
     assert tab.console == []
     assert [url for url in tab.requests if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
     assert len([url for url in tab.requests if url.startswith("file:")]) == 1
 
 
 def test_sections_as_pictures(tab: Any, pictures: Path) -> None:
-    """Saves a PNG of each section, two of them as on a phone, in `pictures` for people to look at."""
+    """Saves a PNG of each section in `pictures` for people to look at, two of them at the width of a
+    phone.
+    """
     tab.run("Hobble.drawAll()")
     sections = tab.run("[...document.querySelectorAll('main section')].map(({ id }) => id)")
     for width, suffix, some in ((1280, "", sections), (390, "-phone", ["summary", "play"])):

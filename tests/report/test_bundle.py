@@ -1,4 +1,4 @@
-"""The page's scripts: from a lock file, the same bytes each time, and a message where they cannot be made."""
+"""The page's scripts: from a lock file, always the same bytes, and a message if they cannot be made."""
 
 from __future__ import annotations
 

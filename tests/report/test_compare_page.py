@@ -1,4 +1,4 @@
-"""Configurations side by side, as one page."""
+"""The page that compares configurations."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from hobble.report.playable import playable
 
 @pytest.fixture(scope="module")
 def compared(material: Material) -> dict[str, Any]:
-    """Two configurations: the example, and one with half its error and twice its time."""
+    """Two configurations: the example, and one with half of its error and twice its time."""
     resolved = {
         "configuration": {
             "dataset": "made_up",

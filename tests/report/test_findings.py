@@ -20,7 +20,7 @@ def changed(material: Material, **changes: Any) -> Material:
 
 
 def heads(material: Material, **changes: Any) -> dict[str, str]:
-    """Head of each hint -> its kind."""
+    """Title of each hint -> its kind."""
     return {hint.head: hint.kind for hint in hints(changed(material, **changes))}
 
 
@@ -104,7 +104,7 @@ def test_links_never_hurt_in_training_only_show_the_drift_of_the_walk(material: 
     caught = {"responses": [swept("never", False, 0.1, 0.1), swept("hurt", True, 11.0, 6.5)]}
     found = heads(material, injury=caught)
     assert "After healing, the walk stays changed for hurt." in found
-    head = "The 1 link hurt in training, of 2, changes the walk at severity 10"
+    head = "1 of 2 links were hurt in training and change the walk at severity 10"
     assert found[head] == "good"
     texts = {hint.head: hint.text for hint in hints(changed(material, injury=caught))}
     assert "11.0 to 11.0 cm per joint" in texts[head]
@@ -153,7 +153,7 @@ def test_errors_of_the_prediction_and_of_the_drawn_pose_are_shown(material: Mate
     one = {"length": 1, "held_out": {"position_error_cm": 0.51}, "train": {"position_error_cm": 0.4}}
     found = changed(material, rollouts={"lengths": [one]})
     figure = next(f for f in key_figures(found) if f.label == "Error on held-out clips")
-    assert "cm per joint for the prediction, 0.510 cm for the drawn pose" in figure.note
+    assert "cm per joint; 0.510 cm for the pose that is drawn" in figure.note
 
 
 def test_key_figures_show_the_published_values(material: Material) -> None:

@@ -1,4 +1,4 @@
-"""The README's picture: both walks are seamless loops, and the file stays small."""
+"""The README's picture: both walks repeat without a seam, and the file stays small."""
 
 from __future__ import annotations
 

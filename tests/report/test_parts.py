@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from hobble.measures.registry import MEASURES
+from hobble.report import measured
 from hobble.report.charts import Chart, Family
 from hobble.report.parts import Pair, Part, Section, Words, joined
 from hobble.report.tables import Column, Table
@@ -26,6 +33,19 @@ def test_sections_of_one_name_are_one_with_the_parts_of_all_in_their_order() -> 
     assert [part.kind for part in second.parts] == ["words", "chart", "table"]
 
 
+def test_a_pair_without_charts_is_nothing() -> None:
+    assert joined([Section("s", [Part(0, Pair([None, None])), Part(5, None)], title="S")]) == []
+    [shown] = joined([Section("s", [Part(0, Pair([None, chart("a")]))])])
+    assert [part.kind for part in shown.parts] == ["pair"]
+
+
+@pytest.mark.parametrize("found", [{}, {"applies": False, "reason": "no such input"}])
+def test_a_measurement_that_found_nothing_leaves_no_section(found: dict[str, Any], material: Any) -> None:
+    nothing = replace(material, measured={one.name: found for one in MEASURES})
+    assert measured.sections(material) != []
+    assert measured.sections(nothing) == []
+
+
 def test_charts_are_found_wherever_they_stand() -> None:
     pair, family = Pair([chart("a"), None]), Family("f", "F", "", [chart("b"), chart("c")])
     section = Section("s", [Part(0, pair), Part(1, family), Part(2, Words("w")), Part(3, chart("d"))])
@@ -34,13 +54,13 @@ def test_charts_are_found_wherever_they_stand() -> None:
 
 def test_words_are_escaped_and_every_kind_is_drawn() -> None:
     parts = [
-        Part(0, Words("<b>", empty=True)),
+        Part(0, Words("<b>")),
         Part(1, Pair([chart("a"), None])),
         Part(2, chart("b"), tall=True),
     ]
     section = joined([Section("s", parts, title="<S>")])
     text = template("measured.html.j2").render(measured=section)
-    assert '<p class="empty">&lt;b&gt;</p>' in text
+    assert "<p>&lt;b&gt;</p>" in text
     assert "<h2>&lt;S&gt;</h2>" in text
     assert text.count("<figure") == 2
     assert 'class="plot tall" tabindex="0" data-chart="b"' in text

@@ -41,7 +41,7 @@ def test_adds_up_jobs_rules_and_bytes(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("seen", "took"), [(3.3, 733.6), (750.0, 750.0)])
 def test_a_resumed_training_took_all_its_calls(tmp_path: Path, seen: float, took: float) -> None:
-    """Snakemake's benchmark has only the last run, which may have had nothing left to train."""
+    """Snakemake's benchmark has only the last call, which may have had nothing left to train."""
     benchmark(tmp_path / "benchmarks" / "training.tsv", seen)
     benchmark(tmp_path / "other" / "accuracy.tsv", 10.0)
     (tmp_path / "network").mkdir()
@@ -62,7 +62,7 @@ def test_a_resumed_training_took_all_its_calls(tmp_path: Path, seen: float, took
 
 
 def test_clips_of_earlier_calls_and_of_other_batches(tmp_path: Path) -> None:
-    """The last call made one clip of two, and there were fewer batches before a clip was added."""
+    """The last call made one clip of two. Before a clip was added there were fewer batches."""
     folder, made = tmp_path / "benchmarks/motion", tmp_path / ".made/motion_clips"
     benchmark(folder / "motion_clips/00.tsv", 2.0)
     benchmark(folder / "motion_clips/walk.tsv", 7.0)

@@ -1,4 +1,4 @@
-"""The network in the page: the same numbers as in Python, and keys, clicks and buttons that work."""
+"""The network in the page gives the same numbers as in Python, and keys, clicks and buttons work."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.motion.decode import decode, frame_rate
 from hobble.motion.read import read_bvh
+from hobble.report import walked
 from hobble.report.formats import embedded
 from hobble.report.playable import playable
 from hobble.runtime.animation import ProceduralAnimation
@@ -67,7 +68,9 @@ def test_inputs_that_weigh_nothing_are_left_out(
 
 
 def wish(frame: int) -> dict[str, Any]:
-    """Walk ahead, turn, strafe, stop and turn on the spot, crouch; hurt from the second third on."""
+    """The target in each frame: walk ahead, turn, strafe, stop, turn on the spot, crouch; hurt in the last
+    two thirds.
+    """
     angle = 0.03 * max(0, frame - 20)
     velocity, facing, gait = [2.5 * np.sin(angle), 2.5 * np.cos(angle)], None, "walk"
     if 40 <= frame < 60:
@@ -80,7 +83,7 @@ def wish(frame: int) -> dict[str, Any]:
 
 
 def hills(x: Any, z: Any) -> Any:
-    """The ground that the page calls rolling."""
+    """The ground that is called "rolling" in the page."""
     return 14 * np.sin(x / 170) * np.cos(z / 140) + 8 * np.sin((x + z) / 260)
 
 
@@ -164,7 +167,26 @@ def test_the_top_of_the_page_has_a_hurt_figure_and_a_healthy_one_beside_it(tab: 
     assert "5 of 10" in tab.run(line)
     assert max(tab.run(f"{of}({hero}.ghost)")) == 0.0
     tab.press("Home")
-    assert "At 0 they walk alike." in tab.run(line)
+    assert "at 0 they walk alike." in tab.run(line)
+
+
+def test_the_figures_at_the_top_go_on_as_the_python_runtime_does(
+    tab: Any, network: Network, examples: ModuleType, character: dict[str, Any], hero: dict[str, Any]
+) -> None:
+    """The page has their states at the moment when it opens. Both go on alike for half a second."""
+    (one,) = [c for c in character["channels"] if c["name"] == "injury"]
+    column = one["columns"][one["sliders"][hero["part"]]]
+    for i, values in enumerate(({column: 7.0}, {})):
+        animation = ProceduralAnimation(network, **dict(examples.RUNTIME))
+        for _ in range(walked.FRAMES + 30):
+            pose = animation.next_pose(walked.AHEAD, None, "walk", injury=values)
+        seen = tab.run(f"""(() => {{
+          const c = Hobble.character(Hobble.material.playable.example);
+          c.follow(Hobble.material.hero.walked[{i}]);
+          for (let f = 0; f < 30; f++) c.frame({json.dumps(walked.AHEAD)}, null, "walk", () => 0);
+          return Array.from(c.pose);
+        }})()""")
+        np.testing.assert_allclose(np.reshape(seen, (-1, 3)), pose.positions, atol=0.05)
 
 
 def test_keys_move_the_figure(tab: Any) -> None:
@@ -263,9 +285,8 @@ def test_presets_sliders_and_the_link_to_them(tab: Any) -> None:
 
 
 def test_the_page_moves_the_body_as_python_does(tab: Any, holden31: Skeleton) -> None:
-    """Corners of the body for random rotations of the bones.
-
-    The page stores integers, so they agree to a tenth.
+    """Corners of the body for random rotations of the bones, equal to a tenth, because the page stores
+    integers.
     """
     mesh, rng = body(holden31), np.random.default_rng(3)
     places = mesh.positions + rng.normal(0, 2, mesh.positions.shape)
@@ -373,7 +394,7 @@ def test_a_link_pasted_into_the_open_page_is_followed_and_taken_with_care(tab: A
 
 
 def test_the_camera_comes_round_behind_at_any_rate_of_pictures(tab: Any) -> None:
-    """The camera's path depends on the time and not on the number of pictures."""
+    """The path of the camera depends on the time and not on the number of frames drawn."""
     script = """((rate) => {
       const orbit = { yaw: 0 }, chase = Hobble.chase(orbit, document.createElement("canvas"));
       let eye;
@@ -437,7 +458,7 @@ def test_playing_says_nothing_and_asks_for_nothing(tab: Any) -> None:
 def test_the_largest_network_leaves_room_in_the_page(
     examples: ModuleType, root: Path, tmp_path: Path, page: str
 ) -> None:
-    """191 joints and two layers of 512: with plotly.js and everything else the page is to be under 20 MB."""
+    """With 191 joints, two layers of 512, plotly.js and everything else the page stays under 20 MB."""
     data = yaml.safe_load((root / "config/skeletons/ava191.yaml").read_text())
     skeleton = Skeleton.from_dict({"name": "ava191", **{k: v for k, v in data.items() if k != "maps"}})
     examples.weights(tmp_path / "weights.npz", skeleton, units=512)

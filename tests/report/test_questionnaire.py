@@ -28,7 +28,7 @@ SHORT = FILMS[3:7]
 def made(
     network: Network, examples: ModuleType, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, dict[str, Any]]:
-    """Four of the films, small and short."""
+    """The page with four small and short films."""
     folder = tmp_path_factory.mktemp("questionnaire")
     with pytest.MonkeyPatch.context() as patch:
         for name, seconds in (("WARM_UP", 0.1), ("HEALTHY", 0.1), ("HURT", 0.3)):

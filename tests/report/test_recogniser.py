@@ -1,4 +1,4 @@
-"""The recogniser in the page: the same cycles, numbers and answers as in Python."""
+"""The recogniser in the page finds the same cycles, numbers and answers as in Python."""
 
 from __future__ import annotations
 

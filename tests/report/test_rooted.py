@@ -1,4 +1,4 @@
-"""A character whose root movement belongs to the pose (motion matching) moves on the page as in Python."""
+"""A character whose root movement is never reduced (motion matching) moves on the page as in Python."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def test_bones_lie_where_rotations_put_them_and_keep_their_lengths(
 def test_motion_without_rotations_is_fitted(
     inputs: dict[str, Any], material: Any, play: dict[str, Any], tmp_path: Path
 ) -> None:
-    """Files without rotations: bones are at the same places, but their twist is unknown."""
+    """Files without rotations: the bones are at the same places, but their twist is unknown."""
     data = {name: value for name, value in np.load(inputs["scenarios"]).items() if "/rotations" not in name}
     np.savez(tmp_path / "old.npz", **data)
     made = scenes(tmp_path / "old.npz", material.network["skeleton"], material.network["channels"])

@@ -1,4 +1,4 @@
-"""Loops drawn without a browser: seamless, with injuries coloured on request, readable by others."""
+"""Loops drawn without a browser: no seam, injuries coloured on request, readable by other programs."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def folder(
 
 
 def in_node(script: str, folder: Path) -> Any:
-    """What a script prints. It gets the exported folder as its argument."""
+    """The output of a script, which gets the exported folder as its argument."""
     done = node(
         ["--input-type=module", "-e", script, str(folder)],
         return_completed_process=True,

@@ -52,7 +52,7 @@ def original(shared: Path) -> dict[str, np.ndarray]:
 
 
 def options(section: str, **changed: object) -> dict[str, Any]:
-    """A section of the original's data set, in the form that its stage gets."""
+    """A section of the original's data set, as its stage gets it."""
     model = getattr(sections, section.capitalize())
     return model(**getattr(RELEASE, section).model_dump() | changed).model_dump(mode="json")
 

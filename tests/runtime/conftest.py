@@ -1,4 +1,4 @@
-"""Small networks that need no data: one of random weights, one that always predicts the same."""
+"""Small networks that need no data: one with random weights, one with a constant prediction."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def make_network(holden31: Skeleton) -> MakeNetwork:
 
 @pytest.fixture
 def network(make_network: MakeNetwork) -> Pfnn:
-    """A network of random weights around a gliding figure, without severities."""
+    """A network with random weights whose figure glides, without severities."""
     return make_network()
 
 
@@ -85,7 +85,7 @@ def steady(make_network: MakeNetwork) -> Pfnn:
 
 @pytest.fixture
 def hurtable(make_network: MakeNetwork) -> Pfnn:
-    """A network of random weights with 30 severities, of which all were seen in training."""
+    """A network with random weights and 30 severities, all of which were above 0 in training."""
     made = make_network(links=30)
     mean = made.x_mean.copy()
     mean[made.layout.x_channel("injury")] = 0.5

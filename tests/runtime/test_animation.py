@@ -34,7 +34,7 @@ def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def test_the_row_is_that_of_the_definition(hurtable) -> None:
-    """X written out in numpy from the state, by the columns' names."""
+    """X computed in numpy from the state, column by column."""
     character = ProceduralAnimation(hurtable)
     walk(character, 90, injury={KNEE: 6.0}, terrain=hills)
     seen = {}

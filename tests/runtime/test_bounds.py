@@ -17,7 +17,7 @@ from hobble.runtime.bounds import MARGIN_SHARE, SPEED_MARGIN, Bounds, clip_rows
 
 
 def walked(network: Pfnn, fastest: float = 4.0) -> Seen:
-    """The ranges of training data in which figures walk at 1 to 2 cm a frame and never stand."""
+    """The ranges of training data in which figures move at 1 to 2 cm a frame and never stand."""
     layout = network.layout
     x = np.zeros(layout.x_size, np.float32)
     x[layout.x_direction][layout.samples :] = 1
@@ -41,7 +41,7 @@ def wishes(frames: int):
 
 
 def run(network: Pfnn, frames: int = 600) -> tuple[np.ndarray, np.ndarray]:
-    """Heights of the hips and largest movement of a joint in each frame, before feet are placed."""
+    """Heights of the hips and the largest movement of a joint in each frame, before foot placement."""
     character = ProceduralAnimation(network, foot_locking=False)
     role = network.skeleton.role
     kept = []

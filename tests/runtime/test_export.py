@@ -28,7 +28,7 @@ def motion(skeleton, frames: int = 20) -> tuple[np.ndarray, np.ndarray]:
 
 
 def read_again(path: Path) -> dict[str, np.ndarray]:
-    """Joint -> world positions (F, 3) of a BVH file, by the format's own rules and nothing of ours."""
+    """Joint -> world positions (F, 3) of a BVH file, read without our code."""
     head, table = path.read_text().split("MOTION")
     values = np.array([line.split() for line in table.strip().splitlines()[2:]], float)
     stack: list[tuple[np.ndarray, Rotation]] = []
@@ -139,7 +139,9 @@ def test_which_link_each_scenario_hurts(hurtable, network) -> None:
 
 @pytest.mark.shared
 def test_the_released_walk_as_bvh(shared: Path, tmp_path: Path, holden31) -> None:
-    """The released network's body is not holden31's: bones are found, and joints land within 3 cm."""
+    """The body of the released network differs from holden31: its bones are found, and joints are within 3
+    cm.
+    """
     network = load_network(shared / "reference" / "pfnn_release_network.npz", holden31)
     character = ProceduralAnimation(network)
     poses = [character.next_pose((0, 2.5)) for _ in range(200)][50:]

@@ -20,7 +20,9 @@ WALK, JOG = 1, 2
 
 @pytest.fixture
 def limited(make_network) -> Network:
-    """A gliding network whose knee halves the walk at 10 and ends the jog at 5; an arm takes a tenth."""
+    """A gliding network. An injury of the knee at 10 halves the speed of the walk, one at 5 makes a jog
+    impossible; an arm takes a tenth of the speed.
+    """
     network = make_network(links=30, scale=0.0)
     speeds = np.full((6, 30, 2), UNLIMITED)
     speeds[WALK], speeds[JOG] = 2.0, 7.0
@@ -33,7 +35,7 @@ def limited(make_network) -> Network:
 def asked(
     network: Network, velocity, hurt, gait=None, frames: int = 90, **options
 ) -> tuple[float, np.ndarray]:
-    """The target speed after some seconds, and the gait shares."""
+    """The target speed after some seconds, and the shares of the gaits."""
     animation = ProceduralAnimation(network, **{"steering": 0.0, **options})
     for _ in range(frames):
         animation.next_pose(velocity, gait=gait, injury=hurt)
@@ -67,7 +69,7 @@ def test_a_body_that_cannot_jog_walks_faster(limited: Network) -> None:
 
 
 def test_steering_makes_up_to_the_limit_and_not_beyond(limited: Network) -> None:
-    """The network glides at 1.5 for any input, which is above the limit of 1."""
+    """The network always glides at 1.5, which is above the limit of 1."""
     speed, _ = asked(limited, (0, 2.5), {KNEE: 10}, steering=2.0)
     assert speed < 1.0
     speed, _ = asked(limited, (0, 2.5), {}, steering=2.0)

@@ -1,4 +1,4 @@
-"""The network: its spline, its modes, its files."""
+"""The network: its spline, its phase modes, its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The network as ONNX: the same numbers in another program."""
+"""The network as ONNX gives the same numbers in another program."""
 
 from __future__ import annotations
 

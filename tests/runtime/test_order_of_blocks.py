@@ -17,7 +17,7 @@ ORDERS = [
 
 
 def columns(layout: RowLayout, ordered: RowLayout) -> np.ndarray:
-    """Where each column of `ordered` stands in `layout`."""
+    """The place of each column of `ordered` in `layout`."""
     blocks = layout.blocks("x")
     return np.concatenate([np.arange(layout.x_size)[blocks[name]] for name in ordered.blocks("x")])
 

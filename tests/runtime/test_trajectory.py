@@ -1,4 +1,4 @@
-"""The trajectory: how wishes bend it, how predictions move it, and that left is the mirror of right."""
+"""The trajectory: targets bend it, predictions move it, and left is the mirror of right."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LENGTH, MIDDLE = 2 * LAYOUT.window, LAYOUT.window
 def path(
     speed: float = 1.5, yaw: float = 0.0, stand: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position (1, T, 2), direction and gait of a straight glide that is at the origin now."""
+    """Position (1, T, 2), direction and gait of a straight glide that is now at the origin."""
     ahead = np.array([np.sin(yaw), np.cos(yaw)])
     t = np.arange(LENGTH) - MIDDLE
     position = (t[:, None] * speed * ahead)[None]
@@ -29,7 +29,7 @@ def path(
 def prediction(
     speed: float = 1.5, side: float = 0.0, turn: float = 0.0, phase_change: float = 0.02
 ) -> np.ndarray:
-    """Y (1, outputs) of a steady glide with a turn, future samples on the arc that it makes."""
+    """Y (1, outputs) of a steady glide with a turn; the future samples lie on the arc."""
     y = np.zeros((1, LAYOUT.y_size), np.float32)
     y[0, LAYOUT.y_root_velocity] = side, speed
     y[0, LAYOUT.y_turn], y[0, LAYOUT.y_phase_change] = turn, phase_change
@@ -195,8 +195,9 @@ def test_steering_adds_the_error_to_the_wish(steering: float, wish: tuple, asked
 
 
 def follow(wish, facing, steering: float, frames: int = 1, speed: float = 1.5, correction=None):
-    """Targets (2,) velocity and (2,) direction, and the correction (2,), of a figure that glides ahead at any
-    wish."""
+    """Target velocity (2,) and direction (2,), and the correction (2,), of a figure that glides ahead
+    whatever the target.
+    """
     position, heading, gait = path(speed)
     velocity, direction = np.zeros((1, 2)), np.array([[0.0, 1.0]])
     correction = np.zeros((1, 2)) if correction is None else np.array([correction], float)

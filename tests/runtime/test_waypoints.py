@@ -1,4 +1,4 @@
-"""Waypoints: the track, being led around it, and arriving."""
+"""Waypoints: the track, how the character follows it, and when it has arrived."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measuring the walker from the files it writes, with nothing of the code that wrote them."""
+"""Measures the walker from its files, without any of the code that wrote them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CONTACT = 0.02  # cm2 per 60 Hz frame
 
 @dataclass(frozen=True)
 class Files:
-    """A clip's three files, read; frames count from 0 at 60 Hz, as every second one of the BVH's is kept."""
+    """The three files of a clip. Frames count from 0 at 60 Hz (every second frame of the BVH file)."""
 
     folder: Path
     name: str

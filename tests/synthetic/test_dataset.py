@@ -1,4 +1,4 @@
-"""The data sets that are walked: complete, balanced, and split so that what is held out has its like."""
+"""The synthetic data sets are complete and balanced, and held-out clips have similar ones in training."""
 
 from __future__ import annotations
 

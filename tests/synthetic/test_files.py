@@ -1,4 +1,4 @@
-"""The files beside the BVH say what is in it, in the form of a user's own."""
+"""The text files beside the BVH files match the motion, in the form of a user's files."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ def plain_errors(patches: Patches, footing: Footing) -> np.ndarray:
     def at(points: np.ndarray) -> np.ndarray:
         return patches.at(every, points.astype(np.float32)).astype(float)
 
-    down, up, beside = footing.down, footing.up, footing.beside
+    down, up, beside = footing.down, footing.up, footing.beam_sides
     under = at(down[:, :2])
     level = under.mean(axis=1, keepdims=True)
     error = 0.1 * np.mean((under - level - down[:, 2] + down[:, 2].mean()) ** 2, axis=1)

@@ -39,7 +39,7 @@ def widen(kind: Any) -> None:
 
 
 def in_double() -> None:
-    """Make networks, batches and the errors that are carried on float64."""
+    """Make networks, batches and carried errors use float64."""
     widen(HostRows)
     widen(DeviceRows)
     to, begin = Trainable.to, RollOut.__init__

@@ -41,7 +41,7 @@ def held_out(state: State) -> list[float]:
 
 
 def first_end(errors: list[float], patience: int) -> int:
-    """Sections after which a training ends, counted by hand."""
+    """The number of sections after which a training ends, counted by hand."""
     best, since = np.inf, 0
     for number, error in enumerate(errors, 1):
         best, since = (error, 0) if error < best else (best, since + 1)

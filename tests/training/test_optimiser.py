@@ -39,7 +39,7 @@ def test_only_the_l1_term_moves_weights_that_have_no_gradient() -> None:
 
 
 def test_the_share_of_a_layer_in_the_l1_term() -> None:
-    """.01 * mean|W| / 6 for three layers: the original has six arrays, three of weights, three of biases."""
+    """.01 * mean|W| / 6 for three layers, because the original divides by its six arrays."""
     network = initialise((342, 512, 512, 311), 4, 1)
     slopes = optimiser.l1_slopes(network, 0.01)
     assert slopes == pytest.approx([0.01 / 6 / (4 * n) for n in (342 * 512, 512 * 512, 512 * 311)])

@@ -47,7 +47,7 @@ Ends = dict[tuple[int, int, tuple[bool, int]], dict[str, np.ndarray]]
 
 @pytest.fixture(scope="module")
 def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """2,300 samples a pass in many small chunks, far more than fit into the memory that a test states."""
+    """2,300 samples a pass in many small chunks, far more than fit into the memory of a test."""
     path = tmp_path_factory.mktemp("database") / "all"
     clips = {"walk": clip_rows("walk", 150, 1, 1), "hop": clip_rows("hop", 80, 10, 2)}
     write_database(path, clips, SPLITS, channels=["injury"], joint_weight=0.1, chunk_bytes=12_000)
@@ -60,7 +60,7 @@ WAYS = [(False, 0), (False, 3), (True, 0)]
 
 @pytest.fixture(scope="module")
 def ends(database: Path, tmp_path_factory: pytest.TempPathFactory) -> Ends:
-    """(processes, stretches, way) -> where a training ends that has them."""
+    """(processes, stretches, way) -> the end of such a training."""
     folder = tmp_path_factory.mktemp("ends")
     found = {}
     for processes, stretches in ((1, [1, 2, 3]), (2, [1, 2]), (3, [1, 3])):
@@ -97,7 +97,7 @@ def furthest(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> float:
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("processes", [2, 3])
 def test_several_processes_take_the_steps_of_one(ends: Ends, processes: int, way: tuple[bool, int]) -> None:
-    """Of consecutive samples, and of those that come from a stretch for each process."""
+    """With batches of consecutive samples, and with a stretch for each process."""
     assert furthest(ends[1, 1, way], ends[processes, 1, way]) < 1e-10
     assert furthest(ends[1, processes, way], ends[processes, processes, way]) < 1e-10
     assert furthest(ends[1, 1, way], ends[processes, processes, way]) > 1e-6
@@ -105,7 +105,7 @@ def test_several_processes_take_the_steps_of_one(ends: Ends, processes: int, way
 
 @pytest.fixture
 def together(database: Path, network: Any, training: Recipe, tmp_path: Path) -> Callable[..., dict[str, Any]]:
-    """Train as the workflow does, in so many processes; what the checkpoint then holds."""
+    """Train in several processes as the workflow does, and return the content of the checkpoint."""
 
     def go(
         processes: int, folder: str = "checkpoints", data: Path = database, **changes: Any
@@ -171,7 +171,7 @@ def test_the_process_with_the_broken_rows_gives_the_message(
 
 
 def spoil(database: Path) -> None:
-    """Make one Y of one row no number, as if the database had been built so."""
+    """Make one Y of one row NaN, as if the database had been built with it."""
     manifest = json.loads((database / "manifest.json").read_text())
     chunk = manifest["chunks"]["train"][-1]
     file = database / manifest["folder"] / chunk["file"]

@@ -1,4 +1,4 @@
-"""A training that is interrupted, prolonged or continued ends with the bits of an undisturbed one."""
+"""A training that is interrupted, prolonged or continued ends with the same bits as an undisturbed one."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_killed_before_or_after_any_write_it_ends_at_the_same_bits(
     written: bool,
     number: int,
 ) -> None:
-    """A checkpoint that is half written when the end comes, and one that has just taken its name."""
+    """Killed while a checkpoint is half written, and right after it has got its name."""
     arguments: Settings = {"network": network, "training": training | recipe, "threads": 1}
     count = iter(range(100))
 
@@ -113,7 +113,7 @@ def test_killed_before_or_after_any_write_it_ends_at_the_same_bits(
 
 
 def _numbers(state: State) -> dict[str, bytes]:
-    """All that a run ends with but how long it took."""
+    """All results of a run except times."""
     arrays = pack(state)
     arrays["history"][:, 3] = 0
     return {name: array.tobytes() for name, array in arrays.items() if name != "seconds"}
@@ -128,7 +128,7 @@ def test_killed_between_the_files_at_the_end(
     monkeypatch: pytest.MonkeyPatch,
     last: str,
 ) -> None:
-    """Snakemake removes what an ended job had made; the same command then makes the same files."""
+    """Snakemake removes the files of the killed job, and the same command makes them again."""
 
     def go(folder: Path) -> dict[str, np.ndarray]:
         files = {name: folder / name for name in ("weights", "history", "checkpoint")}
@@ -197,7 +197,7 @@ def test_one_configuration_continues_another_as_if_it_were_one(
 def test_another_start_is_another_run(
     data: Database, network: Settings, training: Settings, tmp_path: Path
 ) -> None:
-    """With a recipe of its own, a run that goes on from something else does not find what it made before."""
+    """A run with its own recipe and another start does not use its earlier checkpoint."""
 
     def start(seed: int) -> Path:
         state = train(

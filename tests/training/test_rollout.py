@@ -1,4 +1,4 @@
-"""Roll-outs in training: the poses have the errors that a character would have."""
+"""Roll-outs in training: the poses have the errors that a running character would have."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FRAMES, STARTS = 5, 9
 
 
 class Mixer:
-    """Stands for a predictor: Y is a fixed mixture of X, wherever that comes from."""
+    """A predictor whose Y is a fixed mixture of X."""
 
     def __init__(self, data: Database) -> None:
         self.network = SimpleNamespace(layout=data.layout, memory=0)
@@ -38,7 +38,7 @@ class Mixer:
 
 
 def straight(data: Database) -> Inputs:
-    """A clip whose joints are where their velocities carry them; its root stands, on level ground."""
+    """A clip whose joints move exactly by their velocities, with a root that stands on level ground."""
     layout, rng, rows = data.layout, np.random.default_rng(2), STARTS + FRAMES
     x, y = rng.normal(0, 5, (rows, layout.x_size)), rng.normal(0, 5, (rows, layout.y_size))
     for row in range(rows):
@@ -52,7 +52,7 @@ def straight(data: Database) -> Inputs:
 
 
 def test_poses_carry_the_errors_of_a_character(data: Database) -> None:
-    """Rows that do follow each other give what the evaluation's roll-out makes of the same clip."""
+    """On consecutive rows, the result equals that of the evaluation's roll-out of the same clip."""
     layout, s = data.layout, data.statistics
     asked, predictor = straight(data), Mixer(data)
     starts = np.arange(STARTS)
@@ -78,7 +78,7 @@ def test_poses_carry_the_errors_of_a_character(data: Database) -> None:
 
 
 def test_each_place_restarts_after_its_frames(data: Database) -> None:
-    """And a fifth of them at every batch, so that ages are mixed; one frame is the recorded pose alone."""
+    """A fifth of the places restarts at every batch. With one frame, only recorded poses are used."""
     frames, rows = 5, 10
     for length in (frames, 1):
         carried = RollOut(data, length, rows, CPU)
@@ -118,7 +118,7 @@ def test_training_uses_the_roll_outs(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each batch has the errors of those before it in this section, and of no other."""
+    """Each batch has the errors of the batches before it in the same section."""
     settings = training | {"rollout": 4, "passes": 1, "sections": 2, "batch": 300}
     given: list[torch.Tensor] = []
     errors: list[torch.Tensor] = []

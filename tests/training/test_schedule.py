@@ -40,7 +40,7 @@ def test_a_constant_rate_rises_and_stays() -> None:
 def test_each_batch_has_the_rate_of_its_place(
     data: Database, network: Settings, training: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In a run that was interrupted too: a rate is a function of the samples seen, and of nothing else."""
+    """Also in an interrupted run: the rate depends only on the number of samples so far."""
     settings = training | FAST | {"passes": 2}
     rates: list[float] = []
     step = Adam.step

@@ -18,7 +18,7 @@ ROWS = 12
 
 
 class Graph:
-    """Stands for a CUDA graph: what was captured is run again, from the same memory into the same memory."""
+    """Stands for a CUDA graph: it runs what was captured again, on the same memory."""
 
     update: CapturedUpdate
 
@@ -39,7 +39,7 @@ class Stream:
 
 @pytest.fixture
 def cuda(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As much of CUDA as a capture asks for."""
+    """The parts of CUDA that a capture needs."""
     for name, value in {
         "CUDAGraph": Graph,
         "Stream": Stream,

@@ -1,4 +1,4 @@
-"""weights.npz: the network, the meaning of its columns, the ranges of its training data."""
+"""weights.npz: the network, the meaning of its columns, and the ranges of its training data."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def data(small_database: Path) -> Database:
 
 
 def write(path: Path, data: Database, seed: int = 1) -> dict[str, np.ndarray]:
-    """Write an untrained network; the arrays that it should have."""
+    """Write an untrained network, and return the expected arrays."""
     made = model("pfnn").trainable(PfnnOptions(units=6), data.layout, figure(), seed)
     write_weights(path, made, data, "mine", {"passes": 3})
     return {name: np.array(array) for name, array in made.arrays().items()}

@@ -22,7 +22,7 @@ print(getpass.getuser())
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can become a user without a name")
 def test_a_user_without_a_name_is_called_by_the_number() -> None:
-    """Imported first, as that user may not be able to read this Python."""
+    """The module is imported first, because that user may not be able to read this Python."""
     names = {
         key: value for key, value in os.environ.items() if key not in ("USER", "LOGNAME", "LNAME", "USERNAME")
     }

@@ -99,7 +99,7 @@ PARTS = {
 
 
 def add(package: Path) -> None:
-    """The new folder, and the one existing file that changes: the list."""
+    """The new folder, and the list, the only existing file that changes."""
     folder = package / "measures" / "hips"
     folder.mkdir()
     for name, text in PARTS.items():

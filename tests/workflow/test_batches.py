@@ -65,8 +65,8 @@ class Job:
             ),
             output=Named(output),
             params=Named(
-                each=[{"clip": clip} for clip in self.clips],
-                counts={"notes": [len(files) for files in notes]},
+                per_clip=[{"clip": clip} for clip in self.clips],
+                files_per_clip={"notes": [len(files) for files in notes]},
                 times=self.times,
             ),
         )
@@ -139,7 +139,9 @@ def test_each_piece_gets_its_files() -> None:
     job = SimpleNamespace(
         input=Named(one=["a", "b"], shared="s", some=["x", "y", "z"], none=[]),
         output=Named(out=["A", "B"], mirror=[]),
-        params=Named(each=[{"clip": "a", "k": 1}, {"clip": "b", "k": 2}], counts={"some": [0, 3]}, code="c"),
+        params=Named(
+            per_clip=[{"clip": "a", "k": 1}, {"clip": "b", "k": 2}], files_per_clip={"some": [0, 3]}, code="c"
+        ),
     )
     first, second = pieces(job)
     assert first.input == {"one": "a", "shared": "s", "some": []}
@@ -193,7 +195,7 @@ def test_one_bad_clip_fails_alone(job: Job, word: str, capfd: pytest.CaptureFixt
 
 
 def test_what_is_kept_is_not_taken_if_it_is_damaged(job: Job) -> None:
-    """In place, so that both names of the file have the damage; its time and size stay."""
+    """The damage is in both names of the file, and its time and size stay the same."""
     path = job.outputs[0]
     times = path.stat()
     with path.open("r+b") as file:

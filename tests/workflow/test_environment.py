@@ -61,7 +61,7 @@ def test_pips_last_lines_are_printed_if_it_fails(tmp_path: Path) -> None:
 
 
 def test_it_needs_nothing_that_is_not_in_python() -> None:
-    """It runs before there is an environment."""
+    """It imports only the standard library, because it runs before there is an environment."""
     imported = re.findall(r"^(?:from|import) (\w+)", Path(environment.__file__).read_text(), re.M)
     assert set(imported) <= set(sys.stdlib_module_names)
 

@@ -137,9 +137,8 @@ def test_a_bad_configuration_ends_before_the_dag(workflow, override: str, messag
 
 @pytest.fixture
 def small_disk(workflow) -> Iterator[Path]:
-    """The run's results on a file system of their own that is too small; Snakemake's own notes lie elsewhere.
-
-    Where Snakemake cannot write its notes either, it adds a traceback of its own to our message.
+    """The run's results on a small file system of their own. Snakemake's own files are elsewhere, because it
+    adds a traceback to our message if it cannot write them.
     """
     results = workflow.folder / "results"
     results.mkdir()
@@ -163,7 +162,7 @@ def test_a_disk_that_fills(workflow, small_disk: Path) -> None:
 
 
 def test_one_bad_clip_of_a_batch_fails_alone(clips: list[Path], workflow) -> None:
-    """More clips than have a batch each: three of them share a batch, and only this is asked for."""
+    """There are enough clips for shared batches. Only one batch, of three clips, is requested."""
     names = [f"clip-{number}" for number in range(200)]
     together = [name for name in names if batch_of(name, SMALLEST) == 5][:3]
     others = [name for name in names if name not in together][: SMALLEST - 2]

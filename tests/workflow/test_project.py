@@ -159,7 +159,10 @@ def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
     [
         ("results/one/stimuli", "configuration one has no `channels`"),
         ("results/eyes/stimuli/", "configuration one has no `channels`"),
-        ("results/one/questionnaire", r"configuration one has no channel injury.*\[injury\]"),
+        (
+            "results/one/questionnaire/questionnaire.html",
+            r"configuration one has no channel injury.*\[injury\]",
+        ),
         ("results/hurt/export/cubik.onnx", "export/cubik.onnx: the phase modes are constant, linear, cubic"),
     ],
 )
@@ -172,7 +175,7 @@ def test_impossible_targets_are_reported_before_training(
         check(Project(base, {}), [target])
     fine = (
         "results/hurt/stimuli",
-        "results/hurt/questionnaire",
+        "results/hurt/questionnaire/questionnaire.html",
         "results/one/export/pfnn",
         "results/one/export/cubic.onnx",
     )
@@ -349,7 +352,7 @@ def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(bas
 
 
 def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path) -> None:
-    """A linked collection is found, even if one of its links leads back to it."""
+    """A linked collection is found once, even if one of its links leads back to it."""
     kept = base / "kept/day 1"
     kept.mkdir(parents=True)
     (kept / "d.bvh").write_text("")

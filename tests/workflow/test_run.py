@@ -30,7 +30,7 @@ def without_times(value: Any) -> Any:
 
 
 def artefacts(folder: Path) -> dict[str, bytes]:
-    """Every data file of a run that must come out the same, by its path."""
+    """The path and content of every data file of a run that must be the same in each run."""
     root = folder / "results"
     files = [p for p in root.rglob("*") if p.suffix in {".npz", ".npy", ".bvh", ".txt", ".bin"}]
     files = [
@@ -166,7 +166,7 @@ def test_what_leaves_the_page_is_made_by_name(copied) -> None:
     targets = [f"{folder}/{name}" for name in ("character.glb", "web", "pfnn", "linear.onnx")]
     planned = copied.planned(*targets)
     assert planned == {"export_glb": 1, "export_web": 1, "export_release": 1, "export_onnx": 1}
-    assert copied.planned("results/test/questionnaire") == {"questionnaire": 1}
+    assert copied.planned("results/test/questionnaire/questionnaire.html") == {"questionnaire": 1}
     copied.run("-c2", *targets)
     export = copied.folder / folder
     magic, version, length, size = struct.unpack("<4sIII", (export / "character.glb").read_bytes()[:16])

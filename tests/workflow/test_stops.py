@@ -1,4 +1,4 @@
-"""Runs that are stopped: by Ctrl-C, by a signal to Snakemake alone, by SIGKILL; the same command goes on."""
+"""Runs stopped by Ctrl-C, by a signal to Snakemake alone, or by SIGKILL. The same command continues."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LIMIT = 120  # seconds within which a job must have begun
 
 
 def started(workflow, *arguments: str, until: Callable[[], object]) -> subprocess.Popen[bytes]:
-    """Start the command and return when `until` is true, to stop it there."""
+    """Start the command, wait until `until` is true, and return it, to be stopped there."""
     process = workflow.start(*arguments, said=workflow.folder / "said.txt")
     deadline = time.monotonic() + LIMIT
     while not until() and time.monotonic() < deadline and process.poll() is None:

@@ -53,7 +53,7 @@ for batch in filter(channels_of, [*batches_of_clips, *batches_of_versions]):
                 batch, 0.2 * len(channels_of(batch)), attempt
             ),
         params:
-            each=lambda w, batch=batch: [
+            per_clip=lambda w, batch=batch: [
                 {
                     "clip": clip,
                     "channel": name,
@@ -65,7 +65,7 @@ for batch in filter(channels_of, [*batches_of_clips, *batches_of_versions]):
                 for name in channels_of(batch)
                 for clip in batch.clips
             ],
-            counts=lambda w, batch=batch: {
+            files_per_clip=lambda w, batch=batch: {
                 "files": [len(files) for files in channel_files(batch)]
             },
         script:

@@ -35,7 +35,7 @@ for batch in batches_of_versions:
                 batch, 0.7, attempt
             ),
         params:
-            each=lambda w, batch=batch: [
+            per_clip=lambda w, batch=batch: [
                 {
                     "clip": clip,
                     "turn": clips.hurt_versions(batch.dataset)[clip],

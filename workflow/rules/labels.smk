@@ -35,7 +35,7 @@ for batch in batches_of_clips:
                 batch, 0.25, attempt
             ),
         params:
-            each=lambda w, batch=batch: [
+            per_clip=lambda w, batch=batch: [
                 {
                     "clip": clip,
                     "gait": clips.entry(batch.dataset, clip).gait,
@@ -43,7 +43,9 @@ for batch in batches_of_clips:
                 }
                 for clip in batch.clips
             ],
-            counts=lambda w, batch=batch: {"files": counted(batch, clips.label_files)},
+            files_per_clip=lambda w, batch=batch: {
+                "files": counted(batch, clips.label_files)
+            },
             options=lambda w, batch=batch: datasets.options(batch.dataset, "labels"),
             code=lambda w: package.code("labels_clips"),
         script:

@@ -49,14 +49,16 @@ for batch in batches_of_clips:
                 batch, 0.3, attempt
             ),
         params:
-            each=lambda w, batch=batch: [
+            per_clip=lambda w, batch=batch: [
                 {
                     "clip": clip,
                     "options": datasets.motion_options(batch.dataset, clip),
                 }
                 for clip in batch.clips
             ],
-            counts=lambda w, batch=batch: {"rigs": counted(batch, clips.rig_files)},
+            files_per_clip=lambda w, batch=batch: {
+                "rigs": counted(batch, clips.rig_files)
+            },
             skeleton_name=lambda w, batch=batch: catalogue.dataset(
                 batch.dataset
             ).skeleton,

@@ -185,7 +185,8 @@ rule questionnaire:
         weights=lambda w: configurations.network(w.configuration, "weights.npz"),
         template=keep_local(package.templates()),
     output:
-        folder=directory("results/{configuration}/questionnaire"),
+        page="results/{configuration}/questionnaire/questionnaire.html",
+        films="results/{configuration}/questionnaire/films.json",
     log:
         "results/{configuration}/logs/report/questionnaire.log",
     benchmark:

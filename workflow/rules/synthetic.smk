@@ -25,7 +25,7 @@ for batch in batches_of_walker:
                 batch, 0.2, attempt
             ),
         params:
-            each=lambda w, batch=batch: [
+            per_clip=lambda w, batch=batch: [
                 {
                     "clip": clip,
                     "frames": datasets.frames(batch.dataset, clip),

@@ -47,7 +47,7 @@ for batch in [*batches_of_clips, *batches_of_versions]:
                 batch, 0.3 * (1 + batch.mirrored), attempt, least=3
             ),
         params:
-            each=lambda w, batch=batch: [
+            per_clip=lambda w, batch=batch: [
                 {"clip": name, "ground": clips.entry(batch.dataset, name).ground}
                 for name in batch.names
             ],

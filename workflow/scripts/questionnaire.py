@@ -1,17 +1,20 @@
 """Creates results/<configuration>/questionnaire/: the page that asks what hurts, and the right answers."""
 
+from pathlib import Path
+
 from hobble.channels.injury.study.questionnaire import doubts, write_questionnaire
 from hobble.models.load import load_network
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake) as log:
+    folder = Path(snakemake.output.page).parent
     solution = write_questionnaire(
         load_network(snakemake.input.weights),
-        snakemake.output.folder,
+        folder,
         Runtime.model_validate(snakemake.params.runtime),
         snakemake.params.configuration,
     )
     for doubt in doubts(solution):
         log.warning("%s", doubt)
-    log.info("wrote %d films to %s", len(solution["films"]), snakemake.output.folder)
+    log.info("wrote %d films to %s", len(solution["films"]), folder)

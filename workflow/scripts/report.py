@@ -4,11 +4,12 @@ from pathlib import Path
 
 from hobble.core.files import write_text
 from hobble.models.load import load_network
-from hobble.report.compare import comparisons
+from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import gather
 from hobble.report.page import render
 from hobble.report.recogniser import playable_with_recogniser
 from hobble.report.scenes import scenes
+from hobble.report.walked import opened
 from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
@@ -33,9 +34,9 @@ with job(snakemake):
     network = material.network
     play = scenes(given.scenarios, network["skeleton"], network["channels"])
     trained = load_network(given.weights)
-    character = playable_with_recogniser(
-        trained, Runtime.model_validate(material.resolved["configuration"]["runtime"])
-    )
+    runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
+    character = playable_with_recogniser(trained, runtime)
+    hero = opened(trained, runtime, character, material.measured.values())
     compared = comparisons(trained, given.rows, asked.splits)
     bundle = Path(given.bundle).read_text(encoding="utf-8")
-    write_text(snakemake.output.html, render(material, play, character, compared, bundle))
+    write_text(snakemake.output.html, render(material, play, character, compared, bundle, hero))

@@ -105,11 +105,11 @@ def speaker(skeleton: Mapping[str, Any]) -> Callable[[str], str]:
     if not skeleton:
         return str
     figure = Skeleton.from_dict({"name": "", **skeleton})
-    said: dict[str, str] = {}
+    names: dict[str, str] = {}
     for one in every():
         columns = one.columns(figure)
-        said |= dict(zip(columns, shown(one.name, figure, columns, columns).spoken, strict=True))
-    return lambda column: said.get(column, column)
+        names |= dict(zip(columns, shown(one.name, figure, columns, columns).spoken, strict=True))
+    return lambda column: names.get(column, column)
 
 
 def module(name: str) -> ModuleType | None:

@@ -137,11 +137,11 @@ def soak(
         low, high = min(low, float(height.min())), max(high, float(height.max()))
         now = pose.positions, pose.rotations, animation.state.joint_rotation.copy()
         if old is not None:
-            asked, made = turns(now[2], old[2]), turns(now[1], old[1])
+            predicted, drawn = turns(now[2], old[2]), turns(now[1], old[1])
             moved = np.linalg.norm(now[0] - old[0], axis=-1)
-            for key, value in zip(worst, (asked, made, made - asked, moved), strict=True):
+            for key, value in zip(worst, (predicted, drawn, drawn - predicted, moved), strict=True):
                 worst[key] = max(worst[key], float(value.max()))
-            wild += int(((made - asked).max(axis=1) > LIMITS["added_turn_degrees"]).sum())
+            wild += int(((drawn - predicted).max(axis=1) > LIMITS["added_turn_degrees"]).sum())
             slides.add(now[0][:, toes], old[0][:, toes], pose.contacts[:, 1::2] >= STANCE)
         old = now
     slide = np.concatenate(slides.done)

@@ -90,8 +90,8 @@ def _effects(sizes: Mapping[str, float]) -> list[str]:
     known = effects_of_people(people())
     lines = [" " * 60 + "".join(f"{gait[:13]:>15}" for gait in known)]
     for key, text in EFFECTS.items():
-        beside = "".join("{:9.2f} ±{:4.2f}".format(*known[gait][key]) for gait in known)
-        lines.append(f"  {key:14}{sizes[key]:8.2f}  {text[:36]:36}{beside}")
+        columns = "".join("{:9.2f} ±{:4.2f}".format(*known[gait][key]) for gait in known)
+        lines.append(f"  {key:14}{sizes[key]:8.2f}  {text[:36]:36}{columns}")
     return lines
 
 

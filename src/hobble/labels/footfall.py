@@ -157,11 +157,11 @@ def _rest_limit(relative: Array, peaks: np.ndarray, valley_factor: float) -> Arr
     for a, b in itertools.pairwise([0, *peaks, frames]):
         if b <= a:
             continue
-        beside = min((relative[p] for p in (a, b) if p in peaks), default=0.0)
+        peak = min((relative[p] for p in (a, b) if p in peaks), default=0.0)
         slowest = relative[a:b].min()
-        limit[a:b] = max(SLOWEST_REST, REST_OF_SWING * beside)
-        if slowest > limit[a] and beside:
-            limit[a:b] = min(valley_factor * slowest, 0.6 * beside)
+        limit[a:b] = max(SLOWEST_REST, REST_OF_SWING * peak)
+        if slowest > limit[a] and peak:
+            limit[a:b] = min(valley_factor * slowest, 0.6 * peak)
     return limit
 
 

@@ -200,9 +200,9 @@ def table(folder: Folder) -> str:
             lines.append(f"{clip.name:{wide}} REFUSED {clip.refused}")
             continue
         off = f"{clip.off[0]} {clip.off[1]:.0f} deg" if clip.off else "as it is"
-        said = "; ".join([off, *clip.warnings])
+        remarks = "; ".join([off, *clip.warnings])
         lines.append(
             f"{clip.name:{wide}} {clip.rig:10.10} {clip.fps:5.4g} {clip.seconds:6.1f} {clip.hips:5.0f} "
-            f"{clip.speed:5.0f} {clip.steps:5d} {clip.cadence:4.0f} {clip.stands:6.1f}  {said}"
+            f"{clip.speed:5.0f} {clip.steps:5d} {clip.cadence:4.0f} {clip.stands:6.1f}  {remarks}"
         )
     return "\n".join([*lines, *folder.notes])

@@ -108,8 +108,8 @@ def _row(look: Look, report: Mapping[str, Any], labels: Mapping[str, Any], down:
         joint, degrees = look.off
         bar = f'<span class="bar"><i style="width:{min(100.0, degrees / 15 * 100):.0f}%"></i></span>'
         off = f"{bar}{html.escape(joint)} {degrees:.0f}&deg;"
-    said = "; ".join([*look.warnings, *labels["warnings"]])
-    name = html.escape(look.name) + (f"<br><small>{html.escape(said)}</small>" if said else "")
+    remarks = "; ".join([*look.warnings, *labels["warnings"]])
+    name = html.escape(look.name) + (f"<br><small>{html.escape(remarks)}</small>" if remarks else "")
     numbers = [f"{look.fps:.4g}", f"{look.seconds:.1f}", f"{look.hips:.0f}", f"{look.cadence:.0f}"]
     cells = "".join(f'<td class="n">{value}</td>' for value in [*numbers, str(labels["cycles"])])
     return (

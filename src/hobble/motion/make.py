@@ -58,10 +58,11 @@ def make_clip(
     if fitted.figures is not None:
         check(file.path, fitted.figures, source.match.rig)
     in_place = check_pace(file.path, fitted.clip, options.defects == "leave")
-    made, said, loops = fitted.clip, source.repairs + fitted.repairs, options.loops
+    made, repairs, loops = fitted.clip, source.repairs + fitted.repairs, options.loops
     if loops > 1:
         made = loop_clip(made, loops, options.heading)
-        said.append(f"The cycle was repeated {loops} times, each {len(made) // loops} frames, seams blended.")
+        frames = len(made) // loops
+        repairs.append(f"The cycle of {frames} frames was repeated {loops} times, with blended seams.")
     if options.facing is not None:
         made = turned(made, np.radians(options.facing) - first_facing(made))
     made = replace(made, name=clip)
@@ -73,7 +74,7 @@ def make_clip(
         "retarget": fitted.figures,
         "unsure": fitted.unsure + ([in_place] if in_place else []),
     }
-    return made, _report(file, source, made) | extra | {"repairs": said, "notes": source.notes}
+    return made, _report(file, source, made) | extra | {"repairs": repairs, "notes": source.notes}
 
 
 def _check_length(file: Bvh, clip: Clip, target: Skeleton, options: ClipMotion) -> None:

@@ -177,8 +177,8 @@ def _found(file: Bvh, rig: Skeleton, raw: Clip, known: Match | None, options: Cl
         raise InputError(
             file.path,
             "its joint names do not say left and right, and its mirror image would move as well",
-            fix="Set motion.handedness in the data set: right, as BVH files are meant to be, or left, as "
-            "from programs with left-handed coordinates.",
+            fix="Set motion.handedness in the data set: right, the standard of BVH files, or left, if the "
+            "program that wrote the file has left-handed coordinates.",
         )
     body = found.body
     if not found.sided and options.handedness == "left":

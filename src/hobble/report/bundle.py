@@ -82,6 +82,7 @@ def _bundle(modules: Path, target: str | Path, entry: Path, networks: Path, form
             "--target=es2022",
             "--charset=utf8",
             "--legal-comments=eof",
+            "--loader:.min.js=text",  # plotly.js, which charts.js runs when it draws the first chart
             "--log-level=error",
         ],
         return_completed_process=True,

@@ -54,10 +54,7 @@ def configuration_table(compared: Compared) -> Table:
 
 
 def difference_table(compared: Compared) -> Table | None:
-    """Errors and frame times of every pair, with eq.
-
-    3.2 of Segerstedt for both kinds of standard deviation.
-    """
+    """Errors and frame times of every pair, with Segerstedt's eq. 3.2 for two standard deviations."""
     found = [("error", r) for r in compared["difference"]]
     found += [("mean ms a frame", r) for r in compared["milliseconds"].get("difference", ())]
     rows = [

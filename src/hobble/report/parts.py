@@ -17,7 +17,6 @@ class Words:
     """A paragraph. Only text from the code may be Markup; everything else is escaped."""
 
     text: str | Markup
-    empty: bool = False  # the text says that there is nothing to show
 
 
 @dataclass(frozen=True)
@@ -99,9 +98,16 @@ def joined(sections: Iterable[Section]) -> list[Section]:
         by_name.setdefault(section.name, []).append(section)
     out = []
     for name, some in by_name.items():
-        parts = sorted((p for s in some for p in s.parts if p.content is not None), key=lambda part: part.at)
+        parts = sorted((p for s in some for p in s.parts if _shows(p.content)), key=lambda part: part.at)
         owner = next((s for s in some if s.title), some[0])
         title = owner.title or name.replace("_", " ").capitalize()
         if parts:
             out.append(replace(owner, parts=parts, title=title, nav=owner.nav or title))
     return sorted(out, key=lambda section: section.at)
+
+
+def _shows(content: Content | None) -> bool:
+    """Whether there is anything to show."""
+    if isinstance(content, Pair):
+        return any(chart is not None for chart in content.charts)
+    return content is not None

@@ -15,7 +15,7 @@ from hobble.figure.mesh import body, key
 from hobble.models.network import Network, inverse
 from hobble.models.packing import packed
 from hobble.rows.layout import RowLayout
-from hobble.runtime import animation, controller, feet, trajectory
+from hobble.runtime import animation, controller, feet, foot_lock, leg_reach, trajectory
 from hobble.runtime.bounds import Bounds
 from hobble.runtime.character import start
 from hobble.runtime.limits import HURRY_FACTOR, LAME_BELOW
@@ -82,7 +82,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
     skeleton, out, first = network.skeleton, [], 0
     assert skeleton is not None
     for name, columns in network.channels.items():
-        one, said, at = channel(name), words(name), list(columns).index
+        one, wording, at = channel(name), words(name), list(columns).index
         limits = network.limits.get(name)
         face = shown(name, skeleton, columns, network.trained(name))
         presets = [
@@ -93,7 +93,7 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
             {
                 "name": name,
                 "title": one.title,
-                "key": said.key or name,
+                "key": wording.key or name,
                 "first": first,
                 "columns": list(columns),
                 "trained": list(network.trained(name)),
@@ -102,12 +102,12 @@ def shown_channels(network: Network, runtime: Runtime) -> list[dict[str, Any]]:
                 "presets": presets,
                 "regions": [list(some) for some in face.regions],
                 "highest": one.highest,
-                "sliderStep": said.step,
-                "rest": said.rest,
-                "never": said.never,
-                "headline": said.headline,
-                "says": said.says,
-                "on": said.on,
+                "sliderStep": wording.step,
+                "rest": wording.rest,
+                "never": wording.never,
+                "headline": wording.headline,
+                "says": wording.says,
+                "on": wording.on,
                 "rate": runtime.rates.get(name, one.rate) / 60,
                 "scale": runtime.scales.get(name, 1.0),
                 "limits": limits.to_dict() if runtime.limits and limits is not None else None,
@@ -177,16 +177,21 @@ def _constants() -> dict[str, float]:
         "jogFrom": animation.JOG_FROM,
         "lameBelow": LAME_BELOW,
         "hurried": HURRY_FACTOR,
-        "lockAt": feet.LOCK_AT,
-        "release": feet.RELEASE,
-        "tooFar": feet.TOO_FAR,
+        "lockAt": foot_lock.LOCK_AT,
+        "release": foot_lock.RELEASE,
+        "tooFar": foot_lock.TOO_FAR,
+        "tooFarAlone": foot_lock.TOO_FAR_ALONE,
+        "missed": foot_lock.MISSED,
+        "missedAlone": foot_lock.MISSED_ALONE,
+        "stepFrames": foot_lock.STEP_FRAMES,
+        "stepHeight": foot_lock.STEP_HEIGHT,
         "fastestTurn": float(controller.FASTEST_TURN),
         "heightMix": feet.HEIGHT_MIX,
         "floating": feet.FLOATING,
         "bodyMix": feet.BODY_MIX,
         "bodyFree": feet.BODY_FREE,
         "bodyFrom": feet.BODY_MIN_CONTACT,
-        "mostAdded": feet.MOST_ADDED,
+        "mostAdded": leg_reach.MOST_ADDED,
         "stretch": feet.STRETCH,
         "behind": feet.BEHIND,
     }

@@ -10,9 +10,9 @@ EQUAL = 0.03  # share of the lower value; two configurations with a smaller diff
 
 @dataclass(frozen=True)
 class Verdict:
-    """title: what is compared.
+    """A sentence about the best configuration.
 
-    name: the best configuration. text: the sentence. at: verdicts are sorted by it.
+    title: what is compared. name: the best configuration. text: the sentence. at: verdicts are sorted by it.
     """
 
     at: int

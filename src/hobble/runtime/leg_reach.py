@@ -90,8 +90,8 @@ def reach(position: Any, hip: int, knee: int, heel: int, sx: float, sy: float, s
     # Turn the old bend direction with the leg. One from the new leg alone may bend the knee backwards.
     along = tx * ax + ty * ay + tz * az
     ox, oy, oz = tx - along * ax, ty - along * ay, tz - along * az
-    turn = (ox * wx + oy * wy + oz * wz) / max(1 + ax * wx + ay * wy + az * wz, 1e-6)
-    ox, oy, oz = ox - turn * (ax + wx), oy - turn * (ay + wy), oz - turn * (az + wz)
+    factor = (ox * wx + oy * wy + oz * wz) / max(1 + ax * wx + ay * wy + az * wz, 1e-6)
+    ox, oy, oz = ox - factor * (ax + wx), oy - factor * (ay + wy), oz - factor * (az + wz)
     size = np.sqrt(ox * ox + oy * oy + oz * oz)
     if size < 1e-6:
         return

@@ -23,7 +23,7 @@ from hobble.terrain.soles import Mask
 
 STANCE_PIECE = 8  # most frames of a stance that become one point
 COVERED_PIECE = 4  # the same for feet below the ground
-BESIDE_CM = (35.0, 50.0)  # beside a beam there must be no ground at these distances from the path
+BEAM_SIDE_CM = (35.0, 50.0)  # distances from the path at which there must be no ground next to a beam
 PATH_CLEARANCE_CM = 25.0  # points beside the path that are closer than this to any part of it are left out
 
 
@@ -89,8 +89,8 @@ def fit_cycle(
     centre, level = where[contacts].mean(axis=0), height[contacts].mean()
     cells = patches.cells(where.reshape(-1, 2), centre).reshape(where.shape)
     table = np.concatenate([cells, (height - level)[..., None]], axis=-1)
-    beside = beside_path(patches, path, sides, centre) if kind == "beam" else np.zeros((0, 4))
-    footing = Footing(table[contacts], table[~contacts], kind == "jumpy", beside)
+    beam_sides = beam_side_points(patches, path, sides, centre) if kind == "beam" else np.zeros((0, 4))
+    footing = Footing(table[contacts], table[~contacts], kind == "jumpy", beam_sides)
     chosen, error = best_patches(patches, footing, fits)
     patch_level = patches.at(chosen, cells[contacts]).mean(axis=1, dtype=float)
     plain = Ground(patches, chosen, error, centre, level - patch_level)
@@ -105,8 +105,9 @@ def flat_ground(
     level: "zero", or "feet" for the mean height of the soles in contact, as in the original. The original
     has no velocity in the last frame, so the contacts of the frame before it are used there.
 
-    bent: correct the ground. If the feet in contact are more than `deepest` cm from it on average (an uneven
-    floor or capture), a surface is added. Otherwise pits are dug under feet more than `deepest` below it.
+    bent: whether to correct the ground. If the feet in contact are more than `deepest` cm from it on average
+    (an uneven floor or capture), a surface is added. Otherwise pits are dug under feet more than `deepest`
+    below it.
     """
     heights = soles[..., 1]
     original = np.concatenate([contacts[:-1], contacts[-2:-1]])
@@ -156,9 +157,9 @@ def _refitted(
     return fit_surfaces(points, residual[None], smoothing, most, len(standing.count))[0]
 
 
-def beside_path(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:
+def beam_side_points(patches: Patches, path: Array, sides: Array, centre: Array) -> Array:
     """(N, 4) points beside the path, where a beam has no ground, and their points on the path, in cells."""
-    off = np.concatenate([path + sign * d * sides for d in BESIDE_CM for sign in (1, -1)])
-    on = np.tile(path, (2 * len(BESIDE_CM), 1))
+    off = np.concatenate([path + sign * d * sides for d in BEAM_SIDE_CM for sign in (1, -1)])
+    on = np.tile(path, (2 * len(BEAM_SIDE_CM), 1))
     free = distances(off, path).min(axis=1) > PATH_CLEARANCE_CM
     return np.concatenate([patches.cells(off[free], centre), patches.cells(on[free], centre)], axis=1)

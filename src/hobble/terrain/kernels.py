@@ -164,7 +164,7 @@ def _up_sum(heights, rows, columns, a, offset, points, jumps):
 
 
 @njit(fastmath=FAST, forceinline=True, cache=False)
-def _beside_sum(heights, rows, columns, a, points):
+def _beam_side_sum(heights, rows, columns, a, points):
     """Sum over points beside the path of max(0, height - height of the path + BEAM_HEIGHT) squared."""
     u, v, path_u, path_v = points
     (ru, rv, r0), (cu, cv, c0) = a
@@ -183,7 +183,7 @@ def _beside_sum(heights, rows, columns, a, points):
 @njit(forceinline=True, cache=False)
 def _error(heights, rows, columns, a, tables, jumps, limit):
     """The error of one patch, or infinity as soon as it is known to exceed `limit`."""
-    down, up_first, up_rest, beside = tables
+    down, up_first, up_rest, beam_sides = tables
     first, offset, squares = _down_means(heights, rows, columns, a, down)
     error = DOWN_WEIGHT * max(squares - offset * offset, 0.0)
     if error > limit:
@@ -196,8 +196,8 @@ def _error(heights, rows, columns, a, tables, jumps, limit):
             return np.inf
         squares += _up_sum(heights, rows, columns, a, offset, up_rest, jumps)
         error += squares / count
-    if len(beside[0]) and error <= limit:
-        error += _beside_sum(heights, rows, columns, a, beside) / len(beside[0])
+    if len(beam_sides[0]) and error <= limit:
+        error += _beam_side_sum(heights, rows, columns, a, beam_sides) / len(beam_sides[0])
     return error
 
 

@@ -22,17 +22,16 @@ GOLDEN_RATIO = 0.6180339887498949
 class Footing:
     """The points that the ground under a cycle has to fit.
 
-    u, v are cells from the middle of the patch, along x and z.
-    down, up: (N, 3) u, v and height of soles in contact and in the air, cm above the mean in contact.
-    jumps: the ground must not be far below feet in the air.
-    beside: (N, 4) u, v of a point beside the path, and u, v of its point on the path; empty unless the ground
-    is a beam.
+    u, v are cells from the middle of the patch, along x and z. down, up: (N, 3) u, v and height of soles in
+    contact and in the air, cm above the mean in contact. jumps: the ground must not be far below feet in the
+    air. beam_sides: (N, 4) u, v of a point beside the path, and u, v of its point on the path; empty unless
+    the ground is a beam.
     """
 
     down: Array = field(repr=False)
     up: Array = field(repr=False)
     jumps: bool = False
-    beside: Array = field(default_factory=lambda: np.zeros((0, 4), np.float32), repr=False)
+    beam_sides: Array = field(default_factory=lambda: np.zeros((0, 4), np.float32), repr=False)
 
 
 def best_patches(patches: Patches, footing: Footing, count: int) -> tuple[np.ndarray, Array]:
@@ -52,9 +51,9 @@ def patch_errors(patches: Patches, footing: Footing) -> Array:
 
 
 def _columns(footing: Footing) -> tuple[tuple[Array, ...], ...]:
-    """Columns of four tables: in contact, the first FIRST_POINTS in the air, the rest in the air, beside."""
+    """Columns of four tables: in contact; the first FIRST_POINTS in the air; the rest; beside a beam."""
     spread = (np.arange(len(footing.up)) * GOLDEN_RATIO) % 1.0  # so that the first points cover all frames
     order = np.argsort(spread, kind="stable")
     up = footing.up[order]
-    tables = footing.down, up[:FIRST_POINTS], up[FIRST_POINTS:], footing.beside
+    tables = footing.down, up[:FIRST_POINTS], up[FIRST_POINTS:], footing.beam_sides
     return tuple(tuple(np.ascontiguousarray(column, np.float32) for column in t.T) for t in tables)

@@ -135,8 +135,8 @@ def rows_for(
 def fits_on(device: torch.device, manifest: Manifest) -> bool:
     """Whether the training rows fit on the GPU beside the training itself.
 
-    Uses its total memory, not the free memory: the order of the rows depends on the result, and a resumed run
-    has to use the same order.
+    Uses its total memory, not the free memory: the rows have another order on the GPU than on
+    the host, and a resumed run needs the order that it began with.
     """
     needed = sum(chunk.bytes for chunk in manifest.chunks[TRAIN])
     return needed < MEMORY_SHARE * torch.cuda.mem_get_info(device)[1]

@@ -74,9 +74,9 @@ def run(
         state.network.flat.copy_(state.best)
         best_section = state.sections - state.since_best
         log.info("best weights: section %d of %d, by the held-out error", best_section, state.sections)
-    whole = HeldOut(data, state.network.flat.device, 0).every_row(state.network)
-    each = zip(["held out, every row", *blocks], whole, strict=True)
-    log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in each))
+    errors = HeldOut(data, state.network.flat.device, 0).every_row(state.network)
+    named = zip(["held out, every row", *blocks], errors, strict=True)
+    log.info("%s", ", ".join(f"{name} {error:.4f}" for name, error in named))
     facts = {
         "passes": state.sections // training.sections,
         "samples": state.samples,
@@ -86,7 +86,7 @@ def run(
     if best_section is not None:
         facts["best_section"] = best_section
     if data.rows("held_out"):
-        facts["held_out_mse"] = whole[0]
+        facts["held_out_mse"] = errors[0]
     write_weights(weights, state.network, data, configuration, facts)
     write_history(history, blocks, state.history)
     save_npz(checkpoint, **kept)

@@ -1,4 +1,4 @@
-"""Who runs the workflow, and whether they may: a user without a name in a container, or one of two."""
+"""Checks who runs the workflow: a user without a name, as in a container, or one who may not write here."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def ensure_user_name() -> None:
 def check_may_write(arguments: Sequence[str], own: Path = OWN) -> None:
     """Raise InputError where Snakemake could not take its lock, as in another user's checkout.
 
-    arguments: of the command line; a dry run writes nothing and is let through.
+    arguments: of the command line. A dry run is allowed, because it writes nothing.
     """
     if any(DRY_RUN.fullmatch(argument) for argument in arguments):
         return

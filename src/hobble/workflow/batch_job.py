@@ -1,6 +1,6 @@
 """Runs a job that makes one clip after another.
 
-What is kept from an earlier try is not made again, and a bad clip fails alone.
+Finished clips of an earlier try are not made again. A bad clip does not stop the others.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 class Piece:
     """A piece of the work of a job: usually a clip and its mirror.
 
-    name: the clip. params: of the rule, and those of this clip. input: by name, a file, or a list of files
-    where the rule says how many each clip has. output: by name, a file.
+    name: the clip. params: those of the rule and those of this clip. input: name -> file, or a list of files
+    if the rule says how many each clip has. output: name -> file.
     """
 
     name: str
@@ -49,29 +49,31 @@ class Piece:
 def pieces(snakemake: Any) -> list[Piece]:
     """The pieces of a job.
 
-    params.each: for each piece its own params, with the name as `clip`. params.counts, optional: by name of
-    an input, how many files each piece has. Other inputs and outputs have a file for each piece, or one for
-    all. A name without files is left out.
+    params.per_clip: for each piece its own params, with the name as `clip`. params.files_per_clip, optional:
+    name of an input -> how many files each piece has. Other inputs and outputs have a file for each piece, or
+    one for all. A name without files is left out.
     """
-    common = {name: value for name, value in snakemake.params.items() if name not in ("each", "counts")}
-    each, counts = snakemake.params.each, snakemake.params.get("counts", {})
+    special = ("per_clip", "files_per_clip")
+    common = {name: value for name, value in snakemake.params.items() if name not in special}
+    per_clip, counts = snakemake.params.per_clip, snakemake.params.get("files_per_clip", {})
     inputs = {
-        name: _dealt(_many(files), len(each), counts.get(name)) for name, files in snakemake.input.items()
+        name: _distributed(_as_list(files), len(per_clip), counts.get(name))
+        for name, files in snakemake.input.items()
     }
-    outputs = {name: _dealt(_many(files), len(each)) for name, files in snakemake.output.items()}
+    outputs = {name: _distributed(_as_list(files), len(per_clip)) for name, files in snakemake.output.items()}
     return [
         Piece(
             own["clip"],
             {**common, **own},
-            {name: dealt[n] for name, dealt in inputs.items() if dealt},
-            {name: dealt[n] for name, dealt in outputs.items() if dealt},
+            {name: files[n] for name, files in inputs.items() if files},
+            {name: files[n] for name, files in outputs.items() if files},
         )
-        for n, own in enumerate(each)
+        for n, own in enumerate(per_clip)
     ]
 
 
 def make_each(snakemake: Any, make: Callable[[Piece, logging.Logger], None]) -> None:
-    """Call `make` for each piece of a job, except those whose files are kept undamaged.
+    """Call `make` for each piece of a job, unless its files are kept from an earlier try and undamaged.
 
     If a piece fails, its error is reported and the others are made, unless the disk is full. Then the process
     ends with status 1. Snakemake deletes the outputs of such a job; the next try takes what is kept.
@@ -134,11 +136,11 @@ def _sha256(file: str) -> str:
         return "cannot be read"  # the job that reads it reports why
 
 
-def _many(files: Any) -> list[str]:
+def _as_list(files: Any) -> list[str]:
     return [files] if isinstance(files, str) else list(files)
 
 
-def _dealt(files: list[str], pieces: int, counts: list[int] | None = None) -> list[Any]:
+def _distributed(files: list[str], pieces: int, counts: list[int] | None = None) -> list[Any]:
     """The file or files of each piece; [] if no piece has any."""
     if counts is not None:
         assert sum(counts) == len(files), f"{files} are not {counts}"

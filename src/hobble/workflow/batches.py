@@ -131,7 +131,8 @@ class Batches:
         datasets: Iterable[str],
         arguments: Sequence[str],
     ) -> list[Batch]:
-        """The batches `of` some data sets that a run needs. arguments: of its command line.
+        """The batches of these data sets that a run needs. of: data set -> its batches. arguments: of the
+        command line.
 
         A job on another machine is a run of one rule. Only its batch is needed then.
         """

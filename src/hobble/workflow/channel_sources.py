@@ -33,9 +33,9 @@ class ChannelSources:
         The file beside the clip is not read if the clip's entry has a value.
         """
         one, made = channel(name), self.catalogue.dataset(dataset).synthetic is not None
-        said = self._value(dataset, clip, name) is not None and not made
-        beside = self.clips.side_files(dataset, clip, (one.suffix,)) if one.suffix and not said else []
-        return [*beside, *self._tables(dataset, name)]
+        in_entry = self._value(dataset, clip, name) is not None and not made
+        files = self.clips.side_files(dataset, clip, (one.suffix,)) if one.suffix and not in_entry else []
+        return [*files, *self._tables(dataset, name)]
 
     def source(self, dataset: str, clip: str, name: str) -> dict[str, Any]:
         """The fields of a `Source` for channel `name` and a clip as plain data, without `files`."""
@@ -69,9 +69,9 @@ class ChannelSources:
                     f"{', '.join(sorted(extra))}; it has {', '.join(self.channels(dataset)) or 'none'}"
                 )
             for name in self.channels(dataset):
-                said = self.source(dataset, clip, name) | {"clip": f"data set {dataset}: clips.{clip}"}
+                fields = self.source(dataset, clip, name) | {"clip": f"data set {dataset}: clips.{clip}"}
                 one = channel(name)
-                one.check(one.source(said, self._tables(dataset, name)), rig)
+                one.check(one.source(fields, self._tables(dataset, name)), rig)
 
     def _value(self, dataset: str, clip: str, name: str) -> Any:
         return self.clips.entry(dataset, clip).channels.get(name)

@@ -248,16 +248,16 @@ class Clips:
         model = self.catalogue.dataset(dataset)
         if model.synthetic is not None or not (folder := self.folder(dataset)).is_dir():
             return []
-        said = unused_file_notes(folder, {*self._files(dataset), *self._checksums(dataset)})
+        notes = unused_file_notes(folder, {*self._files(dataset), *self._checksums(dataset)})
         mirrors = [] if model.clips or model.mirror else self._mirrors(dataset)
         if mirrors:
-            said.insert(
+            notes.insert(
                 0,
                 f"{len(mirrors)} files in {folder} are mirrors of other clips ({mirrors[0]}.bvh, ...) and "
                 "are left out. With `mirror: true` Hobble makes mirrors of all clips, with labels.",
             )
-        more = len(said) - MAX_NOTES
-        return [*said[:MAX_NOTES], *([f"{more} more files belong to no clip."] if more > 0 else [])]
+        more = len(notes) - MAX_NOTES
+        return [*notes[:MAX_NOTES], *([f"{more} more files belong to no clip."] if more > 0 else [])]
 
     def _manifest(self, dataset: str) -> Path:
         options = self.catalogue.dataset(dataset).download

@@ -14,15 +14,15 @@ COMPARE = "compare"  # the folder under results/, and the key of --config
 class Comparison:
     """The configurations that `--config compare='[holden,injured]'` names.
 
-    asked: the value from the command line, not yet checked.
+    value: the value from the command line, not yet checked.
     """
 
-    def __init__(self, configurations: Configurations, asked: Any) -> None:
-        self.configurations, self._asked = configurations, asked
+    def __init__(self, configurations: Configurations, value: Any) -> None:
+        self.configurations, self._value = configurations, value
 
     def names(self) -> list[str]:
         """Their names. Raises HobbleError unless it is a list of different names."""
-        names = self._asked.split(",") if isinstance(self._asked, str) else self._asked
+        names = self._value.split(",") if isinstance(self._value, str) else self._value
         if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
             raise HobbleError(f"compare: must be a list of names, as in '[holden,injured]', not {names!r}")
         if not names or len(set(names)) < len(names):

@@ -26,8 +26,9 @@ Places = dict[str, list[str]]
 def stages(configurations: Configurations, batches: Batches, name: str) -> dict[str, Places]:
     """Where the costs of each stage of configuration `name` are found.
 
-    Stage -> `benchmarks`, `files`: folders; `batches`: names of the benchmark files of batches, since a
-    folder may have others from before a clip was added; `made`: folders in which finished clips are kept.
+    Stage -> `benchmarks`, `files`: folders; `batches`: names of the benchmark files of the present batches (a
+    folder may also have old ones, from before a clip was added); `made`: folders in which finished clips are
+    kept.
     """
     dataset = configurations.dataset(name)
     source = configurations.catalogue.dataset(dataset).source or dataset

@@ -32,16 +32,16 @@ class Line:
         self.fetched, self.name, self.size, self.now = 0.0, "", 0.0, 0.0
         self.last = float("-inf")
 
-    def take(self, said: str) -> None:
+    def take(self, text: str) -> None:
         """Update the progress with a line of pip's output."""
-        if found := DOWNLOAD_LINE.match(said):
+        if found := DOWNLOAD_LINE.match(text):
             self.fetched += self.size
             self.name, self.size, self.now = found[1], float(found[2]) * BYTES[found[3]], 0.0
-        elif found := PROGRESS_LINE.match(said):
+        elif found := PROGRESS_LINE.match(text):
             self.now = float(found[1])
-        elif said.startswith("Installing collected packages"):
+        elif text.startswith("Installing collected packages"):
             self.fetched, self.size = self.fetched + self.size, 0.0
-            self.name = f"unpacking {said.count(',') + 1} packages, which takes a while"
+            self.name = f"unpacking {text.count(',') + 1} packages, which takes a while"
             self.last = float("-inf")  # show it at once, because pip prints nothing after this
         else:
             return
@@ -63,10 +63,10 @@ class Line:
             self.stream.write("\r\x1b[K")
 
 
-def follow(said: Iterable[str], line: Line) -> list[str]:
+def follow(lines: Iterable[str], line: Line) -> list[str]:
     """Show pip's output as progress. Returns its last lines, for an error message."""
     words: list[str] = []
-    for text in said:
+    for text in lines:
         line.take(text)
         if not PROGRESS_LINE.match(text):
             words = [*words[-30:], text]
@@ -88,10 +88,10 @@ def is_sound(python: Path) -> bool:
     """Whether this is the interpreter of an environment with pip, of the Python that runs this."""
     version = "import sys, pip; print(sys.version)"
     try:
-        told = subprocess.run([python, "-c", version], capture_output=True, text=True, check=True).stdout
+        found = subprocess.run([python, "-c", version], capture_output=True, text=True, check=True).stdout
     except (OSError, subprocess.CalledProcessError):
         return False
-    return told.strip() == sys.version
+    return found.strip() == sys.version
 
 
 def main(folder: Path) -> None:

@@ -29,8 +29,8 @@ def fingerprint(params: Mapping[str, Any], inputs: Iterable[tuple[str, str]], ou
     params: plain values, with the fingerprint of the code. inputs: (file name, SHA-256) of each input, in
     order. outputs: the paths of the files.
     """
-    asked = [params, list(inputs), [str(_place(Path(path), "")[1]) for path in outputs]]
-    return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
+    dependencies = [params, list(inputs), [str(_place(Path(path), "")[1]) for path in outputs]]
+    return hashlib.sha256(json.dumps(dependencies, sort_keys=True).encode()).hexdigest()
 
 
 class Kept:
@@ -59,7 +59,7 @@ class Kept:
         return False
 
     def keep(self, mark: str, outputs: Iterable[str], seconds: float) -> None:
-        """Keep finished outputs. On a full disk nothing is kept, which is no error."""
+        """Keep finished outputs. On a full disk nothing is kept, and no error is raised."""
         pairs = [(self._kept(path), Path(path)) for path in outputs]
         place = _record(pairs[0][0])
         with contextlib.suppress(OSError):

@@ -25,21 +25,21 @@ class Measurements:
 
     def inputs(self, configuration: str, name: str) -> dict[str, str | list[str]]:
         """Name of each input of the measurement -> its file or files."""
-        return {asked: self._input(configuration, asked) for asked in measure(name).inputs}
+        return {need: self._input(configuration, need) for need in measure(name).inputs}
 
-    def _input(self, configuration: str, asked: str) -> str | list[str]:
+    def _input(self, configuration: str, need: str) -> str | list[str]:
         configurations = self.configurations
-        if asked == "weights":
+        if need == "weights":
             return configurations.network(configuration, "weights.npz")
-        if asked == "clips":
+        if need == "clips":
             return configurations.of_dataset(configuration, "database/clips/{clip}.npz")
-        if asked == "facts":
+        if need == "facts":
             return configurations.of_dataset(configuration, "database/clips/{clip}.json")
-        if asked == "skeleton":
+        if need == "skeleton":
             return self.clips.skeleton_file(configurations.dataset(configuration))
-        if asked == "published":
+        if need == "published":
             return self.package.published()
-        return result_file(configuration, measure(asked).name)
+        return result_file(configuration, measure(need).name)
 
     def splits(self, configuration: str, name: str) -> dict[str, str]:
         """Clip -> "train" or "held_out", if the measurement reads clips, else {}."""

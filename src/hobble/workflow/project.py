@@ -46,11 +46,11 @@ class Project:
         self.measurements = Measurements(self.configurations, self.clips, self.package)
 
 
-def _folder(asked: Any) -> Path:
+def _folder(value: Any) -> Path:
     """The folder given with `--config mocap=...`. YAML may have turned it into a number or a list."""
-    if isinstance(asked, str | Path) and str(asked).strip():
-        return Path(asked)
+    if isinstance(value, str | Path) and str(value).strip():
+        return Path(value)
     raise HobbleError(
-        f"--config mocap: must be the name of one folder, as in mocap=/data/mocap, not {asked!r:.80}. "
+        f"--config mocap: must be the name of one folder, as in mocap=/data/mocap, not {value!r:.80}. "
         "Write a folder whose name is a number as mocap=./5"
     )

@@ -27,7 +27,7 @@ FRAMES = 480
 
 
 def mirrored(cycle: Cycle) -> Cycle:
-    """The same cycle in a mirror."""
+    """The same cycle with left and right swapped."""
 
     def across(name: str) -> str:
         return name[:-1] + {"R": "L", "L": "R"}[name[-1]] if name[-2:] in ("_R", "_L") else name
@@ -41,8 +41,9 @@ def mirrored(cycle: Cycle) -> Cycle:
 
 
 def walking(limp: dict[str, float], speed: float) -> Shown:
-    """A figure that walks as people do, and limps on a side by a share of what people with pain in the right
-    leg do."""
+    """A figure that walks like people and limps on one side, by a share of the limp of people with pain in
+    the right leg.
+    """
     known, strength = people(), max(limp.values(), default=0.0)
 
     def mixed(of: Callable[[str], Any]) -> Any:
@@ -58,7 +59,9 @@ def walking(limp: dict[str, float], speed: float) -> Shown:
 
 @pytest.fixture
 def measured(hurtable, holden31, monkeypatch):
-    """measured(effect): limp.json of a character who limps by `effect(severity)` of what people do."""
+    """measured(effect): limp.json of a character whose limp at a severity is `effect(severity)` of people's
+    limp.
+    """
 
     def run(effect, other_side: bool = False, every: tuple[Limp, ...] = (), splits=None) -> dict[str, Any]:
         def shown(network, each, speeds, gait, seconds, runtime):
@@ -111,7 +114,7 @@ def test_severities_that_do_nothing_are_nobodys_limp(measured) -> None:
 
 
 def test_a_change_of_two_percent_is_steady_and_still_small(measured) -> None:
-    """The rank correlation of an effect that has a given size at 10."""
+    """The rank correlation of an effect, and its size at 10."""
     found = measured(lambda s: 0.002 * s)
     knee = next(row for row in found["trends"] if row["gait"] == "walk" and row["effect"] == "knee_hurt")
     assert knee["spearman"] == pytest.approx(-1)
@@ -128,7 +131,7 @@ def test_a_limp_of_the_other_leg_is_seen(measured) -> None:
 def test_a_limp_is_measured_beside_the_walk_of_the_same_mood(
     hurtable, holden31, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Sad: half as fast, the same limp. Old: no limp. Tired: no cycle."""
+    """Sad: half as fast, the same limp. Old: no limp. Tired: no whole cycle."""
     layout = replace(hurtable.layout, channels=(("injury", 25), ("mood", 5)))
     moods = channel("mood").columns(holden31)
     links = hurtable.channels["injury"][:25]

@@ -75,7 +75,7 @@ def judged(network, motion, splits=SPLITS) -> dict[str, Any]:
 
 
 def test_two_clouds_are_told_apart_along_the_line_that_parts_them() -> None:
-    """Fisher's direction is that of the inverse covariance times the difference of the means."""
+    """Fisher's direction is the inverse covariance times the difference of the means."""
     rng = np.random.default_rng(3)
     # That of both classes, which count the same however many there are of each.
     one, other = np.array([[3.0, 1.5], [1.5, 1.0]]), np.array([[1.0, 0.5], [0.5, 3.0]])
@@ -176,7 +176,7 @@ def test_without_side_a_leg_is_not_told_from_the_other(holden31: Skeleton) -> No
 
 
 def test_what_is_judged_was_not_learnt() -> None:
-    """Windows that differ in nothing but their label are named by chance."""
+    """If windows differ only in their labels, the names are guesses."""
     rng = np.random.default_rng(6)
     windows = [
         Window("a", f"{n % 2}", 5.0, {f"{d}": float(v) for d, v in enumerate(rng.normal(size=60))}, n // 10)

@@ -155,14 +155,14 @@ def test_an_injury_is_kept_from_walking_into_jogging(hurtable) -> None:
 
 
 def test_each_gait_is_held_against_its_own_healthy_one(hurtable) -> None:
-    """A network whose jog differs from its walk."""
+    """The network's jog differs from its walk."""
     healthy, *hurt = into_a_jog(hurtable, [KNEE], 1.0, RUNTIME)
     assert healthy["walk_from_healthy_cm"] == healthy["jog_from_healthy_cm"] == 0
     assert all(row["jog_from_healthy_cm"] != row["walk_from_healthy_cm"] for row in hurt)
 
 
 def test_falling_severity_is_measured_on_its_own(hurtable) -> None:
-    """Rows that differ between rising and falling severity."""
+    """The rows of rising and falling severity differ."""
     sweep = Sweep(hurtable, [KNEE], "walk", 0.2, RUNTIME)
     rows = sweep.rows(0)
     rng = np.random.default_rng(2)
@@ -189,7 +189,7 @@ def test_divided_severities_are_smaller_ones(hurtable) -> None:
 
 
 def test_figures_of_a_crowd_do_not_mind_each_other(hurtable) -> None:
-    """A character in a crowd walks as it does alone."""
+    """A character walks in a crowd as it does alone."""
     hurt = severities(hurtable, [{}, {KNEE: 4.0}, {KNEE: 10.0}])
     together = run(hurtable, [Stretch(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
     for figure, gait in enumerate(("walk", "jog", "walk")):

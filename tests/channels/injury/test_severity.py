@@ -100,7 +100,7 @@ def test_each_frame_has_the_source_frame_that_shows_then(fps, start, expected):
 
 @pytest.mark.parametrize("fps", [120.0, 1 / 0.00833, 1 / 0.01667, 23.976])
 def test_after_ten_minutes_each_frame_still_has_the_source_frame_of_its_moment(fps):
-    """Motion at nearly a whole rate is resampled at the exact rate; so are the severities."""
+    """If the file's rate is nearly a whole number, motion and severities are resampled at the exact rate."""
     times = sample_times(72_000, fps, 60.0)
     rows = source_rows(len(times), 72_000, motion(72_000, fps))
     np.testing.assert_array_equal(rows, np.floor(times + 1e-6))
@@ -146,7 +146,7 @@ def test_a_wrong_status_of_a_data_set_names_the_clip(clip):
 
 
 def test_on_a_skeleton_without_links_a_clip_is_hurt_and_has_no_column(clip):
-    """A data set with another skeleton may list the same clips; its networks leave out the hurt ones."""
+    """A data set on a skeleton without links may list hurt clips. Its networks are not trained on them."""
     figure = replace(clip, skeleton=replace(clip.skeleton, links=()))
     severity, warnings = clip_severity(figure, None, f"{THIGH}[4]", motion())
     assert (severity.shape, warnings) == ((300, 0), [])

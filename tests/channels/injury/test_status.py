@@ -1,4 +1,4 @@
-"""The status file: valid and invalid content, and that writing and reading it loses nothing."""
+"""The status file: valid and invalid content, and writing and reading it without loss."""
 
 from __future__ import annotations
 

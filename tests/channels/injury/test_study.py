@@ -78,7 +78,7 @@ def back(film) -> tuple[list[str], int]:
 
 
 def test_tables_of_people_whose_answers_are_known(folder: Path, study: Study) -> None:
-    """Three people: one names all parts, one confuses the sides, one always says the back."""
+    """Of three people one names all parts, one confuses the sides, and one always says the back."""
     people = [read_answers(write(folder, says.__name__, says), study) for says in (right, mirrored, back)]
     made = tables(study, people)
     assert tuple(made) == NUMERALS
@@ -107,7 +107,9 @@ def test_tables_of_people_whose_answers_are_known(folder: Path, study: Study) ->
 
 
 def test_a_part_of_the_parts_is_seen_in_part(study: Study) -> None:
-    """Film 9 has three parts; one of two people ticks one of them. For film 1 both tick one part too many."""
+    """In film 9 three parts hurt, and one of two people ticks one of them. In film 1 both tick one part too
+    many.
+    """
     first = [Answer(f.number, f.parts[:1] if f.number == 9 else f.parts, 4) for f in FILMS]
     second = [Answer(f.number, () if f.number == 9 else f.parts, 2) for f in FILMS]
     rows = {row["film"]: row for row in tables(study, [first, second])["XVI"][:13]}

@@ -1,4 +1,6 @@
-"""The network as the paper defines it: each sample's weights are blended first; slow, plain, by autograd."""
+"""The network as the paper defines it, slow and plain: each sample's weights are blended first, and autograd
+finds the gradient.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ from hobble.models.mann.trainable import TrainableMann
 
 
 def output(network: TrainableMann, layers: list[Tensor], x: Tensor, masks: list[Tensor]) -> Tensor:
-    """(Y,) of one sample x (X,); masks (in,): of each layer, the gate's first."""
+    """(Y,) of one sample x (X,). masks (in,): one for each layer, those of the gate first."""
     gates = len(network.gate_sizes) - 1
     h = torch.stack([x[column] for column in network.columns])
     for number, layer in enumerate(layers[:gates]):

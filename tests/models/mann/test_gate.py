@@ -10,7 +10,7 @@ from hobble.rows.layout import GAITS, RowLayout
 
 
 def test_the_gate_sees_feet_gait_and_the_wished_velocity(holden31: Skeleton) -> None:
-    """Columns found by writing a number where each of them is meant to be."""
+    """The columns are found by writing a number where each of them should be."""
     layout = RowLayout(len(holden31.joints), channels=(("injury", 30),))
     x = np.zeros(layout.x_size)
     velocity = x[layout.x_joint_velocity].reshape(-1, 3)

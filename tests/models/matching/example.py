@@ -25,14 +25,14 @@ def layout_of(skeleton: Skeleton) -> RowLayout:
 
 
 def smooth(rng: np.random.Generator, rows: int, columns: int, size: float) -> np.ndarray:
-    """(rows, columns): a sine of its own in each column."""
+    """(rows, columns), each column another sine."""
     t = np.arange(rows)[:, None] / 60
     rate, start = rng.uniform(0.5, 2, columns), rng.uniform(0, 7, columns)
     return (size * np.sin(2 * np.pi * rate * t + start)).astype(np.float32)
 
 
 def clip(skeleton: Skeleton, number: int, seed: int = 1) -> ClipRows:
-    """One clip of two cycles that share a frame, two fits under each row."""
+    """A clip of two cycles that share a frame, with two fits for each row."""
     layout, rng = layout_of(skeleton), np.random.default_rng([seed, number])
     count = FRAMES[number]
     once = np.arange(count)
@@ -60,7 +60,7 @@ def clip(skeleton: Skeleton, number: int, seed: int = 1) -> ClipRows:
 
 
 def built(skeleton: Skeleton, folder: Path, **options: Any) -> tuple[Any, dict[str, Any], Matching]:
-    """The tables of both clips, the arrays of their file, and what is read from them."""
+    """The tables of both clips, the arrays of their file, and the network read from them."""
     files = []
     for number in range(len(FRAMES)):
         files.append(folder / f"clip-{number}.npz")

@@ -1,4 +1,4 @@
-"""The tables: every frame once, in runs, on the mean of its terrain fits."""
+"""The tables have every frame once, in runs of consecutive frames, on the mean of its terrain fits."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ AT = np.array([0, 3 * J, 6 * J, 9 * J])  # positions, velocities, rotations, cha
 
 
 def two_runs(rng: np.random.Generator) -> np.ndarray:
-    """Two runs of 60 frames: joints go straight on and turn evenly, each in its own way."""
+    """Two runs of 60 frames in which joints move straight on and turn evenly, differently in each."""
     out = []
     for _ in range(2):
         t = np.arange(60)[:, None]
@@ -31,7 +31,7 @@ def two_runs(rng: np.random.Generator) -> np.ndarray:
 
 
 def played(frames: np.ndarray, rows: list[int]) -> np.ndarray:
-    """What is shown of rows, one a frame, whatever their order."""
+    """What is shown if these rows are played, one in each frame."""
     memory, shown = np.zeros((1, memory_size(J))), []
     phases = (0.02 * np.arange(len(frames)) % 1).astype(np.float32)
     before = -1

@@ -1,4 +1,4 @@
-"""Motion matching at run time: frames shown, searches, and that the page does the same."""
+"""Motion matching at run time: which frames are shown, when it searches. The page does the same."""
 
 from __future__ import annotations
 
@@ -56,7 +56,9 @@ def test_the_nearest_frame_equals_a_search_over_all(made: Made) -> None:
 
 
 def test_channel_values_have_to_match(made: Made) -> None:
-    """A query that is otherwise a frame of the healthy clip finds one of the hurt clip where it is hurt."""
+    """A query equals a frame of the healthy clip except for the channel. It finds a frame of the hurt
+    clip.
+    """
     _, _, network = made
     x = x_of(network, 10)
     x[0, network.layout.x_channel("injury").start + 4] = 7.0
@@ -105,7 +107,7 @@ def test_an_invalid_memory_is_reset(made: Made, wrong: float) -> None:
 
 
 def sequence(network: Matching, frames: int = 80) -> tuple[np.ndarray, np.ndarray]:
-    """X (F, X) and phases (F,) of a character that asks for one place of the clips after another."""
+    """X (F, X) and phases (F,) of a character that requests one place of the clips after another."""
     rng = np.random.default_rng(4)
     rows = np.repeat(rng.choice(network.starts, 12), 7)[:frames]
     return np.concatenate([x_of(network, row) for row in rows]), rng.random(frames)
@@ -137,7 +139,9 @@ def test_integers_halve_the_frames_and_are_near(made: Made) -> None:
 
 
 def test_the_page_finds_the_same_frames_as_python(made: Made, tmp_path: Path) -> None:
-    """Over searches and transitions; the first input weighs nothing and is not there, outputs are chosen."""
+    """Over searches and transitions. The page lacks the first input, which has no weight, and some
+    outputs.
+    """
     _, _, network = made
     layout = network.layout
     object.__setattr__(network, "x_std", np.where(np.arange(layout.x_size) == 0, 0, network.x_std))

@@ -1,4 +1,6 @@
-"""The network, its loss and its training as the paper defines them: slow, plain, in float64, by autograd."""
+"""The network, its loss and its training as the paper defines them: slow and plain, in float64, by
+autograd.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ from hobble.models.pfnn.trainable import TrainablePfnn
 
 
 def spline(control_points: Tensor, p: float) -> Tensor:
-    """The cyclic cubic through control points (K, ...) at phase p: Hermite's with Catmull-Rom's tangents."""
+    """The cyclic cubic through control points (K, ...) at phase p: Hermite form with Catmull-Rom tangents."""
     k = len(control_points)
     position = (p % 1.0) * k
     at = int(position)
@@ -45,5 +47,5 @@ def loss(
 
 
 def parameters(network: TrainablePfnn) -> list[Tensor]:
-    """The network's layers as leaves of a graph."""
+    """The network's layers, as tensors with gradients."""
     return [layer.clone().requires_grad_() for layer in network.layers]

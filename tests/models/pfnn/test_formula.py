@@ -1,4 +1,4 @@
-"""The formula in the file describes the layers."""
+"""The formula in the network's file describes the layers."""
 
 from __future__ import annotations
 

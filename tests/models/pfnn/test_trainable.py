@@ -1,4 +1,4 @@
-"""The network is the one of the paper."""
+"""The network equals the one of the paper."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from hobble.models.plain.trainable import FusedPlainStep, PlainStep, initialise
 @pytest.mark.parametrize("kind", [PlainStep, FusedPlainStep])
 @pytest.mark.parametrize("units", [(6, 5, 4), (7, 4, 4, 4, 3)])
 def test_loss_and_gradient_are_those_of_autograd(kind: type, units: tuple[int, ...]) -> None:
-    """Layer by layer, written out, under the same dropout."""
+    """Written out layer by layer, with the same dropout."""
     generator = torch.Generator().manual_seed(3)
     network = initialise(units, 1).to("cpu", torch.float64)
     network.flat.normal_(0, 0.5, generator=generator)

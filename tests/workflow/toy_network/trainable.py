@@ -43,7 +43,7 @@ class TrainableToy(Trainable):
 
 
 class Step:
-    """Its gradient is a product; it drops nothing."""
+    """The gradient is one matrix product. There is no dropout."""
 
     def __init__(self, network):
         self.network, self.gradients, self.error = network, [], torch.empty(0)

@@ -98,12 +98,12 @@ def read_table(path: str) -> dict[str, str]:
         raise InputError(path, f"has no column {' and no '.join(missing)}", line=1, fix=fix)
     out: dict[str, str] = {}
     for row in reader:
-        clip, said = PurePosixPath(row["file"] or "").stem, (row["diagnosis"] or "").strip()
-        if said not in (*DIAGNOSES, HEALTHY):
-            problem = f"{printable(clip)} has {printable(said, 80)!r}"
+        clip, diagnosis = PurePosixPath(row["file"] or "").stem, (row["diagnosis"] or "").strip()
+        if diagnosis not in (*DIAGNOSES, HEALTHY):
+            problem = f"{printable(clip)} has {printable(diagnosis, 80)!r}"
             raise InputError(path, problem, line=reader.line_num, fix=f"Write one of {_known()}.")
-        if out.setdefault(clip, said) != said:
-            problem = f"{printable(clip)} is {said} here and {out[clip]} above"
+        if out.setdefault(clip, diagnosis) != diagnosis:
+            problem = f"{printable(clip)} is {diagnosis} here and {out[clip]} above"
             raise InputError(
                 path, problem, line=reader.line_num, fix=f"Leave one of them in {Path(path).name}."
             )

@@ -28,20 +28,22 @@ def severity_matrix(status: Status, links: Sequence[str]) -> Array:
 
 def odd_ranges(status: Status, path: str | Path) -> list[str]:
     """A sentence for each range that starts at 0, goes past the clip's end or contradicts an earlier line."""
-    said = []
+    notes = []
     overlaps = _overlaps(status.spells)
     for i, spell in enumerate(status.spells):
         place = f"{Path(path).name}, line {spell.line}: the range {spell.first}-{spell.last}"
         if spell.first > status.frames:
-            said.append(f"{place} lies past the last of {status.frames} frames and was ignored.")
+            notes.append(f"{place} lies past the last of {status.frames} frames and was ignored.")
         elif spell.last > status.frames:
-            said.append(f"{place} goes past the last of {status.frames} frames; it was cut there.")
+            notes.append(f"{place} goes past the last of {status.frames} frames; it was cut there.")
         if spell.first == 0:
-            said.append(f"{place} starts at 0; frames count from 1, so it was taken to start there.")
+            notes.append(f"{place} starts at 0; frames count from 1, so it was taken to start there.")
         for earlier in overlaps.get(i, ()):
             if both := _contested(earlier, spell):
-                said.append(f"{place} overlaps that of line {earlier.line}; the later one counts for {both}.")
-    return said
+                notes.append(
+                    f"{place} overlaps that of line {earlier.line}; the later one counts for {both}."
+                )
+    return notes
 
 
 def _overlaps(spells: Sequence[Spell]) -> dict[int, list[Spell]]:
@@ -58,8 +60,8 @@ def _overlaps(spells: Sequence[Spell]) -> dict[int, list[Spell]]:
 
 def _contested(earlier: Spell, later: Spell) -> str:
     """The links for which two overlapping spells give different severities, separated by commas."""
-    said = dict(earlier.links)
-    return ", ".join(link for link, severity in later.links if said.get(link, severity) != severity)
+    earlier_values = dict(earlier.links)
+    return ", ".join(link for link, severity in later.links if earlier_values.get(link, severity) != severity)
 
 
 def clip_severity(
@@ -90,15 +92,15 @@ def clip_severity(
             line=1,
             fix="Count the frames of the BVH file, at its own rate, and check the ranges.",
         )
-    said = odd_ranges(read, status_file)
+    warnings = odd_ranges(read, status_file)
     if read.frames != motion["source_frames"]:
-        said.insert(
+        warnings.insert(
             0,
             f"{Path(status_file).name}, line 1: counts {read.frames} frames, but {motion['source']} has "
             f"{motion['source_frames']}; the ranges were taken as they stand. Is it the file of this clip?",
         )
     rows = severity_matrix(read, links)
-    return rows[source_rows(len(clip), read.frames, motion)], said
+    return rows[source_rows(len(clip), read.frames, motion)], warnings
 
 
 def source_rows(frames: int, rows: int, motion: Mapping[str, Any]) -> Array:

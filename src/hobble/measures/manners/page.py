@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from hobble.measures.given import Json
+from hobble.measures.manners.results import OfChannel
 from hobble.measures.manners.windows import EFFECTS, NONE
 from hobble.report.charts import Chart
 from hobble.report.gather import Material
 from hobble.report.parts import Part, Section, Words
 
 UNITS = {"speed": "m/s", "stride": "cm", "trunk": "° forward", "arms": "° of swing", "head": "° forward"}
-AMOUNTS = (
+AMOUNTS: tuple[tuple[Literal["captured", "generated", "generated_at_half"], str, str], ...] = (
     ("captured", "captured", "@muted"),
     ("generated", "generated at 1", "@accent"),
     ("generated_at_half", "generated at .5", "@predicted"),
@@ -31,7 +34,7 @@ def section(found: Json, material: Material) -> Section:
     return Section("manners", parts, title=title, at=21)
 
 
-def summary(found: Json) -> str:
+def summary(found: OfChannel) -> str:
     """What the classifier recognises, in generated walks and in captured ones of others."""
     captured = found["captured"]
     text = (
@@ -46,12 +49,13 @@ def summary(found: Json) -> str:
     return text
 
 
-def together_chart(found: Json) -> Chart | None:
+def together_chart(found: OfChannel) -> Chart | None:
     """The share of windows in which each manner is named while a column of another channel is highest."""
     rows = found["together"]
     if not rows:
         return None
-    manners, columns = (list(dict.fromkeys(row[key] for row in rows)) for key in ("manner", "column"))
+    manners = list(dict.fromkeys(row["manner"] for row in rows))
+    columns = list(dict.fromkeys(row["column"] for row in rows))
     shares = {(row["manner"], row["column"]): row["share"] for row in rows}
     trace = {
         "type": "heatmap",
@@ -65,7 +69,7 @@ def together_chart(found: Json) -> Chart | None:
         "ygap": 2,
         "hovertemplate": "%{y} with %{x}: %{z:.0%}<extra></extra>",
     }
-    manner = sum(row["share"] * row["windows"] for row in rows if row["manner"] != NONE)
+    manner = sum((row["share"] or 0.0) * row["windows"] for row in rows if row["manner"] != NONE)
     whole = sum(row["windows"] for row in rows if row["manner"] != NONE)
     layout = {
         "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
@@ -79,7 +83,7 @@ def together_chart(found: Json) -> Chart | None:
     return Chart(f"{found['channel']}-together", "Two at once", words, [trace], layout, 340)
 
 
-def effect_chart(found: Json, effect: str) -> Chart:
+def effect_chart(found: OfChannel, effect: str) -> Chart:
     """One effect of all manners, captured and generated."""
     rows = [row for row in found["effects"] if row["effect"] == effect]
     traces = [

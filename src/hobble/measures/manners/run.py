@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,9 @@ from hobble.core.section import Section
 from hobble.evaluation.captured import Captured, captured_clips
 from hobble.evaluation.crowd import FPS
 from hobble.gait.discriminant import Discriminant, learn
-from hobble.measures.given import Given, Outcome
+from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.manners.left_out import left_out, share
+from hobble.measures.manners.results import Effect, Manners, Named, OfChannel, Together
 from hobble.measures.manners.windows import (
     EFFECTS,
     NONE,
@@ -36,10 +37,6 @@ from hobble.runtime.options import Runtime
 PACES = (0.85, 1.0, 1.15)  # of the median speed of captured neutral walks; the same for every manner
 ASKED = 120.0  # cm a second, if there are no captured neutral walks
 HALF, FULL = 0.5, 1.0  # values of a manner
-# Shrinkages of the covariance towards its diagonal. The one that names most windows of left-out people right
-# is used. With fewer clips a larger one is better: .6 recognises 69 % of moods and 51 % of diagnoses, .02
-# 54 % and 63 %.
-SHRINKAGES = (0.02, 0.1, 0.3, 0.6)
 REASON = "none of this network's inputs is a manner of walking"
 TOO_FEW = "there are walking clips of fewer than two manners"
 
@@ -50,7 +47,7 @@ def manners(
     splits: Mapping[str, str],
     people: Mapping[str, str],
     runtime: Runtime,
-) -> dict[str, Any]:
+) -> Manners:
     """The content of manners.json. If it cannot be measured, `applies` is false and `reason` says why.
 
     people: clip -> the person who walks in it, or the clip's own name if that is unknown. channels: a result
@@ -75,21 +72,20 @@ def of_channel(
     splits: Mapping[str, str],
     people: Mapping[str, str],
     runtime: Runtime,
-) -> dict[str, Any]:
-    """The result for one channel; {} with walks of fewer than two manners.
+) -> OfChannel | None:
+    """The result for one channel; None with walks of fewer than two manners.
 
-    captured: see `left_out`, with the one of SHRINKAGES that names most windows right. generated: for each
-    manner and value the share of `windows` recognised with what was learnt from the training clips. For two
-    manners together: the share recognised as either, and how far the walk is `between` the two single ones.
+    captured: see `left_out`. generated: for each manner and value the share of `windows` recognised with what
+    was learnt from the training clips. For two manners together: the share recognised as either, and how far
+    the walk is `between` the two single ones.
     together: the same for each manner at 1 together with each column of another channel at its highest.
     effects: of each manner, captured and generated, minus the neutral walk's.
     """
     known = [w for w in windows if splits[w.clip] == "train"]
     seen = sorted({w.manner for w in known} - {NONE})
     if len(seen) < 2:
-        return {}
-    tried = [left_out(windows, people, shrinkage) for shrinkage in SHRINKAGES]
-    captured = max(tried, key=lambda one: (one["right"] or 0.0, one["shrinkage"]))
+        return None
+    captured = left_out(windows, people)
     judge = learn(table(known), [w.manner for w in known], captured["shrinkage"])
     speed = float(np.median([w.values["speed"] for w in known if w.manner == NONE] or [ASKED])) / FPS
     single = [{}, *({manner: value} for value in (HALF, FULL) for manner in seen)]
@@ -113,49 +109,13 @@ def of_channel(
         "generated": rows,
         "right_at_1": _weighted(right),
         "together": together(network, name, judge, seen, speed, runtime),
-        "effects": [
-            {"channel": name, "manner": m, "effect": e, **_sizes(e, m, known, each[0], half[m], full[m])}
-            for m in seen
-            for e in EFFECTS
-        ],
-    }
-
-
-def left_out(windows: Sequence[Window], people: Mapping[str, str], shrinkage: float) -> dict[str, Any]:
-    """Windows of each person (or clip, with its mirror), named with what was learnt from all others.
-
-    people: number of persons, `people_of` those of each manner. right: share of windows named right,
-    `by_manner` too. presence_right: share in which it is right whether there is a manner at all. A manner
-    that only one person has cannot be named.
-    """
-    persons: dict[str, list[Window]] = {}
-    for w in windows:
-        persons.setdefault(people[w.clip], []).append(w)
-    right: dict[str, list[bool]] = {}
-    either: list[bool] = []
-    for person, mine in sorted(persons.items()):
-        rest = [w for other, some in persons.items() if other != person for w in some]
-        if len({w.manner for w in rest}) < 2:
-            continue
-        names = learn(table(rest), [w.manner for w in rest], shrinkage).names(table(mine))
-        for w, name in zip(mine, names, strict=True):
-            right.setdefault(w.manner, []).append(w.manner == name)
-            either.append((w.manner == NONE) == (name == NONE))
-    owners = {(w.manner, people[w.clip]) for w in windows}
-    return {
-        "shrinkage": shrinkage,
-        "people": len(persons),
-        "people_of": {m: sum(manner == m for manner, _ in owners) for m in sorted({m for m, _ in owners})},
-        "windows": sum(map(len, right.values())),
-        "right": _share([r for some in right.values() for r in some]),
-        "by_manner": {manner: _share(some) for manner, some in sorted(right.items())},
-        "presence_right": _share(either),
+        "effects": [_effect(name, m, e, known, each[0], half[m], full[m]) for m in seen for e in EFFECTS],
     }
 
 
 def together(
     network: Network, name: str, judge: Discriminant, seen: Sequence[str], speed: float, runtime: Runtime
-) -> list[dict[str, Any]]:
+) -> list[Together]:
     """How often each manner at 1 is named while a column of another channel is at its highest value.
 
     It has a row for each manner (or NONE) and each column that was above 0 in training.
@@ -171,15 +131,20 @@ def together(
         for m, other, column in cases
     ]
     walks = generated(network, figures, name, runtime)
-    rows = []
+    rows: list[Together] = []
     for (manner, other, column), some in zip(cases, walks, strict=True):
         names = judge.names(table(some))
-        named = {
-            "windows": len(names),
-            "share": _share([n == manner for n in names]),
-            "named": _counts(names),
-        }
-        rows.append({"channel": name, "manner": manner, "other": other, "column": column, **named})
+        rows.append(
+            {
+                "channel": name,
+                "manner": manner,
+                "other": other,
+                "column": column,
+                "windows": len(names),
+                "share": share([n == manner for n in names]),
+                "named": _counts(names),
+            }
+        )
     return rows
 
 
@@ -188,20 +153,24 @@ def run(given: Given, options: Section) -> Outcome:
     motion = captured_clips(given.clips.values())
     result = manners(load_network(given.weights), motion, given.splits, given.people, given.runtime)
     found = result.get("channels", [])
-    tables = {key: [row for one in found for row in one[key]] for key in ("effects", "together")}
-    tables["together"] = [{k: v for k, v in row.items() if k != "named"} for row in tables["together"]]
+    tables: dict[str, list[Row]] = {
+        "effects": [row for one in found for row in one["effects"]],
+        "together": [
+            {k: v for k, v in row.items() if k != "named"} for one in found for row in one["together"]
+        ],
+    }
     says = "; ".join(f"{one['channel']} named right: {one['right_at_1']}" for one in found)
-    return Outcome(result, tables, says or result["reason"])
+    return Outcome(result, tables, says or result.get("reason", ""))
 
 
-def _named(judge: Discriminant, values: Mapping[str, float], windows: Sequence[Window]) -> dict[str, Any]:
+def _named(judge: Discriminant, values: Mapping[str, float], windows: Sequence[Window]) -> Named:
     names = judge.names(table(windows))
     wanted = set(values) or {NONE}
     return {
         "manners": list(values),
         "value": next(iter(values.values()), 0.0) if len(values) < 2 else None,
         "windows": len(names),
-        "share": _share([name in wanted for name in names]),
+        "share": share([name in wanted for name in names]),
         "named": _counts(names),
     }
 
@@ -210,19 +179,23 @@ def _counts(names: Sequence[str]) -> dict[str, int]:
     return {name: names.count(name) for name in sorted(set(names))}
 
 
-def _sizes(
-    effect: str,
+def _effect(
+    name: str,
     manner: str,
+    effect: str,
     known: Sequence[Window],
     plain: Sequence[Window],
     half: Sequence[Window],
     full: Sequence[Window],
-) -> dict[str, float | None]:
-    """Differences from no manner: captured (None without neutral clips), generated at 1 and at .5."""
+) -> Effect:
+    """One effect. Windows: captured ones, and generated ones without a manner, with it at .5 and at 1."""
     neutral = [w for w in known if w.manner == NONE]
     mine = [w for w in known if w.manner == manner]
     base = mean_effect(plain, effect)
     return {
+        "channel": name,
+        "manner": manner,
+        "effect": effect,
         "captured": round(mean_effect(mine, effect) - mean_effect(neutral, effect), 4) if neutral else None,
         "generated": round(mean_effect(full, effect) - base, 4),
         "generated_at_half": round(mean_effect(half, effect) - base, 4),
@@ -239,10 +212,6 @@ def _mean(windows: Sequence[Window]) -> Array:
     return np.asarray(table(windows).mean(axis=0))
 
 
-def _share(right: Sequence[bool]) -> float | None:
-    return round(sum(right) / len(right), 5) if right else None
-
-
-def _weighted(shares: Sequence[tuple[float, int]]) -> float | None:
+def _weighted(shares: Sequence[tuple[float | None, int]]) -> float | None:
     whole = sum(windows for _, windows in shares)
-    return round(sum(share * windows for share, windows in shares) / whole, 5) if whole else None
+    return round(sum((right or 0.0) * windows for right, windows in shares) / whole, 5) if whole else None

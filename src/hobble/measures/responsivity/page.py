@@ -271,14 +271,14 @@ def track_figures(found: Json) -> list[Figure]:
 
 def _turn(found: Json) -> Figure:
     """The largest turn of a joint in one frame: as predicted, and as drawn after the runtime's limit."""
-    drawn, asked = (number(found.get(key)) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
+    drawn, predicted = (number(found.get(key)) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
     allowed = f"the runtime limits it to {np.degrees(FASTEST_TURN):.0f}°"
     if found.get("predicted_turn_degrees") is None:
         return Figure("Largest turn of a joint", drawn, "°", f"in one frame, as drawn; {allowed}")
     frames = sum(lap.get("frames") or 0 for lap in found["laps"])
     held = f"{found['turns_held_back']:,} of {frames:,} frames"
     note = f"of a joint in one frame; {allowed}, which changed {held}; largest turn drawn: {drawn}°"
-    return Figure("Largest predicted turn", asked, "°", note)
+    return Figure("Largest predicted turn", predicted, "°", note)
 
 
 def speed_published(found: Json, material: Material) -> Table | None:
@@ -359,24 +359,24 @@ def _speed(found: Json) -> Iterator[Hint]:
 
 
 def _track(found: Json) -> Iterator[Hint]:
-    reached, asked = (found.get(key) for key in ("waypoints_reached", "waypoints"))
-    if asked and reached is not None and reached < asked:
+    reached, total = (found.get(key) for key in ("waypoints_reached", "waypoints"))
+    if total and reached is not None and reached < total:
         yield Hint(
             "warn",
-            f"The character reached {reached} of {asked} waypoints.",
+            f"The character reached {reached} of {total} waypoints.",
             "It circles or stops before a waypoint that it does not reach. See the laps under Speed and "
             "response.",
         )
-    drawn, asked = (found.get(key) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
+    drawn, predicted = (found.get(key) for key in ("largest_turn_degrees", "predicted_turn_degrees"))
     if drawn is not None and drawn > 60:
         yield Hint(
             "warn",
             f"A joint turned by {drawn:.0f} degrees in one frame.",
             "That is a flip, which is visible on a skinned character.",
         )
-    elif asked is not None and asked > 60:
+    elif predicted is not None and predicted > 60:
         yield Hint(
             "note",
-            f"The network predicted a turn of a joint by {asked:.0f} degrees in one frame.",
+            f"The network predicted a turn of a joint by {predicted:.0f} degrees in one frame.",
             f"The runtime limited it to {drawn:.0f}. Check whether joint rotations flip in the clips.",
         )

@@ -173,7 +173,7 @@ def _lap(
     start = int(follower.reached[0])
     goal = start + len(follower.track)
     positions, rotations, contacts, off = [], [], [], []
-    asked, taken, places = [], [], []
+    predicted, taken, places = [], [], []
     times: list[tuple[float, ...]] = []
     while follower.reached[0] < goal and len(times) < longest:
         before = perf_counter()
@@ -182,7 +182,7 @@ def _lap(
         times.append((*animation.seconds, whole))
         positions.append(pose.positions[toes])
         rotations.append(pose.rotations.astype(np.float32))
-        asked.append(animation.predicted_rotations[0])
+        predicted.append(animation.predicted_rotations[0])
         taken.append(animation.state.joint_rotation[0].copy())
         contacts.append(pose.contacts)
         off.append(follower.off_path[0])
@@ -200,8 +200,8 @@ def _lap(
         "foot_slide_cm": round(float(slide.mean()), 4) if len(slide) else None,
         "steps": len(slide),
         "largest_turn_degrees": round(largest_turn(np.array(rotations)), 3),
-        "predicted_turn_degrees": round(largest_turn(np.array(asked)), 3),
-        "turns_held_back": _held_back(np.array(asked), np.array(taken)),
+        "predicted_turn_degrees": round(largest_turn(np.array(predicted)), 3),
+        "turns_held_back": _held_back(np.array(predicted), np.array(taken)),
         "milliseconds": _milliseconds(seconds),
     }
     return lap, seconds, _run(number, np.array(places), np.array(off))
@@ -222,10 +222,10 @@ def _run(number: int, places: Array, off: Array) -> dict[str, Any]:
     }
 
 
-def _held_back(asked: Array, taken: Array) -> int:
+def _held_back(predicted: Array, taken: Array) -> int:
     """Number of frames in which the runtime limited the turn of a joint; both (F, J, 4), else equal."""
-    same = np.abs(np.sum(asked * taken, axis=-1)) > 1 - 1e-6
-    return int((~same).any(axis=1).sum()) if len(asked) else 0
+    same = np.abs(np.sum(predicted * taken, axis=-1)) > 1 - 1e-6
+    return int((~same).any(axis=1).sum()) if len(predicted) else 0
 
 
 def _milliseconds(seconds: Array) -> dict[str, Any]:

@@ -125,7 +125,7 @@ def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
 
 
 def roll_out(
-    predictor: Predictor, asked: Inputs, starts: np.ndarray, length: int
+    predictor: Predictor, clip_inputs: Inputs, starts: np.ndarray, length: int
 ) -> tuple[list[Array], Array]:
     """The joints of roll-outs that begin at frames `starts` (n,), which rise, and their last phases (n,).
 
@@ -134,23 +134,23 @@ def roll_out(
     """
     layout = predictor.network.layout
     joints = (len(starts), layout.joints, 3)
-    x = asked.x[starts]
+    x = clip_inputs.x[starts]
     place = x[:, layout.x_joint_position].reshape(joints).astype(float)
-    phase = asked.phase[starts].copy()
+    phase = clip_inputs.phase[starts].copy()
     speed = np.zeros(joints)
     memory = np.zeros((len(starts), predictor.network.memory))
     made = []
     for age in range(length):
-        alive = int(np.searchsorted(starts, len(asked.x) - age))
+        alive = int(np.searchsorted(starts, len(clip_inputs.x) - age))
         at = starts[:alive] + age
         if not alive:
             break
-        row = asked.x[at].copy()
+        row = clip_inputs.x[at].copy()
         if age:
             # The predicted pose, still in the last frame's root. Heights are made relative to this frame's
             # mean.
             lower = place[:alive].copy()
-            lower[..., 1] += (asked.mean[at - 1] - asked.mean[at])[:, None]
+            lower[..., 1] += (clip_inputs.mean[at - 1] - clip_inputs.mean[at])[:, None]
             row[:, layout.x_joint_position] = lower.reshape(alive, -1)
             row[:, layout.x_joint_velocity] = speed[:alive].reshape(alive, -1)
         kept = {"memory": memory[:alive]} if predictor.network.memory else {}
@@ -158,18 +158,18 @@ def roll_out(
         before = row[:, layout.x_joint_position].reshape(alive, -1, 3).astype(float)
         speed[:alive] = y[:, layout.y_joint_velocity].reshape(alive, -1, 3)
         guess = y[:, layout.y_joint_position].reshape(alive, -1, 3)
-        place[:alive] = joint_place(_carried(before, asked, at) + speed[:alive], guess)
+        place[:alive] = joint_place(_carried(before, clip_inputs, at) + speed[:alive], guess)
         made.append(place[:alive].copy())
-        moved = phase_change(asked.moving[at], y[:, layout.y_phase_change][:, 0])
+        moved = phase_change(clip_inputs.moving[at], y[:, layout.y_phase_change][:, 0])
         phase[:alive] = np.mod(phase[:alive] + moved, 1.0)
     return made, phase
 
 
-def _carried(place: Array, asked: Inputs, at: np.ndarray) -> Array:
+def _carried(place: Array, clip_inputs: Inputs, at: np.ndarray) -> Array:
     """Joints (n, J, 3) moved from the root frame of frames at - 1 to that of frames `at`."""
     out = place.copy()
-    level = place[..., ::2] - asked.velocity[at - 1][:, None]
-    out[..., ::2] = rotate_by_yaw(level, asked.turn[at - 1][:, None])
+    level = place[..., ::2] - clip_inputs.velocity[at - 1][:, None]
+    out[..., ::2] = rotate_by_yaw(level, clip_inputs.turn[at - 1][:, None])
     return out
 
 
@@ -184,21 +184,21 @@ def clip_roll_outs(
     layout = predictor.network.layout
     out = {length: RollOutErrors() for length in lengths}
     for chosen in unbroken(rows.frame):
-        asked = inputs(rows, chosen, layout)
+        clip_inputs = inputs(rows, chosen, layout)
         for length in lengths:
             all_starts = np.arange(1, len(chosen), max(1, length // OVERLAP))
             for first in range(0, len(all_starts), BATCH):
                 starts = all_starts[first : first + BATCH]
-                out[length] += _errors(predictor, asked, starts, length, joints)
+                out[length] += _errors(predictor, clip_inputs, starts, length, joints)
     return out
 
 
 def _errors(
-    predictor: Predictor, asked: Inputs, starts: np.ndarray, length: int, joints: Sequence[int]
+    predictor: Predictor, clip_inputs: Inputs, starts: np.ndarray, length: int, joints: Sequence[int]
 ) -> RollOutErrors:
     layout = predictor.network.layout
-    truth = asked.y[:, layout.y_joint_position].reshape(len(asked.y), -1, 3)[:, joints]
-    made, phase = roll_out(predictor, asked, starts, length)
+    truth = clip_inputs.y[:, layout.y_joint_position].reshape(len(clip_inputs.y), -1, 3)[:, joints]
+    made, phase = roll_out(predictor, clip_inputs, starts, length)
     frames, moments = 0, Moments.nothing(2)
     errors: Array = np.zeros((0, len(joints), 2))
     for age, place in enumerate(made):
@@ -208,10 +208,10 @@ def _errors(
         moments = moments + Moments.of(errors.reshape(-1, 2), weights)
         frames += len(place)
     # The phase is already that of the next frame, so that one has to be in the stretch too.
-    ended = int(np.searchsorted(starts, len(asked.x) - length))
+    ended = int(np.searchsorted(starts, len(clip_inputs.x) - length))
     if not ended:
         return RollOutErrors(frames, len(starts), moments)
-    off = np.abs(np.mod(phase[:ended] - asked.phase[starts[:ended] + length] + 0.5, 1.0) - 0.5)
+    off = np.abs(np.mod(phase[:ended] - clip_inputs.phase[starts[:ended] + length] + 0.5, 1.0) - 0.5)
     last = np.stack([errors[:ended, :, 1].mean(axis=1), off], axis=1)
     return RollOutErrors(frames, len(starts), moments, Moments.of(last), ended)
 

@@ -1,6 +1,12 @@
 // Shared by every part of the page: its data and its colours.
 
-export const material = JSON.parse(document.getElementById("material").textContent);
+// The data of the page, one element for each part. A part is parsed when it is used first, so that nobody waits for it.
+const PARTS = ["name", "hero", "bodies", "playable", "charts", "scenes", "strips", "grounds", "compare"];
+export const material = Object.defineProperties({}, Object.fromEntries(PARTS.map((part) => {
+  let known;
+  const get = () => (known ??= JSON.parse(document.querySelector(`script#data-${part}`)?.textContent ?? "null"));
+  return [part, { get, enumerable: true }];
+})));
 
 // Called when the colours change.
 export const onTheme = [];

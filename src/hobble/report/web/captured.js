@@ -7,7 +7,7 @@ import { createView } from "./view.js";
 // Opens a clip by name at the frame with the largest distance. Returns false if the page does not have the clip.
 export let openClip = () => false;
 
-(() => {
+export const startCaptured = () => {
   const shown = material.compare, canvas = document.getElementById("compare-view");
   if (!canvas || !shown || !shown.clips) return;
   const J = shown.joints, slider = find("compare-time"), choice = find("compare-choice"), unpacked = new Map();
@@ -85,4 +85,4 @@ export let openClip = () => false;
   });
   view.orbit.listen(find("compare-stage"));
   choose();
-})();
+};

@@ -1,12 +1,22 @@
 // Charts: drawn when they scroll into view, in the page's colours, and again when the theme changes.
-import Plotly from "plotly.js-cartesian-dist-min";
+import library from "plotly.js-cartesian-dist-min"; // as text, see bundle.py
 import { colour, material, onTheme } from "./base.js";
 import { openClip } from "./captured.js";
 
-// Draws every chart, for printing.
-export let drawAll;
+// To read and run plotly.js takes long, so it happens at the first chart.
+const plotly = () => {
+  if (!globalThis.Plotly) {
+    const script = document.createElement("script");
+    script.textContent = library;
+    document.head.append(script);
+  }
+  return globalThis.Plotly;
+};
 
-(() => {
+// Draws every chart, for printing.
+export let drawAll = () => {};
+
+export const startCharts = () => {
   const resolve = (value) => {
     if (typeof value === "string") return value[0] === "@" ? colour(value.slice(1)) : value;
     if (Array.isArray(value)) return value.map(resolve);
@@ -53,7 +63,7 @@ export let drawAll;
     const shape = layout(chosen && chosen.layout ? merge(spec, { layout: chosen.layout }) : spec, narrow);
     const first = !drawn.has(element);
     if (first) drawn.set(element, 0);
-    Plotly.react(element, traces, shape, config);
+    plotly().react(element, traces, shape, config);
     // A click on a point of a clip opens the clip in the viewer.
     if (first) element.on("plotly_click", ({ points }) => [points[0].y, points[0].x, points[0].text].some(openClip));
   };
@@ -75,4 +85,4 @@ export let drawAll;
   }, { rootMargin: "600px" });
   document.querySelectorAll("[data-chart]").forEach((element) => near.observe(element));
   onTheme.push(() => { for (const element of drawn.keys()) draw(element); });
-})();
+};

@@ -1,6 +1,6 @@
 // The figure: one surface, moved by the rotations of its bones and coloured frame by frame.
 import {
-  Bone, Color, DetachedBindMode, Matrix4, MeshStandardMaterial, Quaternion, Skeleton, SkinnedMesh, Sphere, Vector3,
+  Bone, Color, DetachedBindMode, Matrix4, MeshBasicMaterial, MeshStandardMaterial, Quaternion, Skeleton, SkinnedMesh, Sphere, Vector3,
 } from "three";
 import { bodyOf } from "./bodies.js";
 import { linear } from "./paint.js";
@@ -47,7 +47,7 @@ export const createFigure = (view, body, regions = [], { ghost = false } = {}) =
     return mesh;
   };
   if (ghost) { // draw only the depth first, so that no part of the ghost shows through another
-    const deep = add(new MeshStandardMaterial({ colorWrite: false }));
+    const deep = add(new MeshBasicMaterial({ colorWrite: false }));
     deep.renderOrder = 1;
   }
   const mesh = add(look(tints, ghost));

@@ -4,7 +4,7 @@ import { createFigure } from "./figure.js";
 import { bytes, mix } from "./numbers.js";
 import { createView } from "./view.js";
 
-(() => {
+export const startFits = () => {
   const grounds = material.grounds, canvas = document.getElementById("ground");
   if (!canvas || !grounds || !grounds.pictures.length) return;
   const choice = document.getElementById("ground-choice");
@@ -41,4 +41,4 @@ import { createView } from "./view.js";
   const figures = [0, 1, 2].map(() => createFigure(view, grounds.body));
   choice.addEventListener("change", view.ask);
   view.orbit.listen(document.getElementById("ground-stage"));
-})();
+};

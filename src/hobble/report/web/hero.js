@@ -9,15 +9,14 @@ import { createView } from "./view.js";
 const GHOST_OFFSET = -84; // cm from the figure to the transparent one, negative: to its left
 const MOST_AHEAD = 120; // cm that the transparent one may get ahead before it is moved back
 const FADE = 24; // frames in which it fades out, and in
-// Frames that are simulated before the first picture: in the first both walk alike, so one is enough; then the value
-// begins. These predictions are most of the time until the figures move.
-const ALIKE = 40, APART = 30;
 const SPEED = 2.5; // target speed, cm per frame
 
 const createHero = (spec, asked) => {
   const section = find("hero"), canvas = find("hero-view"), line = find("hero-line"), still = find("hero-walk");
   const one = firstShown(spec), labels = one ? Object.keys(one.sliders) : [];
   const values = new Map(), neutralValues = new Map(), flat = () => 0, hero = { frames: 0 };
+  let drawn;
+  hero.shown = new Promise((done) => { drawn = done; }); // when it has moved, or has its first picture if it rests
   let part = labels.includes(asked.part) ? asked.part : labels[0];
   let last = null, due = 0, shown = 0, fade = 1, leaving = false, camera = null, walks = !matchMedia("(prefers-reduced-motion: reduce)").matches;
 
@@ -27,6 +26,7 @@ const createHero = (spec, asked) => {
   const view = createView(canvas, { yaw: .62, pitch: .1, distance: 460, nearest: 240, furthest: 800 }, (now) => {
     if (walks) advance(now);
     draw(now);
+    if (!walks || hero.frames > 1) drawn();
     if (walks) view.ask();
   });
   view.onHidden = () => { last = null; };
@@ -90,8 +90,8 @@ const createHero = (spec, asked) => {
       words.part.textContent = part;
       words.much.textContent = `${dial.value} of 10`;
       if (!one.on) find("hero-on").textContent = part;
-      const same = "One neural network moves both figures, and both have the same target speed. ";
-      if (dial.value) line.replaceChildren(`${same}For the solid one, the network also gets the input ${before}`, words.part, `${after}, `, words.much, ".");
+      const same = "One neural network moves both figures at the same target speed. ";
+      if (dial.value) line.replaceChildren(`${same}The solid one also gets the input ${before}`, words.part, `${after}, `, words.much, ".");
       else line.replaceChildren(`${same}At 0 they walk alike.`);
       chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
     };
@@ -124,15 +124,22 @@ const createHero = (spec, asked) => {
   still.addEventListener("click", () => { walks = !walks; last = null; rest(); view.ask(); });
   rest();
 
-  for (const actor of [main, ghost]) actor?.start(flat);
-  for (; hero.frames < ALIKE; hero.frames++) main.frame(wish(), neutralValues);
-  ghost?.character.follow(main.character, [GHOST_OFFSET, 0]);
-  for (; hero.frames < ALIKE + APART; hero.frames++) { main.frame(wish(), values); ghost?.frame(wish(), neutralValues); }
+  // The page has the states of figures that walk already, because to predict their first steps would take long here.
+  const [walking, beside] = asked.walked ?? [];
+  view.compile();
+  main.start(flat);
+  ghost?.start(flat);
+  if (walking) main.character.follow(walking);
+  if (ghost && beside) ghost.character.follow(beside, [walking.root[0] - beside.root[0] + GHOST_OFFSET, walking.root[2] - beside.root[2]]);
+  for (const actor of [main, ghost]) actor?.rig.take(actor.character.pose, actor.character.turns);
   glide(1);
   showPace();
   section.classList.add("ready");
   return Object.assign(hero, { main, ghost, view, step });
 };
 
-const canvas = find("hero-view"), spec = Object.values(material.playable)[0];
-export const hero = canvas && spec ? createHero(spec, material.hero) : null;
+export let hero = null;
+export const startHero = () => {
+  const [spec] = find("hero-view") ? Object.values(material.playable) : [];
+  if (spec) hero = createHero(spec, material.hero);
+};

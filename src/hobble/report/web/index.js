@@ -1,21 +1,43 @@
 // The report's page. `Hobble` gives access to its parts from the browser's console and from the tests.
 import { colour, material } from "./base.js";
 import { bvh } from "./bvh.js";
+import { openClip, startCaptured } from "./captured.js";
 import { createCharacter } from "./character.js";
+import { drawAll, startCharts } from "./charts.js";
 import { createChase } from "./chase.js";
-import { hero } from "./hero.js";
-import { createRig } from "./rig.js";
-import { groundSamples, jointVelocities } from "./inputs.js";
-import { drawAll } from "./charts.js";
-import { csv } from "./tables.js";
-import "./walking.js";
-import { player } from "./play.js";
-import { createLab } from "./lab.js";
-import { openClip } from "./captured.js";
 import { measureWalk, profile } from "./cycles.js";
+import { startFits } from "./fits.js";
+import { hero, startHero } from "./hero.js";
+import { groundSamples, jointVelocities } from "./inputs.js";
+import { createLab } from "./lab.js";
+import { startPage } from "./page.js";
+import { player, startPlay } from "./play.js";
 import { createGrader, createWatch } from "./recogniser.js";
-import "./fits.js";
-import "./strips.js";
-import "./page.js";
+import { createRig } from "./rig.js";
+import { startStrips } from "./strips.js";
+import { csv, startTables } from "./tables.js";
+import { startWalks } from "./walking.js";
 
-globalThis.Hobble = { bvh, character: createCharacter, chase: createChase, colour, csv, drawAll, grader: createGrader, groundSamples, hero, jointVelocities, lab: createLab, material, measureWalk, openClip, player, profile, rig: createRig, watch: createWatch };
+globalThis.Hobble = {
+  bvh, character: createCharacter, chase: createChase, colour, csv, grader: createGrader, groundSamples, jointVelocities, lab: createLab,
+  material, measureWalk, profile, rig: createRig, watch: createWatch, ready: false,
+  get drawAll() { return drawAll; },
+  get hero() { return hero; },
+  get openClip() { return openClip; },
+  get player() { return player; },
+};
+
+const parts = [startPage, startTables, startPlay, startWalks, startCaptured, startCharts, startStrips, startFits];
+const next = () => {
+  const start = parts.shift();
+  if (start) { setTimeout(next); start(); } else Hobble.ready = true;
+};
+const rest = async () => {
+  if (hero) await Promise.race([hero.shown, new Promise((done) => { setTimeout(done, 1000); })]);
+  next();
+};
+
+// The figures at the top walk at once, while the browser still reads what is below. Then the other parts start one after
+// another, with time for a picture in between.
+if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", rest); else queueMicrotask(rest);
+startHero();

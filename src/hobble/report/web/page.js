@@ -3,7 +3,7 @@ import { onTheme } from "./base.js";
 import { drawAll } from "./charts.js";
 import { views } from "./view.js";
 
-(() => {
+export const startPage = () => {
   const root = document.documentElement, button = document.getElementById("theme");
   const themes = ["auto", "light", "dark"];
   const remembered = () => { try { return localStorage.getItem("hobble-theme"); } catch { return null; } };
@@ -53,4 +53,4 @@ import { views } from "./view.js";
     });
   }, { rootMargin: "-20% 0px -60%" });
   document.querySelectorAll("main section[id]").forEach((section) => watch.observe(section));
-})();
+};

@@ -139,5 +139,8 @@ const createPlay = (stage, playables) => {
   return Object.assign(player, { chase, sliders, steering, view, start });
 };
 
-const stage = find("play-stage");
-export const player = stage && Object.keys(material.playable).length ? createPlay(stage, material.playable) : null;
+export let player = null;
+export const startPlay = () => {
+  const stage = find("play-stage");
+  if (stage && Object.keys(material.playable).length) player = createPlay(stage, material.playable);
+};

@@ -1,7 +1,7 @@
 // Label strips: contacts, phase, gait, speed and channel values of one clip over time.
 import { colour, material, onTheme } from "./base.js";
 
-(() => {
+export const startStrips = () => {
   const strips = material.strips, host = document.getElementById("strip");
   if (!host || !strips || !strips.length) return;
   const select = document.getElementById("strip-clip"), keys = document.getElementById("strip-keys");
@@ -116,4 +116,4 @@ import { colour, material, onTheme } from "./base.js";
   addEventListener("resize", () => requestAnimationFrame(draw));
   onTheme.push(draw);
   draw();
-})();
+};

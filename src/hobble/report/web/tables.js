@@ -4,30 +4,31 @@ import { save } from "./base.js";
 const raw = (cell) => cell.dataset.v ?? cell.textContent;
 const byText = new Intl.Collator("en", { numeric: true }).compare;
 
-document.querySelectorAll("table[data-csv]").forEach((table) => {
-  const heads = [...table.tHead.rows[0].cells];
-  heads.forEach((head, column) => head.addEventListener("click", () => {
-    const falling = head.getAttribute("aria-sort") === "ascending";
-    heads.forEach((other) => other.removeAttribute("aria-sort"));
-    head.setAttribute("aria-sort", falling ? "descending" : "ascending");
-    const numeric = head.classList.contains("n");
-    const rows = [...table.tBodies[0].rows];
-    rows.sort((a, b) => {
-      const [x, y] = [raw(a.cells[column]), raw(b.cells[column])];
-      if (!numeric) return falling ? byText(y, x) : byText(x, y);
-      const [p, q] = [parseFloat(x), parseFloat(y)];
-      if (isNaN(p) || isNaN(q)) return isNaN(p) - isNaN(q); // empty cells stay at the end
-      return falling ? q - p : p - q;
-    });
-    table.tBodies[0].append(...rows);
-  }));
-});
-
 const quoted = (text) => (/[",\n\r]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
 export const csv = (table) => [...table.rows]
   .map((row) => [...row.cells].map((cell) => quoted(raw(cell).trim())).join(",")).join("\r\n") + "\r\n";
 
-document.querySelectorAll("[data-download]").forEach((button) => button.addEventListener("click", () => {
-  const name = button.dataset.download, table = document.querySelector(`table[data-csv="${CSS.escape(name)}"]`);
-  save(new Blob([csv(table)], { type: "text/csv" }), `${name}.csv`);
-}));
+export const startTables = () => {
+  document.querySelectorAll("table[data-csv]").forEach((table) => {
+    const heads = [...table.tHead.rows[0].cells];
+    heads.forEach((head, column) => head.addEventListener("click", () => {
+      const falling = head.getAttribute("aria-sort") === "ascending";
+      heads.forEach((other) => other.removeAttribute("aria-sort"));
+      head.setAttribute("aria-sort", falling ? "descending" : "ascending");
+      const numeric = head.classList.contains("n");
+      const rows = [...table.tBodies[0].rows];
+      rows.sort((a, b) => {
+        const [x, y] = [raw(a.cells[column]), raw(b.cells[column])];
+        if (!numeric) return falling ? byText(y, x) : byText(x, y);
+        const [p, q] = [parseFloat(x), parseFloat(y)];
+        if (isNaN(p) || isNaN(q)) return isNaN(p) - isNaN(q); // empty cells stay at the end
+        return falling ? q - p : p - q;
+      });
+      table.tBodies[0].append(...rows);
+    }));
+  });
+  document.querySelectorAll("[data-download]").forEach((button) => button.addEventListener("click", () => {
+    const name = button.dataset.download, table = document.querySelector(`table[data-csv="${CSS.escape(name)}"]`);
+    save(new Blob([csv(table)], { type: "text/csv" }), `${name}.csv`);
+  }));
+};

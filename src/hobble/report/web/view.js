@@ -21,10 +21,13 @@ const asked = new URLSearchParams(location.search).get("quality");
 let level = 0, slow = 0;
 
 let renderer = null;
-const shared = () => {
+// first: the canvas of the first view, whose size is the first size of the picture.
+const shared = (first) => {
   if (renderer === null) {
     try {
-      renderer = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: "high-performance" });
+      const [width, height] = first ? [first.clientWidth, first.clientHeight] : [300, 150];
+      const canvas = Object.assign(document.createElement("canvas"), { width, height });
+      renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: "high-performance" });
       renderer.shadowMap.enabled = true;
       renderer.shadowMap.type = VSMShadowMap;
       renderer.setScissorTest(true);
@@ -164,16 +167,23 @@ export const createView = (canvas, home, draw) => {
     lights.fine(LEVELS[level].shadow);
     view.balls = LEVELS[level].balls;
   };
+  // Begins to compile the shaders of what is in the scene. The graphics card does it while scripts go on.
+  view.compile = () => {
+    const gl = shared(canvas);
+    if (!gl) return;
+    fit();
+    gl.compile(scene, camera);
+  };
   const fits = () => drawnFor >= 0 && view.W === canvas.clientWidth && view.H === canvas.clientHeight;
   // Setting the size of a canvas clears it. For printing, the size is set first and then the picture is drawn. The observer
   // is told of this size afterwards and must not clear the picture again, hence `fits`.
   views.push(() => {
-    shared();
+    shared(canvas);
     if (!fits()) fit();
     paint(performance.now());
   });
   new ResizeObserver(() => {
-    shared();
+    shared(canvas);
     if (fits()) return;
     fit();
     if (seen) paint(performance.now()); // at once

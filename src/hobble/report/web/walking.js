@@ -1,4 +1,4 @@
-// Recorded walks: plays the motion in the page, with footprints, readings and a time slider.
+// Scripted walks: plays the motion in the page, with footprints, readings and a time slider.
 import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
 import { createMotion } from "./motion.js";
@@ -6,7 +6,7 @@ import { bytes } from "./numbers.js";
 import { channelColour } from "./paint.js";
 import { createView } from "./view.js";
 
-(() => {
+export const startWalks = () => {
   const scenes = material.scenes, stage = document.getElementById("stage");
   if (!stage || !scenes.scenarios || !scenes.scenarios.length) return;
   const slider = find("time"), clock = find("clock"), reading = find("reading"), choice = find("scenario");
@@ -141,4 +141,4 @@ import { createView } from "./view.js";
   view.orbit.listen(stage);
   choose(0);
   play(playing);
-})();
+};

@@ -72,9 +72,9 @@ def limp(
         return {**head, "applies": False, "reason": NO_SEVERITIES}
     links = list(links or links_of(network))
     rows: list[dict[str, Any]] = []
-    for gait, asked in SPEEDS.items():
+    for gait, speed in SPEEDS.items():
         cases = [(link, s) for link in links for s in SEVERITIES]
-        figures = shown(network, [{}, *({link: s} for link, s in cases)], asked, gait, seconds, runtime)
+        figures = shown(network, [{}, *({link: s} for link, s in cases)], speed, gait, seconds, runtime)
         healthy = figures[0]
         if healthy.profile is None:
             if gait == "walk":
@@ -221,13 +221,13 @@ def compare_held_out(
     are asked for 1.2 m/s, the likely speed of the performer's healthy walk. `hurt` and `healthy` are
     distances. `nearer` should be true.
     """
-    asked = [one for one in every if one.hurt and splits.get(one.clip) == "held_out"]
-    if not asked:
+    limps = [one for one in every if one.hurt and splits.get(one.clip) == "held_out"]
+    if not limps:
         return []
-    figures = shown(network, [{}, *(one.hurt for one in asked)], SPEEDS["walk"], "walk", seconds, runtime)
+    figures = shown(network, [{}, *(one.hurt for one in limps)], SPEEDS["walk"], "walk", seconds, runtime)
     own = figures[0].profile
     out = []
-    for one, figure in zip(asked, figures[1:], strict=True):
+    for one, figure in zip(limps, figures[1:], strict=True):
         healthy, whose = healthy_of(one, every)
         row: dict[str, Any] = {"clip": one.clip, "hurt_links": dict(one.hurt), "compared_with": whose}
         if own is None or figure.profile is None:

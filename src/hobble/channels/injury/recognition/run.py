@@ -129,13 +129,13 @@ def walking_windows(clip: Captured, network: Network) -> list[Window]:
 def generated(network: Network, classes: Sequence[str], healthy: bool, runtime: Runtime) -> list[Window]:
     """Windows of generated walks, each class at each severity and speed."""
     assert network.skeleton is not None
-    asked = [(name, s, v) for name, s, v in product(classes, GENERATED, SPEEDS)]
-    asked += [(HEALTHY, 0.0, v) for v in SPEEDS] if healthy else []
-    hurt = [{} if name == HEALTHY else dict.fromkeys(name.split(" and "), s) for name, s, _ in asked]
-    script = Stretch(WARM_UP + USED, ["walk"] * len(asked), severities(network, hurt), [v for *_, v in asked])
+    cases = [(name, s, v) for name, s, v in product(classes, GENERATED, SPEEDS)]
+    cases += [(HEALTHY, 0.0, v) for v in SPEEDS] if healthy else []
+    hurt = [{} if name == HEALTHY else dict.fromkeys(name.split(" and "), s) for name, s, _ in cases]
+    script = Stretch(WARM_UP + USED, ["walk"] * len(cases), severities(network, hurt), [v for *_, v in cases])
     walks = run_walks(network, [script], runtime)
     out = []
-    for i, (name, severity, speed) in enumerate(asked):
+    for i, (name, severity, speed) in enumerate(cases):
         for start in range(WARM_UP, WARM_UP + USED - WINDOW + 1, STEP):
             span = slice(start, start + WINDOW)
             values = _values(
@@ -204,10 +204,10 @@ def _cross_validated(windows: Sequence[Window], sided: Plain) -> dict[str, Any]:
     named: list[str] = []
     for part in range(FOLDS):
         rest = [w for w in windows if w.part != part]
-        asked = [w for w in windows if w.part == part]
-        if asked and len({w.hurt for w in rest}) > 1:
-            named += learn(table(rest), [w.hurt for w in rest]).names(table(asked))
-            judged += asked
+        of_part = [w for w in windows if w.part == part]
+        if of_part and len({w.hurt for w in rest}) > 1:
+            named += learn(table(rest), [w.hurt for w in rest]).names(table(of_part))
+            judged += of_part
     return _confusion(sorted({w.hurt for w in windows}), judged, named, sided)
 
 

@@ -51,8 +51,8 @@ def injury_hints(found: Json) -> Iterator[Hint]:
         felt = [r["from_healthy_cm"] for r in walks]
         yield Hint(
             "good",
-            f"The {_plural(len(walks), 'link')} hurt in training, of {len(responses)}, "
-            f"change{'s' if len(walks) == 1 else ''} the walk at severity 10",
+            f"{len(walks)} of {_plural(len(responses), 'link')} were hurt in training and change the walk "
+            "at severity 10",
             f"by {number(min(felt))} to {number(max(felt))} cm per joint.",
         )
 

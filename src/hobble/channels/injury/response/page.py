@@ -5,22 +5,16 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
-from markupsafe import Markup
-
 from hobble.channels.injury.response import page_cases as cases
 from hobble.channels.injury.response.hints import injury_hints
 from hobble.channels.shown import speaker
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, Family, Trace, axis, line
 from hobble.report.gather import Material
-from hobble.report.parts import Pair, Part, Section, Words
+from hobble.report.parts import Pair, Part, Section
 from hobble.report.summary import Hint, placed
 from hobble.report.tables import Column, Table
 
-NOTHING = Markup(
-    "This network has no severities among its inputs, so nothing can hurt it. The configuration "
-    "<code>injured</code> has them."
-)
 LINKS = ("link", "first", "second")  # keys of the JSON that hold a link
 UNTRAINED = "never hurt in training"
 GAIT_COLOURS = {"walk": "@accent", "jog": "@g2"}
@@ -62,9 +56,8 @@ PANELS: tuple[tuple[str, str, str, tuple[tuple[str, str, str], ...], float, bool
 
 
 def section(found: Json, material: Material) -> Section:
-    """Charts and tables. A network without severities has only a sentence."""
-    found = in_words(found, material)
-    parts = _parts(found, material.name) if found.get("applies") else [Part(0, Words(NOTHING, empty=True))]
+    """Charts and tables. Empty for a network without severities."""
+    parts = _parts(in_words(found, material), material.name) if found.get("applies") else []
     return Section("injury", parts, title="Injury response", at=20)
 
 

@@ -88,8 +88,8 @@ def _answer(path: str | Path, number: int, row: Any, study: Study) -> Answer:
     if film not in [shown.number for shown in study.films] or isinstance(film, bool):
         raise InputError(path, f"{where}: there is no film {printable(film, 40)}")
     if not isinstance(parts, list) or (odd := [part for part in parts if part not in study.parts]):
-        said = printable(parts if not isinstance(parts, list) else odd[0], 40)
-        raise InputError(path, f"{where}: no such part: {said}", fix=f"There are {', '.join(study.parts)}.")
+        given = printable(parts if not isinstance(parts, list) else odd[0], 40)
+        raise InputError(path, f"{where}: no such part: {given}", fix=f"There are {', '.join(study.parts)}.")
     if not isinstance(fluid, int) or isinstance(fluid, bool) or fluid not in FLUID:
         raise InputError(path, f"{where}: `fluid` is {printable(fluid, 40)}, but it is a number from 1 to 5")
     return Answer(film, tuple(dict.fromkeys(parts)), fluid)

@@ -11,7 +11,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import headings, root_path
 from hobble.figure.mesh import body
 from hobble.models.network import Network
-from hobble.report.compare import in_world
+from hobble.report.captured_and_predicted import in_world
 from hobble.report.scenes import UNIT
 
 
@@ -55,7 +55,7 @@ def _drawn(made: np.ndarray, compared: dict[str, Any], skeleton: Skeleton) -> np
 
 
 def test_the_error_is_the_distance_of_what_is_drawn(compared: dict[str, Any], network: Network) -> None:
-    """The mean is over all joints, placed by their rotations; most of them are drawn."""
+    """The mean over all joints, most of which are drawn, placed by their rotations."""
     clip = compared["clips"][0]
     apart = np.linalg.norm(
         positions(clip, "captured", compared["joints"]) - positions(clip, "predicted", compared["joints"]),
