@@ -18,7 +18,7 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter, process_time
+from time import perf_counter, process_time, thread_time
 from typing import Any
 
 import numpy as np
@@ -117,8 +117,9 @@ def predictions(network: Pfnn) -> None:
                 rows, times, floor = len(pool), [], []
                 for k in range(CALLS):
                     phase[0] = rng.random() if cold else 0.3
-                    times.append(timed(lambda _, p=many[k % copies]: p.evaluate(z, phase, out), 1)[0])
-                    floor.append(timed(lambda _, p=pool[k % rows]: read(p), 1)[0])
+                    of = many[k % copies]
+                    times.append(timed(lambda _, p=of: p.evaluate(z, phase, out), 1, thread_time)[0])
+                    floor.append(timed(lambda _, p=pool[k % rows]: read(p), 1, thread_time)[0])
                 least = float(np.median(floor[9:]))
                 median, p99 = np.median(times[9:]), np.percentile(times[9:], 99)
                 name = f"{mode} {storage}{' cold' if cold else ''} (original {ORIGINAL[mode]})"
