@@ -1,4 +1,4 @@
-"""Derives people.json, the means of impaired walks, from recordings: python -m hobble.hurt IMPAIRED_WALKS.npz"""
+"""Derives people.json (means of impaired walks): python -m hobble.hurt IMPAIRED_WALKS.npz"""
 
 import sys
 
