@@ -39,7 +39,12 @@ def test_too_many_joints_are_refused_from_the_header(tmp_path: Path, deep: bool)
 def test_the_longest_allowed_chain_of_joints_is_read(tmp_path: Path) -> None:
     count = bvh.MOST_JOINTS - 1
     joints = "".join(f"JOINT j{i}\n{{\nOFFSET 0 1 0\n" for i in range(count))
-    text = HEADER + joints + "}\n" * (count + 1) + "MOTION\nFrames: 1\nFrame Time: 0.0083\n1\n"
+    text = (
+        HEADER.replace("Xposition", "Zrotation")
+        + joints
+        + "}\n" * (count + 1)
+        + "MOTION\nFrames: 1\nFrame Time: 0.0083\n1\n"
+    )
     path = write(tmp_path / "a.bvh", text)
     assert len(bvh.read_bvh(path).names) == bvh.MOST_JOINTS
     make = lambda: make_clip(path, SKELETON, SKELETON.parent, "a", "holden31", OPTIONS)  # noqa: E731
