@@ -114,6 +114,4 @@ def _locked(path: Path) -> Iterator[None]:
 
 @cache
 def _warn_once(problem: str) -> None:
-    log.warning(
-        "the fastest products cannot be saved, so the default ones are used (%s)", problem
-    )
+    log.warning("the fastest products cannot be saved, so the default ones are used (%s)", problem)
