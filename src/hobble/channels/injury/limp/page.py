@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from hobble.channels.injury.response.page import in_words
+from hobble.channels.shown import speaker
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.formats import number
@@ -29,11 +31,11 @@ def section(found: Json, material: Material) -> Section:
     """
     if not found.get("applies"):
         return Section("injury", [])
-    name = material.name
+    name, say, found = material.name, speaker(material.network["skeleton"]), in_words(found, material)
     return Section(
         "injury",
         [
-            Part(1, Words(provenance(found["hurt_seconds"]))),
+            Part(1, Words(provenance(found["hurt_seconds"], say))),
             Part(2, size_chart(found)),
             Part(
                 3,
@@ -44,21 +46,23 @@ def section(found: Json, material: Material) -> Section:
                 ),
             ),
             Part(5, together_table(name, found["named_together"])),
-            Part(4, held_out_table(name, found["held_out_limps"])),
+            Part(4, held_out_table(name, found["held_out_limps"], say)),
             Part(80, size_table(name, found["sizes"])),
-            Part(81, captured_table(name, found["captured"])),
+            Part(81, captured_table(name, found["captured"], say)),
             Part(82, second_table(name, found["second"])),
         ],
     )
 
 
-def provenance(hurt_seconds: Mapping[str, Mapping[str, float]]) -> str:
+def provenance(hurt_seconds: Mapping[str, Mapping[str, float]], say: Callable[[str], str] = str) -> str:
     """Which injuries of the training data were captured and which were generated from healthy clips."""
     parts = []
     for kind, words in (("captured", "were captured"), ("made", "were generated from healthy clips")):
         if some := hurt_seconds[kind]:
             seconds = sum(some.values())
-            parts.append(f"{len(some)} links {words} ({number(seconds, 3)} s: {', '.join(sorted(some))})")
+            parts.append(
+                f"{len(some)} links {words} ({number(seconds, 3)} s: {', '.join(map(say, sorted(some)))})"
+            )
     return f"Of the injuries in training, {'; '.join(parts)}." if parts else "No link was hurt in training."
 
 
@@ -112,7 +116,7 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Column], list[list[A
     return columns, [[r["severity"], r["walks"], r["impaired"], r["named"], r["wrong_side"]] for r in rows]
 
 
-def held_out_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+def held_out_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[str], str]) -> Table | None:
     """Captured limps that were held out of training, compared with the character."""
     if not rows:
         return None
@@ -127,7 +131,7 @@ def held_out_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
     table = [
         [
             r["clip"],
-            ", ".join(f"{k} {v:g}" for k, v in r["hurt_links"].items()),
+            ", ".join(f"{say(k)} {v:g}" for k, v in r["hurt_links"].items()),
             r["compared_with"],
             r["healthy"],
             r["hurt"],
@@ -169,7 +173,7 @@ def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
     return Table(f"{name}-limp-together", columns, [[row.get(key) for key in keys] for row in rows], title)
 
 
-def captured_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+def captured_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[str], str]) -> Table | None:
     """Captured limps with the same effects."""
     if not rows:
         return None
@@ -182,7 +186,7 @@ def captured_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
     table = [
         [
             r["clip"],
-            ", ".join(f"{k} {v:g}" for k, v in r["hurt"].items()),
+            ", ".join(f"{say(k)} {v:g}" for k, v in r["hurt"].items()),
             r["healthy"],
             *(r[k] for k in SHOWN),
         ]
