@@ -15,6 +15,8 @@ from hobble.report.parts import Part, Section, Words
 from hobble.report.tables import Column, Table
 
 SHOWN = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")
+MOST_NAMED = 8  # links that a sentence lists
+COLOURS = {"hip": "@g1", "thigh": "@g2", "shank": "@g3", "foot": "@g4", "back": "@g5"}  # of parts; arms: @g0
 IMPAIRMENTS = {
     "hip": "trendelenburg",
     "pelvis": "trendelenburg",
@@ -59,10 +61,8 @@ def provenance(hurt_seconds: Mapping[str, Mapping[str, float]], say: Callable[[s
     parts = []
     for kind, words in (("captured", "were captured"), ("made", "were generated from healthy clips")):
         if some := hurt_seconds[kind]:
-            seconds = sum(some.values())
-            parts.append(
-                f"{len(some)} links {words} ({number(seconds, 3)} s: {', '.join(map(say, sorted(some)))})"
-            )
+            names = f": {', '.join(map(say, sorted(some)))}" if len(some) <= MOST_NAMED else ""
+            parts.append(f"{len(some)} links {words} ({number(sum(some.values()), 3)} s{names})")
     return f"Of the injuries in training, {'; '.join(parts)}." if parts else "No link was hurt in training."
 
 
@@ -76,16 +76,22 @@ def size_chart(found: Json) -> Chart:
             row["link"] for row in rows if row["part"] in IMPAIRMENTS or "arm" in row["part"]
         ):
             some = [row for row in rows if row["link"] == link]
-            colour = "@accent" if some[0]["side"] == "left" else "@g2"
-            traces.append(line(link, [r["severity"] for r in some], [r[effect] for r in some], colour))
-        for gait, values in found["people"].items():
+            trace = line(
+                link,
+                [r["severity"] for r in some],
+                [r[effect] for r in some],
+                COLOURS.get(some[0]["part"].replace("pelvis", "hip"), "@g0"),
+            )
+            trace["line"]["dash"] = "dot" if some[0]["side"] == "right" else "solid"
+            traces.append(trace)
+        for i, (gait, values) in enumerate(found["people"].items()):
             mean, spread = values[effect]
             traces.append(
                 {
                     "type": "scatter",
                     "mode": "markers",
                     "name": f"people, {gait.replace('_', ' ')}",
-                    "x": [10.4],
+                    "x": [10.3 + 0.1 * i],
                     "y": [mean],
                     "error_y": {"type": "data", "array": [spread], "visible": True},
                     "marker": {"color": "@muted", "size": 8},
@@ -96,10 +102,10 @@ def size_chart(found: Json) -> Chart:
         "limp-sizes",
         "Size of the limp",
         "The character walks at a target speed of 1.2 m/s with one link at severity 3, 5, 7 or 10, and is "
-        "compared with its healthy walk. Grey: mean and standard deviation of ten people who imitated strong "
-        "limps.",
+        "compared with its healthy walk. Lines of the right side are dotted. Grey: mean and standard "
+        "deviation of ten people who imitated strong limps.",
         layout={"xaxis": axis("severity", range=[2.5, 11]), "yaxis": axis("size")},
-        height=360,
+        height=560,
         choose="Effect",
         options=options,
     )
