@@ -77,7 +77,7 @@ def test_a_cycle_that_turns_goes_on_turning(walker, holden31):
 
 
 def test_too_short_for_a_cycle(walk):
-    with pytest.raises(HobbleError, match="walk: 3 frames are no cycle"):
+    with pytest.raises(HobbleError, match="walk: 3 frames are too few"):
         loop_clip(part(walk, 0, 3), 4)
 
 
@@ -86,7 +86,7 @@ def test_a_data_set_can_ask_for_loops(walk, bvh, make):
     assert (len(clip), report["loops"], report["cycle_frames"]) == (240, 4, 60)
     assert "repeated 4 times" in report["repairs"][-1]
     assert clip.root[-1, 0] > 380
-    with pytest.raises(HobbleError, match="walk: 2 frames are no cycle"):
+    with pytest.raises(HobbleError, match="walk: 2 frames are too few"):
         make(bvh(part(walk, 0, 3)), loops=4)
 
 

@@ -17,15 +17,21 @@ from hobble.runtime.feet import (
     BODY_FREE,
     FLOATING,
     FOOT,
-    LOCK_AT,
-    RELEASE,
     STRETCH,
     TOES,
-    TOO_FAR,
     carried,
     carry_body,
     leg_joints,
     place_feet,
+)
+from hobble.runtime.foot_lock import (
+    LOCK_AT,
+    MISSED,
+    RELEASE,
+    STEP_FRAMES,
+    STEP_HEIGHT,
+    TOO_FAR,
+    TOO_FAR_ALONE,
 )
 from hobble.runtime.leg_reach import MOST_ADDED, bend, reach
 
@@ -89,17 +95,26 @@ class Feet:
         self.legs = leg_joints(skeleton)
         self.below = carried(skeleton, self.legs)
         self.lock, self.hold, self.lift = np.zeros((1, 2)), np.zeros((1, 2, 2)), np.zeros((1, 2))
+        self.step, self.missed = np.zeros((1, 2)), np.zeros((1, 2))
         self.added = np.tile([1.0, 0, 0, 0], (1, 2, 2, 1))
         self.base = crouched(skeleton, *bent)
 
-    def __call__(self, moved: np.ndarray, contact: float, ground: float | None = None, locking: bool = True):
+    def __call__(
+        self,
+        moved: np.ndarray,
+        contact: float,
+        ground: float | None = None,
+        locking: bool = True,
+        other: float = 0.0,
+    ):
         if ground is None:  # just under the feet, neither sunk nor floating
             ground = min(self.base[0][self.legs[0, 2], 1] - 5.0, self.base[0][self.legs[0, 3], 1] - 4.0) - 1.0
         position, rotation = self.base[0][None] + moved, self.base[1][None].copy()
-        contacts = np.array([[contact, contact, 0, 0]], np.float32)
+        contacts = np.array([[contact, contact, other, other]], np.float32)
         legs = self.legs, self.below, np.array([5.0, 4.0])
-        feet = self.lock, self.hold, self.lift, self.added
+        feet = (self.lock, self.hold, self.step, self.missed), self.lift, self.added
         place_feet(contacts, np.full((1, 4), ground), locking, legs, feet, position, rotation)
+        self.contacts, self.ground = contacts[0], ground
         self.rotation = rotation[0]
         return position[0]
 
@@ -173,13 +188,69 @@ def test_renewed_contact_holds_the_foot_where_it_is_shown(holden31: Skeleton) ->
     np.testing.assert_allclose(again, seen, atol=1e-9)
 
 
-def test_a_foot_is_not_held_too_far_away(holden31: Skeleton) -> None:
+def glide(
+    feet: Feet, speed: float, frames: int, **contacts: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The left toe (F, 3), where the network has it (F, 3), and whether it counts as standing (F,).
+
+    The figure moves forward by `speed` cm a frame, and the network says that its feet stand.
+    """
+    toe = feet.legs[0, 3]
+    shown, network, stands = [], [], []
+    for k in range(frames):
+        moved = np.array([0.0, 0, speed * k])
+        shown.append(feet(moved, 1.0, **contacts)[toe])
+        network.append(feet.base[0][toe] + moved)
+        stands.append(feet.contacts[1] >= LOCK_AT)
+    return np.array(shown), np.array(network), np.array(stands)
+
+
+@pytest.mark.parametrize("speed", [0.4, 2.0])
+def test_a_gliding_foot_steps_instead_of_sliding(holden31: Skeleton, speed: float) -> None:
+    """While a foot counts as standing it does not move. Otherwise it is in the air."""
     feet = Feet(holden31)
+    shown, network, stands = glide(feet, speed, int(150 / speed), other=1.0)
+    still = stands[1:] & stands[:-1]
+    moves = np.linalg.norm(np.diff(shown, axis=0)[:, ::2], axis=1)
+    assert moves[still].max() < 1e-6
+    assert np.abs(shown - network)[:, 2].max() < TOO_FAR + 2 * speed
+    edges = np.flatnonzero(np.diff(stands.astype(int)))
+    lengths = np.diff(edges)[::2]
+    assert len(lengths) >= 3
+    assert set(lengths) == {STEP_FRAMES - 1}
+    high = shown[:, 1] - network[:, 1]
+    for a, b in zip(edges[::2], edges[1::2], strict=False):
+        assert STEP_HEIGHT - 1.5 < high[a + 1 : b + 1].max() < STEP_HEIGHT
+        assert 0.3 < high[a + 1] < 2.5, "it rises and comes down gradually"
+        assert high[b] < 2.5
+        assert np.linalg.norm(shown[b + 1] - network[b + 1]) < 0.5, "it lands where the network has it"
+
+
+def test_a_foot_waits_while_the_other_is_in_the_air(holden31: Skeleton) -> None:
+    """With the other foot down it steps after TOO_FAR, without it after TOO_FAR_ALONE, if its leg reaches."""
+    for other, far in ((1.0, TOO_FAR), (0.0, TOO_FAR_ALONE)):
+        feet = Feet(holden31, 0.5, 1.2)
+        _, network, stands = glide(feet, 0.5, 120, other=other)
+        held = network[np.argmin(stands), 2] - network[0, 2]
+        assert far <= held <= far + 0.5
+    both = Feet(holden31)
+    glide(both, 2.0, 12, other=1.0)
+    assert (both.step > 0).sum() == 1, "never both at once"
+
+
+def test_a_foot_that_its_leg_cannot_reach_steps(holden31: Skeleton) -> None:
+    """The body rises by 30 cm, further than a leg stretches, while the foot is held 8 cm ahead."""
+    feet = Feet(holden31, 0.2, 0.35)
     toe = holden31.role("left_toe")
-    for k in range(60):
-        moved = np.array([0, 0, 0.8 * k])
-        distance = np.linalg.norm(feet(moved, 1.0)[toe] - feet.base[0][toe] - moved)
-        assert distance < TOO_FAR + 0.8
+    first = feet(np.zeros(3), 1.0, other=1.0)[toe]
+    slid = []
+    for k in range(1, 20):
+        shown = feet(np.array([0.0, min(1.5 * k, 30.0), -8.0]), 1.0, ground=0.0, other=1.0)[toe]
+        if feet.contacts[1] < LOCK_AT:
+            break
+        slid.append(np.hypot(*(shown - first)[::2]))
+    assert feet.contacts[1] == 0.0
+    assert 0.0 < max(slid) < MISSED + 2.0
 
 
 def test_without_locking_feet_move_freely(holden31: Skeleton) -> None:

@@ -1,8 +1,9 @@
-"""How many cores this machine has, and whether they multiply bfloat16 in hardware."""
+"""This machine's processor: its name, how many cores it has, whether they multiply bfloat16 in hardware."""
 
 from __future__ import annotations
 
 import os
+import platform
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -46,3 +47,13 @@ def multiplies_bfloat16(cpuinfo: Path = CPUINFO, environment: Mapping[str, str] 
     except OSError:
         return False
     return "avx512_bf16" in flags or "amx_bf16" in flags
+
+
+def processor(cpuinfo: Path = CPUINFO) -> str:
+    """The name of this machine's processor."""
+    try:
+        lines = cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or "unknown"

@@ -14,7 +14,7 @@ from hobble.gait.recogniser import LEFT, RIGHT
 EFFECTS: dict[str, str] = {
     "speed": "speed, share of healthy",
     "stride": "stride time, share of healthy",
-    "stance": "stance share of the sound leg minus that of the hurt leg, more than healthy",
+    "stance": "stance of the sound leg minus that of the hurt leg (share of the cycle), above healthy",
     "step_hurt": "step onto the hurt foot, share of healthy",
     "step_sound": "step onto the sound foot, share of healthy",
     "knee_hurt": "knee range of the hurt leg, share of healthy",

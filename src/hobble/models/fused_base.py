@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from hobble.models.kernels import counter_after, draw, use_threads
+from hobble.models.products import product
 from hobble.models.trainable import ALL_ROWS
 
 
@@ -42,6 +43,10 @@ class FusedBase:
             draw(masks[-1].numpy(), counter_after(self.counter, first * width), self.keep)
             self.counter = counter_after(self.counter, rows * width)
         return masks
+
+    def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
+        """As in `Step`, in memory that the next step uses again."""
+        return product(a, b, self.buffer(name, len(a), len(b), a.dtype))
 
     def buffer(self, name: str, rows: int, width: int, dtype: torch.dtype | None = None) -> Tensor:
         """(rows, width) of uninitialised memory. The same name and width give the same memory."""

@@ -26,7 +26,7 @@ def loop_clip(clip: Clip, times: int, heading: float | None = None) -> Clip:
     frame may repeat the first or come just before it. Raises HobbleError for less than four frames.
     """
     if len(clip) < 4:
-        raise HobbleError(f"{clip.name}: {len(clip)} frames are no cycle to repeat")
+        raise HobbleError(f"{clip.name}: {len(clip)} frames are too few for a cycle that could be repeated")
     cycle = _open(clip)
     step = _step(cycle)
     top = _top_speed(clip)

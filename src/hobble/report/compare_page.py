@@ -10,7 +10,7 @@ from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
 from hobble.report import measured, side_by_side
 from hobble.report.formats import embedded
-from hobble.report.hero import placed
+from hobble.report.hero import body_channel
 from hobble.report.playable import skeleton_of
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.rounded import has_weights, rounded
@@ -64,7 +64,7 @@ def render_compared(
         playable=list(kept),
         left_out=left_out,
         rounding=[(name, (errors or {})[name]) for name in small if name in kept and name in (errors or {})],
-        hurts=any(placed(spec) for spec in kept.values()),
+        hurts=any(body_channel(spec) for spec in kept.values()),
         style=style(),
         bundle=trusted("the bundle", bundle),
         provenance={"commit": commit(FOLDER), "machine": machine(), "versions": versions()},

@@ -15,7 +15,7 @@ from hobble.figure.mesh import body, key
 from hobble.models.network import Network, inverse
 from hobble.models.packing import packed
 from hobble.rows.layout import RowLayout
-from hobble.runtime import animation, controller, feet, trajectory
+from hobble.runtime import animation, controller, feet, foot_lock, leg_reach, trajectory
 from hobble.runtime.bounds import Bounds
 from hobble.runtime.character import start
 from hobble.runtime.limits import HURRY_FACTOR, LAME_BELOW
@@ -177,16 +177,21 @@ def _constants() -> dict[str, float]:
         "jogFrom": animation.JOG_FROM,
         "lameBelow": LAME_BELOW,
         "hurried": HURRY_FACTOR,
-        "lockAt": feet.LOCK_AT,
-        "release": feet.RELEASE,
-        "tooFar": feet.TOO_FAR,
+        "lockAt": foot_lock.LOCK_AT,
+        "release": foot_lock.RELEASE,
+        "tooFar": foot_lock.TOO_FAR,
+        "tooFarAlone": foot_lock.TOO_FAR_ALONE,
+        "missed": foot_lock.MISSED,
+        "missedAlone": foot_lock.MISSED_ALONE,
+        "stepFrames": foot_lock.STEP_FRAMES,
+        "stepHeight": foot_lock.STEP_HEIGHT,
         "fastestTurn": float(controller.FASTEST_TURN),
         "heightMix": feet.HEIGHT_MIX,
         "floating": feet.FLOATING,
         "bodyMix": feet.BODY_MIX,
         "bodyFree": feet.BODY_FREE,
         "bodyFrom": feet.BODY_MIN_CONTACT,
-        "mostAdded": feet.MOST_ADDED,
+        "mostAdded": leg_reach.MOST_ADDED,
         "stretch": feet.STRETCH,
         "behind": feet.BEHIND,
     }

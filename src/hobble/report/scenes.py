@@ -38,7 +38,7 @@ WORDS = {
 def scenes(
     path: str | Path, skeleton: Mapping[str, Any], channels: Mapping[str, Sequence[str]] | None = None
 ) -> dict[str, Any]:
-    """The recorded walks of the page, from `runtime/scenarios.npz`.
+    """The scripted walks of the page, from `runtime/scenarios.npz`.
 
     skeleton: as in the network's file. channels: channel -> its columns. Positions of bones are kept at 30
     Hz, relative to the root joint, as 16-bit integers in steps of 0.1 mm. Rotations have 16 bits too.

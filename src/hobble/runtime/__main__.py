@@ -32,7 +32,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("network", help="weights.npz, its folder, or a folder of .bin files")
     parser.add_argument("target", help="the file or folder to write")
-    parser.add_argument("--mode", choices=get_args(PhaseMode), default="cubic", help="phase lookup")
+    parser.add_argument(
+        "--mode",
+        choices=get_args(PhaseMode),
+        default="cubic",
+        help="how the weights of a phase are found; cubic is exact",
+    )
     parser.add_argument("--skeleton", help="a file of config/skeletons, if the network has no skeleton")
     options = parser.parse_args(arguments)
     try:

@@ -20,8 +20,8 @@ class Character:
     joint_position, joint_velocity: (C, J, 3); joint_rotation: (C, J, 4) world. This is the network's copy.
     phase: (C,). channel_values, channel_targets: (C, K) present and wanted values of all channels' columns.
     target_velocity, target_direction: (C, 2); strafe: (C,); correction: (C, 2): see `trajectory.follow_wish`.
-    foot_lock (C, 2), foot_hold (C, 2, 2), foot_lift (C, 2), foot_added (C, 2, 2, 4), body_lift (C,): see
-    `feet`.
+    foot_lock (C, 2), foot_hold (C, 2, 2), foot_step (C, 2), foot_missed (C, 2): see `foot_lock`.
+    foot_lift (C, 2), foot_added (C, 2, 2, 4), body_lift (C,): see `feet`.
     placed: (C,) whether the joints have been lifted to the ground at the start.
     memory: (C, M) the network's own state of the character, see `Network.memory`.
     """
@@ -43,6 +43,8 @@ class Character:
     correction: Array
     foot_lock: Array
     foot_hold: Array
+    foot_step: Array
+    foot_missed: Array
     foot_lift: Array
     foot_added: Array
     body_lift: Array
@@ -99,6 +101,8 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         correction=np.zeros((count, 2)),
         foot_lock=np.zeros((count, 2)),
         foot_hold=np.zeros((count, 2, 2)),
+        foot_step=np.zeros((count, 2)),
+        foot_missed=np.zeros((count, 2)),
         foot_lift=np.zeros((count, 2)),
         foot_added=np.tile([1.0, 0.0, 0.0, 0.0], (count, 2, 2, 1)),
         body_lift=np.zeros(count),

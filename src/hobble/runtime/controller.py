@@ -123,7 +123,7 @@ class Controller:
         self._channels = (c.channel_values, c.channel_targets, self._channel_steps)
         self._joints = (c.joint_position, c.joint_velocity, c.joint_rotation)
         self._drawn = (self.root, self.yaw, self.pose_position, self.pose_rotation)
-        self._feet = (c.foot_lock, c.foot_hold, c.foot_lift, c.foot_added)
+        self._feet = ((c.foot_lock, c.foot_hold, c.foot_step, c.foot_missed), c.foot_lift, c.foot_added)
         self._contacts = self.y[:, self.layout.y_contacts]
         self._checked = tuple(getattr(c, name).reshape(len(c.phase), -1) for name in CHECKED)
 

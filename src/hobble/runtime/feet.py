@@ -9,15 +9,9 @@ import numpy as np
 from hobble.core.compiled import njit
 from hobble.core.skeleton import Skeleton
 from hobble.models.network import Network
+from hobble.runtime.foot_lock import Hold, hold_foot, note_missed, step_rise
 from hobble.runtime.leg_reach import MOST_ADDED, bend, turn, turned
 
-# Contact from which a foot is held. With the original's .8, a foot slides 4.8 cm a step before it is held and
-# after it is released.
-LOCK_AT = 0.5
-# Share of the hold that is released each frame after contact. With .075 the foot drags behind the swing, and
-# the knee bends by 46 degrees instead of the network's 53.
-RELEASE = 0.2
-TOO_FAR = 20.0  # cm between a held foot and the network's foot at which the foot is released
 HEIGHT_MIX = 0.5  # share of the remaining foot lift that is applied each frame
 # Share of its length to which foot placement may stretch the leg of a held foot behind the hips, unless the
 # network stretches it further. Beyond that the heel rises. Otherwise a foot that is 5 cm behind the network's
@@ -36,9 +30,9 @@ FOOT, TOES = 1, 2  # the joints of a foot, see `carried`
 #
 # joints (2, 4), see `leg_joints`; carried (2, J), see `carried`; sole (2,), see `sole_heights`.
 Legs = tuple[Any, Any, Any]
-# The state of the feet between frames: lock (C, 2), share of the hold; hold (C, 2, 2), x and z where the toe
-# landed; lift (C, 2), smoothed rise of the heel; added (C, 2, 2, 4), see `bend`.
-Feet = tuple[Any, Any, Any, Any]
+# The state of the feet between frames: the hold of each foot; lift (C, 2), smoothed rise of the heel; added
+# (C, 2, 2, 4), see `bend`.
+Feet = tuple[Hold, Any, Any]
 
 
 def leg_joints(skeleton: Skeleton) -> np.ndarray:
@@ -171,33 +165,29 @@ def place_feet(
 ) -> None:
     """Hold feet in contact and keep feet out of the ground. Changes the pose and the state of the feet.
 
-    contacts: (C, 4) of left heel, left toe, right heel, right toe. ground: (C, 4 or more) heights under them.
-    locking: whether feet are held at all. position: (C, J, 3); rotation: (C, J, 4) of the pose.
+    contacts: (C, 4) of left heel, left toe, right heel, right toe; 0 is written for a foot that steps, see
+    `foot_lock`. ground: (C, 4 or more) heights under them. locking: whether feet are held at all.
+    position: (C, J, 3); rotation: (C, J, 4) of the pose.
     """
     joints, below, sole = legs
-    lock, hold, lift, added = feet
+    held, lift, added = feet
+    lock, _, step, _ = held
     shift, by = np.zeros(3), np.zeros(4)
     for c in range(position.shape[0]):
         for f in range(2):
             hip, knee, heel, toe = joints[f, 0], joints[f, 1], joints[f, 2], joints[f, 3]
             x, z = position[c, toe, 0], position[c, toe, 2]
-            away_x, away_z = hold[c, f, 0] - x, hold[c, f, 1] - z
-            far = lock[c, f] * np.sqrt(away_x * away_x + away_z * away_z)
-            if not locking:
-                lock[c, f] = 0.0
-            elif contacts[c, 2 * f + 1] >= LOCK_AT and far < TOO_FAR:
-                if lock[c, f] < 1.0:
-                    # Hold the foot where it is shown now, so that renewed contact does not pull it back.
-                    away_x, away_z = lock[c, f] * away_x, lock[c, f] * away_z
-                    hold[c, f, 0], hold[c, f, 1] = x + away_x, z + away_z
-                lock[c, f] = 1.0
-            else:
-                lock[c, f] = max(0.0, lock[c, f] - RELEASE)
-            # Lift a foot out of the ground; lower a held foot that floats.
-            rise = sole_depth(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
-            rise = max(rise, 0.0) + lock[c, f] * min(rise + FLOATING, 0.0)
+            shift[0], shift[2] = hold_foot(c, f, x, z, contacts[c, 2 * f + 1], locking, held)
+            # Lift a foot out of the ground; lower a held foot that floats; raise a foot that steps.
+            deep = sole_depth(position[c], heel, toe, ground[c, 2 * f], ground[c, 2 * f + 1], sole)
+            rise = max(deep, 0.0)
+            if step[c, f] == 0.0:
+                rise += lock[c, f] * min(deep + FLOATING, 0.0)
             lift[c, f] += HEIGHT_MIX * (rise - lift[c, f])
-            shift[0], shift[1], shift[2] = lock[c, f] * away_x, lift[c, f], lock[c, f] * away_z
+            shift[1] = lift[c, f]
+            if step[c, f] > 0.0:
+                shift[1] += step_rise(step[c, f], -deep)
+                contacts[c, 2 * f] = contacts[c, 2 * f + 1] = 0.0
             if lock[c, f] > 0.0:
                 raise_heel(position[c], hip, knee, heel, toe, shift, by)
             else:
@@ -205,6 +195,7 @@ def place_feet(
             x, up, z = position[c, heel, 0], position[c, heel, 1], position[c, heel, 2]
             bend(position[c], rotation[c], hip, knee, heel, shift, added[c, f])
             carry_foot(position[c], rotation[c], below[f], heel, toe, x, up, z, by)
+            note_missed(c, f, position[c, toe, 0], position[c, toe, 2], held)
 
 
 def carried(skeleton: Skeleton, legs: np.ndarray) -> np.ndarray:

@@ -12,7 +12,10 @@ from hobble.core.section import PhaseMode, PositiveFloat, Section
 class Runtime(Section):
     """The character."""
 
-    mode: PhaseMode = Field("cubic", description="phase lookup of the network")
+    mode: PhaseMode = Field(
+        "cubic",
+        description="how a phase gets its weights: cubic is exact, linear has 10 tables, constant 50",
+    )
     rates: dict[str, PositiveFloat] = Field(
         {}, description="channel: largest change of its values per second; default: the channel's own rate"
     )

@@ -182,7 +182,7 @@ def published_table(found: Json, material: Material) -> Table:
 
 def section(found: Json, material: Material) -> Section:
     """The charts and tables, and the view of captured and predicted motion. Empty if it was not measured."""
-    if not found:
+    if not found.get("clips"):
         return Section("accuracy", [])
     return Section(
         "accuracy",
@@ -250,7 +250,7 @@ def _centimetres(error: float, split: str, material: Material) -> str:
     drawn = (lengths.get(1, {}).get(split) or {}).get("position_error_cm")
     if drawn is None:
         return f"{number(error)} cm per joint on average"
-    return f"{number(error)} cm per joint for the prediction, {number(drawn)} cm for the drawn pose"
+    return f"{number(error)} cm per joint; {number(drawn)} cm for the pose that is drawn"
 
 
 def hints(found: Json, material: Material) -> Iterator[Hint]:

@@ -81,8 +81,8 @@ def together_chart(found: OfChannel, say: Callable[[str], str] = str) -> Chart |
     }
     words = (
         f"The share of windows in which the classifier names the right {found['title'].lower()} while the "
-        f"value at the left is at its highest: none in a pale field, all in a dark one. It is {_percent(manner / whole)} over all columns but "
-        f'"{NONE}".'
+        "value at the left is at its highest: none in a pale field, all in a dark one. It is "
+        f'{_percent(manner / whole)} over all columns but "{NONE}".'
     )
     return Chart(
         f"{found['channel']}-together", "Two at once", words, [trace], layout, 120 + 20 * len(columns)

@@ -54,7 +54,7 @@ class Step:
         for number, weight in enumerate(weights):
             x = torch.nn.functional.elu(x) if number else x
             kept.append(self.prepared(number, x, masks[self.gates + number]))
-            outputs.append(product(kept[-1][0], weight))
+            outputs.append(self.multiplied(f"outputs {number}", kept[-1][0], weight))
             x = self.blended(number, outputs[-1], c)
         self.error = x.sub_(y)
         d = self.error * (2.0 / y.numel())
@@ -62,9 +62,10 @@ class Step:
         gradients = [d] * len(weights)
         for number in range(len(weights) - 1, -1, -1):
             da = self.spread(number, d, outputs[number], c, dc)
-            gradients[number] = product(da.T, kept[number][0].T)
+            gradients[number] = self.multiplied(f"gradient {number}", da.T, kept[number][0].T)
             if number:
-                d = self.sloped(number, product(da, weights[number].T), kept[number][1])
+                dh = self.multiplied(f"of inputs {number}", da, weights[number].T)
+                d = self.sloped(number, dh, kept[number][1])
         self.gradients = [*self._gate_gradients(c, dc, of_gate), *gradients]
         return torch.mean(torch.square(self.error))
 
@@ -77,6 +78,10 @@ class Step:
         flat = self.network.flat
         drawn = torch.rand(rows, sum(self.widths), generator=self.generator, device=flat.device)[own]
         return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(self.widths, dim=1))
+
+    def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
+        """a @ b.T. name: of the product within the step."""
+        return product(a, b)
 
     def prepared(self, number: int, x: Tensor, mask: Tensor) -> Kept:
         """Layer `number`'s masked inputs x (B, n) with a 1 appended, and the slopes (B, n).

@@ -54,15 +54,16 @@ class Step:
             e, slope = self.expanded(number, x, c, masks[number])
             expanded.append(e)
             slopes.append(slope)
-            x = product(e, weight).to(y.dtype)
+            x = self.multiplied(f"outputs {number}", e, weight).to(y.dtype)
         self.error = x.sub_(y)
         d = self.error * (2.0 / y.numel())
         self.gradients = [d] * len(weights)
         for number in range(len(weights) - 1, -1, -1):
             d = d.to(self.factors.dtype)
-            self.gradients[number] = product(d.T, expanded[number].T)
+            self.gradients[number] = self.multiplied(f"gradient {number}", d.T, expanded[number].T)
             if number:
-                d = self.contracted(number, product(d, weights[number].T), c, slopes[number])
+                de = self.multiplied(f"inputs {number}", d, weights[number].T)
+                d = self.contracted(number, de, c, slopes[number])
         return torch.mean(torch.square(self.error))
 
     def seed(self, seed: int) -> None:
@@ -74,6 +75,10 @@ class Step:
         flat, widths = self.network.flat, self.widths
         drawn = torch.rand(rows, sum(widths), generator=self.generator, device=flat.device)[own]
         return list((drawn < self.keep).to(flat.dtype).mul_(1.0 / self.keep).split(widths, dim=1))
+
+    def multiplied(self, name: str, a: Tensor, b: Tensor) -> Tensor:
+        """a @ b.T. name: of the product within the step."""
+        return product(a, b)
 
     def coefficients(self, p: Tensor) -> Tensor:
         """Spline coefficients (B, K) of phases (B,)."""

@@ -1,8 +1,9 @@
 // The controller of `hobble.runtime` in JavaScript, for one character. It has the same steps in the same order, so the
 // same test data check both. Centimetres, 60 Hz; yaw 0 faces +Z and grows toward +X.
 import { networks } from "networks"; // by kind; the bundle gathers them from the folders of hobble.models
-import { bytes, dot, minus } from "./numbers.js";
-import { at4, between, multiply, rotate } from "./turns.js";
+import { createFeet } from "./feet.js";
+import { bytes } from "./numbers.js";
+import { at4, multiply } from "./turns.js";
 
 // Characters of one network share it. It remembers nothing between two predictions.
 const predictors = new WeakMap();
@@ -26,9 +27,10 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     gait: filled(T * G, 0), ground: filled(S * 3, 0), height: 0, phase: 0, joints: filled(3 * J, 0),
     velocities: filled(3 * J, 0), pose: filled(3 * J, 0), rotations: filled(4 * J, 0), turns: filled(4 * J, 0), channelValues: filled(L, 0), channelTargets: filled(L, 0),
     velocity: [0, 0], direction: [sin(heading), cos(heading)], strafe: 0, correction: [0, 0], lock: [0, 0],
-    hold: [[0, 0], [0, 0]], lift: [0, 0], raised: 0, placed: false, added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
+    hold: [[0, 0], [0, 0]], step: [0, 0], missed: [0, 0], lift: [0, 0], raised: 0, placed: false, added: [0, 1].map(() => [[1, 0, 0, 0], [1, 0, 0, 0]]), contacts: [0, 0, 0, 0], root: [place[0], 0, place[1]],
     memory: filled(spec.network.memory ?? 0, 0),
   };
+  const feet = createFeet(spec, c);
   // Writes into q the rotation at index `i` of the outputs (axis times half the angle), turned about Y with the root.
   const q = [1, 0, 0, 0];
   const turned = (y, i, co, si) => {
@@ -252,8 +254,8 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     c.pose.set(c.joints);
     settle();
     for (let i = 0; i < 4; i++) c.contacts[i] = y[Y.contacts + i];
-    carryBody(ground);
-    for (let f = 0; f < 2; f++) placeFoot(f, ground);
+    feet.carryBody(ground);
+    for (let f = 0; f < 2; f++) feet.placeFoot(f, ground);
   };
   const update = (y, wish) => {
     for (let i = 0; i < M; i++) {
@@ -295,129 +297,6 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
     }
     const phase = c.phase + (.9 * moving + .1) * y[Y.phase_change];
     c.phase = phase - floor(phase);
-  };
-
-  // Foot placement: hold feet in contact where they landed, keep feet out of the ground, and bend the leg to reach.
-
-  const joint = (j) => c.pose.subarray(3 * j, 3 * j + 3);
-  // How deep a foot is in the ground, cm; negative if it is above.
-  const soleDepth = (f, ground) => {
-    const [heel, toe] = [2, 3].map((i) => {
-      const [px, py, pz] = joint(spec.legs[f][i]);
-      return ground(px, pz) + spec.sole[i - 2] - py;
-    });
-    return max(heel, toe);
-  };
-  // Raise or lower the body so that standing feet are on the ground. The hips stay within their height range in training.
-  const hips = spec.names.indexOf(spec.roles.hips);
-  const carryBody = (ground) => {
-    let wanted = 0, weight = 0;
-    for (let f = 0; f < 2; f++) {
-      const rise = soleDepth(f, ground), stands = min(max(c.contacts[2 * f], c.contacts[2 * f + 1], 0), 1);
-      wanted += stands * (max(rise - k.bodyFree, 0) + min(rise + k.bodyFree, 0));
-      weight += stands;
-    }
-    if (weight > k.bodyFrom) c.raised += k.bodyMix * (wanted / weight - c.raised);
-    const [hx, hy, hz] = joint(hips), above = hy - ground(hx, hz), [low, high] = spec.bounds.hips;
-    c.raised = min(max(c.raised, low - above), high - above);
-    for (let j = 1; j < 3 * J; j += 3) c.pose[j] += c.raised;
-  };
-  const placeFoot = (f, ground) => {
-    const [hip, knee, heel, toe] = spec.legs[f], point = joint(toe);
-    let away = [c.hold[f][0] - point[0], c.hold[f][1] - point[2]];
-    const far = c.lock[f] * hypot(...away);
-    if (!spec.footLocking) c.lock[f] = 0;
-    else if (c.contacts[2 * f + 1] >= k.lockAt && far < k.tooFar) {
-      if (c.lock[f] < 1) {
-        away = away.map((v) => v * c.lock[f]);
-        c.hold[f] = [point[0] + away[0], point[2] + away[1]];
-      }
-      c.lock[f] = 1;
-    } else c.lock[f] = max(0, c.lock[f] - k.release);
-    const up = soleDepth(f, ground), rise = max(up, 0) + c.lock[f] * min(up + k.floating, 0);
-    c.lift[f] += k.heightMix * (rise - c.lift[f]);
-    const shift = [c.lock[f] * away[0], c.lift[f], c.lock[f] * away[1]];
-    const by = c.lock[f] > 0 ? raiseHeel(joint(hip), joint(knee), joint(heel), point, shift) : [1, 0, 0, 0];
-    const before = Array.from(joint(heel));
-    bend(joint(hip), joint(knee), joint(heel), shift, hip, knee, c.added[f]);
-    carryFoot(f, before, by);
-  };
-  // If the leg of a held foot would stretch too far, its heel rises. Returns the turn of the foot about its toe.
-  const raiseHeel = (hip, knee, heel, toe, shift) => {
-    const flat = [1, 0, 0, 0], leg = minus(heel, hip);
-    const whole = k.stretch * (hypot(...minus(knee, hip)) + hypot(...minus(heel, knee)));
-    const aim = leg.map((v, i) => v + shift[i]), needed = dot(aim, aim), least = max(dot(leg, leg), whole * whole);
-    const along = hypot(toe[0] - heel[0], toe[2] - heel[2]), high = heel[1] - toe[1];
-    if (needed <= least || along < 1e-6) return flat;
-    const fx = (toe[0] - heel[0]) / along, fz = (toe[2] - heel[2]) / along;
-    const [wx, up, wz] = minus(toe, hip).map((v, i) => v + shift[i]), ahead = wx * fx + wz * fz;
-    if (ahead >= 0) return flat;
-    const most = least + max(1 + ahead / k.behind, 0) * (needed - least);
-    const cosine = up * high - ahead * along, sine = ahead * high + up * along;
-    const share = .5 * (most - wx * wx - up * up - wz * wz - along * along - high * high) / hypot(cosine, sine);
-    const angle = min(max(atan2(sine, cosine) + Math.acos(min(max(share, -1), 1)), 0), k.mostAdded);
-    const forward = along * (1 - cos(angle)) + high * sin(angle);
-    shift[0] += forward * fx;
-    shift[1] += along * sin(angle) - high * (1 - cos(angle));
-    shift[2] += forward * fz;
-    return [cos(angle / 2), sin(angle / 2) * fz, 0, -sin(angle / 2) * fx];
-  };
-  // The joints below a heel that was at `before`: the foot turns `by`, its toes do not.
-  const carryFoot = (f, before, by) => {
-    const [, , heel, toe] = spec.legs[f], now = joint(heel);
-    const place = (point) => rotate(by, minus(point, before)).map((v, i) => v + now[i]);
-    const moved = minus(place(joint(toe)), joint(toe));
-    c.turns.set(multiply(by, at4(c.turns, heel)), 4 * heel);
-    for (const j of spec.carried[f]) {
-      if (spec.toes[f].includes(j)) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
-      else {
-        c.pose.set(place(joint(j)), 3 * j);
-        c.turns.set(multiply(by, at4(c.turns, j)), 4 * j);
-      }
-    }
-  };
-  // Turns `held` toward `aim` by at most mostAdded. Returns whether it did not reach it.
-  const approach = (held, aim) => {
-    const near = held[0] * aim[0] + held[1] * aim[1] + held[2] * aim[2] + held[3] * aim[3], to = near < 0 ? aim.map((v) => -v) : aim;
-    const whole = Math.acos(min(abs(near), 1)), most = .5 * k.mostAdded, late = whole > most;
-    const [keep, take] = late ? [sin(whole - most) / sin(whole), sin(most) / sin(whole)] : [0, 1];
-    for (let i = 0; i < 4; i++) held[i] = keep * held[i] + take * to[i];
-    return late;
-  };
-  // Like `reach`, but adds at most mostAdded to the network's own turn of thigh and shank.
-  const bend = (hip, knee, heel, shift, h, n, added) => {
-    const thigh = minus(knee, hip), shank = minus(heel, knee);
-    if (abs(shift[0]) + abs(shift[1]) + abs(shift[2]) > 1e-9) reach(hip, knee, heel, shift);
-    const late = [[thigh, minus(knee, hip)], [shank, minus(heel, knee)]].map(([a, b], i) => approach(added[i], between(a, b)));
-    if (late[0] || late[1]) {
-      const [t, s] = [rotate(added[0], thigh), rotate(added[1], shank)];
-      for (let i = 0; i < 3; i++) {
-        knee[i] = hip[i] + t[i];
-        heel[i] = knee[i] + s[i];
-      }
-    }
-    c.turns.set(multiply(added[0], at4(c.turns, h)), 4 * h);
-    c.turns.set(multiply(added[1], at4(c.turns, n)), 4 * n);
-  };
-  const reach = (hip, knee, heel, shift) => {
-    const thigh = minus(knee, hip), shank = minus(heel, knee);
-    const upper = hypot(...thigh), lower = hypot(...shank);
-    const leg = thigh.map((v, i) => v + shank[i]), before = hypot(...leg);
-    const aim = leg.map((v, i) => v + shift[i]), distance = hypot(...aim);
-    if (min(before, distance, upper, lower) < 1e-6) return;
-    const was = leg.map((v) => v / before), way = aim.map((v) => v / distance);
-    const length = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * .999);
-    const cosine = min(max((upper * upper + length * length - lower * lower) / (2 * upper * length), -1), 1);
-    // Turn the direction in which the knee bends with the leg.
-    const along = dot(thigh, was), side = thigh.map((v, i) => v - along * was[i]);
-    const turn = dot(side, way) / max(1 + dot(was, way), 1e-6);
-    const out = side.map((v, i) => v - turn * (was[i] + way[i])), size = hypot(...out);
-    if (size < 1e-6) return;
-    const sine = sqrt(1 - cosine * cosine) / size;
-    for (let i = 0; i < 3; i++) {
-      knee[i] = hip[i] + upper * (way[i] * cosine + out[i] * sine);
-      heel[i] = hip[i] + way[i] * length;
-    }
   };
 
   // Copies the state of another character (or one from the data of the page), moved by [x, z] cm.

@@ -1,4 +1,4 @@
-// Recorded walks: plays the motion in the page, with footprints, readings and a time slider.
+// Scripted walks: plays the motion in the page, with footprints, readings and a time slider.
 import { find, material } from "./base.js";
 import { createFigure } from "./figure.js";
 import { createMotion } from "./motion.js";

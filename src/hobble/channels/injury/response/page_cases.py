@@ -80,7 +80,8 @@ def divided_chart(rows: Sequence[Mapping[str, Any]]) -> Chart | None:
     return Chart(
         "divided",
         "Divided severities",
-        "Distance of the pose from the healthy walk, if severities are divided before the network gets them.",
+        "Distance of the pose from the healthy walk. Each line divides the severities by another number "
+        "before the network gets them.",
         layout={"xaxis": axis("severity", dtick=2), "yaxis": axis("cm per joint", rangemode="tozero")},
         choose="Link",
         options=options,

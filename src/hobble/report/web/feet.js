@@ -1,0 +1,147 @@
+// Foot placement, as `feet`, `foot_lock` and `leg_reach` of `hobble.runtime`: hold feet in contact where they landed, keep
+// feet out of the ground, and bend the leg to reach. Changes the drawn pose of the character `c`, see character.js.
+import { dot, minus } from "./numbers.js";
+import { at4, between, multiply, rotate } from "./turns.js";
+
+export const createFeet = (spec, c) => {
+  const { constants: k } = spec, { atan2, sin, cos, hypot, min, max, abs, sqrt } = Math;
+
+  const joint = (j) => c.pose.subarray(3 * j, 3 * j + 3);
+  // How deep a foot is in the ground, cm; negative if it is above.
+  const soleDepth = (f, ground) => {
+    const [heel, toe] = [2, 3].map((i) => {
+      const [px, py, pz] = joint(spec.legs[f][i]);
+      return ground(px, pz) + spec.sole[i - 2] - py;
+    });
+    return max(heel, toe);
+  };
+  // Raise or lower the body so that standing feet are on the ground. The hips stay within their height range in training.
+  const hips = spec.names.indexOf(spec.roles.hips);
+  const carryBody = (ground) => {
+    let wanted = 0, weight = 0;
+    for (let f = 0; f < 2; f++) {
+      const rise = soleDepth(f, ground), stands = min(max(c.contacts[2 * f], c.contacts[2 * f + 1], 0), 1);
+      wanted += stands * (max(rise - k.bodyFree, 0) + min(rise + k.bodyFree, 0));
+      weight += stands;
+    }
+    if (weight > k.bodyFrom) c.raised += k.bodyMix * (wanted / weight - c.raised);
+    const [hx, hy, hz] = joint(hips), above = hy - ground(hx, hz), [low, high] = spec.bounds.hips;
+    c.raised = min(max(c.raised, low - above), high - above);
+    for (let j = 1; j < c.pose.length; j += 3) c.pose[j] += c.raised;
+  };
+  const placeFoot = (f, ground) => {
+    const [hip, knee, heel, toe] = spec.legs[f], point = joint(toe);
+    const [a, b] = holdFoot(f, point), deep = soleDepth(f, ground);
+    const rise = max(deep, 0) + (c.step[f] ? 0 : c.lock[f] * min(deep + k.floating, 0));
+    c.lift[f] += k.heightMix * (rise - c.lift[f]);
+    const shift = [a, c.lift[f], b];
+    if (c.step[f]) {
+      shift[1] += max(4 * k.stepHeight * c.step[f] * (1 - c.step[f]) - max(-deep, 0), 0);
+      c.contacts[2 * f] = c.contacts[2 * f + 1] = 0;
+    }
+    const by = c.lock[f] > 0 ? raiseHeel(joint(hip), joint(knee), joint(heel), point, shift) : [1, 0, 0, 0];
+    const before = Array.from(joint(heel));
+    bend(joint(hip), joint(knee), joint(heel), shift, hip, knee, c.added[f]);
+    carryFoot(f, before, by);
+    c.missed[f] = c.lock[f] === 1 ? hypot(c.hold[f][0] - point[0], c.hold[f][1] - point[2]) : 0;
+  };
+  // Hold a foot from its landing until the network lifts it, or until it has to step. Returns how far [x, z] to move it.
+  const holdFoot = (f, point) => {
+    let away = [c.hold[f][0] - point[0], c.hold[f][1] - point[2]];
+    if (!spec.footLocking) {
+      c.lock[f] = c.step[f] = 0;
+      return [0, 0];
+    }
+    if (c.step[f] > 0 && (c.step[f] += 1 / k.stepFrames) > 1 - 1e-6) c.step[f] = c.lock[f] = 0;
+    if (c.step[f] === 0) {
+      const alone = c.lock[1 - f] !== 1, far = alone ? k.tooFarAlone : k.tooFar;
+      if (c.contacts[2 * f + 1] < k.lockAt) c.lock[f] = max(0, c.lock[f] - k.release);
+      else if (c.lock[f] < 1) {
+        away = away.map((v) => v * c.lock[f]);
+        c.hold[f] = [point[0] + away[0], point[2] + away[1]];
+        c.lock[f] = 1;
+      } else if (hypot(...away) >= far || c.missed[f] > (alone ? k.missedAlone : k.missed)) c.step[f] = 1 / k.stepFrames;
+    }
+    if (c.step[f] > 0) c.lock[f] = 1 - c.step[f] * c.step[f] * (3 - 2 * c.step[f]);
+    return away.map((v) => c.lock[f] * v);
+  };
+  // If the leg of a held foot would stretch too far, its heel rises. Returns the turn of the foot about its toe.
+  const raiseHeel = (hip, knee, heel, toe, shift) => {
+    const flat = [1, 0, 0, 0], leg = minus(heel, hip);
+    const whole = k.stretch * (hypot(...minus(knee, hip)) + hypot(...minus(heel, knee)));
+    const aim = leg.map((v, i) => v + shift[i]), needed = dot(aim, aim), least = max(dot(leg, leg), whole * whole);
+    const along = hypot(toe[0] - heel[0], toe[2] - heel[2]), high = heel[1] - toe[1];
+    if (needed <= least || along < 1e-6) return flat;
+    const fx = (toe[0] - heel[0]) / along, fz = (toe[2] - heel[2]) / along;
+    const [wx, up, wz] = minus(toe, hip).map((v, i) => v + shift[i]), ahead = wx * fx + wz * fz;
+    if (ahead >= 0) return flat;
+    const most = least + max(1 + ahead / k.behind, 0) * (needed - least);
+    const cosine = up * high - ahead * along, sine = ahead * high + up * along;
+    const share = .5 * (most - wx * wx - up * up - wz * wz - along * along - high * high) / hypot(cosine, sine);
+    const angle = min(max(atan2(sine, cosine) + Math.acos(min(max(share, -1), 1)), 0), k.mostAdded);
+    const forward = along * (1 - cos(angle)) + high * sin(angle);
+    shift[0] += forward * fx;
+    shift[1] += along * sin(angle) - high * (1 - cos(angle));
+    shift[2] += forward * fz;
+    return [cos(angle / 2), sin(angle / 2) * fz, 0, -sin(angle / 2) * fx];
+  };
+  // The joints below a heel that was at `before`: the foot turns `by`, its toes do not.
+  const carryFoot = (f, before, by) => {
+    const [, , heel, toe] = spec.legs[f], now = joint(heel);
+    const place = (point) => rotate(by, minus(point, before)).map((v, i) => v + now[i]);
+    const moved = minus(place(joint(toe)), joint(toe));
+    c.turns.set(multiply(by, at4(c.turns, heel)), 4 * heel);
+    for (const j of spec.carried[f]) {
+      if (spec.toes[f].includes(j)) for (let i = 0; i < 3; i++) c.pose[3 * j + i] += moved[i];
+      else {
+        c.pose.set(place(joint(j)), 3 * j);
+        c.turns.set(multiply(by, at4(c.turns, j)), 4 * j);
+      }
+    }
+  };
+  // Turns `held` toward `aim` by at most mostAdded. Returns whether it did not reach it.
+  const approach = (held, aim) => {
+    const near = held[0] * aim[0] + held[1] * aim[1] + held[2] * aim[2] + held[3] * aim[3], to = near < 0 ? aim.map((v) => -v) : aim;
+    const whole = Math.acos(min(abs(near), 1)), most = .5 * k.mostAdded, late = whole > most;
+    const [keep, take] = late ? [sin(whole - most) / sin(whole), sin(most) / sin(whole)] : [0, 1];
+    for (let i = 0; i < 4; i++) held[i] = keep * held[i] + take * to[i];
+    return late;
+  };
+  // Like `reach`, but adds at most mostAdded to the network's own turn of thigh and shank.
+  const bend = (hip, knee, heel, shift, h, n, added) => {
+    const thigh = minus(knee, hip), shank = minus(heel, knee);
+    if (abs(shift[0]) + abs(shift[1]) + abs(shift[2]) > 1e-9) reach(hip, knee, heel, shift);
+    const late = [[thigh, minus(knee, hip)], [shank, minus(heel, knee)]].map(([a, b], i) => approach(added[i], between(a, b)));
+    if (late[0] || late[1]) {
+      const [t, s] = [rotate(added[0], thigh), rotate(added[1], shank)];
+      for (let i = 0; i < 3; i++) {
+        knee[i] = hip[i] + t[i];
+        heel[i] = knee[i] + s[i];
+      }
+    }
+    c.turns.set(multiply(added[0], at4(c.turns, h)), 4 * h);
+    c.turns.set(multiply(added[1], at4(c.turns, n)), 4 * n);
+  };
+  const reach = (hip, knee, heel, shift) => {
+    const thigh = minus(knee, hip), shank = minus(heel, knee);
+    const upper = hypot(...thigh), lower = hypot(...shank);
+    const leg = thigh.map((v, i) => v + shank[i]), before = hypot(...leg);
+    const aim = leg.map((v, i) => v + shift[i]), distance = hypot(...aim);
+    if (min(before, distance, upper, lower) < 1e-6) return;
+    const was = leg.map((v) => v / before), way = aim.map((v) => v / distance);
+    const length = min(max(distance, abs(upper - lower) * 1.001 + 1e-6), (upper + lower) * .999);
+    const cosine = min(max((upper * upper + length * length - lower * lower) / (2 * upper * length), -1), 1);
+    // Turn the direction in which the knee bends with the leg.
+    const along = dot(thigh, was), side = thigh.map((v, i) => v - along * was[i]);
+    const turn = dot(side, way) / max(1 + dot(was, way), 1e-6);
+    const out = side.map((v, i) => v - turn * (was[i] + way[i])), size = hypot(...out);
+    if (size < 1e-6) return;
+    const sine = sqrt(1 - cosine * cosine) / size;
+    for (let i = 0; i < 3; i++) {
+      knee[i] = hip[i] + upper * (way[i] * cosine + out[i] * sine);
+      heel[i] = hip[i] + way[i] * length;
+    }
+  };
+
+  return { carryBody, placeFoot };
+};
