@@ -2,11 +2,10 @@
 
     python benchmarks/report.py [results/injured/report.html ...] [--seconds 5] [--width 1280]
 
-Headless Chromium draws on the processor, in software, many times slower than the graphics of any laptop; the
-character's milliseconds are what they are anywhere on that processor. Ratios: of the character to the 16.7 ms
-of a frame at 60 Hz, and to Python's frame on the same network, if `--python` names its folder. The time until
-the figure at the top walks is also given as processor time of the page's main thread, which a busy machine
-changes less.
+Headless Chromium draws without a graphics card, many times slower than any laptop. The milliseconds of the
+character do not depend on that. They are compared with the 16.7 ms of a frame at 60 Hz, and with Python's
+frame of the same network, if `--python` names its folder. The time until the figure at the top walks is also
+given as processor time of the page's main thread, which depends less on other work on the machine.
 """
 
 from __future__ import annotations
@@ -102,7 +101,7 @@ def main() -> None:
     if path is None:
         raise SystemExit(f"no browser here ({', '.join(tools.BROWSERS)})")
     for page in asked.pages:
-        print(f"{page}: {page.stat().st_size / 1e6:.1f} MB, of 25 allowed")
+        print(f"{page}: {page.stat().st_size / 1e6:.1f} MB, of 20 allowed")
         with tempfile.TemporaryDirectory() as folder:
             browser = tools.Browser(path, Path(folder), asked.width, 900)
             browser.send("Performance.enable", timeDomain="threadTicks")

@@ -25,17 +25,26 @@ ATTACKS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         ),
     ),
     "a bad download server": ("a clip's download", UNHARMED, ("tests/motion/test_download.py",)),
-    "a hostile file or name": ("its reader", REFUSED, ("tests/faults/test_untrusted.py",)),
+    "a hostile file or name": (
+        "its reader",
+        REFUSED,
+        (
+            "tests/faults/test_hostile_bvh.py",
+            "tests/faults/test_hostile_arrays.py",
+            "tests/faults/test_hostile_names.py",
+            "tests/faults/test_no_code_runs.py",
+        ),
+    ),
     "clips with awkward names": ("a whole run", UNHARMED, ("tests/faults/test_names.py",)),
     "a misuse of the runtime": (
         "`next_pose`",
         REFUSED,
         (
-            "tests/runtime/test_animation.py::test_impossible_wishes_are_refused_and_change_nothing",
-            "tests/runtime/test_animation.py::test_invalid_wishes_are_refused",
-            "tests/runtime/test_animation.py::test_severities_of_another_shape",
-            "tests/runtime/test_animation.py::test_a_severity_out_of_range",
-            "tests/runtime/test_animation.py::test_a_terrain_that_raises_leaves_the_state_as_it_was",
+            "tests/runtime/test_wrong_calls.py::test_impossible_wishes_are_refused_and_change_nothing",
+            "tests/runtime/test_wrong_calls.py::test_invalid_wishes_are_refused",
+            "tests/runtime/test_wrong_calls.py::test_severities_of_another_shape",
+            "tests/runtime/test_wrong_calls.py::test_a_severity_out_of_range",
+            "tests/runtime/test_wrong_calls.py::test_a_terrain_that_raises_leaves_the_state_as_it_was",
         ),
     ),
     "a state that is not finite": (

@@ -1,35 +1,51 @@
-// Layers of K sets of weights, as `packed_rows` packs them, whose outputs are blended by shares; an ELU between them.
+// Layers with K sets of weights each, packed by `packed_rows`. Their outputs are blended by shares, with an ELU between layers.
+// Weights of 8 bits are packed by `hobble.report.rounded`. They have a factor for each group of columns, others for each row.
 import { bytes } from "../report/web/numbers.js";
 
 export const floats = (text) => new Float32Array(bytes(text));
 
-const unpacked = ({ points, rows, columns, weights, scale, biases }) => {
-  const integers = new Int16Array(bytes(weights)), factors = floats(scale), w = new Float32Array(integers.length);
-  for (let r = 0, i = 0; r < points * rows; r++) for (let c = 0; c < columns; c++, i++) w[i] = integers[i] * factors[r];
+export const unpacked = ({ points, rows, columns, weights, scale, biases, bits = 16, group = columns }) => {
+  const integers = new (bits === 8 ? Int8Array : Int16Array)(bytes(weights)), factors = floats(scale), w = new Float32Array(integers.length);
+  for (let r = 0, i = 0, f = 0; r < points * rows; r++) {
+    for (let from = 0; from < columns; from += group, f++) {
+      for (const end = i + Math.min(group, columns - from); i < end; i++) w[i] = integers[i] * factors[f];
+    }
+  }
   return { points, rows, columns, w, b: floats(biases), out: new Float32Array(rows) };
 };
 
-const applied = ({ points, rows, columns, w, b, out }, shares, x, last) => {
-  for (let r = 0; r < rows; r++) {
-    let y = 0;
-    for (let k = 0; k < points; k++) {
-      const share = shares ? shares[k] : 1, start = (k * rows + r) * columns;
-      let sum = b[k * rows + r];
-      for (let c = 0; c < columns; c++) sum += w[start + c] * x[c];
-      y += share * sum;
-    }
-    out[r] = last || y >= 0 ? y : Math.exp(y) - 1;
+// Sum of w[from + c] x[c]. Four sums go on side by side, because an addition has to wait for the one before it.
+const product = (w, from, x, n) => {
+  const whole = n - n % 4;
+  let p = 0, q = 0, s = 0, t = 0;
+  for (let c = 0, i = from; c < whole; c += 4, i += 4) {
+    p += w[i] * x[c];
+    q += w[i + 1] * x[c + 1];
+    s += w[i + 2] * x[c + 2];
+    t += w[i + 3] * x[c + 3];
   }
+  for (let c = whole; c < n; c++) p += w[from + c] * x[c];
+  return p + q + s + t;
+};
+
+// One set of weights after another, so that they are read from memory in their order.
+const applied = ({ points, rows, columns, w, b, out }, shares, x, last) => {
+  out.fill(0);
+  for (let k = 0; k < points; k++) {
+    const share = shares ? shares[k] : 1;
+    for (let r = 0, i = k * rows; r < rows; r++, i++) out[r] += share * (b[i] + product(w, i * columns, x, columns));
+  }
+  if (!last) for (let r = 0; r < rows; r++) if (out[r] < 0) out[r] = Math.exp(out[r]) - 1;
   return out;
 };
 
-// Returns (x, shares) => outputs, in an array that the next call writes over; without shares, of one set of weights.
+// Returns (x, shares) => outputs, in an array that the next call overwrites. Without shares there is one set of weights.
 export const createLayers = (packed) => {
   const layers = packed.map(unpacked);
   return (x, shares) => layers.reduce((h, one, i) => applied(one, shares, h, i === layers.length - 1), x);
 };
 
-// Inputs as they are, of which those that weigh nothing are not looked at, into z; outputs back into raw units, in place.
+// standardise: raw inputs x into z, without those that have no weight. restore: outputs to raw units, in place.
 export const createScales = (spec) => {
   const mean = floats(spec.xMean), inverse = floats(spec.xScale), seen = Int32Array.from(spec.seen);
   const yMean = floats(spec.yMean), yStd = floats(spec.yStd);
