@@ -187,6 +187,7 @@ def _constants() -> dict[str, float]:
         "stepHeight": foot_lock.STEP_HEIGHT,
         "fastestTurn": float(controller.FASTEST_TURN),
         "heightMix": feet.HEIGHT_MIX,
+        "fastestLift": feet.FASTEST_LIFT,
         "floating": feet.FLOATING,
         "bodyMix": feet.BODY_MIX,
         "bodyFree": feet.BODY_FREE,
