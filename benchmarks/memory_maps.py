@@ -1,4 +1,4 @@
-"""The database's reader against a reader of the same rows in memory maps, as ratios measured in one run.
+"""Compares the database's reader with a reader of the same rows from memory maps, as ratios in one run.
 
     python benchmarks/memory_maps.py [--size-mb 1280] [--memory-mb 128] [--rounds 5] [--folder DIR]
 
@@ -60,10 +60,11 @@ class Mapped:
             setattr(self, name, np.load(folder / f"{name}.npy", mmap_mode="r"))
         self.first = order.starts(self.count)
         self.chunk_rows = [c.rows for c in db.manifest.chunks["train"]]
+        self.shards = db.manifest.shard_of_chunk("train")
         self.starts = np.cumsum(self.chunk_rows) - self.chunk_rows
 
     def blocks(self, section: int, seed: int, block_rows: int, window: int) -> Iterator[Block]:
-        """A section of the first pass, as `Database.blocks` gives it with windows of so many chunks."""
+        """A section of the first pass, like `Database.blocks` with windows of this many chunks."""
         visits, rows = self.db.manifest.visits, self.db.rows("train")
         parts = chain.from_iterable(
             self.parts((seed, 0, layer), start, stop, window)
@@ -74,7 +75,7 @@ class Mapped:
     def parts(self, of: tuple[int, int, int], start: int, stop: int, window: int) -> Iterator[tuple]:
         """Rows and fits of the places start to stop of a layer, as indices into the whole tables."""
         every = range(len(self.chunk_rows))
-        some = [np.array(every)] if window >= len(every) else order.groups(self.chunk_rows, window, *of)
+        some = [np.array(every)] if window >= len(every) else order.groups(self.shards, window, *of)
         done = 0
         for group, members in enumerate(some):
             own = np.concatenate([np.arange(n) + s for n, s in self.pieces(members)])

@@ -8,9 +8,9 @@ of motion that the configuration uses; all else is unchanged. Each batch pays fo
 longer clips take fewer hours than estimated. Mirrored clips count as motion: with them, the hours double.
 Under `synthetic` the bytes are those of the BVH files, which are the user's own.
 
---parts: jobs that merge the database side by side (`database.parts`). --training-nodes: machines that train
-together, whose network of 10 Gb/s adds to each step what a ring all-reduce of the gradient takes; --batch:
-samples of a step then, and --passes, where not those of the run. Accuracy and roll-outs measure at most
+--parts: jobs that merge the database at the same time (`database.parts`). --training-nodes: machines that
+train together; each step then also takes a ring all-reduce of the gradient at 10 Gb/s. --batch, --passes:
+samples of a step and passes, if they differ from the run. Accuracy and roll-outs measure at most
 `evaluation.sample_frames`.
 """
 
@@ -31,7 +31,7 @@ from hobble.workflow.batches import batch_count
 from hobble.workflow.costs import BATCH_RULES
 
 ROOT = Path(__file__).resolve().parents[1]
-# Rules of one job each whose work grows with the motion; the others of one job do always the same.
+# Rules with one job whose work grows with the motion. The work of other single jobs stays the same.
 GROWING = {"database_merge", "training", "recognition", "report"}
 SAMPLED = {"accuracy", "rollouts"}  # whose work grows up to so many frames
 FPS = 60
@@ -50,8 +50,8 @@ def motion_seconds(folder: Path, configuration: str) -> float:
 
 @dataclass(frozen=True)
 class Plan:
-    """factor: times as much motion as in the run. clips, nodes, parts: as asked. sampled: times as much
-    motion as is measured. training: hours on the clock that training takes."""
+    """factor: how much more motion than in the run. clips, nodes, parts: as requested. sampled: how much more
+    motion is measured. training: hours on the clock."""
 
     factor: float
     clips: int
@@ -61,7 +61,7 @@ class Plan:
     training: float
 
     def growth(self, rule: str, per_clip: set[str]) -> float:
-        """Times as much work of a rule."""
+        """How much more work a rule has."""
         if rule in SAMPLED:
             return self.sampled
         return self.factor if rule in per_clip or rule in GROWING else 1.0
@@ -70,7 +70,7 @@ class Plan:
 def scaled(stage: dict[str, Any], plan: Plan) -> dict[str, float]:
     """One line of the table: jobs, hours of processors, hours on the clock, longest job, bytes.
 
-    The batches of a stage go side by side over the nodes; the jobs of its other rules go one after another.
+    The batches of a stage run at the same time on the nodes; its other jobs run one after another.
     """
     per_clip = {rule for rules in BATCH_RULES.values() for rule in rules}
     batches = batch_count(plan.clips)
@@ -98,7 +98,7 @@ def scaled(stage: dict[str, Any], plan: Plan) -> dict[str, float]:
 def training_hours(
     folder: Path, stages: list[dict[str, Any]], factor: float, asked: argparse.Namespace
 ) -> float:
-    """Hours on the clock of so many nodes, each as fast as the one of the run."""
+    """Hours on the clock with this many nodes, each as fast as the machine of the run."""
     resolved = yaml.safe_load((folder / f"results/{asked.configuration}/configuration.yaml").read_text())
     recipe = resolved["configuration"]["training"]
     history = folder / f"results/{asked.configuration}/network/history.csv"

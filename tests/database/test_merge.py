@@ -186,7 +186,7 @@ def test_a_half_removed_build_is_completed(rows_of, tmp_path):
     rows, splits = {"a": rows_of("a", 60)}, {"a": "train"}
     manifest = write_database(tmp_path / "db", rows, splits, **OPTIONS)
     before = contents(tmp_path / "db")
-    shutil.rmtree(tmp_path / "db" / manifest.folder / "train")
+    shutil.rmtree(tmp_path / "db" / manifest.folder / "0" / "train")
     write_database(tmp_path / "db", rows, splits, **OPTIONS)
     assert contents(tmp_path / "db") == before
 

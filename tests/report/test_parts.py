@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from hobble.measures.registry import MEASURES
+from hobble.report import measured
 from hobble.report.charts import Chart, Family
 from hobble.report.parts import Pair, Part, Section, Words, joined
 from hobble.report.tables import Column, Table
@@ -26,11 +33,17 @@ def test_sections_of_one_name_are_one_with_the_parts_of_all_in_their_order() -> 
     assert [part.kind for part in second.parts] == ["words", "chart", "table"]
 
 
-def test_a_section_of_words_alone_is_left_out() -> None:
-    introduction = Section("s", [Part(0, Words("Each bar is a lap.")), Part(5, None)], title="S")
-    assert joined([introduction, Section("s", [Part(10, Pair([None, None]))])]) == []
-    [shown] = joined([introduction, Section("s", [Part(10, Pair([None, chart("a")]))])])
-    assert [part.kind for part in shown.parts] == ["words", "pair"]
+def test_a_pair_without_charts_is_nothing() -> None:
+    assert joined([Section("s", [Part(0, Pair([None, None])), Part(5, None)], title="S")]) == []
+    [shown] = joined([Section("s", [Part(0, Pair([None, chart("a")]))])])
+    assert [part.kind for part in shown.parts] == ["pair"]
+
+
+@pytest.mark.parametrize("found", [{}, {"applies": False, "reason": "no such input"}])
+def test_a_measurement_that_found_nothing_leaves_no_section(found: dict[str, Any], material: Any) -> None:
+    nothing = replace(material, measured={one.name: found for one in MEASURES})
+    assert measured.sections(material) != []
+    assert measured.sections(nothing) == []
 
 
 def test_charts_are_found_wherever_they_stand() -> None:

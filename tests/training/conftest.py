@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from hobble.core.skeleton import Skeleton
-from hobble.database.merge import write_database
+from hobble.database.merge import merge_shards
 from hobble.database.reader import Database
+from hobble.database.shard import write_shard
 from hobble.models.pfnn.options import PfnnOptions
 from hobble.rows.clip_rows import ClipRows
 from hobble.rows.layout import RowLayout
@@ -57,14 +58,13 @@ def clip_rows(name: str, rows: int, fits: int, seed: int) -> ClipRows:
 
 @pytest.fixture(scope="session")
 def small_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """230 rows to train on and 70 held out, ten fits each or one: 2,300 samples a pass."""
+    """Two shards with 230 rows to train on and 70 held out, ten fits each or one: 2,300 samples a pass."""
     path = tmp_path_factory.mktemp("database") / "all"
-    clips = {
-        "walk": clip_rows("walk", 150, 1, 1),
-        "hop": clip_rows("hop", 80, 10, 2),
-        "turn": clip_rows("turn", 70, 1, 3),
-    }
-    write_database(path, clips, SPLITS, channels=["injury"], joint_weight=0.1)
+    walk, turn = clip_rows("walk", 150, 1, 1), clip_rows("turn", 70, 1, 3)
+    shards = {"0": {"walk": walk, "turn": turn}, "1": {"hop": clip_rows("hop", 80, 10, 2)}}
+    for name, clips in shards.items():
+        write_shard(path.parent / name, clips, SPLITS, channels=["injury"], joint_weight=0.1)
+    merge_shards(path, [path.parent / name for name in shards], joint_weight=0.1)
     return path
 
 

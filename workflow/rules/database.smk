@@ -1,5 +1,4 @@
 from hobble.database.options import Merging, Rows
-from hobble.workflow.datasets import shard_of
 
 for batch in [*batches_of_clips, *batches_of_versions]:
 
@@ -52,57 +51,60 @@ for batch in [*batches_of_clips, *batches_of_versions]:
             "../scripts/database_clips.py"
 
 
-def clips_of(dataset, channels, file):
-    """That file of each clip of a database."""
-    return expand(
-        f"results/datasets/{dataset}/{file}",
-        clip=datasets.selected(dataset, channels_of_folder(channels)),
+def clips_of(dataset, channels, file, shard=None):
+    """That file of each clip of a database, or of one of its shards."""
+    names = (
+        datasets.selected(dataset, channels_of_folder(channels))
+        if shard is None
+        else datasets.in_shard(dataset, channels_of_folder(channels), int(shard))
     )
+    return expand(f"results/datasets/{dataset}/{file}", clip=names)
 
 
 def compared(w, file):
     """That file of the clips that must not be one motion on both sides of the split; of one shard, if asked."""
     names = datasets.compared(w.dataset, channels_of_folder(w.channels))
-    if hasattr(w, "number"):
-        names = shard_of(names, int(w.number), datasets.parts(w.dataset))
+    if hasattr(w, "shard"):
+        own = datasets.in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))
+        names = [name for name in names if name in own]
     return expand(f"results/datasets/{w.dataset}/{file}", clip=names)
 
 
-def pieces(w, kind):
-    """The folders of a database's shards, or of its parts; none where one job merges it."""
-    count = datasets.parts(w.dataset)
+def shards_of(w):
+    """The folders of a database's shards; none if one job reads all clips."""
+    count = datasets.shards(w.dataset)
     return [
-        f"results/datasets/{w.dataset}/database/parts/{w.channels}/{kind}-{number}"
+        f"results/datasets/{w.dataset}/database/shards/{w.channels}/{number}"
         for number in range(count if count > 1 else 0)
     ]
 
 
 rule database_shard:
-    """The rows of some clips, scattered over the parts of the database."""
+    """The rows of some clips of a database, shuffled and in chunks."""
     input:
-        clips=lambda w: clips_of(w.dataset, w.channels, "database/clips/{clip}.npz"),
+        clips=lambda w: clips_of(
+            w.dataset, w.channels, "database/clips/{clip}.npz", w.shard
+        ),
         compared=lambda w: compared(w, "motion/{clip}.npz"),
         reports=lambda w: compared(w, "motion/{clip}.json"),
     output:
-        shard=temp(
-            directory(
-                "results/datasets/{dataset}/database/parts/{channels}/shard-{number}"
-            )
-        ),
+        shard=directory("results/datasets/{dataset}/database/shards/{channels}/{shard}"),
     log:
-        "results/datasets/{dataset}/logs/database/database_shard/{channels}-{number}.log",
+        "results/datasets/{dataset}/logs/database/database_shard/{channels}-{shard}.log",
     benchmark:
-        "results/datasets/{dataset}/benchmarks/database/database_shard/{channels}-{number}.tsv"
+        "results/datasets/{dataset}/benchmarks/database/database_shard/{channels}-{shard}.tsv"
     threads: 1
     resources:
-        mem_mb=lambda w, attempt: demands.memory_of_longest(w.dataset, 10, 24, attempt),
-        runtime=lambda w, attempt: demands.minutes_of_part(w.dataset, 0.1, attempt),
+        mem_mb=lambda w, attempt: demands.shard_memory(w.dataset, attempt),
+        runtime=lambda w, attempt: demands.shard_minutes(w.dataset, 0.1, attempt),
     params:
-        number=lambda w: int(w.number),
-        parts=lambda w: datasets.parts(w.dataset),
-        splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.channels)),
+        splits=lambda w: datasets.in_shard(
+            w.dataset, channels_of_folder(w.channels), int(w.shard)
+        ),
         channels=lambda w: channels_of_folder(w.channels),
-        sources=lambda w: datasets.sources(w.dataset, channels_of_folder(w.channels)),
+        sources=lambda w: datasets.sources(
+            datasets.in_shard(w.dataset, channels_of_folder(w.channels), int(w.shard))
+        ),
         options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=lambda w: package.code(
             "database_shard", *modules_of(channels_of_folder(w.channels))
@@ -111,49 +113,18 @@ rule database_shard:
         "../scripts/database_shard.py"
 
 
-rule database_part:
-    """A stretch of the shuffled rows, in chunks."""
-    input:
-        shards=lambda w: pieces(w, "shard"),
-    output:
-        part=temp(
-            directory(
-                "results/datasets/{dataset}/database/parts/{channels}/part-{number}"
-            )
-        ),
-    log:
-        "results/datasets/{dataset}/logs/database/database_part/{channels}-{number}.log",
-    benchmark:
-        "results/datasets/{dataset}/benchmarks/database/database_part/{channels}-{number}.tsv"
-    threads: 1
-    resources:
-        mem_mb=lambda w, attempt: demands.part_memory(w.dataset, attempt),
-        runtime=lambda w, attempt: demands.minutes_of_part(w.dataset, 0.1, attempt),
-    params:
-        number=lambda w: int(w.number),
-        parts=lambda w: datasets.parts(w.dataset),
-        options=lambda w: datasets.part(w.dataset, "database", Merging),
-        code=lambda w: package.code(
-            "database_part", *modules_of(channels_of_folder(w.channels))
-        ),
-    script:
-        "../scripts/database_part.py"
-
-
 rule database_merge:
     """The rows of all clips, shuffled and in chunks, with their statistics."""
     input:
         clips=lambda w: (
             []
-            if pieces(w, "part")
+            if shards_of(w)
             else clips_of(w.dataset, w.channels, "database/clips/{clip}.npz")
         ),
         # To check that no motion is on both sides of the split.
-        compared=lambda w: [] if pieces(w, "part") else compared(w, "motion/{clip}.npz"),
-        reports=lambda w: [] if pieces(w, "part") else compared(w, "motion/{clip}.json"),
-        # Of more than one job there is what these have made.
-        shards=lambda w: pieces(w, "shard"),
-        parts=lambda w: pieces(w, "part"),
+        compared=lambda w: [] if shards_of(w) else compared(w, "motion/{clip}.npz"),
+        reports=lambda w: [] if shards_of(w) else compared(w, "motion/{clip}.json"),
+        shards=shards_of,
     output:
         database=directory("results/datasets/{dataset}/database/{channels}"),
     log:
@@ -162,15 +133,15 @@ rule database_merge:
         "results/datasets/{dataset}/benchmarks/database/database_merge/{channels}.tsv"
     threads: 1
     resources:
-        mem_mb=lambda w, attempt: demands.memory_of_longest(w.dataset, 10, 24, attempt),
-        runtime=lambda w, attempt: demands.minutes_of_all(
-            w.dataset, 0.1, attempt, least=5
-        ),
+        mem_mb=lambda w, attempt: demands.shard_memory(w.dataset, attempt),
+        runtime=lambda w, attempt: demands.shard_minutes(w.dataset, 0.1, attempt),
     params:
         dataset=lambda w: w.dataset,
         splits=lambda w: datasets.selected(w.dataset, channels_of_folder(w.channels)),
         channels=lambda w: channels_of_folder(w.channels),
-        sources=lambda w: datasets.sources(w.dataset, channels_of_folder(w.channels)),
+        sources=lambda w: datasets.sources(
+            datasets.selected(w.dataset, channels_of_folder(w.channels))
+        ),
         options=lambda w: datasets.part(w.dataset, "database", Merging),
         code=lambda w: package.code(
             "database_merge", *modules_of(channels_of_folder(w.channels))

@@ -1,12 +1,11 @@
-"""Creates the shuffled, chunked database and its statistics from the rows of all clips, or from its parts."""
+"""Creates the database and its statistics from the rows of all clips, or from its shards."""
 
 from pathlib import Path
 
 from hobble.core.clip import load_clip
 from hobble.core.files import read_json
-from hobble.database.merge import write_database
+from hobble.database.merge import merge_shards, write_database
 from hobble.database.options import Merging
-from hobble.database.parts import join_parts
 from hobble.database.sides import refuse_both_sides
 from hobble.motion.duplicates import likeness, load_likenesses, same_pairs
 from hobble.workflow.job import job
@@ -19,8 +18,7 @@ with job(snakemake) as log:
     like += [one for shard in shards for one in load_likenesses(shard / "likenesses.npz")]
     refuse_both_sides(f"data set {snakemake.params.dataset}", same_pairs(like), snakemake.params.splits)
     if shards:
-        parts = [Path(part) for part in snakemake.input.parts]
-        manifest = join_parts(database, shards, parts, joint_weight=options.joint_weight, dtype=options.dtype)
+        manifest = merge_shards(database, shards, joint_weight=options.joint_weight, dtype=options.dtype)
     else:
         manifest = write_database(
             database,

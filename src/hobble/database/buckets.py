@@ -23,18 +23,13 @@ def gather_fits(fits: Array, count: np.ndarray, order: np.ndarray) -> Array:
 
 
 class Buckets:
-    """Files of up to `rows_each` rows for consecutive places in the final order. Rows arrive in any order.
+    """Files of up to `rows_each` rows for consecutive places in the final order. Rows arrive in any order."""
 
-    there: whether the folder may exist already, with rows that were added before.
-    """
-
-    def __init__(
-        self, folder: Path, rows: int, rows_each: int, columns: int, fit_columns: int, there: bool = False
-    ) -> None:
+    def __init__(self, folder: Path, rows: int, rows_each: int, columns: int, fit_columns: int) -> None:
         self.folder, self.rows_each = folder, rows_each
         self.columns, self.fit_columns = columns, fit_columns
         self.count = -(-rows // rows_each)
-        folder.mkdir(parents=True, exist_ok=there)
+        folder.mkdir(parents=True)
 
     def add(self, frames: Array, fits: Array, index: np.ndarray) -> None:
         """Scatter rows: frames (R, columns), their fits (S, fit_columns) and index (R,) of INDEX."""

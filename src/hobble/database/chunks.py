@@ -21,7 +21,7 @@ from hobble.core.errors import InputError
 LENGTH = 8  # bytes of the header's length
 MOST_PARTS = 16  # buffers in one vectored read: the least that POSIX guarantees
 TYPES = {"<f2": "F16", "<u2": "BF16", "<f4": "F32", "<i4": "I32"}
-HINT = "Delete the database's folder; the next run makes it again."
+HINT = "Delete the folder of the database, and those of its shards. The next run makes them again."
 
 
 @dataclass(frozen=True)

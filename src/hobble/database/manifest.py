@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from hobble.core.errors import InputError
 from hobble.core.files import read_json, write_json
@@ -15,8 +17,18 @@ from hobble.rows.layout import RowLayout
 
 FILE = "manifest.json"
 STATISTICS = "statistics.npz"
-VERSION = 1
+SCALES = "scales.npz"  # of each shard: the statistics by which its chunks are standardised
+VERSION = 2
 SPLITS = ("train", "held_out")
+
+
+@dataclass(frozen=True)
+class ShardCounts:
+    """The numbers of clips, and of chunks of each split, that a shard has."""
+
+    clips: int
+    train: int
+    held_out: int
 
 
 @dataclass(frozen=True)
@@ -24,8 +36,9 @@ class Manifest:
     """folder: subfolder of chunks and statistics, named by a hash of their content.
 
     layout: of the composed rows. visits: how often a pass uses each row. clips: one entry for each clip with
-    `clip`, `split`, `rows`, `pairs`. chunks: per split. original_bytes: size of the same pairs in the
-    original's layout. limits: channel -> speed limits (`hobble.channels.limits`).
+    `clip`, `split`, `rows`, `pairs`. shards: `clips` and `chunks` are in their order. chunks: per split; in
+    a chunk, the clip of a row is a number among the clips of its shard. original_bytes: size of the same
+    pairs in the original's layout. limits: channel -> speed limits (`hobble.channels.limits`).
     """
 
     folder: str
@@ -35,6 +48,7 @@ class Manifest:
     dtype: str
     joint_weight: float
     clips: list[dict[str, Any]]
+    shards: list[ShardCounts]
     chunks: Mapping[str, list[Chunk]]
     original_bytes: int
     bytes: int
@@ -44,6 +58,15 @@ class Manifest:
         """Rows of a split."""
         return sum(chunk.rows for chunk in self.chunks[split])
 
+    def shard_of_chunk(self, split: str) -> np.ndarray:
+        """(chunks,) the shard of each chunk of a split."""
+        return np.repeat(np.arange(len(self.shards)), [getattr(shard, split) for shard in self.shards])
+
+    def first_clip(self) -> np.ndarray:
+        """(shards,) the number of each shard's first clip in `clips`."""
+        count = np.array([shard.clips for shard in self.shards])
+        return np.cumsum(count) - count
+
     def save(self, path: Path) -> None:
         """Write manifest.json into the database's folder, atomically."""
         values = {**vars(self), "format": "hobble database", "version": VERSION}
@@ -51,6 +74,7 @@ class Manifest:
         values["skeleton"] = json.dumps(
             self.skeleton
         )  # a text, since keys get sorted and its joints must not
+        values["shards"] = [asdict(shard) for shard in self.shards]
         values["chunks"] = {split: [c.to_dict() for c in chunks] for split, chunks in self.chunks.items()}
         write_json(path / FILE, values)
 
@@ -68,6 +92,7 @@ class Manifest:
                 raise InputError(file, f"not a database of version {VERSION}", fix=HINT)
             values["layout"] = RowLayout.from_dict(values["layout"])
             values["skeleton"] = json.loads(values["skeleton"])
+            values["shards"] = [ShardCounts(**shard) for shard in values["shards"]]
             chunks = values["chunks"]
             values["chunks"] = {split: [Chunk(**chunk) for chunk in chunks[split]] for split in SPLITS}
             return cls(**values)

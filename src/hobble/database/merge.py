@@ -1,8 +1,7 @@
-"""Shuffle the rows of all clips and write them in chunks: a two-pass external shuffle in bounded memory.
+"""Merge shards into a database, without reading their rows.
 
-Pass 1 reads each clip once, adds it to the statistics and scatters its rows over buckets. A bucket holds a
-consecutive part of one permutation of all rows. Pass 2 sorts each bucket into the permutation's order,
-standardises it and writes its chunks. The manifest is written last and atomically. So a killed build leaves
+The chunks of the shards get a second name in the database's folder. The statistics are those of all training
+rows, from the moments of the shards. The manifest is written last and atomically. So a killed merge leaves
 the previous database, or none.
 """
 
@@ -12,21 +11,19 @@ import hashlib
 import os
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import replace
+from functools import reduce
 from pathlib import Path
 
-from hobble.channels.limits import Pace
+import numpy as np
+
+from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import save_npz, sync_folder, write_error
 from hobble.database.chunks import Chunk
-from hobble.database.manifest import FILE, SPLITS, STATISTICS, Manifest
-from hobble.database.ordered import write_chunks
-from hobble.database.pace import gather, paces_of
-from hobble.database.plan import Plan, Source, make_plan
-from hobble.database.precision import STORED
-from hobble.database.scatter import make_buckets, scatter
-from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
-
-CHUNK_BYTES = 4 << 20  # read at a time: large enough to be fast on any disk, small enough for any memory
+from hobble.database.manifest import FILE, SCALES, SPLITS, STATISTICS, Manifest, ShardCounts
+from hobble.database.pace import paces_of
+from hobble.database.plan import Source, fit_together
+from hobble.database.shard import CHUNK_BYTES, Shard, add, statistics_of, write_shard
 
 
 def write_database(
@@ -41,7 +38,7 @@ def write_database(
     seed: int = 1,
     chunk_bytes: int = CHUNK_BYTES,
 ) -> Manifest:
-    """Build the database folder `path` from the rows of clips, or from files of rows.
+    """Build the database folder `path` of one shard from the rows of clips, or from files of rows.
 
     clips: clip name -> rows or file. splits: clip name -> "train" or "held_out". channels: the network's
     input channels, in the order of their columns. sources: hurt version -> its healthy clip. dtype: float32,
@@ -49,68 +46,120 @@ def write_database(
     same bytes. Raises HobbleError if no training clip has rows, InputError if a clip does not fit the others.
     """
     path = Path(path)
-    path.mkdir(parents=True, exist_ok=True)
-    _remove_others(path, keep=None)
-    work = path / f"part-{os.getpid()}"
+    work = _work(path)
     try:
-        work.mkdir()
-        plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes)
-        paces = paces_of(plan.layout, plan.skeleton)
-        buckets = make_buckets(work, plan, dict.fromkeys(SPLITS, plan.bucket_rows))
-        moments = []
-        for entry, clip in scatter(buckets, clips, plan, seed):
-            if entry["split"] == "train":
-                moments.append(clip_moments(clip, plan.layout))
-                gather(paces, clip, (sources or {}).get(entry["clip"]))
-        statistics = all_statistics(plan, moments, joint_weight)
-        chunks = {
-            split: list(write_chunks(work, split, buckets[split], plan, statistics, dtype))
-            for split in SPLITS
-        }
-        for folder in work.glob("buckets-*"):
-            folder.rmdir()
-        return publish(path, work, plan, chunks, statistics, paces, joint_weight, dtype)
+        shard = work / "0"
+        write_shard(
+            shard,
+            clips,
+            splits,
+            channels=channels,
+            sources=sources,
+            joint_weight=joint_weight,
+            dtype=dtype,
+            seed=seed,
+            chunk_bytes=chunk_bytes,
+        )
+        return _merged(path, work, [shard], joint_weight, dtype)
     except OSError as error:
         raise write_error(error, path) from error
     finally:
         shutil.rmtree(work, ignore_errors=True)
 
 
-def all_statistics(plan: Plan, moments: Sequence[tuple[Moments, Moments]], joint_weight: float) -> Statistics:
-    """The statistics of a database, from the moments of X and Y of each training clip, in order."""
-    x, y = moments[0]
-    for of_x, of_y in moments[1:]:
-        x, y = x + of_x, y + of_y
-    return finish(plan.layout, x, y, joint_weight, unseen_joints(plan.skeleton))
-
-
-def publish(
-    path: Path,
-    work: Path,
-    plan: Plan,
-    chunks: Mapping[str, list[Chunk]],
-    statistics: Statistics,
-    paces: Mapping[str, Pace],
-    joint_weight: float,
-    dtype: str,
+def merge_shards(
+    path: str | Path, shards: Sequence[Path], *, joint_weight: float, dtype: str = "float32"
 ) -> Manifest:
-    """Turn the folder `work`, which holds all chunks, into the database in the folder `path`."""
-    save_npz(work / STATISTICS, **{f.name: getattr(statistics, f.name) for f in fields(statistics)})
+    """Build the database folder `path` from the folders of its shards, in order.
+
+    Raises HobbleError if no training clip has rows, InputError if a shard does not fit the others.
+    """
+    path = Path(path)
+    work = _work(path)
+    try:
+        return _merged(path, work, shards, joint_weight, dtype)
+    except OSError as error:
+        raise write_error(error, path) from error
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def _work(path: Path) -> Path:
+    """A new folder in the database's folder for what is not finished, without those of killed builds."""
+    path.mkdir(parents=True, exist_ok=True)
+    _remove_others(path, keep=None)
+    work = path / f"part-{os.getpid()}"
+    work.mkdir()
+    return work
+
+
+def _merged(path: Path, work: Path, folders: Sequence[Path], joint_weight: float, dtype: str) -> Manifest:
+    """Merge shards in the folder `work`, then put the database in its place."""
+    shards = [shard for folder in folders if (shard := Shard.load(folder)) is not None]
+    _check(shards)
+    plan, clips = shards[0].plan, [entry for shard in shards for entry in shard.plan.clips]
+    statistics = statistics_of(plan, reduce(add, (shard.sums() for shard in shards)), joint_weight)
+    rows = work / "rows"
+    chunks = _linked(shards, rows)
+    save_npz(rows / STATISTICS, **vars(statistics))
+    scales = [shard.scale() for shard in shards]
+    save_npz(
+        rows / SCALES, **{name: np.stack([vars(one)[name] for one in scales]) for name in vars(statistics)}
+    )
+    paces = paces_of(plan.layout, plan.skeleton)
+    for shard in shards:
+        shard.add_paces(paces)
+    visits, values = max(shard.plan.visits for shard in shards), plan.layout.x_size + plan.layout.y_size + 1
     manifest = Manifest(
-        folder=_folder_name(work, chunks),
+        folder=_folder_name(rows, chunks),
         layout=plan.layout,
         skeleton=plan.skeleton,
-        visits=plan.visits,
+        visits=visits,
         dtype=dtype,
         joint_weight=joint_weight,
-        clips=plan.clips,
+        clips=clips,
+        shards=[ShardCounts(len(s.plan.clips), *(len(s.chunks[split]) for split in SPLITS)) for s in shards],
         chunks=chunks,
-        original_bytes=plan.original_bytes,
+        original_bytes=4 * values * visits * sum(entry["rows"] for entry in clips),
         bytes=sum(chunk.bytes for split in SPLITS for chunk in chunks[split]),
         limits={name: found.to_dict() for name, pace in paces.items() if (found := pace.learn())},
     )
-    _put_in_place(path, work, manifest)
+    _put_in_place(path, rows, manifest)
     return manifest
+
+
+def _check(shards: Sequence[Shard]) -> None:
+    """Check that there is something to train on, and that the rows of all shards have the same columns."""
+    trained = (entry["rows"] for s in shards for entry in s.plan.clips if entry["split"] == "train")
+    if not any(trained):
+        raise HobbleError(
+            "There is nothing to train on: no clip of the training part has a whole locomotion "
+            "cycle. Add clips, or hold fewer out."
+        )
+    first = shards[0].plan
+    for shard in shards:
+        if not fit_together(shard.plan, first):
+            clip, other = shard.plan.clips[0]["clip"], first.clips[0]["clip"]
+            raise InputError(clip, f"the layout of its rows differs from that of {other}")
+
+
+def _linked(shards: Sequence[Shard], rows: Path) -> dict[str, list[Chunk]]:
+    """Give the chunks of all shards a second name in `rows`, or copy them if there are no hard links."""
+    found: dict[str, list[Chunk]] = {split: [] for split in SPLITS}
+    for shard in shards:
+        for split, chunks in shard.chunks.items():
+            for chunk in chunks:
+                named = replace(chunk, file=f"{shard.folder.name}/{chunk.file}")
+                target = rows / named.file
+                target.parent.mkdir(parents=True, exist_ok=True)
+                try:
+                    os.link(shard.folder / chunk.file, target)
+                except FileNotFoundError:
+                    raise
+                except OSError:
+                    shutil.copyfile(shard.folder / chunk.file, target)
+                found[split].append(named)
+    return found
 
 
 def _remove_others(path: Path, keep: str | None) -> None:
@@ -122,23 +171,23 @@ def _remove_others(path: Path, keep: str | None) -> None:
         entry.unlink()
 
 
-def _folder_name(work: Path, chunks: Mapping[str, list[Chunk]]) -> str:
+def _folder_name(rows: Path, chunks: Mapping[str, list[Chunk]]) -> str:
     """A name for the build from a hash of its content."""
-    digest = hashlib.sha256((work / STATISTICS).read_bytes())
+    digest = hashlib.sha256((rows / STATISTICS).read_bytes() + (rows / SCALES).read_bytes())
     digest.update(repr(chunks).encode())
     return f"rows-{digest.hexdigest()[:12]}"
 
 
-def _put_in_place(path: Path, work: Path, manifest: Manifest) -> None:
+def _put_in_place(path: Path, rows: Path, manifest: Manifest) -> None:
     """Rename the finished build, write the manifest, then remove the previous build."""
     final = path / manifest.folder
     if final.exists():  # the same rows were built before: replace every file, since some may be damaged
-        for file in sorted(p for p in work.rglob("*") if p.is_file()):
-            place = final / file.relative_to(work)
+        for file in sorted(p for p in rows.rglob("*") if p.is_file()):
+            place = final / file.relative_to(rows)
             place.parent.mkdir(parents=True, exist_ok=True)  # a killed removal may have left a part
             os.replace(file, place)
         sync_folder(final)
     else:
-        os.rename(work, final)
+        os.rename(rows, final)
     manifest.save(path)
     _remove_others(path, keep=manifest.folder)

@@ -36,10 +36,12 @@ class Merging(Section):
 
 
 class Database(Rows, Merging):
-    """The content of rows, their storage, and the number of jobs that merge them."""
+    """The content of rows, their storage, and the number of shards."""
 
-    parts: Annotated[int, Field(gt=0, le=1000)] = Field(
-        1, description="parallel jobs that read and shuffle the rows; the result does not depend on it"
+    shards: Annotated[int, Field(gt=0, le=1000)] = Field(
+        1,
+        description="shards of the database, each made by a job from the rows of some clips; a new clip "
+        "changes one. The order in which training sees the rows depends on it",
     )
 
     terrain_side: PositiveFloat = Field(25.0, description="centimetres from the path to the side heights")

@@ -39,20 +39,36 @@ def spans(
         start = end
 
 
-def groups(
-    chunk_rows: Sequence[int], window: int, seed: int, pass_index: int, layer: int
-) -> list[np.ndarray]:
-    """Groups of chunks that are read and mixed together, in random order: 1, 2, 4, ..., `window` chunks each.
+def groups(shards: np.ndarray, window: int, seed: int, pass_index: int, layer: int) -> list[np.ndarray]:
+    """Groups of chunks that are read and mixed together, in random order: each twice as large as the one
+    before, up to `window` chunks.
 
-    So the first rows of a layer are ready after one chunk is read. Small groups mix as well as large ones,
-    because the rows were permuted when they were written.
+    shards: (chunks,) the shard of each chunk. The first group has as many chunks as there are shards. Each
+    group has chunks of all shards in proportion, up to a chunk. So the first rows of a layer are ready soon,
+    and small groups mix as well as large ones, because the rows of a shard were permuted when they were
+    written.
     """
-    order = generator(seed, CHUNKS, pass_index, layer).permutation(len(chunk_rows))
-    out, start, size = [], 0, 1
+    draw = generator(seed, CHUNKS, pass_index, layer)
+    order = draw.permutation(len(shards))
+    of_each = np.bincount(shards)
+    if (count := int(np.count_nonzero(of_each))) > 1:
+        order = order[np.argsort(_places(shards[order], of_each, draw.random(len(of_each))), kind="stable")]
+    out, start, size = [], 0, min(count, window)
     while start < len(order):
         out.append(order[start : start + size])
         start, size = start + size, min(2 * size, window)
     return out
+
+
+def _places(shards: np.ndarray, of_each: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """(chunks,) places from 0 to 1 that spread the chunks of each shard evenly.
+
+    shards: (chunks,) of the chunks in their order. of_each: (S,) chunks of each shard. first: (S,) from 0 to
+    1, the place of a shard's first chunk within its first share.
+    """
+    number, by_shard = np.empty(len(shards)), np.argsort(shards, kind="stable")
+    number[by_shard] = np.arange(len(shards)) - np.repeat(np.cumsum(of_each) - of_each, of_each)
+    return (number + first[shards]) / of_each[shards]
 
 
 def row_order(rows: int, seed: int, pass_index: int, layer: int, group: int) -> np.ndarray:

@@ -17,10 +17,10 @@ from hobble.rows.compose import x_columns
 
 
 def write_chunks(
-    work: Path, split: str, buckets: Buckets, plan: Plan, statistics: Statistics, dtype: str, number: int = 0
+    work: Path, split: str, buckets: Buckets, plan: Plan, statistics: Statistics, dtype: str
 ) -> Iterator[Chunk]:
-    """Write each bucket, sorted and standardised, as chunks of `chunk_rows` rows, numbered from `number`."""
-    columns = x_columns(plan.layout)
+    """Write each bucket, sorted and standardised, as chunks of `chunk_rows` rows."""
+    columns, number = x_columns(plan.layout), 0
     for frames, fits, index in buckets.drain():
         ends = np.cumsum(index["count"])
         for start in range(0, len(index), plan.chunk_rows):

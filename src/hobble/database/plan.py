@@ -1,4 +1,4 @@
-"""The plan of a database, made before any row is written: layout, clips, sizes of chunks and buckets."""
+"""The plan of a shard, made before any row is written: layout, clips, sizes of chunks and buckets."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hobble.core.errors import HobbleError, InputError
-from hobble.core.files import read_json, write_json
+from hobble.core.errors import InputError
 from hobble.rows.clip_rows import ClipRows, Outline, outline
 from hobble.rows.compose import fit_columns, x_columns
 from hobble.rows.layout import RowLayout
@@ -21,7 +20,10 @@ Source = ClipRows | str | Path
 
 @dataclass(frozen=True)
 class Plan:
-    """Layout of the rows, clips with their rows, and rows of a chunk and of a bucket."""
+    """Layout of the rows, clips with their rows, and rows of a chunk and of a bucket.
+
+    visits: how often a pass uses each row. clips: for each clip `clip`, `split`, `rows` and `pairs`.
+    """
 
     layout: RowLayout
     skeleton: Mapping[str, Any]
@@ -34,24 +36,17 @@ class Plan:
         """Rows of a split."""
         return sum(clip["rows"] for clip in self.clips if clip["split"] == split)
 
-    @property
-    def original_bytes(self) -> int:
-        """Size of the same pairs in the original's layout: each a row of X, Y and P in float32."""
-        values = self.layout.x_size + self.layout.y_size + 1
-        return 4 * values * self.visits * sum(clip["rows"] for clip in self.clips)
-
-    def save(self, path: Path) -> None:
-        """Write it as JSON."""
-        # As text: write_json sorts keys, but the joints have to keep their order.
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for a file."""
+        # The skeleton as text: write_json sorts keys, but the joints have to keep their order.
         skeleton = json.dumps(self.skeleton)
-        write_json(path, {**vars(self), "layout": self.layout.to_dict(), "skeleton": skeleton})
+        return {**vars(self), "layout": self.layout.to_dict(), "skeleton": skeleton}
 
     @classmethod
-    def load(cls, path: Path) -> Plan:
-        """The inverse of `save`."""
-        values = read_json(path)
-        values["layout"] = RowLayout.from_dict(values["layout"])
-        return cls(**{**values, "skeleton": json.loads(values["skeleton"])})
+    def from_dict(cls, values: Mapping[str, Any]) -> Plan:
+        """The inverse of `to_dict`."""
+        layout, skeleton = RowLayout.from_dict(values["layout"]), json.loads(values["skeleton"])
+        return cls(**{**values, "layout": layout, "skeleton": skeleton})
 
 
 def make_plan(
@@ -60,11 +55,10 @@ def make_plan(
     channels: Sequence[str],
     item: int,
     chunk_bytes: int,
-) -> Plan:
-    """The plan of rows by clip name; see `hobble.database.merge.write_database`.
+) -> Plan | None:
+    """The plan of rows by clip name, or None for no clips; see `hobble.database.merge.write_database`.
 
-    item: bytes of a number on disk. Raises HobbleError if no training clip has rows, InputError if a clip
-    does not fit the others.
+    item: bytes of a number on disk. Raises InputError if a clip does not fit the others.
     """
     entries: list[dict[str, Any]] = []
     first: Outline | None = None
@@ -72,7 +66,7 @@ def make_plan(
     for name in sorted(clips):
         one = outline(clips[name])
         first = first or one
-        if one.layout != first.layout or list(one.skeleton["joints"]) != list(first.skeleton["joints"]):
+        if not fit_together(one, first):
             source = clips[name]
             where = name if isinstance(source, ClipRows) else source
             raise InputError(where, f"the layout of its rows differs from that of {min(clips)}")
@@ -80,13 +74,15 @@ def make_plan(
         entries.append({"clip": name, "split": splits[name], "rows": len(one.fits), "pairs": fits})
         visits = max(visits, one.visits, int(one.fits.max(initial=1)))
         rows, pairs = rows + len(one.fits), pairs + fits
-    if first is None or not any(e["rows"] for e in entries if e["split"] == "train"):
-        raise HobbleError(
-            "There is nothing to train on: no clip of the training part has a whole locomotion "
-            "cycle. Add clips, or hold fewer out."
-        )
+    if first is None:
+        return None
     layout = first.layout.with_channels(channels)
-    values = x_columns(layout) + layout.y_size + fit_columns(layout) * pairs / rows
+    values = x_columns(layout) + layout.y_size + fit_columns(layout) * pairs / max(rows, 1)
     chunk_rows = max(1, int(chunk_bytes / (item * values + 16)))
     each = max(1, int(BUCKET_BYTES / (chunk_rows * 4 * values)))
     return Plan(layout, first.skeleton, visits, entries, chunk_rows, chunk_rows * each)
+
+
+def fit_together(one: Outline | Plan, other: Outline | Plan) -> bool:
+    """Whether the rows of both have the same columns and joints."""
+    return one.layout == other.layout and list(one.skeleton["joints"]) == list(other.skeleton["joints"])

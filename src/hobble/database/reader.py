@@ -17,6 +17,7 @@ from hobble.core.quat import Array
 from hobble.database import order
 from hobble.database.manifest import STATISTICS, Manifest
 from hobble.database.precision import widen
+from hobble.database.scale import Shards
 from hobble.database.statistics import Statistics
 from hobble.database.stretches import Stretch
 from hobble.database.window import Buffers, Window, empty_buffers, load
@@ -50,6 +51,7 @@ class Database:
     manifest: Manifest
     statistics: Statistics
     memory_mb: int
+    _shards: Shards = field(repr=False)
     _loaded: dict[str, Window] = field(default_factory=dict, repr=False)
     _verified: set[str] = field(default_factory=set, repr=False)
 
@@ -64,7 +66,7 @@ class Database:
         path = Path(path)
         manifest = Manifest.load(path)
         statistics = Statistics(**load_npz(path / manifest.folder / STATISTICS))
-        return cls(path, manifest, statistics, memory_mb)
+        return cls(path, manifest, statistics, memory_mb, Shards(path, manifest, statistics))
 
     @property
     def layout(self) -> RowLayout:
@@ -161,7 +163,7 @@ class Database:
         """The groups of chunks with places start to stop of a layer, and the places of each group."""
         rows = [chunk.rows for chunk in self.manifest.chunks[split]]
         done = 0
-        for group, some in enumerate(order.groups(rows, window, *of)):
+        for group, some in enumerate(order.groups(self._shards.of[split], window, *of)):
             n = sum(rows[i] for i in some)
             low, high = max(start - done, 0), min(stop - done, n)
             if low < high:
@@ -199,7 +201,7 @@ class Database:
     def load(self, split: str, some: Sequence[int], into: Buffers) -> Window:
         """Read chunks of a split into the buffers `into` (`hobble.database.window.empty_buffers`)."""
         folder = self.path / self.manifest.folder
-        return load(folder, self.manifest.chunks[split], some, into, self._verified)
+        return load(folder, self.manifest, split, some, into, self._shards, self._verified)
 
     def _composed(self, parts: Iterator[Part], total: int, block_rows: int) -> Iterator[Block]:
         """Blocks of `block_rows` rows from parts of any length."""

@@ -19,11 +19,11 @@ from hobble.rows.layout import RowLayout
 PART_ROWS = 8192  # rows of a clip that are scattered at a time
 
 
-def make_buckets(folder: Path, plan: Plan, rows_each: Mapping[str, int]) -> dict[str, Buckets]:
-    """Buckets for each split. rows_each: split -> rows of a bucket."""
+def make_buckets(folder: Path, plan: Plan) -> dict[str, Buckets]:
+    """Buckets for each split."""
     columns, of_fits = x_columns(plan.layout) + plan.layout.y_size, fit_columns(plan.layout)
     return {
-        split: Buckets(folder / f"buckets-{split}", plan.rows(split), rows_each[split], columns, of_fits)
+        split: Buckets(folder / f"buckets-{split}", plan.rows(split), plan.bucket_rows, columns, of_fits)
         for split in SPLITS
     }
 
@@ -31,10 +31,9 @@ def make_buckets(folder: Path, plan: Plan, rows_each: Mapping[str, int]) -> dict
 def scatter(
     buckets: Mapping[str, Buckets], clips: Mapping[str, Source], plan: Plan, seed: int
 ) -> Iterator[tuple[dict[str, Any], ClipRows]]:
-    """Put each clip of `clips` into the buckets of its split, then yield its entry and its rows.
+    """Put each clip into the buckets of its split, then yield its entry and its rows.
 
-    One permutation of all rows of a split determines the place of each row. `clips` may be a part of the
-    plan's.
+    One permutation of all rows of a split determines the place of each row.
     """
     places = {
         split: np.random.default_rng([seed, number]).permutation(plan.rows(split))
@@ -44,8 +43,6 @@ def scatter(
     for number, entry in enumerate(plan.clips):
         split, start = entry["split"], done[entry["split"]]
         done[split] += entry["rows"]
-        if entry["clip"] not in clips:
-            continue
         source = clips[entry["clip"]]
         clip = source if isinstance(source, ClipRows) else load_clip_rows(source)
         index = np.zeros(len(clip), INDEX)

@@ -10,9 +10,10 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.database import order
-from hobble.database.chunks import Chunk, read_chunk
+from hobble.database.chunks import read_chunk
 from hobble.database.manifest import Manifest
 from hobble.database.precision import STORED
+from hobble.database.scale import Shards
 from hobble.rows.compose import fit_columns, x_columns
 
 Buffers = Mapping[str, np.ndarray]
@@ -56,21 +57,29 @@ def empty_buffers(manifest: Manifest, split: str, most: int) -> dict[str, np.nda
 
 
 def load(
-    folder: Path, chunks: Sequence[Chunk], some: Sequence[int], into: Buffers, verified: set[str]
+    folder: Path,
+    manifest: Manifest,
+    split: str,
+    some: Sequence[int],
+    into: Buffers,
+    shards: Shards,
+    verified: set[str],
 ) -> Window:
-    """Read the chunks numbered `some`, one after another, directly into the arrays `into`.
+    """Read the chunks numbered `some` of a split, one after another, directly into the arrays `into`.
 
-    verified: files whose checksum was checked before and is not checked again; files that pass are added.
-    Raises InputError with the file's name if one is damaged.
+    folder: of the chunks. shards: what changes them to rows of the whole database. verified: files whose
+    checksum was checked before and is not checked again; files that pass are added. Raises InputError with
+    the file's name if one is damaged.
     """
-    wanted = [chunks[i] for i in some]
+    wanted = [manifest.chunks[split][i] for i in some]
     all_rows, all_fits = sum(c.rows for c in wanted), sum(c.fits for c in wanted)
     tables = {name: table[: all_fits if name == "fits" else all_rows] for name, table in into.items()}
     row = fit = 0
-    for chunk in wanted:
+    for number, chunk in zip(some, wanted, strict=True):
         rows, fits = slice(row, row + chunk.rows), slice(fit, fit + chunk.fits)
         parts = {name: table[fits if name == "fits" else rows] for name, table in tables.items()}
         read_chunk(folder, chunk, parts, verify=chunk.file not in verified)
         verified.add(chunk.file)
+        shards.convert(split, number, parts)
         row, fit = rows.stop, fits.stop
     return Window(some, [c.rows for c in wanted], order.starts(tables["count"]), **tables)

@@ -89,10 +89,9 @@ class Section:
 
 
 def joined(sections: Iterable[Section]) -> list[Section]:
-    """Sections in order. Sections of the same name become one with all their parts.
+    """Sections in order. Sections of the same name become one with all their parts; empty ones are left out.
 
-    Title and place come from the first section that has a title. A section with nothing but words is left
-    out, because words introduce what a measurement found.
+    Title and place come from the first section that has a title.
     """
     by_name: dict[str, list[Section]] = {}
     for section in sections:
@@ -102,7 +101,7 @@ def joined(sections: Iterable[Section]) -> list[Section]:
         parts = sorted((p for s in some for p in s.parts if _shows(p.content)), key=lambda part: part.at)
         owner = next((s for s in some if s.title), some[0])
         title = owner.title or name.replace("_", " ").capitalize()
-        if any(not isinstance(part.content, Words) for part in parts):
+        if parts:
             out.append(replace(owner, parts=parts, title=title, nav=owner.nav or title))
     return sorted(out, key=lambda section: section.at)
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from hobble.config.load import Catalogue
 from hobble.core.errors import HobbleError
 from hobble.core.section import Section
+from hobble.workflow.batches import batch_of
 from hobble.workflow.clips import MIRROR_SUFFIX, Clips, original
 
 
-def shard_of(clips: Sequence[str], shard: int, shards: int) -> list[str]:
-    """The clips that job `shard`, from 0, of `shards` merges: neighbours by name are spread over them."""
-    return sorted(clips)[shard::shards]
+def shard_of(clip: str, shards: int) -> int:
+    """The shard, from 0, of a clip's rows. Mirrors and hurt versions are in the shard of their clip.
+
+    It depends on no other clip. If `shards` divides the number of batches, a batch has clips of one shard.
+    """
+    return batch_of(original(clip), shards)
 
 
 class Datasets:
@@ -90,12 +95,24 @@ class Datasets:
         both = len(set(splits.values())) > 1
         return [clip for clip in splits if both and clip == original(clip)]
 
-    def parts(self, dataset: str) -> int:
-        """By how many jobs the rows of a database are merged, side by side."""
-        return int(self.options(dataset, "database", "parts")["parts"])
+    def shards(self, dataset: str) -> int:
+        """The number of shards of each of its databases."""
+        return int(self.options(dataset, "database", "shards")["shards"])
 
-    def sources(self, dataset: str, channels: Sequence[str]) -> dict[str, str]:
-        """Hurt version -> the healthy clip it is made from, for the selected clips."""
-        chosen = self.selected(dataset, channels)
+    @functools.cache  # noqa: B019 - one project lives as long as the process
+    def _splits_by_shard(self, dataset: str, channels: tuple[str, ...]) -> list[dict[str, str]]:
+        count = self.shards(dataset)
+        found: list[dict[str, str]] = [{} for _ in range(count)]
+        for clip, split in self.selected(dataset, channels).items():
+            found[shard_of(clip, count)][clip] = split
+        return found
+
+    def in_shard(self, dataset: str, channels: Sequence[str], shard: int) -> dict[str, str]:
+        """As `selected`, only the clips of a shard, from 0."""
+        return self._splits_by_shard(dataset, tuple(channels))[shard]
+
+    def sources(self, chosen: Iterable[str]) -> dict[str, str]:
+        """Hurt version -> the healthy clip it is made from, for the chosen clips."""
+        chosen = list(chosen)
         mirrors = {clip: MIRROR_SUFFIX if clip.endswith(MIRROR_SUFFIX) else "" for clip in chosen}
         return {clip: original(clip) + mirrors[clip] for clip in chosen if self.clips.is_hurt_version(clip)}

@@ -32,7 +32,8 @@ CLIP_SECONDS = 0.1  # least time for a clip
 ASSUMED_FRAMES = 20_000  # of a clip that is not downloaded yet
 VISITS_PER_PASS = 10  # how often a pass of training uses a row
 HEADER_BYTES = 1 << 20  # the motion of a BVH file begins within this many bytes
-ROW_KB = 5  # of a row of 31 joints before it is standardised, with its fits
+SHARD_MB = 10  # of a shard's job, for a thousand frames of its longest clip
+ROW_BYTES = 24  # of a shard's job, for each of its rows: the place in the order
 WEEK_MINUTES = 7 * 24 * 60  # longest time that a job requests
 
 
@@ -55,19 +56,23 @@ class Demands:
         longest = max(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
         return _megabytes(rate * longest + rows * self.all_thousands(dataset) / 1e3, attempt)
 
+    def shard_memory(self, dataset: str, attempt: int = 1) -> int:
+        """MB for a job that makes a shard. It holds a clip at a time, and a few numbers of each row."""
+        longest = max(self.thousands(dataset, clip) for clip in self.project.clips.of(dataset))
+        return _megabytes(SHARD_MB * longest + ROW_BYTES * self._shard_thousands(dataset) / 1e3, attempt)
+
+    def shard_minutes(self, dataset: str, rate: float, attempt: int = 1) -> int:
+        """Minutes for a job that takes `rate` seconds for a thousand frames of a shard."""
+        return _minutes(rate * self._shard_thousands(dataset), attempt, least=5)
+
+    def _shard_thousands(self, dataset: str) -> float:
+        """Thousands of frames of the largest shard. Of several, it may have twice as many as the average."""
+        shards = self.project.datasets.shards(dataset)
+        return self.all_thousands(dataset) * min(1.0, 2 / shards if shards > 1 else 1.0)
+
     def minutes_of_all(self, dataset: str, rate: float, attempt: int = 1, least: int = 1) -> int:
         """Minutes for a job that takes `rate` seconds for a thousand frames, over all clips and mirrors."""
         return _minutes(rate * self.all_thousands(dataset), attempt, least)
-
-    def minutes_of_part(self, dataset: str, rate: float, attempt: int = 1) -> int:
-        """Minutes for a job that takes `rate` seconds for a thousand frames of its part of a database."""
-        thousands = self.all_thousands(dataset) / self.project.datasets.parts(dataset)
-        return _minutes(rate * thousands, attempt, least=5)
-
-    def part_memory(self, dataset: str, attempt: int = 1) -> int:
-        """MB for a job that orders a part of a database. It holds the rows of one shard for it at a time."""
-        parts = self.project.datasets.parts(dataset)
-        return _megabytes(400 + ROW_KB * self.all_thousands(dataset) / parts**2, attempt)
 
     def measure_memory(self, configuration: str, name: str, attempt: int = 1) -> int:
         """MB for the measurement `name`."""
@@ -106,7 +111,7 @@ class Demands:
         network is built and not trained, the process holds up to three copies of all rows.
         """
         training = self.project.configurations.section(configuration, "training")
-        needed = 500 + training["memory_mb"] + 32e-6 * self.weights(configuration)
+        needed = 500 + training["memory_mb"] + 32e-6 * self.parameters(configuration)
         if self.project.configurations.is_built(configuration):
             layout, dataset = self.layout(configuration), self.project.configurations.dataset(configuration)
             needed += 3 * 4e-3 * (layout.x_size + layout.y_size) * self.all_thousands(dataset)
@@ -121,7 +126,7 @@ class Demands:
         dataset = self.project.configurations.dataset(configuration)
         frames = 1e3 * self.all_thousands(dataset) * MEASURED_JOINTS / self._joints(dataset)
         samples = frames * VISITS_PER_PASS * training["passes"]
-        seconds = samples * self.weights(configuration) / 4 / 6.4e9
+        seconds = samples * self.parameters(configuration) / 4 / 6.4e9
         return _minutes(seconds / self.machines(configuration).count, attempt, least=60)
 
     def machines(self, configuration: str) -> Machines:
@@ -159,7 +164,7 @@ class Demands:
     def _thousands_of(self, batch: Batch) -> list[float]:
         return [self.thousands(batch.dataset, clip) for clip in batch.clips]
 
-    def weights(self, configuration: str) -> float:
+    def parameters(self, configuration: str) -> float:
         """Number of trained parameters."""
         chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
         kind = model(chosen.network.kind)

@@ -182,7 +182,7 @@ def published_table(found: Json, material: Material) -> Table:
 
 def section(found: Json, material: Material) -> Section:
     """The charts and tables, and the view of captured and predicted motion. Empty if it was not measured."""
-    if not found:
+    if not found.get("clips"):
         return Section("accuracy", [])
     return Section(
         "accuracy",

@@ -1,0 +1,144 @@
+"""A shard: the rows of some clips of a database, shuffled and in chunks. Its job reads no other clips.
+
+Its rows are standardised by its own statistics, so that half precision stores them well. The reader changes
+them to those of the whole database (`hobble.database.scale`). The clip of a row is a number among the clips
+of the shard. So a shard stays the same to the byte when another one changes.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hobble.channels.limits import Pace
+from hobble.core.errors import InputError
+from hobble.core.files import load_npz, read_json, save_npz, write_error, write_json
+from hobble.database.chunks import HINT, Chunk
+from hobble.database.manifest import SPLITS
+from hobble.database.ordered import write_chunks
+from hobble.database.pace import gather, paces_of
+from hobble.database.plan import Plan, Source, make_plan
+from hobble.database.precision import STORED
+from hobble.database.scatter import make_buckets, scatter
+from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
+
+CHUNK_BYTES = 4 << 20  # read at a time: large enough to be fast on any disk, small enough for any memory
+INDEX, MOMENTS, SCALE = "shard.json", "moments.npz", "scale.npz"
+Sums = tuple[Moments, Moments]  # of X and of Y
+
+
+def write_shard(
+    folder: Path,
+    clips: Mapping[str, Source],
+    splits: Mapping[str, str],
+    *,
+    channels: Sequence[str],
+    sources: Mapping[str, str] | None = None,
+    joint_weight: float,
+    dtype: str = "float32",
+    seed: int = 1,
+    chunk_bytes: int = CHUNK_BYTES,
+) -> None:
+    """Write the shard of `clips` to `folder`. For the arguments see `hobble.database.merge.write_database`.
+
+    There may be no clips, or none with rows. Raises InputError if a clip does not fit the others, HobbleError
+    if the disk is full.
+    """
+    plan = make_plan(clips, splits, channels, STORED[dtype].itemsize, chunk_bytes)
+    try:
+        for split in SPLITS:  # a chunk may have a second name in a database, so it is not written over
+            shutil.rmtree(folder / split, ignore_errors=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        if plan is None:
+            write_json(folder / INDEX, {"plan": None, "chunks": {}})
+            return
+        buckets = make_buckets(folder, plan)
+        nothing = Moments.nothing(plan.layout.x_size), Moments.nothing(plan.layout.y_size)
+        sums: dict[str, Sums] = dict.fromkeys(SPLITS, nothing)
+        paces = paces_of(plan.layout, plan.skeleton)
+        for entry, clip in scatter(buckets, clips, plan, seed):
+            sums[entry["split"]] = add(sums[entry["split"]], clip_moments(clip, plan.layout))
+            if entry["split"] == "train":
+                gather(paces, clip, (sources or {}).get(entry["clip"]))
+        own = sums["train"] if sums["train"][0].weight else sums["held_out"]
+        scale = statistics_of(plan, own, joint_weight)
+        chunks = {
+            split: list(write_chunks(folder, split, buckets[split], plan, scale, dtype)) for split in SPLITS
+        }
+        for split in SPLITS:
+            buckets[split].folder.rmdir()
+        _save(folder, plan, sums["train"], scale, paces)
+        of_split = {split: [asdict(chunk) for chunk in found] for split, found in chunks.items()}
+        write_json(folder / INDEX, {"plan": plan.to_dict(), "chunks": of_split})
+    except OSError as error:
+        raise write_error(error, folder) from error
+
+
+def add(one: Sums, other: Sums) -> Sums:
+    """The moments of both sets of rows together."""
+    return one[0] + other[0], one[1] + other[1]
+
+
+def statistics_of(plan: Plan, sums: Sums, joint_weight: float) -> Statistics:
+    """The statistics of rows with these moments."""
+    return finish(plan.layout, *sums, joint_weight, unseen_joints(plan.skeleton))
+
+
+def _save(folder: Path, plan: Plan, sums: Sums, scale: Statistics, paces: Mapping[str, Pace]) -> None:
+    """Save moments (weight (2,); mean and squares as x (2, X), y (2, Y)), statistics and speeds of clips."""
+    x, y = ((one.mean, one.squares) for one in sums)
+    save_npz(folder / MOMENTS, weight=np.array([one.weight for one in sums]), x=np.array(x), y=np.array(y))
+    save_npz(folder / SCALE, **vars(scale))
+    for channel, pace in paces.items():
+        cycles = {
+            f"{number}.{key}": values
+            for number, entry in enumerate(plan.clips)
+            for key, values in pace.to_arrays(entry["clip"]).items()
+        }
+        save_npz(folder / f"pace-{channel}.npz", **cycles)
+
+
+@dataclass(frozen=True)
+class Shard:
+    """A shard in its folder: its plan, and the chunks of each split."""
+
+    folder: Path
+    plan: Plan
+    chunks: Mapping[str, list[Chunk]]
+
+    @classmethod
+    def load(cls, folder: Path) -> Shard | None:
+        """Read it; None if it has no clips. Raises InputError if it is incomplete."""
+        values = read_json(folder / INDEX)
+        try:
+            if values["plan"] is None:
+                return None
+            chunks = {split: [Chunk(**chunk) for chunk in values["chunks"][split]] for split in SPLITS}
+            return cls(folder, Plan.from_dict(values["plan"]), chunks)
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(folder / INDEX, f"not a shard of a database ({error})", fix=HINT) from error
+
+    def sums(self) -> Sums:
+        """The moments of its training rows."""
+        data = load_npz(self.folder / MOMENTS)
+        x, y = (Moments(float(w), *data[name]) for w, name in zip(data["weight"], "xy", strict=True))
+        return x, y
+
+    def scale(self) -> Statistics:
+        """The statistics by which its rows are standardised."""
+        return Statistics(**load_npz(self.folder / SCALE))
+
+    def add_paces(self, paces: Mapping[str, Pace]) -> None:
+        """Add the speeds of its training clips."""
+        for channel, pace in paces.items():
+            data = load_npz(self.folder / f"pace-{channel}.npz")
+            cycles: dict[int, dict[str, np.ndarray]] = {}
+            for key, values in data.items():
+                number, _, name = key.partition(".")
+                cycles.setdefault(int(number), {})[name] = values
+            for place, arrays in sorted(cycles.items()):
+                pace.add_arrays(self.plan.clips[place]["clip"], arrays)
