@@ -171,6 +171,7 @@ def _constants() -> dict[str, float]:
         "mostCorrection": trajectory.MOST_CORRECTION,
         "unwishedLoss": trajectory.UNWISHED_LOSS,
         "pull": trajectory.PULL,
+        "pullAhead": trajectory.PULL_AHEAD,
         "furthestTurn": float(trajectory.FURTHEST_TURN),
         "strafeFrom": float(trajectory.STRAFE_FROM),
         "turnInPlace": float(animation.TURN_IN_PLACE),
