@@ -26,7 +26,8 @@ CORRECTION_RATE = 0.01  # integral gain a frame: a steady error is corrected wit
 CORRECTION_WITHIN = 0.8  # share of the wish; with a larger error the character is still turning or starting
 MOST_CORRECTION = 1.0  # largest integral correction, as a share of the wish
 FURTHEST_TURN = np.radians(137)  # largest turn to ask for; a larger one may come out the other way round
-PULL = 0.2  # with `Network.rooted`: largest change of a frame's movement across the wish, as a share of it
+# With `Network.rooted`: largest change of a frame's movement across the wish, as a share of the movement.
+PULL = 0.2
 PULL_AHEAD = 0.5  # the same along the wish, as a share of PULL; a faster character takes corners wider
 UNWISHED_LOSS = 0.5  # share of movement against the wish that is removed; removing all would drag the feet
 STRAFE_FROM = np.radians(45)  # angle between facing and velocity from which the strafe share is 1
@@ -226,7 +227,8 @@ def _pull(share: float, wish_x: float, wish_z: float, x: float, z: float) -> tup
     """What to add to a movement (x, z) so that it comes nearer to the wish.
 
     Across the wish by at most `share` times the movement's length, and along it by PULL_AHEAD of that. If the
-    two shared one limit, a clip that is too slow would use all of it, and the character would leave its path sideways.
+    two shared one limit, a clip that is too slow would use all of it, and the character would leave its path
+    sideways.
     """
     most = share * np.sqrt(x * x + z * z)
     size = np.sqrt(wish_x * wish_x + wish_z * wish_z)
