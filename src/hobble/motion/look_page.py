@@ -20,6 +20,7 @@ from hobble.motion.root import facing
 
 FRAMES, SECONDS = 40, 4.0  # of the picture, from the middle of the clip
 MOST_READ, MOST_SECONDS = 600, 5 * 3600.0  # clips that are read, and their length: 10 MB, about half a minute
+LABELS = ("cycles", "seconds", "warnings")  # what the page shows of the labels
 GOLDEN = 0.6180339887498949
 HEAD = (
     "clip",
@@ -98,8 +99,9 @@ def look_page(
 ) -> str:
     """The page of data set `name` as one file.
 
-    reports, labels: `motion/<clip>.json` and `labels/<clip>.json` of each clip. read: returns a clip, by its
-    place among them, and its contacts (F, 4). It is called for the clips of `chosen`, one after another.
+    reports, labels: of each clip `motion/<clip>.json`, and the keys LABELS of `labels/<clip>.json`. read:
+    returns a clip, by its place among them, and its contacts (F, 4). It is called for the clips of `chosen`,
+    one after another.
     """
     some = chosen(reports, labels)
     lines = [_Line(reported(report), told) for report, told in zip(reports, labels, strict=True)]

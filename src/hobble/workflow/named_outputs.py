@@ -10,7 +10,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import snakemake.dag
+from snakemake import dag
 from snakemake.output_index import OutputIndex
 
 if TYPE_CHECKING:
@@ -38,4 +38,4 @@ class NamedOutputs(OutputIndex):  # type: ignore[misc]
 
 def use() -> None:
     """Let Snakemake plan with it."""
-    snakemake.dag.OutputIndex = NamedOutputs
+    dag.OutputIndex = NamedOutputs
