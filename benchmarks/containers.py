@@ -33,7 +33,7 @@ Read = Callable[[int, np.ndarray], None]
 
 @dataclass(frozen=True)
 class Container:
-    """write: blocks into a folder. reader: of the folder, a function that fills room with block i."""
+    """write: writes blocks into a folder. reader: folder -> a function that fills `room` with block i."""
 
     write: Callable[[Path, np.ndarray], None]
     reader: Callable[[Path, int], Read]
@@ -188,7 +188,7 @@ CONTAINERS = {
 
 
 def rows(size: int) -> np.ndarray:
-    """A table of about `size` bytes whose columns go together as those of neighbouring joints do."""
+    """A table of about `size` bytes whose columns are correlated like those of neighbouring joints."""
     count = size // (4 * COLUMNS) // BLOCK * BLOCK
     rng = np.random.default_rng(1)
     mix = rng.standard_normal((60, COLUMNS), np.float32) / 8
@@ -198,7 +198,9 @@ def rows(size: int) -> np.ndarray:
 def reading(
     container: Container, order: np.ndarray, folder: Path, table: np.ndarray, room: np.ndarray
 ) -> tuple[float, float]:
-    """MB a second and processor seconds a GB, blocks in an order, cold cache; the last block is compared."""
+    """MB a second and processor seconds a GB, for blocks in this order, with a cold cache. Checks the last
+    block.
+    """
     cold(folder)
     read = container.reader(folder, len(order))
     start, used = time.perf_counter(), time.process_time()

@@ -70,7 +70,7 @@ def main() -> None:
     parser.add_argument("--laps", type=int, default=19)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--rollouts", action="store_true")
-    parser.add_argument("--no-times", action="store_true", help="where frame times are not wanted")
+    parser.add_argument("--no-times", action="store_true", help="leave out the frame times")
     options = parser.parse_args()
     paths = {name: Path(path) for name, _, path in (one.partition("=") for one in options.networks)}
     networks = {name: load_network(path) for name, path in paths.items()}

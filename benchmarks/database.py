@@ -31,7 +31,7 @@ from hobble.rows.layout import RowLayout
 
 CLIP_ROWS = 3000
 BATCH = 512
-WINDOWS = 3  # of the reader, that a turn of training reads
+WINDOWS = 3  # windows of the reader in a turn of training
 STACK = 8 << 20
 PROGRAM_MB = 100  # Python, numpy and some room for the page cache
 SECONDS = 6.0  # of reading, per measurement
@@ -77,7 +77,7 @@ def cold(folder: Path) -> None:
 
 
 def rate(batches: Iterator[int], seconds: float = SECONDS) -> float:
-    """Rows a second of an iterator of row counts, its first batch (compiling, loading) left out."""
+    """Rows a second of an iterator of row counts, without its first batch (compiling, loading)."""
     next(batches)
     start, rows = time.perf_counter(), 0
     for n in batches:
@@ -88,7 +88,7 @@ def rate(batches: Iterator[int], seconds: float = SECONDS) -> float:
 
 
 def of_database(db: Database) -> Iterator[int]:
-    """Rows of one block after another, over as many sections as are asked for."""
+    """Yields the rows of each block, section after section."""
     rows = db.block_rows(BATCH)
     for section in range(1_000_000):
         for block in db.blocks("train", section // 10, section % 10, 10, 1, rows):
@@ -96,7 +96,7 @@ def of_database(db: Database) -> Iterator[int]:
 
 
 def write_expanded(db: Database, path: Path, rows: int) -> None:
-    """The original's layout, every pair a row of X, Y and P in float32: what the factorised one replaces."""
+    """The original's layout: a row of X, Y and P in float32 for every pair."""
     with open(path, "wb") as file:
         for section in range(1_000_000):
             for block in db.blocks("train", 0, section, 10, 1):
@@ -108,14 +108,14 @@ def write_expanded(db: Database, path: Path, rows: int) -> None:
 
 
 def random_rows(table: np.memmap) -> Iterator[int]:
-    """Batches of rows at random, as a data loader over a memory map does it."""
+    """Batches of random rows, like a data loader over a memory map."""
     rng = np.random.default_rng(1)
     while True:
         yield len(np.array(table[np.sort(rng.integers(0, len(table), BATCH))]))
 
 
 def shuffled_pieces(table: np.memmap, rows: int) -> Iterator[int]:
-    """Pieces of `rows` rows at random, 16 of them shuffled together: the same mixing, no thread."""
+    """Random pieces of `rows` rows, 16 of them shuffled together: the same mixing without a thread."""
     rng = np.random.default_rng(1)
     while True:
         order = rng.permutation(len(table) // rows)
@@ -127,7 +127,7 @@ def shuffled_pieces(table: np.memmap, rows: int) -> Iterator[int]:
 
 
 def build(args: argparse.Namespace, folder: Path) -> Database:
-    """Build in a process of its own, so that its peak memory is its own."""
+    """Build in a process of its own, to measure its peak memory."""
     start = time.perf_counter()
     files = made_up(folder / "clips", args.size_mb << 20, args.joints)
     print(f"made {len(files)} clips of {CLIP_ROWS} rows in {time.perf_counter() - start:.0f} s")
@@ -145,7 +145,7 @@ def child(
 ) -> list[float]:
     """Run a task of a benchmark's script, by default this one, in a new process; the numbers that it prints.
 
-    limit_mb: most memory, the page cache counted in, beyond which the kernel reclaims pages or kills.
+    limit_mb: most memory with the page cache. Above it the kernel reclaims pages or kills the process.
     """
     command = [sys.executable, script, "--task", task, "--folder", str(folder), "--argument", argument]
     one_arena = {**os.environ, "MALLOC_ARENA_MAX": "1"}  # else each thread reserves 64 MB of address space
@@ -159,7 +159,7 @@ def child(
 
 @contextlib.contextmanager
 def cgroup(limit_mb: int | None) -> Iterator[Callable[[], None] | None]:
-    """A memory cgroup of its own, where this user may make one; yields what a child calls to join it."""
+    """Make a memory cgroup, if this user may. Yields a function with which a child joins it."""
     if limit_mb is None:
         yield None
         return
@@ -189,7 +189,7 @@ def task_build(folder: Path, clips: str) -> None:
 
 
 def task_section(folder: Path, memory_mb: str) -> None:
-    """One section from disk, with no more new address space than stated: an allocation beyond it fails."""
+    """Read one section from disk with limited new address space; an allocation beyond it fails."""
     list(Database.open(folder / "small").blocks("train", 0, 0, 10, 1))  # the program itself, once through
     before = status("VmRSS")
     limit = (int(memory_mb) << 20) + 2 * STACK  # the threads' stacks, of which the kernel counts every byte
@@ -226,7 +226,7 @@ def status(field: str) -> int:
 
 
 def reading(db: Database, folder: Path, args: argparse.Namespace) -> None:
-    """Rows a second from memory, from disk and by the simpler ways; memory under hard limits."""
+    """Rows a second from memory, from disk and by simpler methods, and the memory under hard limits."""
     window = db.window("train", db.block_rows(BATCH))
     chunks = db.manifest.chunks["train"]
     print(
@@ -258,9 +258,9 @@ def reading(db: Database, folder: Path, args: argparse.Namespace) -> None:
 def training(folder: Path, memory_mb: int, rounds: int) -> None:
     """The real training, from memory and from disk in turns, each turn a stretch of several windows.
 
-    A turn begins as a section does, with nothing read ahead, and from disk with the page cache dropped; which
-    comes first changes from round to round. So both meet the same machine, and neither profits from what was
-    read in the other's time.
+    A turn begins like a section, with nothing read ahead; from disk, the page cache is dropped first. The
+    order alternates from round to round. So other work on the machine affects both equally, and neither
+    profits from what the other has read.
     """
     from hobble.config.sections import Training
     from hobble.models.pfnn.options import PfnnOptions
@@ -279,7 +279,7 @@ def training(folder: Path, memory_mb: int, rounds: int) -> None:
     stretch = min(stretch, disk.section_pairs("train", 0, 10))
 
     def turn(db: Database, section: int) -> tuple[float, float]:
-        """Samples a second over one stretch, by the clock and by processor time, that of all threads."""
+        """Samples a second over one stretch, by the clock and by the processor time of all threads."""
         start, used, done = time.perf_counter(), time.process_time(), 0
         for batch in HostRows(db, device).batches(0, section % 10, 10, 1, options.batch):
             loss = update(*batch[:3], 1.0)
@@ -313,7 +313,7 @@ def arguments(description: str, rounds: int) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--size-mb", type=int, default=1280)
     parser.add_argument("--memory-mb", type=int, default=128)
-    parser.add_argument("--rounds", type=int, default=rounds, help="of measuring each way")
+    parser.add_argument("--rounds", type=int, default=rounds, help="rounds in which each way is measured")
     parser.add_argument("--folder", type=Path)
     parser.add_argument("--task", help=argparse.SUPPRESS)
     parser.add_argument("--argument", help=argparse.SUPPRESS)

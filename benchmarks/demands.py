@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def plan(folder: Path, targets: list[str], more: list[str]) -> str:
-    """What Snakemake would do to make everything again."""
+    """The text of a dry run that makes everything again."""
     command = [sys.executable, "-m", "snakemake", "-s", str(ROOT / "Snakefile"), "-d", str(folder)]
     command += ["-np", "-F", *more, "--", *targets]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -36,7 +36,7 @@ def seconds(work: Callable[[], object]) -> float:
 
 
 def sweep(network: Network) -> tuple[float, float]:
-    """CPU microseconds of a figure's frame: a figure for each link at once, and one after another."""
+    """CPU microseconds for a frame of one figure: a figure for each link at once, and one after another."""
     links = network.channels.get("injury") or ("",) * 30
     hurt = severities(network, [{link: 5.0} if link else {} for link in links])
 
@@ -49,7 +49,9 @@ def sweep(network: Network) -> tuple[float, float]:
 
 
 def roll_outs(network: Network) -> tuple[float, float]:
-    """CPU microseconds of a roll-out's frame: all starts of a stretch at once, and one after another."""
+    """CPU microseconds for a frame of a roll-out: with all starts of a stretch at once, and one after
+    another.
+    """
     layout, count, length = network.layout, 400, 60
     rng = np.random.default_rng(1)
     x = (network.x_mean + 0.1 * rng.normal(size=(count, layout.x_size))).astype(np.float32)
@@ -77,7 +79,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("network", nargs="?", type=Path, help="weights.npz, or a folder that holds one")
+    parser.add_argument("network", nargs="?", type=Path, help="weights.npz, or a folder with one")
     asked = parser.parse_args().network
     network = load_network(asked) if asked else random_network(load_skeleton(SKELETON))
     print("microseconds of CPU a frame       at once  one by one  ratio")

@@ -2,16 +2,16 @@
 
     python benchmarks/experts.py [--batches 32,256] [--threads 2] [--turns 5] [--sizes 342,512,512,311]
 
-As `training.py`: each turn gives every way a moment of the machine, and the best turn counts.
+As in `training.py`, all variants run in each turn, and the best turn of each counts.
 
 - per sample: the experts' weights blended for every sample, by autograd, PyTorch's Adam;
-- blended: outputs of all experts blended, by autograd: what a careful author writes first;
-- PyTorch, float32: `hobble.models.mann.step.Step`, the way that other devices take;
+- blended: outputs of all experts blended, by autograd: the usual good implementation;
+- PyTorch, float32: `hobble.models.mann.step.Step`, as on other devices than a CPU;
 - fused: `hobble.models.mann.fused.FusedStep`, with float32 and with bfloat16 factors;
-- products: a step's products of the experts and nothing else, with the same factors.
+- products: only the experts' matrix products of a step, with the same factors.
 
-Predictions are of random networks of one size on one core, in microseconds of the median, each controller in
-turn; the phase-functioned network in its cubic mode.
+Predictions are of random networks of one size on one core: median microseconds, the controllers in turns, the
+phase-functioned network in its cubic mode.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def by_hand(kind: type[Step], half: bool, sizes: tuple[int, ...], moves: bool = 
 
 
 def products(half: bool, sizes: tuple[int, ...]) -> Callable[[Batch], None]:
-    """Nothing but a step's products: outputs, gradients of weights and of all inputs but the first."""
+    """Only a step's matrix products: outputs, gradients of weights, and of all inputs but the first."""
     dtype = torch.bfloat16 if half else torch.float32
     weights = [torch.randn(EXPERTS * out, size + 1, dtype=dtype) for size, out in pairwise(sizes)]
     inputs: dict[int, list[tuple[Tensor, Tensor]]] = {}

@@ -2,13 +2,15 @@
 
     python benchmarks/generalise.py DATABASE < recipes
 
-DATABASE is results/datasets/<dataset>/database/plain, beside the `clips` it was made from. Each line of the
-input is one recipe, in keys of the training section: `passes: 2, batch: 256, dropout: 0.1`. For each, the
-mean squared error of the last section of its training (with dropout and roll-outs) and of every held-out row;
-how far joints are from the recorded ones over roll-outs of 1, 10 and 60 frames, cm, as the evaluation stage
-measures it; and of a lap of the track the waypoints reached, the seconds, how far off the path the character
-came (cm) and its largest turn of a joint in a frame (degrees). Roll-outs take the path from the clip: a
-network that is good at them may still stand and turn in a place where a character of its own brought it.
+DATABASE is results/datasets/<dataset>/database/plain; its `clips` have to be in the same folder. Each line of
+the input is one recipe, in keys of the training section: `passes: 2, batch: 256, dropout: 0.1`. For each
+recipe it prints:
+
+- the mean squared error of the last section of training (with dropout and roll-outs) and of held-out rows;
+- the distance of joints from the recorded ones in roll-outs of 1, 10 and 60 frames, cm;
+- for a lap of the track: waypoints reached, seconds, largest distance from the path (cm), and largest turn of
+  a joint in a frame (degrees). In a roll-out the path comes from the clip, so a network with good roll-outs
+  may still get stuck on the track.
 """
 
 from __future__ import annotations

@@ -2,10 +2,10 @@
 
     python benchmarks/ground.py [DATASET ...] [--mocap FOLDER] [--kinds flat rocky jumpy beam] [--workers 2]
 
-Each clip and its mirror is made, labelled and fitted as the workflow does it, on the kind of ground that its
-data set names or, with --kinds, on those, whatever it walked on. Printed for each data set and kind: the
-worst mean distance of feet in contact from their ground over a clip (goal: 1 cm) and over a single fit of a
-cycle, and how far the deepest foot is below it (goal: 1 cm); then each clip that misses a goal.
+Each clip and its mirror is made, labelled and fitted as in the workflow, on the kind of ground that its data
+set names, or with --kinds on these kinds. Prints for each data set and kind: the largest mean distance of
+feet in contact from their ground, over a clip (goal: 1 cm) and over a single fit of a cycle; how far the
+deepest foot is below the ground (goal: 1 cm); and each clip that misses a goal.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ GOAL = 1.0  # cm
 
 
 class Job(NamedTuple):
-    """One clip of a data set on some kinds of ground; no kinds: the one that it names."""
+    """One clip of a data set on some kinds of ground. Without kinds: the kind in its entry."""
 
     dataset: str
     clip: str
@@ -47,7 +47,7 @@ class Job(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What the fits of a clip on one kind of ground came to, cm."""
+    """The errors of the fits of a clip on one kind of ground, cm."""
 
     dataset: str
     clip: str
@@ -70,7 +70,7 @@ def patches_of(dataset: str, mocap: Path) -> Patches:
 
 
 def source(project: Project, job: Job, folder: Path) -> tuple[Path, list[Path]]:
-    """The BVH file of a clip and the label files beside it; written to `folder` where it is synthetic."""
+    """The BVH file of a clip and its label files. A synthetic clip is first written to `folder`."""
     if project.catalogue.dataset(job.dataset).synthetic is None:
         files = [Path(file) for file in project.clips.label_files(job.dataset, job.clip)]
         return Path(project.clips.source(job.dataset, job.clip)), files
@@ -85,7 +85,7 @@ def source(project: Project, job: Job, folder: Path) -> tuple[Path, list[Path]]:
 
 
 def made(project: Project, job: Job, folder: Path) -> Iterator[tuple[Clip, dict]]:
-    """The clip and, where the data set has them, its mirror, with their labels."""
+    """The clip and its mirror, if the data set has mirrors, with their labels."""
     bvh, files = source(project, job, folder)
     entry, dataset = project.clips.entry(job.dataset, job.clip), project.catalogue.dataset(job.dataset)
     clip, report = make_clip(

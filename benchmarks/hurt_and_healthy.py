@@ -1,4 +1,4 @@
-"""A network that learnt injuries next to one of the same recipe that did not, on healthy motion.
+"""Compares a network trained with injuries and one trained without, by the same recipe, on healthy motion.
 
     snakemake -c2 results/limp/network/weights.npz
     snakemake -c2 results/holden/network/weights.npz --config training=limp

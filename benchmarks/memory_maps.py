@@ -1,4 +1,4 @@
-"""The database's reader against a reader of the same rows in memory maps, as ratios measured in one run.
+"""Compares the database's reader with a reader of the same rows from memory maps, as ratios in one run.
 
     python benchmarks/memory_maps.py [--size-mb 1280] [--memory-mb 128] [--rounds 5] [--folder DIR]
 
@@ -64,7 +64,7 @@ class Mapped:
         self.starts = np.cumsum(self.chunk_rows) - self.chunk_rows
 
     def blocks(self, section: int, seed: int, block_rows: int, window: int) -> Iterator[Block]:
-        """A section of the first pass, as `Database.blocks` gives it with windows of so many chunks."""
+        """A section of the first pass, like `Database.blocks` with windows of this many chunks."""
         visits, rows = self.db.manifest.visits, self.db.rows("train")
         parts = chain.from_iterable(
             self.parts((seed, 0, layer), start, stop, window)

@@ -1,4 +1,4 @@
-"""Reading BVH and making clips: MB a second, and against plain Python on the same file in the same run.
+"""Reading BVH and making clips: MB a second, compared with plain Python on the same file in the same run.
 
 Run `python benchmarks/motion.py` for a file made here, `python benchmarks/motion.py FOLDER` for every BVH
 file in a folder of yours, `python benchmarks/motion.py --megabytes 100` for a large one.
@@ -38,7 +38,7 @@ def seconds(work: Callable[[], object]) -> float:
 
 
 def made(folder: Path, megabytes: float) -> Path:
-    """A figure that sways, as a file of about so many megabytes."""
+    """A BVH file of about this many megabytes, of a figure that sways."""
     skeleton = load_skeleton(SKELETONS / "holden31.yaml").skeleton
     frames = 1000
     sway = 0.2 * np.sin(np.linspace(0, 30, frames)[:, None] + np.arange(31))
@@ -54,7 +54,7 @@ def made(folder: Path, megabytes: float) -> Path:
 
 
 def plain(path: Path) -> np.ndarray:
-    """What a few lines of Python do."""
+    """Read the file with a few lines of plain Python."""
     rows = path.read_text().split("Frame Time:")[1].splitlines()[1:]
     return np.array([[float(x) for x in row.split()] for row in rows])
 
@@ -87,7 +87,7 @@ def main() -> None:
 
 
 def figure_at_run_time() -> None:
-    """What it costs to let the 31-joint pose drive other figures, frame by frame."""
+    """The time to retarget the pose of 31 joints to other figures, frame by frame."""
     small = load_skeleton(SKELETONS / "holden31.yaml")
     rest = np.tile(quat.IDENTITY, (1, 31, 1))
     pose = Clip("rest", small.skeleton, 60.0, rest, np.array([[0.0, 90.0, 0.0]]))

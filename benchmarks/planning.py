@@ -35,7 +35,7 @@ def rules_copy(folder: Path) -> Path:
 
 
 def write_clips(folder: Path, count: int) -> None:
-    """So many BVH files with the joints of the skeleton holden31, each with other numbers."""
+    """Write this many different BVH files with the joints of the skeleton holden31."""
     folder.mkdir()
     joints = yaml.safe_load((ROOT / "config/skeletons/holden31.yaml").read_text())["joints"]
     head = "HIERARCHY\n" + "".join(

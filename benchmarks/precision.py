@@ -2,10 +2,10 @@
 
     python benchmarks/precision.py [FOLDER] [--passes 3] [--seeds 1 2]
 
-FOLDER is a data set's results (results/datasets/synthetic), whose rows are there. They are merged into three
-databases, in float32, float16 and bfloat16, and the usual network is trained on each, with each seed, by the
-usual recipe. Accuracy is that of the evaluation: one-step predictions of the rows as they were before they
-were rounded. A difference means something where it is larger than that between seeds.
+FOLDER has a data set's results with rows (results/datasets/synthetic). They are merged into three databases,
+in float32, float16 and bfloat16. The default network is trained on each, with each seed, by the default
+recipe. Accuracy is measured as in the evaluation, on rows that are not rounded. A difference counts only if
+it is larger than that between seeds.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""The products of a training step in each way that PyTorch has on a CPU, and what the choice gains a step.
+"""The matrix products of a training step, by each way that PyTorch has on a CPU, and the gain of the best.
 
     python benchmarks/products.py [--batches 32,256] [--threads 1] [--sizes 342,512,512,311] [--half]
 
-The ways of a product take turns and the fastest call of each counts: other work comes and goes. "chosen" is
-what `hobble.models.products` takes on this machine, by its own trial. A step is that of `pfnn` with dropout,
-without Adam. Ratios are to the way named "linear", oneDNN's inner product. To see what other processors see,
-set ATEN_CPU_CAPABILITY=avx2 ONEDNN_MAX_CPU_ISA=AVX2 MKL_ENABLE_INSTRUCTIONS=AVX2 NUMBA_CPU_NAME=znver3.
+The ways take turns, and the fastest call of each counts, because other work disturbs some calls. "chosen" is
+the way that `hobble.models.products` chooses on this machine. A step is that of `pfnn` with dropout, without
+Adam. Ratios are to the way named "linear", oneDNN's inner product. To see what other processors see, set
+ATEN_CPU_CAPABILITY=avx2 ONEDNN_MAX_CPU_ISA=AVX2 MKL_ENABLE_INSTRUCTIONS=AVX2 NUMBA_CPU_NAME=znver3.
 """
 
 from __future__ import annotations

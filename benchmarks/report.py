@@ -2,11 +2,10 @@
 
     python benchmarks/report.py [results/injured/report.html ...] [--seconds 5] [--width 1280]
 
-Headless Chromium draws on the processor, in software, many times slower than the graphics of any laptop; the
-character's milliseconds are what they are anywhere on that processor. Ratios: of the character to the 16.7 ms
-of a frame at 60 Hz, and to Python's frame on the same network, if `--python` names its folder. The time until
-the figure at the top walks is also given as processor time of the page's main thread, which a busy machine
-changes less.
+Headless Chromium draws without a graphics card, many times slower than any laptop. The milliseconds of the
+character do not depend on that. They are compared with the 16.7 ms of a frame at 60 Hz, and with Python's
+frame of the same network, if `--python` names its folder. The time until the figure at the top walks is also
+given as processor time of the page's main thread, which depends less on other work on the machine.
 """
 
 from __future__ import annotations

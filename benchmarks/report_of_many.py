@@ -1,4 +1,5 @@
-"""The report of a data set of many clips: size of the page, and its growth against the data set as it is.
+"""The report of a data set with many clips: the size of the page, compared with that of the original data
+set.
 
     python benchmarks/report_of_many.py results/limp results/datasets/synthetic --clips 10000
 
@@ -18,7 +19,7 @@ from pathlib import Path
 
 from hobble.core.files import read_json
 from hobble.models.load import load_network
-from hobble.report.compare import comparisons
+from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import gather
 from hobble.report.page import render
 from hobble.report.recogniser import playable_with_recogniser

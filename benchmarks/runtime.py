@@ -18,7 +18,7 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter, process_time
+from time import perf_counter, process_time, thread_time
 from typing import Any
 
 import numpy as np
@@ -72,7 +72,7 @@ def random_network(skeleton: Skeleton, units: int = 512, hidden: int = 2) -> Pfn
 
 
 def timed(call: Callable[[int], object], count: int, clock: Callable[[], float] = perf_counter) -> Array:
-    """Microseconds of each of `count` calls call(k), the first tenth left out."""
+    """Microseconds of each of `count` calls call(k), without the first tenth."""
     times = np.zeros(count)
     for k in range(count):
         before = clock()
@@ -83,7 +83,7 @@ def timed(call: Callable[[int], object], count: int, clock: Callable[[], float] 
 
 @njit(fastmath=True)
 def read(values: Any) -> Any:
-    """The sum of all: each is read once, and nothing else is done."""
+    """The sum of all arrays, which reads each of them once."""
     quarter = values.size // 4
     a, b, c, d = values, values[quarter:], values[2 * quarter :], values[3 * quarter :]
     total = 0
@@ -117,8 +117,9 @@ def predictions(network: Pfnn) -> None:
                 rows, times, floor = len(pool), [], []
                 for k in range(CALLS):
                     phase[0] = rng.random() if cold else 0.3
-                    times.append(timed(lambda _, p=many[k % copies]: p.evaluate(z, phase, out), 1)[0])
-                    floor.append(timed(lambda _, p=pool[k % rows]: read(p), 1)[0])
+                    of = many[k % copies]
+                    times.append(timed(lambda _, p=of: p.evaluate(z, phase, out), 1, thread_time)[0])
+                    floor.append(timed(lambda _, p=pool[k % rows]: read(p), 1, thread_time)[0])
                 least = float(np.median(floor[9:]))
                 median, p99 = np.median(times[9:]), np.percentile(times[9:], 99)
                 name = f"{mode} {storage}{' cold' if cold else ''} (original {ORIGINAL[mode]})"
@@ -126,7 +127,7 @@ def predictions(network: Pfnn) -> None:
 
 
 def crowds(network: Pfnn) -> None:
-    """Many characters, exact: microseconds of the processor, beside onnxruntime's of the same run."""
+    """Many characters in cubic mode: processor microseconds, and those of onnxruntime in the same run."""
     try:
         import onnxruntime
     except ImportError:
@@ -176,7 +177,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("network", nargs="?", help="weights.npz, a folder that holds one, or the original's")
+    parser.add_argument("network", nargs="?", help="weights.npz, a folder with one, or the original's folder")
     parser.add_argument("skeleton", nargs="?", type=Path, default=SKELETON, help="for networks without one")
     asked = parser.parse_args()
     skeleton = load_skeleton(asked.skeleton)

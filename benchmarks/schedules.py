@@ -36,7 +36,9 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 class Curve(NamedTuple):
-    """Of one recipe, after each section: seconds and held-out error; `whole`: of every row at the end."""
+    """The curve of one recipe: seconds and held-out error after each section. whole: the error of every row
+    at the end.
+    """
 
     name: str
     wall: list[float]
@@ -46,7 +48,7 @@ class Curve(NamedTuple):
 
 
 class CpuSeconds(logging.Handler):
-    """Notes the CPU seconds of the process whenever the training says how it goes."""
+    """Records the CPU seconds of the process at each progress message of the training."""
 
     def __init__(self) -> None:
         super().__init__(logging.INFO)

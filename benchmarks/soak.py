@@ -1,4 +1,4 @@
-"""A million frames of random wishes, injuries and grounds, by many characters at once.
+"""A million frames with random targets, injuries and grounds, by many characters at once.
 
     python benchmarks/soak.py results/injured/network [--characters 200] [--frames 5000] [--seed 1]
 
@@ -21,7 +21,7 @@ def main() -> int:
     parser.add_argument("--characters", type=int, default=200)
     parser.add_argument("--frames", type=int, default=5000, help="of each character")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--mode", default="constant", help="how phase is looked up")
+    parser.add_argument("--mode", default="constant", help="phase mode of the network")
     parser.add_argument("--without-locking", action="store_true", help="feet are only kept out of the ground")
     parser.add_argument(
         "--skeleton", default="config/skeletons/holden31.yaml", help="where the network has none"

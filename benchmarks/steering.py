@@ -1,9 +1,9 @@
-"""How well a character follows its wish, with the original runtime's steering (0) and Hobble's (2).
+"""How well a character follows its target, with the original runtime's steering (0) and Hobble's (2).
 
     python benchmarks/steering.py results/holden/network [--skeleton FILE] [--laps 2]
 
-Units are centimetres, degrees and frames; both get the same wishes. The results do not depend on the speed of
-the machine.
+Units are centimetres, degrees and frames; both get the same targets. The results do not depend on the speed
+of the machine.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.waypoints import TRACK
 
-LINES = {  # degrees from the facing to the way, cm a frame
+LINES = {  # degrees from the facing to the direction of travel, cm a frame
     "ahead": (0, 2.5),
     "to the left": (90, 2.2),
     "to the right": (-90, 2.2),
@@ -33,7 +33,7 @@ def way(speed: float, degrees: float) -> np.ndarray:
 
 
 def line(network: Network, degrees: float, speed: float, steering: float) -> str:
-    """A straight way from a stand, facing +Z; measured from two seconds on."""
+    """A straight path from a stand, facing +Z; measured from two seconds on."""
     character = ProceduralAnimation(network, steering=steering)
     velocity = way(speed, degrees)
     poses = [character.next_pose(velocity, (0, 1), "walk") for _ in range(60 * (SECONDS + 2))][120:]

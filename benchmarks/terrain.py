@@ -4,8 +4,8 @@
     python benchmarks/terrain.py FOLDER                         the BVH files of a folder, and mirrors
     python benchmarks/terrain.py FOLDER --cycles 8800 --flat 0.48 --workers 2
 
-The last line makes as many cycles as the released data set of the original has, by taking the clips again and
-again, and times the drawing of the patches and all the fits, as jobs on two cores do them.
+The last line repeats the clips until they have as many cycles as the released data set of the original. It
+measures the drawing of the patches and all fits, as done by jobs on two cores.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ Labelled = tuple[Clip, ClipLabels]
 
 
 def made(bvh: Path, ground: str) -> list[Labelled]:
-    """The clip of a BVH file and its mirror, labelled; none where it holds no cycle."""
+    """The clip of a BVH file and its mirror, with labels; nothing if they have no cycle."""
     motion = ClipMotion()
     skeleton = SKELETONS / "holden31.yaml"
     try:
@@ -105,7 +105,7 @@ def plain_error(patches: Patches, p: int, footing: search.Footing) -> float:
 
 
 def footings(clips: list[Labelled], patches: Patches, most: int) -> list[search.Footing]:
-    """What the search is given for the first cycles of the clips."""
+    """The arguments of the search for the first cycles of the clips."""
     few = replace(patches, which=patches.which[:20], affine=patches.affine[:20], mean=patches.mean[:20])
     caught: list[search.Footing] = []
     real = search.best_patches
@@ -132,7 +132,7 @@ def fit(job: tuple[Clip, ClipLabels, Patches, str]) -> tuple[int, float, float]:
 
 
 def parts(clips: list[Labelled]) -> None:
-    """Each part beside plain numpy."""
+    """Time each part, and compare it with plain numpy."""
     count = OPTIONS.patches
     draw(50)
     drawing = seconds(lambda: draw(count), 1)
@@ -172,9 +172,9 @@ def parts(clips: list[Labelled]) -> None:
 
 
 def agreement(patches: Patches, footing: search.Footing) -> bool:
-    """Whether the search finds the ten of lowest error, or others exactly as low.
+    """Whether the search finds the ten patches with the lowest errors, or others with equal errors.
 
-    Plain numpy looks at the forty that come first.
+    Plain numpy computes the errors of the best forty.
     """
     errors = [plain_error(patches, p, footing) for p in search.best_patches(patches, footing, 40)[0]]
     found = [plain_error(patches, p, footing) for p in search.best_patches(patches, footing, 10)[0]]
@@ -182,7 +182,7 @@ def agreement(patches: Patches, footing: search.Footing) -> bool:
 
 
 def released(clips: list[Labelled], wanted: int, flat: float, workers: int) -> None:
-    """So many cycles, a share of them flat, in so many processes, patches included."""
+    """Draw the patches and fit this many cycles, a share of them flat, in several processes."""
     start = time.perf_counter()
     patches = draw(OPTIONS.patches)
     jobs, sizes = [], {"flat": 0, "rocky": 0}

@@ -4,15 +4,15 @@
         [--clips 2500] [--nodes 80] [--shards 1] [--training-nodes 1] [--batch 0] [--passes 0]
 
 FOLDER is the folder in which Snakemake ran. From one run, seconds and bytes of jobs over clips are scaled
-with the amount of motion that the configuration uses; all else is unchanged. --against: a run with less motion. It
-prints the growth of each stage from one to the other, as ratios. Then a rule's seconds are a fixed part and a
-part that grows with the motion, from both runs.
+with the amount of motion that the configuration uses; all else is unchanged. --against: a run with less
+motion. It prints the growth of each stage from one to the other, as ratios. Then a rule's seconds are a fixed
+part and a part that grows with the motion, from both runs.
 
 Mirrored clips count as motion: with them, the hours double. Under `synthetic` the bytes are those of the BVH
 files, which are the user's own. --shards: those of the database (`database.shards`). --training-nodes:
 machines that train together, whose network of 10 Gb/s adds to each step what a ring all-reduce of the
-gradient takes; --batch: samples of a step then, and --passes, where not those of the run. Accuracy and roll-outs
-measure at most `evaluation.sample_frames`.
+gradient takes; --batch: samples of a step then, and --passes, where not those of the run. Accuracy and
+roll-outs measure at most `evaluation.sample_frames`.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
-"""Training steps a second, with Adam, dropout and the L1 term, in the ways there are, measured in one run.
+"""Training steps a second, with Adam, dropout and the L1 term, for several implementations in one run.
 
     python benchmarks/training.py [--batches 32,256,1024] [--threads 2] [--turns 7] [--sizes 342,512,512,311]
 
-Each turn gives every way a moment of the machine, and the best turn counts: other work comes and goes. The
-floor is the time that the products alone take, at their own best, with the same factors.
+All of them run in each turn, and the best turn of each counts, because other work disturbs some turns. The
+floor is the time of the matrix products alone, at their best, with the same factors.
 
 - per sample: weights built for every sample, differentiated by autograd, PyTorch's Adam (sixty-four samples
   at a time, since 1,024 need 5 GB);
-- blended: outputs of the control points blended, otherwise the same: what a careful author writes first;
-- PyTorch, float32: `hobble.models.pfnn.step.Step`, the way that other devices take;
+- blended: outputs of the control points blended, otherwise the same: the usual good implementation;
+- PyTorch, float32: `hobble.models.pfnn.step.Step`, as on other devices than a CPU;
 - fused, float32: `hobble.models.pfnn.fused.FusedStep`, the default below batch 256;
 - fused, bfloat16: the same with factors rounded to bfloat16, the default from there on.
 
@@ -91,7 +91,7 @@ def by_hand(kind: type[Step], half: bool, sizes: tuple[int, ...]) -> Callable[[B
 def products(
     half: bool, sizes: tuple[int, ...], device: torch.device | str = "cpu"
 ) -> Callable[[Batch], None]:
-    """Nothing but a step's products: outputs, gradients of weights and of all inputs but the first."""
+    """Only a step's matrix products: outputs, gradients of weights, and of all inputs but the first."""
     dtype = torch.bfloat16 if half else torch.float32
     like = {"dtype": dtype, "device": device}
     weights = [torch.randn(out, POINTS * (size + 1), **like) for size, out in pairwise(sizes)]

@@ -1,12 +1,12 @@
-"""Training on a GPU: samples a second with rows composed there, beside the products alone, in one run.
+"""Training on a GPU: samples a second with rows composed there, and those of the products alone, in one run.
 
     python benchmarks/training_cuda.py [--batches 32,256,4096] [--seconds 5] [--device cuda]
 
-Each line is the loop of `hobble.training.train`, over a made-up database of holden's rows that lies on the
-device: composing, dropout, gradient, Adam, the watch over the losses; without held-out errors and
-checkpoints. Up to the batch of `CAPTURED_UP_TO` a step is one captured graph. `plain` is the same with each
-kernel launched by itself; `floor` the time that the products take, by themselves, in the same precision. The
-last column is what the whole of the original's training (20 passes of 4.66 million samples) takes.
+Each line is the loop of `hobble.training.train` on a made-up database on the device, with rows like those of
+`holden`: composing, dropout, gradient, Adam, check of the losses; without held-out errors and checkpoints. Up
+to a batch of `CAPTURED_UP_TO` a step is one captured graph. `plain` is the same with single kernels. `floor`
+is the time of the matrix products alone in the same precision. The last column is the time of the original's
+whole training (20 passes of 4.66 million samples).
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def alone(work: Callable[[Batch], None], batch: Batch) -> Iterator[int]:
 
 
 def speed(counts: Iterator[int], seconds: float, device: torch.device) -> float:
-    """Samples a second, once it is warm, with everything that was started also done."""
+    """Samples a second after warming up, until all kernels have ended."""
     wait = torch.cuda.synchronize if device.type == "cuda" else lambda: None
     for _ in range(20):
         next(counts)

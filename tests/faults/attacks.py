@@ -25,7 +25,16 @@ ATTACKS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         ),
     ),
     "a bad download server": ("a clip's download", UNHARMED, ("tests/motion/test_download.py",)),
-    "a hostile file or name": ("its reader", REFUSED, ("tests/faults/test_untrusted.py",)),
+    "a hostile file or name": (
+        "its reader",
+        REFUSED,
+        (
+            "tests/faults/test_hostile_bvh.py",
+            "tests/faults/test_hostile_arrays.py",
+            "tests/faults/test_hostile_names.py",
+            "tests/faults/test_no_code_runs.py",
+        ),
+    ),
     "clips with awkward names": ("a whole run", UNHARMED, ("tests/faults/test_names.py",)),
     "a misuse of the runtime": (
         "`next_pose`",

@@ -66,6 +66,20 @@ GAME = "".join(
     f"\nthigh_twist_{s}|thigh_{s}|{side}UpLeg+0,-20,0\nik_hand_{s}|root|{side}Hand\nik_foot_{s}|root|{side}Foot"
     for s, side in (("l", "Left"), ("r", "Right"))
 )
+# As Rigify has it: a second leg that only moves the first, a longer chain to the heel than to the ball.
+MECHANISM = "".join(
+    f"\nmch_thigh_{s}|hips|{side}UpLeg\nmch_shin_{s}|mch_thigh_{s}|{side}Leg\nmch_foot_{s}|mch_shin_{s}|{side}Foot"
+    f"\nheel_{s}|foot_{s}|{side}Foot+0,-6,-5\nheel_end_{s}|heel_{s}|{side}Foot+{6 * x},-6,-14"
+    for s, side, x in (("l", "Left", 1), ("r", "Right", -1))
+)
+# As avatars of Second Life have them, and a rig nearly three times as wide as high.
+HIND = "\nhind|hips|Hips+0,0,-6" + "".join(
+    f"\nhind1_{s}|hind|Hips+{10 * x},0,-10\nhind2_{s}|hind1_{s}|Hips+{12 * x},-40,-8"
+    f"\nhind3_{s}|hind2_{s}|Hips+{12 * x},-80,-8\nhind4_{s}|hind3_{s}|Hips+{12 * x},-86,2"
+    f"\nwing_{s}|chest|Spine1+{10 * x},10,-10\nwing2_{s}|wing_{s}|Spine1+{16 * x},15,-14"
+    f"\nwing3_{s}|wing2_{s}|Spine1+{230 * x},15,-14"
+    for s, x in (("l", 1), ("r", -1))
+)
 ROLLS = "hips|-|Hips\nspine|hips|LowerBack\nspine1|spine|Spine\nspine2|spine1|Spine1\n" + "\n".join(
     ["neck|spine2|Neck", "neck1|neck|Neck1", "head|neck1|Head"]
     + [

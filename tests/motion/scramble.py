@@ -27,6 +27,7 @@ from hobble.motion.options import ClipMotion
 Array = np.ndarray
 SIDES = (("Left", "L"), ("Right", "R"))
 NEAR = 3.5  # cm: a floor 3.1 cm off is put at 0, and one 2.9 off is not, which says nothing of a rig
+BALL = 3.0  # cm: how much higher or lower a figure may stand whose balls of the feet had to be guessed
 TRUNK = ("Hips", "LowerBack", "Spine", "Spine1", "Neck", "Neck1", "Head")
 LIMB = ("Shoulder", "Arm", "ForeArm", "Hand", "FingerBase", "HandIndex1", "Thumb")
 LEG = ("HipJoint", "UpLeg", "Leg", "Foot", "ToeBase")
@@ -494,7 +495,7 @@ def outcome(file: Path, seed: int, folder: Path, frames: int | None = None) -> O
     except HobbleError as error:
         return Outcome(how, names, None, str(error))
     lowered = floor_of(two) - floor_of(one)
-    if abs(lowered) <= NEAR:
+    if abs(lowered) <= NEAR + (0.0 if "LeftToeBase" in names else BALL):
         second = replace(second, root=second.root + np.array([0.0, lowered, 0.0]))
     return Outcome(how, names, compare(first, second, names), said=" ".join(two["unsure"]))
 
@@ -539,13 +540,13 @@ def compare(first: Clip, second: Clip, names: dict[str, str]) -> Array:
     """(N,) mean distance in centimetres of each joint that both have.
 
     A rig without toes does not tell how high its ankles are above the balls of its feet: how much higher or
-    lower all of the figure stands for that, 3 cm at most, is taken off.
+    lower all of the figure stands for that, BALL at most, is taken off.
     """
     frames = min(len(first), len(second))
     joints = [first.skeleton.index(name) for name in names]
     apart = second.positions[:frames, joints] - first.positions[:frames, joints]
     if "LeftToeBase" not in names:
-        apart[..., 1] -= np.clip(np.median(apart[..., 1]), -3.0, 3.0)
+        apart[..., 1] -= np.clip(np.median(apart[..., 1]), -BALL, BALL)
     return np.linalg.norm(apart, axis=-1).mean(axis=0)
 
 

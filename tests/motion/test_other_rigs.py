@@ -20,6 +20,8 @@ from hobble.motion.source import load_source
 from tests.motion.other_rigs import (
     CLOTHES,
     GAME,
+    HIND,
+    MECHANISM,
     PLAIN,
     ROLLS,
     TRUNK,
@@ -82,7 +84,9 @@ RIGS = {
     ),
     "pelvis beside the spine": (PELVIS.replace("thigh_l|", "pelvis|hips|Hips\nthigh_l|", 1), {}),
     "skirt, hair, wings and tail": (PLAIN + CLOTHES, {}),
-    "the same without names": (nameless(PLAIN + CLOTHES), {"rest": "one axis"}),
+    "legs of a mechanism, and heels": (PLAIN + MECHANISM, {}),
+    "hind limbs and wide wings": (PLAIN + HIND, {}),
+    "skirt, hair, wings and tail, without names": (nameless(PLAIN + CLOTHES), {"rest": "one axis"}),
 }  # fmt: skip
 
 
@@ -116,6 +120,16 @@ def test_a_rig_comes_out_as_the_clip_itself(outcome, name):
     off = compare(first, second, names)
     assert off.mean() < 1.0, (name, report["roles"])
     assert off.max() < 1.5, dict(zip(names, off.round(1), strict=True))
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("rest", ["own", "one axis"])
+def test_arms_that_hang_from_the_neck_as_in_3ds_max_belong_to_the_chest(outcome, rest):
+    rig = PLAIN.replace("shoulder_l|chest", "shoulder_l|neck").replace("shoulder_r|chest", "shoulder_r|neck")
+    first, (second, report), names = outcome(rig, rest=rest)
+    assert (report["roles"]["chest"], report["roles"]["neck"]) == ("chest", "neck")
+    assert not any("neck" in note for note in report["unsure"])
+    assert compare(first, second, names).max() < 1.5
 
 
 @pytest.mark.shared

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hobble.core.bvh import write_bvh
 from hobble.core.clip import Clip
+from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, forward_kinematics, rest_positions
 from hobble.motion.decode import decode
 from hobble.motion.options import ClipMotion
 from hobble.motion.read import read_bvh
 from hobble.motion.rig import load_skeleton
 from hobble.motion.source import load_source
+from tests.motion.other_rigs import PLAIN, rigged
 from tests.motion.scramble import outcome
 
 SKELETONS = Path(__file__).parents[2] / "config/skeletons"
@@ -93,11 +97,33 @@ def test_hips_and_shoulders_are_as_level_as_in_the_file(shared, make, name):
 
 @pytest.mark.shared
 def test_feet_that_only_stand_unlike_are_told_of(shared, tmp_path):
-    """On uneven ground, or with a zero pose in which nobody could stand, the tilt of the feet is a guess."""
-    path = shared / "mocap/cmu/03_02.bvh"
-    one = outcome(path, 99, tmp_path, 420)
+    """On uneven ground, with a zero pose in which nobody could stand, the tilt of the feet is a guess."""
+    one = outcome(shared / "mocap/cmu/03_02.bvh", 100, tmp_path, 420)
+    assert one.how.rest == "heap"
+    assert "feet stand at different angles" in one.said + one.refused
+
+
+@pytest.mark.shared
+def test_a_clip_too_short_to_show_its_feet_is_refused_or_accepted(shared, tmp_path, make):
+    """A third of a second of a walk on a rig whose zero pose is a heap."""
+    maps, path = SKELETONS, shared / "mocap/cmu/07_01.bvh"
+    clip = load_source(read_bvh(path), load_skeleton(maps / "holden31.yaml"), maps, ClipMotion()).clip
+    clip = replace(clip, rotations=clip.rotations[:40], root=clip.root[:40])
+    write_bvh(tmp_path / "short.bvh", rigged(clip, PLAIN, rest="heap")[0], decimals=8)
+    with pytest.raises(InputError, match=r"short.bvh: The height .*0.33 s are too short.*accept_doubt"):
+        make(tmp_path / "short.bvh")
+    assert make(tmp_path / "short.bvh", accept_doubt=True)[1]["unsure"]
+    write_bvh(tmp_path / "stands.bvh", rigged(clip, PLAIN)[0], decimals=8)
+    assert "too short" not in " ".join(make(tmp_path / "stands.bvh")[1]["unsure"])
+
+
+@pytest.mark.shared
+def test_one_foot_that_agrees_with_the_zero_pose_is_enough(shared, tmp_path):
+    """On uneven ground one foot never comes down. The mean of both would be 2.5 cm off."""
+    one = outcome(shared / "mocap/cmu/03_02.bvh", 99, tmp_path, 900)
     assert one.how.rest == "twisted"
-    assert "feet stand at different angles" in one.said
+    assert one.right, one
+    assert "ankles" not in one.said
 
 
 @pytest.mark.shared

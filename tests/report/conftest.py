@@ -17,7 +17,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.report.bundle import WEB, bundle, install
-from hobble.report.compare import comparisons
+from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import Material, gather
 from hobble.report.page import render
 from hobble.report.playable import playable

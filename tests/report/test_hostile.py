@@ -13,7 +13,7 @@ import pytest
 from hobble.core.files import load_npz, save_npz
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
-from hobble.report.compare import comparisons
+from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import gather
 from hobble.report.page import render
 from hobble.report.playable import playable

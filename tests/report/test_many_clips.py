@@ -62,10 +62,10 @@ def test_seconds_are_estimated_from_a_random_choice_of_clips(
     paths = [str(tmp_path / f"walk-{i}.npz") for i in range(30)]
     for path in paths:
         shutil.copy(tmp_path / "walk.npz", path)
-    some = shown_clips.counted(paths, most=10)
+    some = shown_clips.sampled(paths, most=10)
     assert len(some) == 10
     assert some != paths[:10]
-    every, few = coverage.counted(paths, {}), coverage.counted(some, {}, of=30)
+    every, few = coverage.seconds_of_data(paths, {}), coverage.seconds_of_data(some, {}, of=30)
     np.testing.assert_allclose(few["both"], every["both"])
     np.testing.assert_allclose(few["turns"]["train"], every["turns"]["train"])
     assert every["estimate"] == ""

@@ -99,7 +99,7 @@ def test_turns_speeds_and_severities_are_counted_in_seconds(
     knee = holden31.link_names.index("LeftUpLeg-LeftLeg")
     severity[: len(rows) // 2, knee] = 7.2
     save_clip_rows(tmp_path / "walk.npz", replace(rows, y=y, channels={"injury": severity}))
-    found = coverage.counted([tmp_path / "walk.npz"], {rows.clip: "held_out"})
+    found = coverage.seconds_of_data([tmp_path / "walk.npz"], {rows.clip: "held_out"})
     seconds, hurt = len(np.unique(rows.frame)) / 60, len(np.unique(rows.frame[: len(rows) // 2])) / 60
     turns = dict(zip(coverage._middles(coverage.TURNS), found["turns"]["held_out"], strict=True))
     assert turns[30.0] == pytest.approx(seconds)

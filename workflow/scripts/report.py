@@ -4,7 +4,7 @@ from pathlib import Path
 
 from hobble.core.files import write_text
 from hobble.models.load import load_network
-from hobble.report.compare import comparisons
+from hobble.report.captured_and_predicted import comparisons
 from hobble.report.gather import gather
 from hobble.report.page import render
 from hobble.report.recogniser import playable_with_recogniser

@@ -9,7 +9,16 @@ from collections.abc import Iterable
 
 from hobble.channels.channel import Channel, Source
 
-__all__ = ["NAMES", "Channel", "Source", "channel", "every", "formerly", "modules_of", "shown_modules"]
+__all__ = [
+    "NAMES",
+    "Channel",
+    "Source",
+    "channel",
+    "channel_of_old_key",
+    "every",
+    "modules_of",
+    "shown_modules",
+]
 
 # All channels. Each is a package beside this file, and its CHANNEL is the channel.
 NAMES = ("injury", "mood", "diagnosis")
@@ -46,12 +55,12 @@ def shown_modules() -> list[str]:
     return [module for module in found if importlib.util.find_spec(module) is not None]
 
 
-def formerly(key: str) -> str:
+def channel_of_old_key(key: str) -> str:
     """The channel that `key` stands for in files from before channels had names.
 
     Raises ValueError for an unknown key.
     """
     for one in every():
-        if key in one.former:
+        if key in one.old_keys:
             return one.name
     raise ValueError(f"there is no such key: {key}")

@@ -46,7 +46,7 @@ class Channel(ABC):
     name: name of the folder, in configurations, and the keyword of `next_pose`. title, value: words for the
     channel and for one of its values on the page. highest: the values are 0 to this. rate: how much a value
     may change in a second at run time, unless the configuration says otherwise. suffix: of a file beside a
-    clip that holds values, or None. former: keys of this channel in older files. Options: model of the data
+    clip that holds values, or None. old_keys: keys of this channel in older files. Options: model of the data
     set's section `channels.<name>`. If it is None, every data set has the channel; else only those with the
     section. slows: whether values above 0 make the body slower. Then its speed limits are learnt from the
     rows (see `hobble.channels.limits`). manner: whether a column above 0 is a manner in which a whole clip
@@ -60,7 +60,7 @@ class Channel(ABC):
     highest: float = 1.0
     rate: float = 1.0
     suffix: str | None = None
-    former: Sequence[str] = ()
+    old_keys: Sequence[str] = ()
     Options: type[Section] | None = None
     slows: bool = False
     manner: bool = False

@@ -38,7 +38,7 @@ def _channel(name: str) -> str:
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,99}$")]
 ClipName = Annotated[str, AfterValidator(_clip_name)]
 ChannelName = Annotated[str, AfterValidator(_channel)]
-OLD_KEYS = {key: one.name for one in every() for key in one.former}
+OLD_KEYS = {key: one.name for one in every() for key in one.old_keys}
 WALKER_KEYS = ("recipe", "share")  # keys of a clip that only the walker reads
 
 

@@ -1,11 +1,11 @@
-"""Derive the profiles of the package: python -m hobble.hurt IMPAIRED_WALKS.npz."""
+"""Derives people.json (means of impaired walks): python -m hobble.hurt IMPAIRED_WALKS.npz"""
 
 import sys
 
 from hobble.hurt.people import FILE, derive
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
+    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
         sys.exit(__doc__)
     derive(sys.argv[1])
     print(FILE)

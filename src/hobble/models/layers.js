@@ -1,4 +1,4 @@
-// Layers of K sets of weights, as `packed_rows` packs them, whose outputs are blended by shares; an ELU between them.
+// Layers with K sets of weights each, packed by `packed_rows`. Their outputs are blended by shares, with an ELU between layers.
 import { bytes } from "../report/web/numbers.js";
 
 export const floats = (text) => new Float32Array(bytes(text));
@@ -23,13 +23,13 @@ const applied = ({ points, rows, columns, w, b, out }, shares, x, last) => {
   return out;
 };
 
-// Returns (x, shares) => outputs, in an array that the next call writes over; without shares, of one set of weights.
+// Returns (x, shares) => outputs, in an array that the next call overwrites. Without shares there is one set of weights.
 export const createLayers = (packed) => {
   const layers = packed.map(unpacked);
   return (x, shares) => layers.reduce((h, one, i) => applied(one, shares, h, i === layers.length - 1), x);
 };
 
-// Inputs as they are, of which those that weigh nothing are not looked at, into z; outputs back into raw units, in place.
+// standardise: raw inputs x into z, without those that have no weight. restore: outputs to raw units, in place.
 export const createScales = (spec) => {
   const mean = floats(spec.xMean), inverse = floats(spec.xScale), seen = Int32Array.from(spec.seen);
   const yMean = floats(spec.yMean), yStd = floats(spec.yStd);

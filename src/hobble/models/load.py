@@ -160,7 +160,7 @@ def _labels(
 ) -> tuple[str, ...]:
     """The labels of a channel, from the file or else the skeleton. Raises InputError if they do not fit."""
     stated = checks.mapping(path, "channels", meta.get("channels", {})).get(name)
-    given = stated or next((meta[key] for key in channel(name).former if meta.get(key)), None)
+    given = stated or next((meta[key] for key in channel(name).old_keys if meta.get(key)), None)
     if given is None and skeleton is not None:
         given = channel(name).columns(skeleton)
     labels, columns = checks.names(path, f"channel {name}", given or ()), dict(layout.channels)[name]

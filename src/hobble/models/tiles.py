@@ -22,6 +22,7 @@ from hobble.core.quat import Array
 WIDTH = 16  # outputs in a panel: two registers with AVX2, one with AVX-512
 DEPTH = 256  # largest number of inputs at a time: their part of a panel stays in the L1 cache
 ALIGNMENT = 64  # bytes of a cache line
+AHEAD = 48  # inputs: how far ahead a single row's weights are fetched from memory
 
 
 def panels_of(outputs: int) -> int:
@@ -73,6 +74,8 @@ def _write_tile(  # type: ignore[no-untyped-def]
     sums = [builder.phi(vector) for _ in places]
     at = builder.mul(k, index(WIDTH))
     w = [_weights_at(builder, weights, builder.add(start, at), vector) for start in of_panel]
+    if rows == 1:
+        _fetch_ahead(builder, weights, of_panel, step, k, depth)
     after = []
     for r in range(rows):
         one = _spread(builder, builder.load(builder.gep(x, [builder.add(of_row[r], k)])), vector)
@@ -85,6 +88,26 @@ def _write_tile(  # type: ignore[no-untyped-def]
     builder.position_at_end(done)
     for place, total in zip(places, after, strict=True):
         builder.store(total, place, align=4)
+
+
+def _fetch_ahead(builder, weights, of_panel, step, k, depth):  # type: ignore[no-untyped-def]
+    """Fetch each panel's weights of AHEAD inputs later, or at the end of these panels, of those after them.
+
+    The processor does so by itself, but begins anew at each panel, and one row has nothing else to do then.
+    """
+    index, flag, cell = ir.IntType(64), ir.IntType(32), ir.IntType(8).as_pointer()
+    fetch = cgutils.get_or_insert_function(
+        builder.module, ir.FunctionType(ir.VoidType(), [cell, flag, flag, flag]), "llvm.prefetch.p0"
+    )
+    later = builder.add(k, index(AHEAD))
+    # A panel's last input is followed by the next panel, which is among these. Those after them are further.
+    further = builder.select(
+        builder.icmp_signed("<", later, depth), index(0), builder.mul(step, index(len(of_panel) - 1))
+    )
+    distance = builder.add(builder.mul(later, index(WIDTH)), further)
+    for start in of_panel:
+        place = builder.gep(weights, [builder.add(start, distance)])
+        builder.call(fetch, [builder.bitcast(place, cell), flag(0), flag(3), flag(1)])  # read, keep, data
 
 
 def _vector_at(builder, array, place):  # type: ignore[no-untyped-def]
@@ -138,9 +161,10 @@ def _has_32_registers() -> bool:
     return not getattr(config, "CPU_NAME", None) and bool(llvm.get_host_cpu_features().get("avx512f"))
 
 
-# Panels in a tile of one row, of two or three rows, and of four to six rows. With these numbers the sums
-# nearly fill the registers, and there are enough of them to hide the latency of an addition.
-PANELS_FOR_1_ROW, PANELS_FOR_3_ROWS, PANELS_FOR_6_ROWS = (6, 4, 4) if _has_32_registers() else (4, 2, 1)
+# Panels in a tile of two or three rows, and of four to six rows. With these numbers the sums nearly fill the
+# registers, and there are enough of them to hide the latency of an addition. One row waits for memory.
+PANELS_FOR_1_ROW = 4
+PANELS_FOR_3_ROWS, PANELS_FOR_6_ROWS = (4, 4) if _has_32_registers() else (2, 1)
 ROWS = 6
 
 
@@ -156,7 +180,7 @@ def multiply(
     at = np.empty(ROWS, np.int64)
     tiles = -(-rows // ROWS)
     wide = PANELS_FOR_1_ROW if rows == 1 else PANELS_FOR_3_ROWS if rows <= 3 else PANELS_FOR_6_ROWS
-    stretches = -(-inputs // DEPTH)
+    stretches = 1 if rows == 1 else -(-inputs // DEPTH)  # no other row takes the same weights again
     for stretch in range(stretches):
         k = inputs * stretch // stretches
         depth = inputs * (stretch + 1) // stretches - k

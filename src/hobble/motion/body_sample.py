@@ -27,7 +27,7 @@ class BodySample:
     positions: (S, J, 3) cm. rotations: (S, J, 4) in the world. speeds: (S, J) cm a second. rest: (J, 3)
     positions in the zero pose. ends: position of an ankle's end site, if it has one. spine: the shape of the
     target's trunk in that stance. target_tilt: radians by which the bones from ankle to ball point down on
-    the target.
+    the target. seconds: length of the clip.
     """
 
     def __init__(
@@ -40,9 +40,11 @@ class BodySample:
         ends: Mapping[str, tuple[float, float, float] | None],
         spine: Spine,
         target_tilt: float,
+        seconds: float,
     ) -> None:
         self.body, self.at, self.turned, self.speeds = body, positions, rotations, speeds
         self.rest, self.ends, self.spine, self.target_tilt = rest, ends, spine, target_tilt
+        self.seconds = seconds
         self.hips_left = self.line(body.legs["right"][0], body.legs["left"][0])
         self.chest_left = self.line(body.arms["right"][1], body.arms["left"][1])
 

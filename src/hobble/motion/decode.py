@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hobble.core import quat
+from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.motion.read import Bvh
 
 STANDARD_RATES = (120, 60, 30, 24, 25, 50, 100, 90, 48, 72, 144, 180, 200, 240, 250, 300, 15, 20, 12, 10)
 
+RADIANS = 0.5  # an angle that changes by more is a movement, if it is in radians
 BLOCK = 4096  # frames at a time, to keep intermediate arrays small
 
 
@@ -35,20 +37,37 @@ class Decoded:
 def frame_rate(frame_time: float, text: str) -> float:
     """Frames a second of a Frame Time. It is a standard rate if the digits fit one, rounded as written.
 
-    >>> frame_rate(0.008333, "0.008333"), frame_rate(0.0333, "0.0333")
-    (120.0, 30.0)
+    >>> frame_rate(0.008333, "0.008333"), frame_rate(0.0333, "0.0333"), frame_rate(0.016, "0.016")
+    (120.0, 30.0, 60.0)
     >>> round(frame_rate(0.0417083, "0.0417083"), 3)
     23.976
     """
     mantissa = text.lower().split("e")[0]
     if "e" not in text.lower() and "." in mantissa:
         step = 10.0 ** -len(mantissa.split(".")[1])
-        for rate in STANDARD_RATES:
-            # Some programs cut digits off instead of rounding.
-            if abs(1 / rate - frame_time) < step * 1.01 and abs(rate * frame_time - 1) < 0.03:
-                return float(rate)
+        # Some programs cut digits off instead of rounding: .016 for 1/60.
+        fit = [rate for rate in STANDARD_RATES if abs(1 / rate - frame_time) < step * 1.01]
+        fit = [rate for rate in fit if abs(rate * frame_time - 1) < 0.045]
+        if fit:
+            return float(min(fit, key=lambda rate: abs(rate * frame_time - 1)))
     nearest = round(1 / frame_time)
     return float(nearest) if abs(nearest * frame_time - 1) < 1e-5 else 1 / frame_time
+
+
+def check_angles(bvh: Bvh) -> None:
+    """Raise InputError if the angles seem to be in radians, or if there are none."""
+    turns = [name.endswith("rotation") for channels in bvh.channels for name in channels]
+    if not any(turns):
+        fix = "Export the clip with rotations, as nearly all programs do."
+        raise InputError(bvh.path, "no joint has rotations, only positions", fix=fix)
+    angles = bvh.values[:, turns]
+    most = float(np.abs(angles).max())
+    if most <= 2 * np.pi and np.ptp(angles, axis=0).max() > RADIANS:
+        raise InputError(
+            bvh.path,
+            f"no angle is larger than {most:.2f}, so they seem to be in radians",
+            fix="Export the clip again with angles in degrees.",
+        )
 
 
 def decode(bvh: Bvh, still: float) -> Decoded:

@@ -17,6 +17,7 @@ from hobble.motion.find_head import find_head
 from hobble.motion.find_limbs import clavicle, find_limbs, joints_of, toe
 from hobble.motion.find_sides import left_arm, left_leg
 from hobble.motion.moving_rig import Rig
+from hobble.motion.names import part_of
 from hobble.motion.tree import above, common, path
 
 
@@ -46,8 +47,9 @@ def find_body(names: Sequence[str], parents: Sequence[int], positions: Array) ->
     across_first = left_arm(rig, leg, first, arm, arms)
     hips = common(parents, [leg[0][0], leg[1][0]])
     hips = parents[hips] if hips in (leg[0][0], leg[1][0]) else hips
-    chest = arms.hub
-    trunk = [j for j in path(parents, hips, chest) if j != hips and (j not in above(parents, hips))]
+    trunk = [j for j in path(parents, hips, arms.hub) if j != hips and (j not in above(parents, hips))]
+    if len(trunk) > 1 and part_of(names[trunk[-1]]) == "neck" and head != trunk[-1]:
+        neck = (trunk.pop(), *neck)  # 3ds Max hangs the arms from the neck
     ordered = {SIDES[0]: first, SIDES[1]: 1 - first}
     across = {SIDES[0]: across_first, SIDES[1]: 1 - across_first}
     body = Body(

@@ -8,7 +8,7 @@ import numpy as np
 
 from hobble.motion.doubt import Doubt
 from hobble.motion.moving_rig import Pair, Rig
-from hobble.motion.names import limb_parts, part_of
+from hobble.motion.names import is_control, limb_parts, part_of
 from hobble.motion.orient import unit
 
 RIGID = 0.03  # relative change of the length between two joints that count as one bone
@@ -73,10 +73,12 @@ def _swing(rig: Rig, pair: Pair, middle: tuple[int, int, int]) -> float:
 
 
 def _named(rig: Rig, pair: Pair, kind: str) -> float:
-    """How strongly names suggest a kind of limb, -1 to 1."""
-    parts = [part_of(rig.names[j]) for chain in pair.chains for j in chain]
+    """How strongly names suggest a kind of limb, -1 to 1. Joints that control others count against it."""
+    names = [rig.names[j] for chain in pair.chains for j in chain]
+    parts = [part_of(name) for name in names]
     other = "arm" if kind == "leg" else "leg"
-    return (sum(p in WORDS[kind] for p in parts) - sum(p in WORDS[other] for p in parts)) / len(parts)
+    against = sum(p in WORDS[other] or is_control(n) for p, n in zip(parts, names, strict=True))
+    return (sum(p in WORDS[kind] for p in parts) - against) / len(parts)
 
 
 def segments(rig: Rig, pair: Pair, kind: str) -> tuple[int, int, int] | None:
@@ -113,7 +115,7 @@ def _fits(rig: Rig, chain: Sequence[int], places: Sequence[int], kind: str) -> b
     i, j, k = (chain[p] for p in places)
     upper, lower = rig.chord(i, j)[0], rig.chord(j, k)[0]
     low, high = RATIOS[kind]
-    return min(upper, lower) > 0.04 * rig.size and low <= lower / max(upper, 1e-9) <= high
+    return min(upper, lower) > 0.03 * rig.size and low <= lower / max(upper, 1e-9) <= high
 
 
 def _moves(rig: Rig, pair: Pair, i: int, j: int) -> bool:
@@ -155,7 +157,12 @@ def toe(rig: Rig, pair: Pair, k: int, heel: int) -> int | None:
     named = limb_parts([rig.names[j] for j in chain]).get("toe")
     if named is not None and chain[named] in after and rig.chord(heel, chain[named])[0] > 0.03 * leg:
         return chain[named]
-    return next((j for j in after if rig.chord(heel, j)[0] > 0.06 * leg), None)
+    found = next((j for j in after if rig.chord(heel, j)[0] > 0.06 * leg), None)
+    if found is None or part_of(rig.names[found]) != "ankle":
+        return found
+    # The chain goes to the back of the heel.
+    toes = (j for j in rig.children[heel] if part_of(rig.names[j]) == "toe")
+    return next((j for j in toes if rig.chord(heel, j)[0] > 0.03 * leg), None)
 
 
 def clavicle(rig: Rig, pair: Pair, k: int, shoulder: int) -> int | None:

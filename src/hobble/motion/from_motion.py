@@ -11,20 +11,22 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.motion.body_sample import LEFT, BodySample
 from hobble.motion.flat_feet import flat_feet
+from hobble.motion.no_neck import has_neck, neck_bone
 from hobble.motion.orient import frame, mean, unit
 from hobble.motion.spine import SHORT, spine_shares
 
 UP, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-# Standard deviation of the chest's lean if the head shows it and no neck does: seven subjects of CMU, whose
-# necks show it as well.
-LEAN_ERROR = np.radians(3.8)
 AGREE = np.radians(25.0)  # trunk joints that differ by less have the same rest pose
 
 
-def from_motion(seen: BodySample) -> dict[int, Array]:
-    """Frames of all joints from the directions of the bones while the figure moves."""
+def from_motion(seen: BodySample, zero: Array | None) -> dict[int, Array]:
+    """Frames of all joints from the directions of the bones while the figure moves.
+
+    zero: (4,) frame of the chest in the zero pose, which counts if the rig has no neck. None if nobody could
+    stand in that pose.
+    """
     frames: dict[int, Array] = {}
-    _trunk(seen, frames)
+    _trunk(seen, frames, zero)
     for side, sign in (("left", 1.0), ("right", -1.0)):
         _arm(seen, frames, side, sign)
         _leg(seen, frames, side)
@@ -41,23 +43,13 @@ def bends(seen: BodySample) -> dict[int, Array]:
     return out
 
 
-def lean_doubt(seen: BodySample) -> str | None:
-    """A sentence on how far the chest leans, on a rig without a neck. None if that is known."""
-    body = seen.body
-    if body.neck:
-        return None
-    arm = float(np.mean([seen.length(body.chest, arm[1]) for arm in body.arms.values()]))
-    return (
-        "It has no joint for the neck, so how far the chest leans is uncertain: arms may lie "
-        f"{2 * LEAN_ERROR * arm:.0f} cm too far forward or back."
-    )
-
-
-def _trunk(seen: BodySample, frames: dict[int, Array]) -> None:
+def _trunk(seen: BodySample, frames: dict[int, Array], zero: Array | None) -> None:
     body = seen.body
     chain = (body.hips, *body.trunk, *body.neck)
     for joint in chain:
         bone, axis, left = _bone(seen, joint)
+        if body.trunk and joint == body.chest and not has_neck(seen):
+            bone, axis = neck_bone(seen, left, zero), seen.spine.neck
         # Hips and chest are level where limbs begin. Spines of captured rigs bend sideways by some degrees.
         carries = joint in (body.hips, body.chest)
         frames[joint] = frame(left, LEFT, bone, axis) if carries else frame(bone, axis, left, LEFT)

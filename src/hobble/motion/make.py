@@ -17,6 +17,7 @@ from hobble.motion.body import body_by_roles
 from hobble.motion.check import check, compare
 from hobble.motion.loop import loop_clip
 from hobble.motion.options import ClipMotion
+from hobble.motion.pace import check_pace
 from hobble.motion.read import MOST_POSES, Bvh, read_bvh
 from hobble.motion.resample import sample_positions, sample_rotations, sample_times
 from hobble.motion.retarget import plan, retarget_clip
@@ -56,6 +57,7 @@ def make_clip(
     fitted = fit_skeleton(resampled, source, target.skeleton, options.proportions)
     if fitted.figures is not None:
         check(file.path, fitted.figures, source.match.rig)
+    in_place = check_pace(file.path, fitted.clip, options.defects == "leave")
     made, repairs, loops = fitted.clip, source.repairs + fitted.repairs, options.loops
     if loops > 1:
         made = loop_clip(made, loops, options.heading)
@@ -70,7 +72,7 @@ def make_clip(
         "cycle_frames": len(made) // loops,
         "scale": fitted.scale,
         "retarget": fitted.figures,
-        "unsure": fitted.unsure,
+        "unsure": fitted.unsure + ([in_place] if in_place else []),
     }
     return made, _report(file, source, made) | extra | {"repairs": repairs, "notes": source.notes}
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from hobble.core.quat import Array
 from hobble.motion.body import SIDES
-from hobble.motion.names import side_of
+from hobble.motion.names import are_twins, side_of
 from hobble.motion.orient import unit
 
 SAMPLES = 150
 ALIKE = 0.15  # relative difference of length that a bone and its counterpart may have
 FEWEST = 3  # joints of a limb
-LEAST = 0.15  # least length of a limb, relative to the size of the body
+LEAST = 0.1  # least length of a limb, relative to the size of the body, which wings and swords make larger
 
 
 @dataclass(frozen=True)
@@ -76,12 +76,21 @@ class Rig:
         best: tuple[float, tuple[int, ...], tuple[int, ...]] = (0.0, (), ())
         for c in self.children[a]:
             for d in self.children[b]:
-                if self.alike(c, d):
+                if self.alike(c, d) and self._named_alike(c, d):
                     found = self.match(c, d)
                     if found[0] > best[0] or not best[1]:
                         best = found
         own = float(min(self.lengths[a], self.lengths[b]))
         return own + best[0], (a, *best[1]), (b, *best[2])
+
+    def _named_alike(self, a: int, b: int) -> bool:
+        """Whether names allow that two joints are counterparts. A joint with a twin by name has no other."""
+        across = {a: self.children[self.parents[b]], b: self.children[self.parents[a]]}
+        for one, other in ((a, b), (b, a)):
+            twins = [j for j in across[one] if j != one and are_twins(self.names[one], self.names[j])]
+            if twins and other not in twins:
+                return False
+        return True
 
     def pairs(self) -> list[Pair]:
         """All pairs of chains that can be legs or arms."""
@@ -89,7 +98,7 @@ class Rig:
         for hub, below in enumerate(self.children):
             for i, a in enumerate(below):
                 for b in below[i + 1 :]:
-                    if not self.alike(a, b):
+                    if not self.alike(a, b) or not self._named_alike(a, b):
                         continue
                     length, one, other = self.match(a, b)
                     length -= float(min(self.lengths[a], self.lengths[b]))

@@ -72,6 +72,7 @@ WORDS = (
     ("leg", ("leg",)),
     ("hip", ("hip", "buttock", "femoral")),
 )
+CONTROLS = ("ik", "mch", "ctrl", "control", "ctl", "pole", "target", "effector")  # joints that move others
 ENDS = ("end", "nub", "site", "tip", "top")  # joints that only mark the end of a bone
 
 
@@ -117,6 +118,26 @@ def side_of_pair(name: str, other: str) -> str | None:
     return {("l", "r"): "left", ("r", "l"): "right"}.get(unlike[0]) if len(unlike) == 1 else None
 
 
+def are_twins(name: str, other: str) -> bool:
+    """Whether two names are those of one joint on the left and on the right.
+
+    >>> are_twins("LeftToe2", "RightToe2"), are_twins("toe2.L", "toe1.R"), are_twins("lfemur", "rfemur")
+    (True, False, True)
+    """
+    if side_of_pair(name, other) is None:
+        return False
+    if side_of(name) is None and side_of(other) is None:
+        return True
+    return _without_side(name) == _without_side(other)
+
+
+def _without_side(name: str) -> list[str]:
+    parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+", re.sub("[左右]", " ", name))
+    if glued := re.match(r"[LR](?=[A-Z][a-z])", name):
+        parts = [parts[0].removeprefix(glued[0]), *parts[1:]]
+    return [part.lower() for part in parts if part and part.lower() not in LEFT | RIGHT]
+
+
 def part_of(name: str) -> str | None:
     """The part of the body that a name means: one of the words of WORDS, or None.
 
@@ -133,6 +154,11 @@ def part_of(name: str) -> str | None:
 def is_end(name: str) -> bool:
     """Whether a name says that the joint only ends a bone, like HeadTop_End."""
     return any(w in ENDS for w in words(name))
+
+
+def is_control(name: str) -> bool:
+    """Whether a name says that the joint is no part of the body but controls one, like foot_ik.L."""
+    return any(w in CONTROLS for w in words(name))
 
 
 def limb_parts(names: Sequence[str]) -> dict[str, int]:

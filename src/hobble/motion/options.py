@@ -78,6 +78,10 @@ class Motion(Section):
         description="what to do with broken frames and a floor off height 0. `repair` mends and reports "
         "them, `refuse` ends the run, `leave` takes the clip as it is, like the original code",
     )
+    accept_doubt: bool = Field(
+        False,
+        description="accept a clip even if nothing in its file shows the height of the figure to 3 cm",
+    )
     loops: Positive = Field(1, description="how often a clip of one short cycle is repeated")
     heading: Finite | None = Field(
         None, description="direction of a looped clip, degrees from +Z towards +X; by default as in the file"

@@ -25,7 +25,7 @@ KNOWN = 0.75  # a skeleton is a clip's rig if it has at least this share of the 
 NAME = re.compile(r"^ +['\"]?([^\s'\":{}][^'\":{}]*)['\"]?\s*:", re.MULTILINE)
 # Degrees that bones may differ in two rest poses that count as equal, by the role at the bone's end.
 LIKE = {"elbow": 20.0, "wrist": 25.0, "knee": 35.0, "heel": 35.0, "toe": 35.0}
-LEG_RANGE = (50.0, 125.0)
+LEG_RANGE = (35.0, 125.0)  # cm: children's and giants'
 FARTHEST = 1e5  # cm from a joint to its parent
 LIMBS = ("shoulder", "hip", "knee", "heel", "toe")
 MANDATORY = ("hips", "head", *(f"{side}_{part}" for side in ("left", "right") for part in LIMBS))

@@ -15,9 +15,9 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.axes import Axes, straighten
 from hobble.motion.body import SIDES, Body, body_by_roles, pairs, with_fingers
-from hobble.motion.decode import Decoded, decode, frame_rate
+from hobble.motion.decode import Decoded, check_angles, decode, frame_rate
 from hobble.motion.defects import Repaired, flips, repair
-from hobble.motion.doubt import Doubt, TwoFigures
+from hobble.motion.doubt import Doubt, TwoFigures, check_height
 from hobble.motion.draft import refusal
 from hobble.motion.find_body import Found, find_body
 from hobble.motion.floor import on_floor
@@ -72,6 +72,7 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion
     skeleton. On other rigs the parts of the body and a standing rest pose are found. Raises InputError if the
     parts cannot be found, or for defects that cannot be repaired.
     """
+    check_angles(file)
     repairs = _frame_count(file, options.defects)
     hips = find_hips(clean_names(file.names), target, maps)
     known = match_rig(rig_of(below_hips(file, hips)), target, maps)
@@ -138,6 +139,7 @@ def _unknown(
     named = known.sources if known is not None and known.rig == target.skeleton.name else {}
     wanted = [rig.index(joint) for joint in named.values()]
     standing_clip = upright(straight.clip, body, target.skeleton, wanted)
+    check_height(file.path, standing_clip.height_error, standing_clip.notes, options.accept_doubt)
     match = Match(
         known.rig if known else FOUND,
         standing_clip.clip.skeleton.roles,

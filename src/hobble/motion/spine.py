@@ -47,6 +47,17 @@ class Spine:
         first = max(first, 0)
         return unit(self.points[max(last, first + 1)] - self.points[first])
 
+    @property
+    def neck(self) -> Array:
+        """(3,) direction of the first bone above the chest: of the neck, or of the head without one."""
+        chest = min(int(np.searchsorted(self.shares, 1.0 - 1e-6)), len(self.shares) - 2)
+        return unit(self.points[chest + 1] - self.points[chest])
+
+    @property
+    def has_neck(self) -> bool:
+        """Whether there is a point between chest and head."""
+        return bool(((self.shares > 1.0 + 1e-6) & (self.shares < 2.0 - 1e-6)).any())
+
     def _below(self, share: float) -> int:
         """The highest point that is at most REACH above a position."""
         return int(np.searchsorted(self.shares, share + REACH, side="right")) - 1

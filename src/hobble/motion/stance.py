@@ -20,9 +20,10 @@ from hobble.core.skeleton import Skeleton, rest_positions
 from hobble.motion.added_joints import with_balls, with_bends
 from hobble.motion.body import Body, body_by_roles
 from hobble.motion.body_sample import LEFT, BodySample
-from hobble.motion.flat_feet import doubt, rest_tilt
-from hobble.motion.from_motion import bends, from_motion, lean_doubt
+from hobble.motion.flat_feet import doubt, height_error, rest_tilt
+from hobble.motion.from_motion import bends, from_motion
 from hobble.motion.from_rest import TRUSTED, add_rest, from_rest, zero_doubt
+from hobble.motion.no_neck import lean_doubt
 from hobble.motion.orient import apart, mean, pointed
 from hobble.motion.rebase import rebased
 from hobble.motion.spine import SHORT, Spine
@@ -37,13 +38,14 @@ class Upright:
     """A clip with a standing rest pose that faces +Z with the arms out. Its joints are those of the body.
 
     rest: where the stance comes from, in words. body: the parts by their new indices. notes: sentences on
-    what is uncertain.
+    what is uncertain. height_error: cm that the figure may stand too high or low.
     """
 
     clip: Clip = field(repr=False)
     body: Body
     rest: str
     notes: list[str] = field(default_factory=list)
+    height_error: float = 0.0
 
 
 def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = ()) -> Upright:
@@ -71,16 +73,18 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
         ends,
         Spine.of(target, theirs),
         rest_tilt(target, theirs),
+        len(clip) / clip.fps,
     )
-    frames, problem = from_motion(seen), stands(body, rest)
-    unsure = [lean_doubt(seen)]
-    if problem is None:
-        zero = from_rest(seen)
-        if max(apart(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED:
-            problem = "the trunk is twisted"
-        else:
-            add_rest(frames, zero, seen)
-            unsure.append(zero_doubt(seen, zero))
+    problem = stands(body, rest)
+    zero = from_rest(seen) if problem is None else None
+    frames = from_motion(seen, zero[body.chest] if zero else None)
+    if zero and max(apart(zero[j], frames[j]) for j in (body.hips, *body.trunk)) > TRUSTED:
+        problem, zero = "the trunk is twisted", None
+        frames = from_motion(seen, None)
+    unsure = [lean_doubt(seen, zero is not None)]
+    if zero:
+        add_rest(frames, zero, seen)
+        unsure.append(zero_doubt(seen, zero))
     said = "its zero pose" if problem is None else f"its motion, because in its zero pose {problem}"
     unsure.append(doubt(seen, problem is None))
     kept = _kept(clip, seen, others, frames)
@@ -88,7 +92,8 @@ def upright(clip: Clip, body: Body, target: Skeleton, others: Collection[int] = 
     roles = body.roles(clip.skeleton.joints)
     clip, body = with_bends(clip, body, frames, bends(seen))
     made = rebased(clip, body, [*body.joints, *kept], frames, roles)
-    return Upright(*made, said, [note for note in unsure if note])
+    notes = [note for note in unsure if note]
+    return Upright(*made, said, notes, height_error(seen, problem is None))
 
 
 def _speeds(clip: Clip) -> Array:

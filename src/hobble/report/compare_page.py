@@ -10,7 +10,7 @@ from hobble.report import compare_sections as parts
 from hobble.report import compare_tables as tables
 from hobble.report import measured, side_by_side
 from hobble.report.formats import embedded
-from hobble.report.hero import placed
+from hobble.report.hero import body_channel
 from hobble.report.playable import skeleton_of
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
@@ -53,7 +53,7 @@ def render_compared(
         embedded={name: embedded(part) for name, part in data.items()},
         playable=list(kept),
         left_out=left_out,
-        hurts=any(placed(spec) for spec in kept.values()),
+        hurts=any(body_channel(spec) for spec in kept.values()),
         style=style(),
         bundle=trusted("the bundle", bundle),
         provenance={"commit": commit(FOLDER), "machine": machine(), "versions": versions()},

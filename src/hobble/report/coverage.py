@@ -23,7 +23,9 @@ LEVELS = np.arange(1, 11)  # tenths of the highest value of a channel
 SPLITS = (("train", "training", "@muted"), ("held_out", "held out", "@accent"))
 
 
-def counted(paths: Sequence[str | Path], splits: Mapping[str, str], of: int | None = None) -> dict[str, Any]:
+def seconds_of_data(
+    paths: Sequence[str | Path], splits: Mapping[str, str], of: int | None = None
+) -> dict[str, Any]:
     """Seconds over the rows in `database/clips/<clip>.npz`, each frame counted once.
 
     of: the number of all clips, if `paths` are a random choice of them; seconds are then an estimate for all.

@@ -66,7 +66,7 @@ def key_figures(material: Material) -> list[Figure]:
 def hints(material: Material, turns: Mapping[str, Array] | None = None) -> list[Hint]:
     """Advice in the order in which to follow it, then what is good, then plain facts.
 
-    turns: split -> seconds at each turn (`coverage.counted`), if they were counted.
+    turns: split -> seconds at each turn (`coverage.seconds_of_data`), if they were counted.
     """
     found = [
         *measured.hints(material),

@@ -29,11 +29,11 @@ def opening(playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]) 
     return {"part": parts[best], "value": OPENING}
 
 
-def placed(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:
+def body_channel(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:
     """The first channel with parts of the body and a slider; None if there is none."""
     return next((c for c in playable.get("channels", ()) if c["regions"] and c["sliders"]), None)
 
 
 def first_shown(playable: Mapping[str, Any]) -> Mapping[str, Any] | None:
     """The channel that the top of the page shows: one with parts of the body, else the first with sliders."""
-    return placed(playable) or next((c for c in playable.get("channels", ()) if c["sliders"]), None)
+    return body_channel(playable) or next((c for c in playable.get("channels", ()) if c["sliders"]), None)

@@ -24,7 +24,7 @@ from hobble.report import (
 from hobble.report.formats import embedded, plain
 from hobble.report.gather import Material
 from hobble.report.ground_pictures import ground_pictures
-from hobble.report.hero import first_shown, opening, placed
+from hobble.report.hero import body_channel, first_shown, opening
 from hobble.report.provenance import commit, machine, versions
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
@@ -39,16 +39,16 @@ def render(
 ) -> str:
     """The report as one HTML document.
 
-    scenes: from `scenes.scenes`; playable: from `playable.playable`; compared: from `compare.comparisons`. A
-    part without data is left out. bundle: the page's scripts, from `bundle.bundle`. hero: from
-    `walked.opened`; without it the figures at the top start from a stand.
+    scenes: from `scenes.scenes`; playable: from `playable.playable`; compared: from
+    `captured_and_predicted.comparisons`. A part without data is left out. bundle: the page's scripts, from
+    `bundle.bundle`. hero: from `walked.opened`; without it the figures at the top start from a stand.
 
     The template escapes every value. Data for the scripts is JSON without any "<".
     """
     clips = shown_clips.shown(material)
     terrain = shown_clips.only(material.terrain, clips)
-    some = shown_clips.counted(material.rows)
-    found = coverage.counted(some, material.splits, of=len(material.rows))
+    some = shown_clips.sampled(material.rows)
+    found = coverage.seconds_of_data(some, material.splits, of=len(material.rows))
     sections, shown = _sections(material, found, clips, terrain), measured.sections(material)
     strips = data_section.strips(material, clips)
     scenes = dict(scenes or {})
@@ -82,7 +82,7 @@ def render(
         embedded={name: embedded(part) for name, part in data.items()},
         scene_names=[scene["name"] for scene in scenes.get("scenarios", ())],
         playable={material.name: playable} if playable else {},
-        hurts=placed(playable or {}) is not None,
+        hurts=body_channel(playable or {}) is not None,
         shown_channel=first_shown(playable or {}),
         compared=[clip["name"] for clip in (compared or {}).get("clips", ())],
         grounds=[picture["name"] for picture in grounds["pictures"]],
@@ -100,7 +100,8 @@ def _sections(
 ) -> dict[str, dict[str, Any]]:
     """Charts and tables by section, None if there is nothing to show.
 
-    found: from `coverage.counted`. clips: names of the clips that are shown one by one. terrain: their fits.
+    found: from `coverage.seconds_of_data`. clips: names of the clips that are shown one by one. terrain:
+    their fits.
     """
     costs, data, training = cost_section, data_section, training_section
     return {

@@ -9,7 +9,7 @@ from hobble.measures.sample import shuffle_key
 from hobble.report.gather import Material
 
 MOST = 150  # clips with a strip, a row of the table and ground of their own
-MOST_COUNTED = 600  # clips whose rows are counted, frame by frame
+MOST_SAMPLED = 600  # clips whose rows are counted, frame by frame
 
 
 def shown(material: Material, most: int = MOST) -> frozenset[str]:
@@ -32,7 +32,7 @@ def shown(material: Material, most: int = MOST) -> frozenset[str]:
     return frozenset(name for *_, name in sorted(turns)[:most])
 
 
-def counted(paths: Sequence[str], most: int = MOST_COUNTED) -> list[str]:
+def sampled(paths: Sequence[str], most: int = MOST_SAMPLED) -> list[str]:
     """At most `most` of the clips' files: each clip is as likely as any other."""
     if len(paths) <= most:
         return list(paths)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from hobble.channels import formerly
+from hobble.channels import channel_of_old_key
 
 GAITS = ("stand", "walk", "jog", "crouch", "jump", "bump")
 CONTACTS = ("left_heel", "left_toe", "right_heel", "right_toe")
@@ -44,7 +44,7 @@ class RowLayout:
         channels = dict(data.get("channels", {}))
         for key in set(data) - {"joints", "window", "step", "channels", "order"}:
             if data[key]:
-                channels[formerly(key)] = data[key]
+                channels[channel_of_old_key(key)] = data[key]
         pairs = tuple((str(name), int(columns)) for name, columns in channels.items())
         return cls(**known, channels=pairs, order=tuple(data.get("order", ())))
 

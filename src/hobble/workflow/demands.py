@@ -111,7 +111,7 @@ class Demands:
         network is built and not trained, the process holds up to three copies of all rows.
         """
         training = self.project.configurations.section(configuration, "training")
-        needed = 500 + training["memory_mb"] + 32e-6 * self.weights(configuration)
+        needed = 500 + training["memory_mb"] + 32e-6 * self.parameters(configuration)
         if self.project.configurations.is_built(configuration):
             layout, dataset = self.layout(configuration), self.project.configurations.dataset(configuration)
             needed += 3 * 4e-3 * (layout.x_size + layout.y_size) * self.all_thousands(dataset)
@@ -126,7 +126,7 @@ class Demands:
         dataset = self.project.configurations.dataset(configuration)
         frames = 1e3 * self.all_thousands(dataset) * MEASURED_JOINTS / self._joints(dataset)
         samples = frames * VISITS_PER_PASS * training["passes"]
-        seconds = samples * self.weights(configuration) / 4 / 6.4e9
+        seconds = samples * self.parameters(configuration) / 4 / 6.4e9
         return _minutes(seconds / self.machines(configuration).count, attempt, least=60)
 
     def machines(self, configuration: str) -> Machines:
@@ -164,7 +164,7 @@ class Demands:
     def _thousands_of(self, batch: Batch) -> list[float]:
         return [self.thousands(batch.dataset, clip) for clip in batch.clips]
 
-    def weights(self, configuration: str) -> float:
+    def parameters(self, configuration: str) -> float:
         """Number of trained parameters."""
         chosen, layout = self.project.catalogue.configuration(configuration), self.layout(configuration)
         kind = model(chosen.network.kind)

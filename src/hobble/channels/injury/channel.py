@@ -32,7 +32,7 @@ class Injury(Channel):
     highest = 10.0
     rate = 10.0
     suffix = "_injuries.txt"
-    former = ("links", "injury", "status", "severity")
+    old_keys = ("links", "injury", "status", "severity")
     slows = True
     targets = ("questionnaire",)
 

@@ -125,15 +125,17 @@ def body_parts(skeleton: Skeleton, links: Sequence[str], hurt: Collection[str] =
     """
     found = {}
     for label, upper, lower in PARTS:
-        known = [name for name in way(skeleton, upper, lower) if name in links]
+        known = [name for name in links_between(skeleton, upper, lower) if name in links]
         if known:
             best = next((name for name in known if name in hurt), known[0])
             found[label] = list(links).index(best)
     return found
 
 
-def way(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
-    """Links from the joint of one role down to that of another, uppermost first; [] where there is no way."""
+def links_between(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
+    """Links from the joint of one role down to that of another, uppermost first; [] if the second is not
+    below the first.
+    """
     if any(skeleton.roles.get(role) not in skeleton.joints for role in (upper, lower)):
         return []
     joint, top, out = skeleton.role(lower), skeleton.role(upper), []
@@ -149,7 +151,7 @@ def way(skeleton: Skeleton, upper: str, lower: str) -> list[str]:
 def spoken(skeleton: Skeleton, link: str) -> str:
     """The name of a link for readers, such as "left thigh", or its label if there is none."""
     for label, upper, lower in (*PARTS, *OTHERS):
-        if link in way(skeleton, upper, lower):
+        if link in links_between(skeleton, upper, lower):
             return label
     ends = link_ends(skeleton.joints, [link])[0]
     for side in ("left", "right"):

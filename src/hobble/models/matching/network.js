@@ -1,5 +1,5 @@
-// Motion matching: play a run of the clips, search every few frames, hide the transitions. See `predictor.py` and
-// `inertia.py`, whose numbers these are; memory: an array of `spec.network.memory` numbers, zeros at first.
+// Motion matching: plays a run of the clips, searches every few frames, hides the transitions. The same as `predictor.py` and
+// `inertia.py` in Python. memory: an array of `spec.network.memory` numbers, zeros at first.
 import { bytes } from "../../report/web/numbers.js";
 import { createScales, floats } from "../layers.js";
 
@@ -36,7 +36,7 @@ export const createNetwork = (spec) => {
     for (let i = 0, from = row * width; i < width; i++) into[i] = values[from + i] * scale[i];
     return into;
   };
-  // Squared distance of a row from the query, or anything above `most` where it is further than that.
+  // Squared distance of a row from the query. If it is above `most`, the result may be any number above `most`.
   const distance = (row, most) => {
     let sum = 0;
     for (let i = 0, from = row * n; i < n && sum <= most; i++) {

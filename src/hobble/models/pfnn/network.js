@@ -1,5 +1,5 @@
-// The phase-functioned network: a prediction from a row of inputs and a phase. What Python's `Predictor` does in
-// cubic mode: the outputs of the four control points around the phase are blended, never the weights.
+// The phase-functioned network: a prediction from a row of inputs and a phase. As Python's `Predictor` in
+// cubic mode it blends the outputs of the four control points around the phase, and not their weights.
 import { bytes } from "../../report/web/numbers.js";
 
 export const createNetwork = (spec) => {
@@ -38,7 +38,7 @@ export const createNetwork = (spec) => {
     }
     return out;
   };
-  // x: inputs as they are, of which those that weigh nothing are not looked at; returns the outputs as they are, in an array that the next call writes over.
+  // x: raw inputs; those without weight are ignored. Returns raw outputs in an array that the next call overwrites.
   return (x, phase) => {
     for (let c = 0; c < z.length; c++) z[c] = (x[seen[c]] - mean[c]) * inverse[c];
     around(phase);

@@ -1,4 +1,4 @@
-// One feed-forward network, whose inputs are the row and sine and cosine of the phase. See `network.py`.
+// One feed-forward network, whose inputs are the row, and the sine and cosine of the phase. See `network.py`.
 import { createLayers, createScales } from "../layers.js";
 
 export const createNetwork = (spec) => {

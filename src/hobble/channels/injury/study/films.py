@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hobble.channels.injury.shown import OTHERS, way
+from hobble.channels.injury.shown import OTHERS, links_between
 from hobble.channels.injury.shown import PARTS as SLIDERS
 from hobble.channels.injury.walks import INJURY, hurt_links
 from hobble.channels.injury.walks import links as links_of
@@ -97,7 +97,7 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
     ends = {label: roles for label, *roles in (*SLIDERS, *OTHERS)}
     out = []
     for part in parts:
-        there = [link for link in way(network.skeleton, *ends[part]) if link in known]
+        there = [link for link in links_between(network.skeleton, *ends[part]) if link in known]
         if not there:
             raise HobbleError(
                 f"the skeleton of this network has no {part} that can hurt, but a film needs one"

@@ -11,7 +11,7 @@ from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import headings, root_path
 from hobble.figure.mesh import body
 from hobble.models.network import Network
-from hobble.report.compare import in_world
+from hobble.report.captured_and_predicted import in_world
 from hobble.report.scenes import UNIT
 
 

@@ -1,0 +1,151 @@
+"""Names and paths from strangers stay in their folders."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from hobble.channels.injury.table import write_statuses
+from hobble.config.load import Catalogue
+from hobble.core.errors import HobbleError, InputError
+from hobble.motion.rig import load_skeleton
+from hobble.workflow.project import Project
+from hobble.workflow.targets import check
+
+from .refusals import refused, write
+from .texts import SKELETON
+
+
+@pytest.fixture
+def catalogue(root: Path, tmp_path: Path) -> Path:
+    """A folder of configurations inside another one, with a configuration outside that must not be
+    reachable.
+    """
+    folder = tmp_path / "checkout/config"
+    (folder / "datasets").mkdir(parents=True)
+    (folder / "skeletons").mkdir()
+    (folder / "skeletons/holden31.yaml").write_bytes(SKELETON.read_bytes())
+    write(tmp_path / "checkout/outside.yaml", "secret: 1\n")
+    return folder
+
+
+OUTSIDE = ["../outside", "/etc/passwd", "..", ".", "a/../../outside", "", "a\nb", "~root", "x" * 5000]
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+@pytest.mark.parametrize("key", ["extends", "dataset", "network_of", "continues"])
+def test_a_configuration_names_nothing_outside_its_folder(catalogue: Path, key: str, name: str) -> None:
+    value = {"training": {"continues": name}} if key == "continues" else {key: name}
+    write(catalogue / "mine.yaml", json.dumps(value))
+    write(catalogue / "datasets/synthetic.yaml", "skeleton: holden31\nfolder: x\n")
+    with pytest.raises(HobbleError, match="mine") as refusal:
+        check(Project(catalogue.parent, {}), ["results/mine/report.html"])
+    assert "secret" not in str(refusal.value)
+
+
+HUGE = {
+    "network": {"units": 10**9},
+    "training": {"batch": 10**12},
+    "evaluation": {"laps": 10**12, "seconds": float("inf")},
+}
+HUGE_DATA = {
+    "synthetic": {"frames": 10**15},
+    "motion": {"loops": 10**9, "fps": float("inf")},
+    "terrain": {"patches": 10**12, "size": 10**6},
+    "database": {"window": 10**9, "step": 10**9},
+}
+
+
+def test_a_huge_configuration_is_refused(catalogue: Path) -> None:
+    for section, values in (HUGE | HUGE_DATA).items():
+        for key, value in values.items():
+            folder = catalogue if section in HUGE else catalogue / "datasets"
+            given = {} if section in HUGE else {"skeleton": "holden31", "folder": "mine"}
+            write(folder / "mine.yaml", yaml.safe_dump({**given, section: {key: value}}))
+            read = Catalogue(catalogue).configuration if section in HUGE else Catalogue(catalogue).dataset
+            refused(lambda read=read: read("mine"), "mine.yaml", f"{section}.{key}")
+
+
+@pytest.mark.parametrize("value", ["../x", "/etc", "a/../../x", "a\nb", "x" * 5000, "x/" * 900])
+@pytest.mark.parametrize("key", ["folder", "path", "skeleton", "source", "clips", "held_out"])
+def test_a_data_set_names_nothing_outside_the_mocap_folder(catalogue: Path, key: str, value: str) -> None:
+    given: dict[str, Any] = {"skeleton": "holden31", "folder": "mine"}
+    more = {
+        "path": {"terrain": {"heightmaps": [{"kind": "file", "path": value}]}},
+        "clips": {"clips": {value: None}},
+        "held_out": {"held_out": [value]},
+    }
+    write(catalogue / "datasets/mine.yaml", json.dumps(given | more.get(key, {key: value})))
+    with pytest.raises(HobbleError, match=r"mine\.yaml"):
+        Catalogue(catalogue).dataset("mine")
+
+
+@pytest.mark.parametrize("value", [10**400, "x" * 9000, [1], None, "\x1b[31m"])
+def test_a_skeleton_with_an_offset_that_is_no_number_is_refused(tmp_path: Path, value: Any) -> None:
+    data = yaml.safe_load(SKELETON.read_text())
+    data["joints"]["LHipJoint"]["offset"][1] = value
+    path = write(tmp_path / "mine.yaml", yaml.safe_dump(data))
+    with pytest.raises(InputError, match=r"mine\.yaml: not a skeleton file") as refusal:
+        load_skeleton(path)
+    assert len(str(refusal.value)) < 400
+    assert str(refusal.value).isprintable()
+
+
+def test_of_thousands_of_problems_twenty_are_listed(catalogue: Path) -> None:
+    given = {"skeleton": "holden31", "folder": "mine", **{f"key {i}": 1 for i in range(5000)}}
+    write(catalogue / "datasets/mine.yaml", yaml.safe_dump(given))
+    refused(
+        lambda: Catalogue(catalogue).dataset("mine"), "mine.yaml", "and 4980 more problems", letters=30_000
+    )
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "<script>",
+        "{clip}",
+        "{0}",
+        " walk",
+        "walk ",
+        "a\nb",
+        "a\tb",
+        "\x1b[31m",
+        "a\\b",
+        "\u202egpj",
+        "é" * 101,
+    ],
+)
+def test_unsafe_clip_names_are_refused_with_their_folder(catalogue: Path, tmp_path: Path, name: str) -> None:
+    write(catalogue / "datasets/mine.yaml", "skeleton: holden31\nfolder: mine\n")
+    folder = tmp_path / "mocap/mine"
+    folder.mkdir(parents=True)
+    write(folder / f"{name}.bvh", "HIERARCHY")
+    with pytest.raises(InputError, match="mocap/mine: a clip is called") as refusal:
+        Project(catalogue.parent, {"mocap": tmp_path / "mocap"}).clips.of("mine")
+    assert str(refusal.value).isprintable()
+
+
+def test_a_table_writes_beside_the_clips_and_nowhere_else(tmp_path: Path) -> None:
+    (tmp_path / "clips").mkdir()
+    for path in (tmp_path / "a.bvh", tmp_path / "clips/b.bvh"):
+        write(path, "Frames: 9\n")
+    links = ("LeftUpLeg-LeftLeg",)
+    for name in ("../a", str(tmp_path / "a"), "x/../../a"):
+        table = write(tmp_path / "t.csv", f"clip,link,severity,from,to\n{name},{links[0]},5,,\n")
+        with pytest.raises(InputError, match=r"t\.csv, line 2: no such clip"):
+            write_statuses(table, tmp_path / "clips", links)
+    assert not list(tmp_path.rglob("*_injuries.txt"))
+
+
+def test_links_are_read_through_and_never_written_through(tmp_path: Path) -> None:
+    from hobble.core.files import write_text
+
+    target = write(tmp_path / "precious", "precious")
+    (tmp_path / "result.json").symlink_to(target)
+    write_text(tmp_path / "result.json", "new")
+    assert target.read_text() == "precious"
+    assert (tmp_path / "result.json").read_text() == "new"

@@ -1,0 +1,68 @@
+"""Files whose numbers contradict each other: units, radians, no rotations, walking in place."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hobble.core.errors import InputError
+
+
+def of_values(change):
+    """An edit of a file's table of values; the first three columns are the root's position."""
+
+    def edit(text: str) -> str:
+        head, body = text.split("Frame Time:")
+        first, _, rows = body.partition("\n")
+        values = change(np.array([[float(x) for x in row.split()] for row in rows.splitlines()]))
+        lines = "\n".join(" ".join(f"{x:.7f}" for x in row) for row in values)
+        return f"{head}Frame Time:{first}\n{lines}\n"
+
+    return edit
+
+
+def root(factor: float):
+    return of_values(lambda values: np.concatenate([values[:, :3] * factor, values[:, 3:]], axis=1))
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(2.54, r"2\.\d+ times"), (1 / 2.54, r"0\.\d+ times"), (100, "1.. times")]
+)
+def test_a_root_in_another_unit_than_the_bones_is_refused(bvh, walk, make, factor, said):
+    path = bvh(walk, "other", edit=root(factor))
+    with pytest.raises(InputError, match=rf"other.bvh: the hips go .*{said} as fast .*OFFSETs"):
+        make(path)
+    make(path, defects="leave")
+
+
+@pytest.mark.parametrize("factor", [0.85, 1.0, 1.2])
+def test_a_pace_that_people_have_is_accepted(bvh, walk, make, factor):
+    assert make(bvh(walk, "near", edit=root(factor)))[1]["unsure"] == []
+
+
+def test_walking_in_place_is_noted(bvh, walk, make):
+    path = bvh(replace(walk, root=walk.root * [0, 1, 0]), "still")
+    assert "stay in place" in make(path)[1]["unsure"][0]
+
+
+def test_standing_says_nothing(bvh, walk, make):
+    still = replace(walk, rotations=np.repeat(walk.rotations[:1], len(walk), axis=0))
+    assert make(bvh(replace(still, root=walk.root[:1] + 0 * walk.root), "stands"))[1]["unsure"] == []
+
+
+def test_angles_in_radians_are_refused(bvh, walk, make):
+    radians = of_values(lambda values: np.concatenate([values[:, :3], np.radians(values[:, 3:])], axis=1))
+    with pytest.raises(InputError, match=r"no angle is larger than .*radians"):
+        make(bvh(walk, "radians", edit=radians))
+
+
+def test_a_file_of_positions_alone_is_refused(bvh, walk, make):
+    def positions(text: str) -> str:
+        text = of_values(lambda values: np.tile(values[:, :3], len(walk.skeleton.joints)))(text)
+        return re.sub(r"CHANNELS .*", "CHANNELS 3 Xposition Yposition Zposition", text)
+
+    with pytest.raises(InputError, match="no joint has rotations"):
+        make(bvh(walk, "points", edit=positions))
