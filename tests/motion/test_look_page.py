@@ -89,3 +89,11 @@ def test_warned_clips_leave_room_for_others_and_long_clips_are_fewer():
     assert len(chosen(*many(8, seconds=dict.fromkeys(range(8), 6_000.0)))) == 3
     assert sorted(chosen(*many(20))) == list(range(20))
     assert chosen([], []) == []
+
+
+def test_very_many_duplicates_are_counted(walker, holden31):
+    clip = walker(holden31, 240, 60.0)
+    reports, labels = many(50)
+    page = look_page("mine", reports, labels, lambda n: (clip, np.ones((10, 4))))
+    assert page.count("are the same motion") == module.MOST_NOTES - 1  # and that nobody stands
+    assert f"And {50 * 49 // 2 + 1 - module.MOST_NOTES} more notes" in page

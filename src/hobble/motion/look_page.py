@@ -20,6 +20,7 @@ from hobble.motion.root import facing
 
 FRAMES, SECONDS = 40, 4.0  # of the picture, from the middle of the clip
 MOST_READ, MOST_SECONDS = 600, 5 * 3600.0  # clips that are read, and their length: 10 MB, about half a minute
+MOST_NOTES = 40  # on clips together, such as duplicates
 LABELS = ("cycles", "seconds", "warnings")  # what the page shows of the labels
 GOLDEN = 0.6180339887498949
 HEAD = (
@@ -111,7 +112,10 @@ def look_page(
     looks, common = shared_warnings([line.look for line in lines])
     lines = [replace(line, look=look) for line, look in zip(lines, looks, strict=True)]
     whole = len(some) == len(lines)
-    notes = [*common, *same_notes(looks), *(standing_notes(looks) if whole else [_sample_note(len(some))])]
+    notes = standing_notes(looks) if whole else [_sample_note(len(some))]
+    notes += [*common, *same_notes(looks)]
+    if (more := len(notes) - MOST_NOTES) > 0:
+        notes[MOST_NOTES:] = [f"And {more} more notes, most of them on duplicates."]
     return _written(name, lines, notes)
 
 
