@@ -15,6 +15,7 @@ from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.tables import read_numbers
 from hobble.measures.accuracy import page as accuracy_page
+from hobble.measures.responsivity import lap_charts
 from hobble.measures.responsivity import page as responsivity_page
 from hobble.report import (
     cost_section,
@@ -145,7 +146,7 @@ def test_stages_beside_the_published(material: Material) -> None:
 
 
 def test_steps_of_a_frame_in_their_order(material: Material) -> None:
-    chart = responsivity_page.lap_chart(material.found("responsivity"), material)
+    chart = lap_charts.lap_chart(material.found("responsivity"), material)
     assert chart is not None
     traces = next(iter(chart.options.values()))
     assert [t["name"] for t in traces] == [
@@ -272,7 +273,7 @@ def test_the_runs_lie_over_the_track_and_are_red_where_they_left_it() -> None:
     track = {"x": [0.0, 10.0, 10.0], "z": [0.0, 0.0, 5.0], "gaits": ["walk", "jog", "crouch"]}
     near = {"lap": 1, "x": [0.0, 5.0], "z": [0.0, 0.1], "off_cm": [0.0, 10.0]}
     far = {"lap": 2, "x": [0.0, 5.0, 9.0], "z": [0.0, -2.0, 0.0], "off_cm": [0.0, 200.0, 3.0]}
-    chart = responsivity_page.track_chart({"track": track, "runs": [near, far]})
+    chart = lap_charts.track_chart({"track": track, "runs": [near, far]})
     assert chart is not None
     by_name = {trace["name"]: trace for trace in chart.traces}
     assert by_name["track"]["x"] == [0.0, 10.0, 10.0, 0.0], "it is closed"
@@ -280,10 +281,10 @@ def test_the_runs_lie_over_the_track_and_are_red_where_they_left_it() -> None:
     left = by_name["more than 100 cm off"]
     assert (left["x"], left["y"], left["customdata"]) == ([5.0], [-2.0], [[200.0, 2]])
     assert "The largest distance from the track was 200 cm" in chart.caption
-    kept = responsivity_page.track_chart({"track": track, "runs": [near]})
+    kept = lap_charts.track_chart({"track": track, "runs": [near]})
     assert kept is not None
     assert "The largest distance from the track was 10 cm" in kept.caption
-    assert responsivity_page.track_chart({"track": {"waypoints": 6}}) is None
+    assert lap_charts.track_chart({"track": {"waypoints": 6}}) is None
 
 
 def test_each_clip_on_other_bones_has_one_bar_and_mirrors_none(material):

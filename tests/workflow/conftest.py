@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.workflow.small_project import DATASET
+
 
 @dataclass
 class Workflow:
@@ -123,3 +125,28 @@ def clips(root: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     status = made.folder / "results/datasets/tiny/synthetic/uneven-1_injuries.txt"
     status.write_text("frames:786\n100-400 LeftLeg-LeftFoot[3];\n401-786 LeftLeg-LeftFoot[10];\n")
     return [made.folder / path for path in paths]
+
+
+@pytest.fixture
+def base(tmp_path: Path) -> Path:
+    """A checkout with one configuration and a data set of three clips, one hurt by its status file."""
+    (tmp_path / "config/datasets").mkdir(parents=True)
+    (tmp_path / "config/one.yaml").write_text("dataset: mine\n")
+    (tmp_path / "config/hurt.yaml").write_text("extends: one\nchannels: [injury]\n")
+    (tmp_path / "config/datasets/mine.yaml").write_text(DATASET)
+    folder = tmp_path / "data/mine"
+    folder.mkdir(parents=True)
+    for name in ("a", "b", "c", "a_mirror"):
+        (folder / f"{name}.bvh").write_text("")
+    (folder / "c_injuries.txt").write_text("frames:9\n1-9 LeftLeg-LeftFoot[4];\n")
+    (folder / "a_injuries.txt").write_text("frames:9\n")
+    (folder / "b_gait.txt").write_text("1 walk\n")
+    return tmp_path
+
+
+@pytest.fixture
+def complete(base: Path, root: Path) -> Path:
+    """The checkout `base` with the skeleton that its data set names."""
+    (base / "config/skeletons").mkdir()
+    shutil.copy(root / "config/skeletons/holden31.yaml", base / "config/skeletons/s.yaml")
+    return base

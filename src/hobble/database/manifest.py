@@ -17,14 +17,14 @@ from hobble.rows.layout import RowLayout
 
 FILE = "manifest.json"
 STATISTICS = "statistics.npz"
-SCALES = "scales.npz"  # of each shard: what its chunks are standardised by
+SCALES = "scales.npz"  # of each shard: the statistics by which its chunks are standardised
 VERSION = 2
 SPLITS = ("train", "held_out")
 
 
 @dataclass(frozen=True)
-class InShard:
-    """How many of the clips, and of the chunks of each split, are of a shard."""
+class ShardCounts:
+    """The numbers of clips, and of chunks of each split, that a shard has."""
 
     clips: int
     train: int
@@ -48,7 +48,7 @@ class Manifest:
     dtype: str
     joint_weight: float
     clips: list[dict[str, Any]]
-    shards: list[InShard]
+    shards: list[ShardCounts]
     chunks: Mapping[str, list[Chunk]]
     original_bytes: int
     bytes: int
@@ -92,7 +92,7 @@ class Manifest:
                 raise InputError(file, f"not a database of version {VERSION}", fix=HINT)
             values["layout"] = RowLayout.from_dict(values["layout"])
             values["skeleton"] = json.loads(values["skeleton"])
-            values["shards"] = [InShard(**shard) for shard in values["shards"]]
+            values["shards"] = [ShardCounts(**shard) for shard in values["shards"]]
             chunks = values["chunks"]
             values["chunks"] = {split: [Chunk(**chunk) for chunk in chunks[split]] for split in SPLITS}
             return cls(**values)

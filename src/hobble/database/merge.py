@@ -20,7 +20,7 @@ import numpy as np
 from hobble.core.errors import HobbleError, InputError
 from hobble.core.files import save_npz, sync_folder, write_error
 from hobble.database.chunks import Chunk
-from hobble.database.manifest import FILE, SCALES, SPLITS, STATISTICS, InShard, Manifest
+from hobble.database.manifest import FILE, SCALES, SPLITS, STATISTICS, Manifest, ShardCounts
 from hobble.database.pace import paces_of
 from hobble.database.plan import Source, fit_together
 from hobble.database.shard import CHUNK_BYTES, Shard, add, statistics_of, write_shard
@@ -118,7 +118,7 @@ def _merged(path: Path, work: Path, folders: Sequence[Path], joint_weight: float
         dtype=dtype,
         joint_weight=joint_weight,
         clips=clips,
-        shards=[InShard(len(s.plan.clips), *(len(s.chunks[split]) for split in SPLITS)) for s in shards],
+        shards=[ShardCounts(len(s.plan.clips), *(len(s.chunks[split]) for split in SPLITS)) for s in shards],
         chunks=chunks,
         original_bytes=4 * values * visits * sum(entry["rows"] for entry in clips),
         bytes=sum(chunk.bytes for split in SPLITS for chunk in chunks[split]),

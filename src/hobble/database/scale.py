@@ -23,7 +23,7 @@ Line = tuple[Array, Array]  # factor and summand of each column, float32
 
 @dataclass(frozen=True)
 class Scale:
-    """What turns a shard's x, y and fits into those of the database: v * factor + summand, by column."""
+    """The conversion of a shard's x, y and fits to the database's: v * factor + summand, by column."""
 
     x: Line = field(repr=False)
     y: Line = field(repr=False)
@@ -64,7 +64,7 @@ def scale_to(whole: Statistics, own: Statistics, terrain: slice) -> Scale | None
 
 
 class Shards:
-    """What the chunks of a database are changed by after reading, from the shard that each is of.
+    """The conversions of all shards of a database.
 
     scale: of each shard. first: (shards,) number of its first clip. of: split -> (chunks,) shard of each.
     """
@@ -80,8 +80,8 @@ class Shards:
         self.first = manifest.first_clip()
         self.of = {split: manifest.shard_of_chunk(split) for split in SPLITS}
 
-    def settle(self, split: str, chunk: int, tables: Mapping[str, np.ndarray]) -> None:
-        """Change the arrays of a chunk, as they were read, to rows of the whole database, in place."""
+    def convert(self, split: str, chunk: int, tables: Mapping[str, np.ndarray]) -> None:
+        """Convert the arrays of a chunk, as read from its shard, to rows of the whole database, in place."""
         shard = self.of[split][chunk]
         if (scale := self.scale[shard]) is not None:
             scale.apply(tables["x"], tables["y"], tables["fits"], self.dtype)

@@ -84,7 +84,7 @@ def add(one: Sums, other: Sums) -> Sums:
 
 
 def statistics_of(plan: Plan, sums: Sums, joint_weight: float) -> Statistics:
-    """What standardises rows with these moments."""
+    """The statistics of rows with these moments."""
     return finish(plan.layout, *sums, joint_weight, unseen_joints(plan.skeleton))
 
 
@@ -129,7 +129,7 @@ class Shard:
         return x, y
 
     def scale(self) -> Statistics:
-        """What its rows are standardised by."""
+        """The statistics by which its rows are standardised."""
         return Statistics(**load_npz(self.folder / SCALE))
 
     def add_paces(self, paces: Mapping[str, Pace]) -> None:

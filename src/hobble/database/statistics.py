@@ -70,7 +70,7 @@ class Moments:
 
 @dataclass(frozen=True)
 class Statistics:
-    """float32 x_mean, x_std (X,) and y_mean, y_std (Y,): what standardises rows; no deviation is 0."""
+    """float32 x_mean, x_std (X,), y_mean, y_std (Y,): rows are standardised by them. No deviation is 0."""
 
     x_mean: Array = field(repr=False)
     x_std: Array = field(repr=False)

@@ -80,6 +80,6 @@ def load(
         parts = {name: table[fits if name == "fits" else rows] for name, table in tables.items()}
         read_chunk(folder, chunk, parts, verify=chunk.file not in verified)
         verified.add(chunk.file)
-        shards.settle(split, number, parts)
+        shards.convert(split, number, parts)
         row, fit = rows.stop, fits.stop
     return Window(some, [c.rows for c in wanted], order.starts(tables["count"]), **tables)

@@ -26,7 +26,7 @@ from hobble.core.errors import HobbleError
 from hobble.core.files import read_json, write_json
 from hobble.core.processors import processor
 
-# What limits the instructions that the libraries use, and so their speed and their bits.
+# Variables that limit the instructions of the libraries, and so change their speed and their rounding.
 SETTINGS = ("ATEN_CPU_CAPABILITY", "ONEDNN_MAX_CPU_ISA", "MKL_ENABLE_INSTRUCTIONS", "MKL_CBWR")
 SECONDS = 0.1  # of a trial of one product
 TURNS = 5, 50  # of each way in a trial, at least and at most
@@ -37,10 +37,10 @@ log = logging.getLogger("hobble")
 
 
 def kept(name: str, trial: Callable[[], str], ways: Collection[str], without: str) -> str:
-    """The way that the file names for the product `name`; if it names none, that of `trial`, which is kept.
+    """The way that the file names for the product `name`. If it names none, run `trial` and keep its choice.
 
-    ways: those that there are; any other name in the file counts as none. without: the way to take if the
-    choice cannot be kept. Processes that ask at the same time wait for the first one's trial.
+    ways: the allowed names. without: the way to take if the choice cannot be kept. Processes that ask at the
+    same time wait for the trial of the first.
     """
     try:
         path = choices_file()
@@ -114,4 +114,4 @@ def _locked(path: Path) -> Iterator[None]:
 
 @cache
 def _warn_once(problem: str) -> None:
-    log.warning("the fastest products of this machine cannot be kept, so none are looked for (%s)", problem)
+    log.warning("the fastest products cannot be saved, so the default ones are used (%s)", problem)

@@ -38,7 +38,7 @@ def _plain(a: Tensor, b: Tensor, out: Tensor | None) -> Tensor:
 
 
 def _turned(a: Tensor, b: Tensor, out: Tensor) -> Tensor:
-    """As (b a')', by the same library. It is faster for the outputs of few rows."""
+    """The transposed product (b a')', by the same library. It is faster for few rows."""
     return out.copy_(torch.mm(b, a.T).T)
 
 

@@ -1,6 +1,6 @@
-"""Tells how the chest of a rig leans that has no joint between chest and head.
+"""Finds how far the chest leans on a rig without a joint between chest and head.
 
-Elsewhere the neck shows it. Here a neck is imagined where people have it.
+On other rigs the neck shows it. On these rigs a neck is assumed with the lean of people's necks.
 """
 
 from __future__ import annotations

@@ -18,14 +18,14 @@ from hobble.motion.rig import leg_length
 # patients, Ferre et al. and the original release it is .88 to 1.30 (fast runs).
 LEAST, MOST = 0.5, 1.6
 IN_PLACE = 0.15
-SLOW = 0.5  # leg lengths a second: slower movements say nothing
+SLOW = 0.5  # leg lengths a second: slower movements are not compared
 UPRIGHT = 0.6  # least height of the hips above the lower foot, in leg lengths
 
 
 def pace(clip: Clip) -> float | None:
     """Speed of the hips divided by that of the lower foot seen from the hips.
 
-    None if neither goes fast enough, or if the figure is not upright.
+    None if both are slow, or if the figure is not upright.
     """
     role, p = clip.skeleton.role, clip.positions
     if len(p) < 3:

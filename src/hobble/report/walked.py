@@ -47,7 +47,7 @@ SMALL = {
 def opened(
     network: Network, runtime: Runtime, playable: Mapping[str, Any], measured: Iterable[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """What `hero.opening` says, and under `walked` the states of its one or two figures.
+    """The result of `hero.opening`, with the states of its one or two figures under `walked`.
 
     They have walked straight on for `FRAMES` frames on flat ground. The first has the value of the slider.
     The second is there if there is a slider, and has no value. Names and units are those of character.js,

@@ -20,8 +20,8 @@ LOCK_AT = 0.5
 # Share of the hold that is released each frame after contact. With .075 the foot drags behind the swing, and
 # the knee bends by 46 degrees instead of the network's 53.
 RELEASE = 0.2
-TOO_FAR = 20.0  # cm between a held foot and the network's foot at which the foot steps
-MISSED = 1.0  # cm between the place of a held foot and where its leg can reach at which the foot steps
+TOO_FAR = 20.0  # cm; a held foot that is further than this from the network's foot steps
+MISSED = 1.0  # cm; a foot that its leg cannot hold nearer than this to its place steps
 # The same while the other foot is in the air: wait for it, so that the character does not hop.
 TOO_FAR_ALONE, MISSED_ALONE = 30.0, 4.0
 STEP_FRAMES = 10  # of a step, a sixth of a second

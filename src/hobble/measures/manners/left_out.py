@@ -1,4 +1,4 @@
-"""Names windows of captured people with what was learnt from all other people."""
+"""Recognises the windows of each captured person after learning from all other people."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ SHRINKAGES = (0.02, 0.1, 0.3, 0.6)
 def left_out(
     windows: Sequence[Window], people: Mapping[str, str], shrinkages: Sequence[float] = SHRINKAGES
 ) -> LeftOut:
-    """Windows of each person (or clip, with its mirror), named with what was learnt from all others.
+    """Recognise the windows of each person (or clip, with its mirror) after learning from all others.
 
-    The result is that of the shrinkage that names most windows right, and of the largest of equals. people:
+    The result is for the shrinkage that names most windows right; of equal ones, the largest. people:
     number of persons, `people_of` those of each manner. right: share of windows named right, `by_manner` too.
     presence_right: share in which it is right whether there is a manner at all. A manner that only one person
     has cannot be named.

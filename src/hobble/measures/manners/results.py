@@ -6,7 +6,7 @@ from typing import NotRequired, TypedDict
 
 
 class LeftOut(TypedDict):
-    """Captured windows, named with what was learnt from all other people; see `left_out.left_out`."""
+    """Recognition of captured people after learning from all others; see `left_out.left_out`."""
 
     shrinkage: float
     people: int

@@ -43,7 +43,7 @@ class Window:
 
 @dataclass(frozen=True)
 class Figure:
-    """What a generated figure is given: channel -> column -> value, and a speed in cm a frame."""
+    """The inputs of a generated figure: channel -> column -> value, and a speed in cm a frame."""
 
     channels: Mapping[str, Mapping[str, float]]
     speed: float
@@ -108,7 +108,7 @@ def _window(skeleton: Skeleton, clip: str, manner: str, local: Array, contacts: 
     effects = {
         "speed": values["speed"] / 100,
         "stride": values["step_left"] + values["step_right"],
-        "trunk": -values["trunk_forward_mean"],  # that one is of the way down
+        "trunk": -values["trunk_forward_mean"],  # the feature measures the direction down the trunk
         "arms": (values["upper_arm_left_sd"] + values["upper_arm_right_sd"]) / 2,
         "head": float(np.degrees(np.arctan2(up[2], up[1]))),
     }

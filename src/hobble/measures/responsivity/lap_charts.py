@@ -1,0 +1,174 @@
+"""Charts of the laps: milliseconds of each step of a frame, and the paths on the track."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hobble.measures.given import Json
+from hobble.report.charts import Chart, Trace, axis, line, mark
+from hobble.report.gather import Material
+
+# The steps of a frame in order, with their colours.
+STEPS = {
+    "prepare": "@g0",
+    "input": "@g3",
+    "insert": "@g5",
+    "predict": "@accent",
+    "output": "@g2",
+    "update": "@muted",
+}
+
+OFF_TRACK = 100.0  # cm from the line between two waypoints; farther places are marked
+
+
+def lap_steps(lap: dict[str, Any]) -> dict[str, float]:
+    """Milliseconds per frame of each step in one lap, without the total."""
+    value = lap.get("milliseconds")
+    if isinstance(value, dict):
+        return {k: v for k, v in value.items() if k not in ("total", "sd") and isinstance(v, (int, float))}
+    return {"frame": value} if isinstance(value, (int, float)) else {}
+
+
+def step_place(step: str) -> int:
+    """The place of a step in a frame; unknown steps come last."""
+    return list(STEPS).index(step) if step in STEPS else len(STEPS)
+
+
+def lap_chart(found: Json, material: Material) -> Chart | None:
+    """Milliseconds per frame of each step, stacked, lap by lap, for each phase mode."""
+    options = {}
+    for entry in found.get("modes") or [found]:
+        traces = _lap_bars(entry)
+        if traces:
+            options[f"{entry.get('mode', 'the')} phase"] = traces
+    if not options:
+        return None
+    own = f"{found.get('mode', 'the')} phase"
+    options = {name: options[name] for name in sorted(options, key=lambda name: name != own)}
+    shapes, notes = [], []
+    theirs = material.published_entry("responsivity")
+    if theirs:
+        shape, note = mark(theirs["milliseconds"], f"{theirs['label']}: published mean", vertical=False)
+        shapes, notes = [shape], [note]
+    counts = [max(len(trace["x"]) for trace in traces) for traces in options.values()]
+    laps = max(counts)
+    fewer = (
+        f" The other phase modes ran {min(counts)} laps, because from the second lap on all laps are alike."
+        if min(counts) < laps
+        else ""
+    )
+    return Chart(
+        "laps",
+        "Milliseconds per frame, lap by lap",
+        "Each bar is one lap of the track. Its segments are the steps of a frame, averaged over the lap. A "
+        "diamond is the median of whole frames: a few frames that another program delayed raise the bar but "
+        "not the diamond. At 60 Hz, a frame may take 16.7 ms." + fewer,
+        layout={
+            "barmode": "stack",
+            "xaxis": axis("lap", dtick=1 if laps < 25 else None),
+            "yaxis": axis("ms per frame", rangemode="tozero"),
+            "shapes": shapes,
+            "annotations": notes,
+        },
+        choose="Phase mode" if len(options) > 1 else None,
+        options=options,
+    )
+
+
+def track_chart(found: Json) -> Chart | None:
+    """The track from above, the paths of the laps, and where they left the track."""
+    track, runs = found.get("track") or {}, found.get("runs") or []
+    if not runs or not track.get("x"):
+        return None
+    ends = [f"{i}, {gait}" for i, gait in enumerate(track["gaits"])]
+    along = {"x": [*track["x"], track["x"][0]], "z": [*track["z"], track["z"][0]]}
+    traces = [line("track", along["x"], along["z"], "@faint", dash="dash", width=1.2, hoverinfo="skip")]
+    for run in runs:
+        name = "laps" if run is runs[0] else f"lap {run['lap']}"
+        shown = {"legendgroup": "runs", "showlegend": run is runs[0]}
+        traces.append(line(name, run["x"], run["z"], "@accent", width=1.5, hoverinfo="skip", **shown))
+    off = [(x, z, cm, r["lap"]) for r in runs for x, z, cm in zip(r["x"], r["z"], r["off_cm"], strict=True)]
+    left = [row for row in off if row[2] > OFF_TRACK]
+    if left:
+        traces.append(_left(left))
+    traces.append(
+        {
+            "type": "scatter",
+            "mode": "markers+text",
+            "name": "waypoints",
+            "x": track["x"],
+            "y": track["z"],
+            "text": ends,
+            "textposition": "top center",
+            "textfont": {"size": 11, "color": "@soft"},
+            "marker": {"symbol": "circle-open", "size": 12, "color": "@ink"},
+            "hoverinfo": "skip",
+        }
+    )
+    most = max(row[2] for row in off)
+    where = f"Red marks places more than {OFF_TRACK:.0f} cm from the track. " if left else ""
+    return Chart(
+        "track",
+        "The track, and the path of the character",
+        "From above. Dashed lines join the waypoints. Each waypoint has a number and the gait on the way to "
+        "it; it counts as reached within a metre. Solid lines are the paths of the first laps. "
+        f"{where}The largest distance from the track was {most:.0f} cm.",
+        traces,
+        {
+            "xaxis": axis("x, m", constrain="domain", zeroline=False),
+            "yaxis": axis("z, m", scaleanchor="x", autorange="reversed", zeroline=False),
+        },
+        height=520,
+    )
+
+
+def _left(places: list[tuple[float, float, float, int]]) -> Trace:
+    """Markers where laps left the track. places: x, z, distance in cm and lap of each."""
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": f"more than {OFF_TRACK:.0f} cm off",
+        "x": [x for x, *_ in places],
+        "y": [z for _, z, *_ in places],
+        "customdata": [[cm, lap] for *_, cm, lap in places],
+        "marker": {"size": 6, "color": "@hurt-high"},
+        "hovertemplate": "lap %{customdata[1]}: %{customdata[0]:.0f} cm off<extra></extra>",
+    }
+
+
+def _lap_bars(entry: dict[str, Any]) -> list[Trace]:
+    laps = entry.get("laps")
+    laps = [lap for lap in laps if lap_steps(lap)] if isinstance(laps, list) else []
+    if not laps:
+        return []
+    numbers = [lap.get("lap", i + 1) for i, lap in enumerate(laps)]
+    bars: list[Trace] = [
+        {
+            "type": "bar",
+            "name": step,
+            "x": numbers,
+            "y": [lap_steps(lap).get(step) for lap in laps],
+            "marker": {"color": STEPS.get(step, "@g0")},
+            "hovertemplate": "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>",
+        }
+        for step in sorted(lap_steps(laps[0]), key=step_place)
+    ]
+    medians = [lap_median(lap) for lap in laps]
+    if all(value is None for value in medians):
+        return bars
+    dots: Trace = {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "median",
+        "x": numbers,
+        "y": medians,
+        "marker": {"symbol": "diamond", "size": 8, "color": "@ink"},
+        "hovertemplate": "lap %{x}: %{y:.3f} ms<extra>%{fullData.name}</extra>",
+    }
+    return [*bars, dots]
+
+
+def lap_median(lap: dict[str, Any]) -> float | None:
+    """The median milliseconds per frame of a lap, all steps together."""
+    value = lap.get("milliseconds")
+    return (value.get("spread") or {}).get("median") if isinstance(value, dict) else None

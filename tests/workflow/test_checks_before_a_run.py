@@ -1,0 +1,152 @@
+"""Wrong data sets, targets and continuations are reported before anything runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hobble.core.errors import HobbleError
+from hobble.workflow import targets
+from hobble.workflow.project import Project
+from hobble.workflow.targets import check
+from tests.workflow.small_project import DATASET
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (DATASET + "clips: {b: , a_mirror: }\n", "a_mirror: names that end in _mirror are reserved"),
+        (DATASET.replace("[b]", "[z]"), "held_out names clips that do not exist: z"),
+        (DATASET.replace("[b]", "[a, b, c]"), "no clip without injury is left to train on"),
+        ("skeleton: s\nfolder: empty\n", "empty: no such folder"),
+    ],
+)
+def test_a_data_set_that_cannot_work_is_reported(base: Path, text: str, message: str) -> None:
+    (base / "config/datasets/mine.yaml").write_text(text)
+    with pytest.raises(HobbleError, match=message):
+        Project(base, {}).configurations.splits("one")
+
+
+def test_where_all_clips_are_asked_for_no_clip_is_left(base: Path) -> None:
+    (base / "config/datasets/mine.yaml").write_text(DATASET.replace("[b]", "[a, b, c]"))
+    with pytest.raises(HobbleError, match="mine: no clip is left to train on"):
+        Project(base, {}).configurations.splits("hurt")
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ("results/one/stimuli", "configuration one has no `channels`"),
+        ("results/eyes/stimuli/", "configuration one has no `channels`"),
+        (
+            "results/one/questionnaire/questionnaire.html",
+            r"configuration one has no channel injury.*\[injury\]",
+        ),
+        ("results/hurt/export/cubik.onnx", "export/cubik.onnx: the phase modes are constant, linear, cubic"),
+    ],
+)
+def test_impossible_targets_are_reported_before_training(
+    base: Path, monkeypatch: pytest.MonkeyPatch, target: str, message: str
+) -> None:
+    (base / "config/eyes.yaml").write_text("extends: hurt\nnetwork_of: one\n")
+    monkeypatch.setattr(targets, "_check_dataset", lambda *_: None)
+    with pytest.raises(HobbleError, match=message):
+        check(Project(base, {}), [target])
+    fine = (
+        "results/hurt/stimuli",
+        "results/hurt/questionnaire/questionnaire.html",
+        "results/one/export/pfnn",
+        "results/one/export/cubic.onnx",
+    )
+    check(Project(base, {}), fine)
+
+
+LISTED = "skeleton: s\nfolder: mine\nclips: {a: , b: {%s}}\n"
+
+
+WALKER = "skeleton: s\nsynthetic: {frames: 600}\nclips: {b: {%s}}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            LISTED % "channels: {injury: 'LeftLeg-LeftFoot[11]'}",
+            "clips.b.channels.injury: severity 11 of LeftLeg-LeftFoot is not in 0",
+        ),
+        (
+            LISTED % "channels: {injury: 'LeftLeg-NoSuch[4]'}",
+            "no such link: LeftLeg-NoSuch. Did you mean LeftLeg-LeftFoot",
+        ),
+        (LISTED % "channels: {injury: 'left knee 8'}", "'left knee 8' does not read as Joint-Joint"),
+        (LISTED % "channels: {injury: ''}", "clips.b.channels.injury: names no link"),
+        (WALKER % "recipe: wlak", "clips.b.recipe: no such recipe: wlak. There are walk-straight, walk, "),
+    ],
+)
+def test_wrong_names_in_clip_entries_are_reported_before_anything_runs(
+    complete: Path, text: str, message: str
+) -> None:
+    (complete / "config/datasets/mine.yaml").write_text(text)
+    with pytest.raises(HobbleError, match=f"data set mine: .*{message}"):
+        check(Project(complete, {}), ["results/one/report.html"])
+
+
+def test_one_file_on_both_sides_of_the_split_is_refused_before_anything_runs(complete: Path) -> None:
+    for name, text in (("a", "one motion"), ("b", "one motion"), ("c", "one m0tion")):
+        (complete / f"data/mine/{name}.bvh").write_text(text)
+    message = r'data set mine: b and a are the same file: the first .* Add to held_out: \["a"\]'
+    with pytest.raises(HobbleError, match=message):
+        check(Project(complete, {}), ["results/one/report.html"])
+    check(Project(complete, {}), ["results/datasets/mine/look.html"])
+    data = complete / "config/datasets/mine.yaml"
+    data.write_text(DATASET.replace("[b]", "[a, b]").replace("mirror: true", ""))
+    (complete / "data/mine/a_mirror.bvh").unlink()
+    check(Project(complete, {}), ["results/hurt/report.html"])
+
+
+def test_a_skeleton_that_cannot_be_mirrored_is_reported_before_anything_runs(complete: Path) -> None:
+    rig = complete / "config/skeletons/s.yaml"
+    rig.write_text(rig.read_text().replace("RightFoot", "OtherFoot"))
+    for mirror in (False, True):
+        text = DATASET.replace("mirror: true", f"mirror: {str(mirror).lower()}") + "clips: {a: , b: }\n"
+        (complete / "config/datasets/mine.yaml").write_text(text)
+        if not mirror:
+            check(Project(complete, {}), ["results/one/report.html"])
+    with pytest.raises(
+        HobbleError, match="skeleton s cannot be mirrored: LeftFoot is the left heel and OtherF"
+    ):
+        check(Project(complete, {}), ["results/one/report.html"])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("channels: [injury]", r"its channels must be \[\], not"),
+        ("network: {units: 9}", "its network must be .*512.*, not .*9"),
+        ("training: {sections: 5}", r"its training\.sections must be 10, not 5"),
+        (
+            "training: {passes: 19}",
+            r"which has 20 passes\. Its training\.passes must not be fewer, but it is 19",
+        ),
+        ("network: {kind: matching}", "but matching is built and not trained"),
+        ("training: {learning_rate: 1.0e-3, batch: 64}", None),
+        ("", None),
+    ],
+)
+def test_an_impossible_continuation_is_reported_before_anything_runs(
+    complete: Path, text: str, message: str | None
+) -> None:
+    (complete / "config/more.yaml").write_text("extends: one\ntraining: {passes: 40, continues: one}\n")
+    (complete / "config/other.yaml").write_text(f"extends: more\n{text}\n")
+    project = Project(complete, {})
+    if message is None:
+        return check(project, ["results/other/report.html"])
+    with pytest.raises(HobbleError, match=f"configuration other continues from one, .*{message}"):
+        check(project, ["results/other/report.html"])
+
+
+def test_every_shipped_data_set_passes(root: Path) -> None:
+    project = Project(root, {"mocap": "nowhere"})
+    names = ("synthetic", "synthetic-ava", "tiny", "cmu")
+    check(project, [f"results/datasets/{name}/x" for name in names])

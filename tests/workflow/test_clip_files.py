@@ -1,0 +1,146 @@
+"""The files of clips in a user's folder: which are found, left out or refused."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from hobble.core.errors import HobbleError
+from hobble.motion.options import ClipMotion
+from hobble.workflow.project import Project
+from hobble.workflow.targets import notes
+from tests.workflow.small_project import DATASET
+
+
+def test_files_beside_a_clip_are_found_and_no_others(base: Path) -> None:
+    project = Project(base, {})
+    assert [Path(f).name for f in project.clips.label_files("mine", "b")] == ["b_gait.txt"]
+    assert project.clips.label_files("mine", "c") == []
+    assert [Path(f).name for f in project.datasets.channel_sources.files("mine", "c", "injury")] == [
+        "c_injuries.txt"
+    ]
+
+
+def test_a_listed_clip_without_its_file_is_told(base: Path) -> None:
+    (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , gone: }\n")
+    with pytest.raises(HobbleError, match=r"gone\.bvh: no such file"):
+        Project(base, {}).clips.source("mine", "gone")
+
+
+def test_clips_are_found_in_subfolders_and_whatever_the_case_of_their_suffix(base: Path) -> None:
+    below = base / "data/mine/takes/day 1"
+    below.mkdir(parents=True)
+    (below / "d.BVH").write_text("")
+    (below / "d_gait.txt").write_text("1 walk\n")
+    (below / "d_injuries.txt").write_text("frames:9\n")
+    (base / "data/mine/.trash").mkdir()
+    (base / "data/mine/.trash/e.bvh").write_text("")
+    project = Project(base, {})
+    assert list(project.clips.of("mine")) == ["a", "b", "c", "d"]
+    assert project.clips.source("mine", "d") == str(below / "d.BVH")
+    assert project.clips.label_files("mine", "d") == [str(below / "d_gait.txt")]
+    assert project.datasets.channel_sources.files("mine", "d", "injury") == [str(below / "d_injuries.txt")]
+
+
+def test_clips_are_found_in_linked_folders_once_whatever_leads_there(base: Path) -> None:
+    """A linked collection is found once, even if one of its links leads back to it."""
+    kept = base / "kept/day 1"
+    kept.mkdir(parents=True)
+    (kept / "d.bvh").write_text("")
+    (kept / "d_injuries.txt").write_text("frames:9\n")
+    (kept / "back").symlink_to(base / "data/mine")
+    for name in ("first", "second"):
+        (base / f"data/mine/{name}").symlink_to(base / "kept")
+    (base / "data/mine/gone").symlink_to(base / "nowhere")
+    project = Project(base, {})
+    assert list(project.clips.of("mine")) == ["a", "b", "c", "d"]
+    assert project.clips.source("mine", "d") == str(base / "data/mine/first/day 1/d.bvh")
+    assert project.datasets.channel_sources.files("mine", "d", "injury") == [
+        str(base / "data/mine/first/day 1/d_injuries.txt")
+    ]
+
+
+@pytest.mark.parametrize("mirror", [True, False])
+def test_a_mirror_beside_its_original_is_left_out(base: Path, mirror: bool) -> None:
+    text = DATASET.replace("mirror: true", f"mirror: {str(mirror).lower()}")
+    (base / "config/datasets/mine.yaml").write_text(text)
+    (base / "data/mine/a_mirror_footsteps.txt").write_text("1 2\n")
+    clips = Project(base, {}).clips
+    assert list(clips.of("mine")) == ["a", "b", "c"]
+    said = [] if mirror else ["1 files in .* are mirrors of other clips .a_mirror.*`mirror: true` Hobble m"]
+    assert all(re.search(wanted, note) for wanted, note in zip(said, clips.notes("mine"), strict=True))
+    (base / "data/mine/a_mirror.bvh").rename(base / "data/mine/z_mirror.bvh")
+    with pytest.raises(HobbleError, match=r"z_mirror: names that end in _mirror are .* `mirror: true` makes"):
+        Project(base, {}).clips.of("mine")
+
+
+def test_a_status_file_without_a_clip_is_reported_with_the_nearest_name(base: Path) -> None:
+    (base / "data/mine/orphan.bvh").write_text("")
+    (base / "data/mine/orphn_injuries.txt").write_text("frames:9\n1-9 LeftLeg-LeftFoot[4];\n")
+    (note,) = notes(Project(base, {}), ["results/one/report.html", "results/hurt/report.html"])
+    assert note.startswith("data set mine: ")
+    assert (
+        "orphn_injuries.txt belongs to no clip and is not read. If it belongs to orphan, rename it." in note
+    )
+
+
+def test_two_files_of_one_clip_are_refused_with_both(base: Path) -> None:
+    (base / "data/mine/old").mkdir()
+    (base / "data/mine/old/a.BVH").write_text("")
+    with pytest.raises(HobbleError, match=r"old/a\.BVH: a second file of clip a; the first is .*mine/a\.bvh"):
+        Project(base, {}).clips.of("mine")
+    (base / "config/datasets/mine.yaml").write_text(DATASET + "clips: {a: , b: , c: }\n")
+    with pytest.raises(HobbleError, match="a second file of clip a"):
+        Project(base, {}).clips.source("mine", "a")
+    assert Project(base, {}).clips.source("mine", "b").endswith("mine/b.bvh")
+
+
+def test_a_clip_depends_on_the_skeleton_that_it_is_retargeted_from(complete: Path, root: Path) -> None:
+    shutil.copy(root / "config/skeletons/mixamo55.yaml", complete / "config/skeletons")
+    joints = ("Hips", "Spine2", "LeftHandThumb1", "LeftHandThumb2", "LeftUpLeg")
+    header = (
+        "HIERARCHY\n" + "".join(f"JOINT mixamorig:{name}{{\r\n" for name in joints) + "MOTION\nJOINT Neck1\n"
+    )
+    (complete / "data/mine/b.bvh").write_text(header)
+    project = Project(complete, {})
+    assert [Path(f).name for f in project.clips.rig_files("mine", "b")] == ["mixamo55.yaml"]
+    assert project.clips.rig_files("mine", "a") == []
+    shipped = Project(root, {}).clips
+    assert [Path(f).name for f in shipped.rig_files("synthetic-ava", "walk-1")] == ["holden31.yaml"]
+    assert shipped.rig_files("synthetic", "walk-1") == []
+
+
+@pytest.mark.shared
+def test_the_plan_and_the_job_agree_on_the_rig(root: Path, shared: Path) -> None:
+    from hobble.motion.make import load_source
+    from hobble.motion.read import read_bvh
+    from hobble.motion.rig import load_skeleton
+
+    project = Project(root, {"mocap": str(shared / "mocap")})
+    target = load_skeleton(root / "config/skeletons/holden31.yaml")
+    options = ClipMotion()
+    for clip in ("Injured_Ilde", "Injured_Walk_LLL", "Injured_Run_LLL_extended_converted"):
+        file = read_bvh(project.clips.source("ferre", clip))
+        rig = load_source(file, target, root / "config/skeletons", options).match.rig
+        assert [Path(f).stem for f in project.clips.rig_files("ferre", clip)] == [rig] * (rig != "holden31")
+
+
+@pytest.mark.parametrize("name", ["a.bvh", "map.txt"])
+def test_a_pipe_is_refused_as_a_clip(base: Path, name: str) -> None:
+    """A pipe is refused during planning, because Snakemake would wait for its end."""
+    text = DATASET + "terrain: {heightmaps: [{kind: file, path: mine/map.txt}]}\n"
+    (base / "config/datasets/mine.yaml").write_text(text)
+    (base / f"data/mine/{name}").unlink(missing_ok=True)
+    os.mkfifo(base / f"data/mine/{name}")
+    clips = Project(base, {}).clips
+    with pytest.raises(HobbleError, match=f"mine/{name}: a device or a pipe, not a file"):
+        (clips.of if name == "a.bvh" else clips.heightmap_files)("mine")
+    listed = text + "clips: {a: , b: }\n"
+    (base / "config/datasets/mine.yaml").write_text(listed)
+    if name == "a.bvh":
+        with pytest.raises(HobbleError, match=f"mine/{name}: a device or a pipe"):
+            Project(base, {}).clips.source("mine", "a")

@@ -1,0 +1,91 @@
+"""Data sets that are downloaded: addresses and checksums."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hobble.core.errors import HobbleError
+from hobble.workflow.project import Project
+from hobble.workflow.targets import check
+
+FAR = """
+skeleton: s
+folder: far
+download: {url: 'https://host/{subject:0>3}/{clip}.bvh', checksums: far.sha256}
+"""
+
+
+def test_missing_clips_are_downloaded(base: Path) -> None:
+    (base / "config/datasets/far.yaml").write_text(FAR + "clips: {'2_1': , '2_2': , '2_3': }\n")
+    (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'B' * 64} *2_2.bvh\n\n")
+    project = Project(base, {})
+    assert project.clips.source("far", "2_1") == str(base / "data/downloaded/far/2_1.bvh")
+    assert (
+        project.clips.label_files("far", "2_1")
+        == project.datasets.channel_sources.files("far", "2_1", "injury")
+        == []
+    )
+    assert project.clips.download("far", "2_2") == {
+        "url": "https://host/002/2_2.bvh",
+        "sha256": "b" * 64,
+        "folder": str(base / "data/far"),
+    }
+    with pytest.raises(
+        HobbleError, match=r"far/2_3\.bvh: no such file, .*not in the download list .*far\.sha256"
+    ):
+        project.clips.source("far", "2_3")
+    (base / "data/far").mkdir()
+    (base / "data/far/2_1.bvh").write_text("")
+    assert Project(base, {}).clips.source("far", "2_1") == str(base / "data/far/2_1.bvh")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("https://host/", "ftp://host/", r"download: url: must be an address like"),
+        ("{clip}", "{name}", r"download: url: 'name'"),
+        ("{clip}", "a", r"download: url: must contain \{clip\}"),
+        ("{clip}", "{clip.x}", "download: url: "),
+        ("{clip}", "{clip:a>400000000}", "only a width of up to 99 may follow a name"),
+        ("{clip}", "{clip:{subject}}", "only a width of up to 99"),
+        ("{clip}", "{clip!r}", "only a width of up to 99"),
+        ("https://host/", "https://host/\u202e", "must be an address like"),
+        ("{clip}", "{clip", "download: url: "),
+        ("far.sha256", "../far.sha256", "checksums: must be relative"),
+        ("clips: {'2_1': }\n", "", "lists them and names a `folder`"),
+    ],
+)
+def test_a_bad_address_is_reported(base: Path, old: str, new: str, message: str) -> None:
+    (base / "config/datasets/far.yaml").write_text((FAR + "clips: {'2_1': }\n").replace(old, new))
+    with pytest.raises(HobbleError, match=message):
+        Project(base, {}).catalogue.dataset("far")
+
+
+def test_a_bad_checksum_list_is_reported_with_its_line(base: Path) -> None:
+    (base / "config/datasets/far.yaml").write_text(FAR + "clips: {'2_1': }\n")
+    (base / "config/datasets/far.sha256").write_text(f"{'a' * 64}  2_1.bvh\n{'a' * 63}  2_2.bvh\n")
+    with pytest.raises(HobbleError, match=r"far\.sha256, line 2: expected a SHA-256"):
+        Project(base, {}).clips.source("far", "2_1")
+
+
+def test_every_clip_of_the_cmu_set_has_a_checksum_and_an_address(root: Path) -> None:
+    project = Project(root, {"mocap": "nowhere"})
+    check(project, ["results/datasets/cmu/motion/02_01.npz"])
+    assert len(project.clips.listed("cmu")) == 69
+    assert project.clips.download("cmu", "02_01")["url"].endswith("/cmu-mocap/master/data/002/02_01.bvh")
+    assert project.clips.download("cmu", "105_16")["url"].endswith("/105/105_16.bvh")
+    assert all(
+        len(project.clips.download("cmu", clip)["sha256"]) == 64 for clip in project.clips.listed("cmu")
+    )
+
+
+@pytest.mark.shared
+def test_the_checksums_are_those_of_the_files(root: Path, shared: Path) -> None:
+    import hashlib
+
+    project = Project(root, {})
+    for clip in project.clips.listed("cmu"):
+        data = (shared / f"mocap/cmu/{clip}.bvh").read_bytes()
+        assert project.clips.download("cmu", clip)["sha256"] == hashlib.sha256(data).hexdigest()
