@@ -69,6 +69,7 @@ wildcard_constraints:
     clip=r"[^/]+(?<!_mirror)",
     channels=r"plain|[a-z_+]+(?<!clips)",
     measure="|".join(MEASURES),
+    shard=r"\d+",
 
 
 def keep_local(files):
