@@ -101,7 +101,7 @@ def main() -> None:
     if path is None:
         raise SystemExit(f"no browser here ({', '.join(tools.BROWSERS)})")
     for page in asked.pages:
-        print(f"{page}: {page.stat().st_size / 1e6:.1f} MB, of 25 allowed")
+        print(f"{page}: {page.stat().st_size / 1e6:.1f} MB, of 20 allowed")
         with tempfile.TemporaryDirectory() as folder:
             browser = tools.Browser(path, Path(folder), asked.width, 900)
             browser.send("Performance.enable", timeDomain="threadTicks")

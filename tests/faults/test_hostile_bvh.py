@@ -14,6 +14,7 @@ from hobble.core.untrusted import read_bytes
 from hobble.motion import read as bvh
 from hobble.motion.draft import MOST_SHOWN
 from hobble.motion.make import make_clip
+from hobble.motion.read_header import MOST_JOINTS
 from hobble.motion.rig import load_skeleton
 
 from .refusals import HEADER, MB, refused, write
@@ -33,11 +34,11 @@ def test_too_many_joints_are_refused_from_the_header(tmp_path: Path, deep: bool)
     joints = "".join(joint % i for i in range(5_000)) + joint * 295_000
     text = HEADER + joints + "}\n" * (300_001 if deep else 1) + "MOTION\nFrames: 1\nFrame Time: 0.0083\n1\n"
     path = write(tmp_path / "a.bvh", text)
-    refused(lambda: bvh.read_bvh(path), "a.bvh, line ", f"more than {bvh.MOST_JOINTS} joints", mb=1000)
+    refused(lambda: bvh.read_bvh(path), "a.bvh, line ", f"more than {MOST_JOINTS} joints", mb=1000)
 
 
 def test_the_longest_allowed_chain_of_joints_is_read(tmp_path: Path) -> None:
-    count = bvh.MOST_JOINTS - 1
+    count = MOST_JOINTS - 1
     joints = "".join(f"JOINT j{i}\n{{\nOFFSET 0 1 0\n" for i in range(count))
     text = (
         HEADER.replace("Xposition", "Zrotation")
@@ -46,9 +47,9 @@ def test_the_longest_allowed_chain_of_joints_is_read(tmp_path: Path) -> None:
         + "MOTION\nFrames: 1\nFrame Time: 0.0083\n1\n"
     )
     path = write(tmp_path / "a.bvh", text)
-    assert len(bvh.read_bvh(path).names) == bvh.MOST_JOINTS
+    assert len(bvh.read_bvh(path).names) == MOST_JOINTS
     make = lambda: make_clip(path, SKELETON, SKELETON.parent, "a", "holden31", OPTIONS)  # noqa: E731
-    more = f"  ... ({bvh.MOST_JOINTS - MOST_SHOWN} more; python -m hobble.motion rig a.bvh writes all)\n"
+    more = f"  ... ({MOST_JOINTS - MOST_SHOWN} more; python -m hobble.motion rig a.bvh writes all)\n"
     refused(make, "a.bvh: the parts of this rig are in doubt: ", more, letters=6000)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -188,7 +189,7 @@ def test_a_network_walks_all_that_is_asked(both: Network, motion: list[Captured]
         [], ["old"], ["sad"], ["old"], ["sad"], ["old", "sad"],
     ]  # fmt: skip
     assert "between" in found["generated"][-1]
-    shown = page.section({"applies": True, "channels": [found]}, None)
+    shown = page.section({"applies": True, "channels": [found]}, SimpleNamespace(network={"skeleton": {}}))
     assert shown.title == "Mood"
     assert len({part.content.name for part in shown.parts if not isinstance(part.content, Words)}) == 6
 
@@ -196,4 +197,4 @@ def test_a_network_walks_all_that_is_asked(both: Network, motion: list[Captured]
 def test_says_why_there_is_nothing(hurtable, both: Network, motion: list[Captured]) -> None:
     assert measured(hurtable, [])["reason"] == run.REASON
     assert measured(both, motion[:6:2])["reason"] == run.TOO_FEW
-    assert page.section(measured(hurtable, []), None).parts == []
+    assert page.section(measured(hurtable, []), SimpleNamespace(network={"skeleton": {}})).parts == []

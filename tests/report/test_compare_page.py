@@ -22,6 +22,7 @@ from hobble.report import compare_tables as tables
 from hobble.report.compare_page import render_compared
 from hobble.report.gather import PUBLISHED, Material
 from hobble.report.playable import playable
+from hobble.report.rounded import rounded
 
 
 @pytest.fixture(scope="module")
@@ -180,9 +181,14 @@ def test_networks_that_are_too_large_together_are_left_out(
     from hobble.report import compare_page
 
     alone = len(render_compared(compared, {"holden": pair["holden"]}).encode())
+    monkeypatch.setattr(compare_page, "LARGEST_PAGE", alone - 10_000 + compare_page.RESERVED)
+    page = render_compared(compared, pair, errors={"holden": 0.0312, "ava": 0.2})
+    assert len(page.encode()) < alone + compare_page.RESERVED
+    assert "weights have 8 bits here" in page
+    assert "0.03 cm (holden)" in page
+    alone = len(render_compared(compared, {"holden": rounded(pair["holden"])}).encode())
     monkeypatch.setattr(compare_page, "LARGEST_PAGE", alone + compare_page.RESERVED)
     page = render_compared(compared, pair)
-    assert len(page.encode()) < alone + compare_page.RESERVED
     assert "to keep the file small: ava" in page
     assert 'id="play-second"' not in page
 

@@ -1,36 +1,20 @@
-"""The character: what goes into the network, what comes out, and what the caller may do."""
+"""The character: what goes into the network, what comes out, and how it follows its targets."""
 
 from __future__ import annotations
 
 import copy
 import subprocess
 import sys
-from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hobble.core import quat
-from hobble.core.errors import InputError
-from hobble.core.skeleton import forward_kinematics
 from hobble.evaluation.motion_measures import foot_slide, largest_turn
 from hobble.models.load import load_network
-from hobble.runtime import Pose, ProceduralAnimation
-from hobble.runtime.axes import MATRICES, Axes
-from hobble.runtime.ground import CELL, Heightmap
-from hobble.runtime.waypoints import Waypoint
-
-KNEE = "LeftUpLeg-LeftLeg"
-
-
-def walk(character: ProceduralAnimation, frames: int, **wishes) -> list[Pose]:
-    wishes = {"target_velocity": (0.5, 2.0)} | wishes
-    return [character.next_pose(**wishes) for _ in range(frames)]
-
-
-def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:
-    return 8 * np.sin(x / 60) + 5 * np.cos(z / 45)
+from hobble.runtime import ProceduralAnimation
+from tests.runtime.walking import KNEE, hills, walk
 
 
 def test_the_row_is_that_of_the_definition(hurtable) -> None:
@@ -212,54 +196,6 @@ def test_severities_change_at_their_rate_and_are_scaled(hurtable) -> None:
     assert healed.channels["injury"].sum() == 0
 
 
-@pytest.mark.parametrize("injury", [{"LeftUpLeg-LeftLeg": 11}, {KNEE: -0.1}, {KNEE: np.nan}])
-def test_a_severity_out_of_range(hurtable, injury) -> None:
-    with pytest.raises(ValueError, match=r"the severity of LeftUpLeg-LeftLeg is .* from 0 to 10"):
-        ProceduralAnimation(hurtable).next_pose((0, 1), injury=injury)
-
-
-def test_invalid_wishes_are_refused(network) -> None:
-    character = ProceduralAnimation(network, characters=2)
-    with pytest.raises(ValueError, match="target_velocity is not a finite vector"):
-        character.next_pose((0, np.nan))
-    with pytest.raises(
-        ValueError, match=r"facing has to be a vector of 2 or 3 .* each of 2, not of shape \(3, 2\)"
-    ):
-        character.next_pose((0, 1), np.ones((3, 2)))
-    with pytest.raises(ValueError, match=r"target_velocity has to be a vector .* not of shape \(4,\)"):
-        character.next_pose((0, 1, 2, 3))
-    with pytest.raises(ValueError, match=r"terrain returned heights of shape \(2,\) for 72 points"):
-        character.next_pose((0, 1), terrain=lambda x, z: np.zeros(2))
-    for shares in (np.ones(5), [-1, 0, 0, 0, 0, 0], np.ones((3, 6), int), [np.inf, 0, 0, 0, 0, 0]):
-        with pytest.raises(
-            ValueError, match=r"gait shares have to be \(6,\) or \(2, 6\) .* order: stand, walk"
-        ):
-            character.next_pose((0, 1), gait=shares)
-    with pytest.raises(ValueError, match="heights that are not finite"):
-        character.next_pose((0, 1), terrain=lambda x, z: x * np.nan)
-    with pytest.raises(ValueError, match="1 gaits for 2 characters"):
-        character.next_pose((0, 1), gait=["walk"])
-    for name, value in (
-        ("characters", 0),
-        ("steering", np.nan),
-    ):
-        with pytest.raises(ValueError, match=f"{name} is {value!r}, but has to be"):
-            ProceduralAnimation(network, **{name: value})
-    for name in ("rate", "scale"):
-        with pytest.raises(ValueError, match=f"the {name} of injury is 0, but has to be more than 0"):
-            ProceduralAnimation(network, **{f"{name}s": {"injury": 0}})
-    with pytest.raises(KeyError, match=r"no gait 'jogging'; did you mean jog\?"):
-        ProceduralAnimation(network, waypoints=[Waypoint((0, 0), "walk", 2), Waypoint((9, 0), "jogging", 2)])
-
-
-def test_the_ground_may_be_one_height(network) -> None:
-    level, flat = ProceduralAnimation(network), ProceduralAnimation(network)
-    for _ in range(9):
-        a, b = level.next_pose((0, 2), terrain=lambda x, z: 30.0), flat.next_pose((0, 2))
-    np.testing.assert_allclose(a.positions - a.root, b.positions - b.root, atol=15)
-    assert a.root[1] == 30.0
-
-
 def test_a_zero_facing_looks_where_the_character_goes(network) -> None:
     crowd, one = ProceduralAnimation(network, characters=2), ProceduralAnimation(network)
     for _ in range(20):
@@ -269,171 +205,6 @@ def test_a_zero_facing_looks_where_the_character_goes(network) -> None:
     assert np.abs(many.positions[1] - single.positions).max() > 0.1
 
 
-def test_unknown_links_are_named(hurtable, network) -> None:
-    with pytest.raises(KeyError, match=r"^injury has no 'Tail': there are Hips-LHipJoint, "):
-        ProceduralAnimation(hurtable).next_pose((0, 1), injury={"Tail": 1})
-    with pytest.raises(
-        KeyError, match=r"^injury has no 'LeftUpLeg-LeftFoot'; did you mean .*LeftUpLeg-LeftLeg"
-    ):
-        ProceduralAnimation(hurtable).next_pose((0, 1), injury={"LeftUpLeg-LeftFoot": 1})
-    with pytest.raises(
-        ValueError, match="no input for injury; train a configuration with `channels: \\[injury\\]`"
-    ):
-        ProceduralAnimation(network).next_pose((0, 1), injury={KNEE: 1})
-
-
-def test_severities_of_another_shape(hurtable, network) -> None:
-    crowd = ProceduralAnimation(hurtable, characters=3)
-    for injury in (np.ones((3, 30)), np.ones(30), {KNEE: [1, 2, 3]}, {KNEE: 4}, {}):
-        crowd.next_pose((0, 1), injury=injury)
-    with pytest.raises(ValueError, match=r"injury has to have shape \(30,\) or \(3, 30\), not \(29,\)"):
-        crowd.next_pose((0, 1), injury=np.ones(29))
-    with pytest.raises(ValueError, match=rf"{KNEE} has to be one severity or 3, not of shape \(2,\)"):
-        crowd.next_pose((0, 1), injury={KNEE: [1, 2]})
-    with pytest.raises(
-        ValueError, match="30 numbers given for injury, but this network has no input for injury"
-    ):
-        ProceduralAnimation(network).next_pose((0, 1), injury=np.ones(30))
-
-
-def test_terrain_as_function_heightmap_and_array(network) -> None:
-    cell = 4.0
-    grid = (np.arange(401) - 200) * cell
-    heights = hills(grid[None, :], grid[:, None])
-    coarse = Heightmap(heights, cell)
-    motions = [
-        [p.positions for p in walk(ProceduralAnimation(network, steering=1.0), 40, terrain=terrain)]
-        for terrain in (hills, coarse, None)
-    ]
-    np.testing.assert_allclose(motions[0], motions[1], atol=0.2)
-    assert np.abs(np.subtract(motions[0], motions[2])).max() > 2
-    one, other = ProceduralAnimation(network), ProceduralAnimation(network)
-    np.testing.assert_array_equal(
-        walk(one, 9, terrain=heights)[-1].positions, walk(other, 9, terrain=Heightmap(heights))[-1].positions
-    )
-    with pytest.raises(TypeError, match="not str"):
-        ProceduralAnimation(network).next_pose((0, 1), terrain="hill")
-    with pytest.raises(ValueError, match="2 x 2"):
-        Heightmap(np.zeros((1, 5)))
-
-
-@pytest.mark.parametrize("unit", ["cm", "m"])
-@pytest.mark.parametrize(("handed", "up"), MATRICES)
-def test_a_heightmap_is_in_the_callers_axes_and_unit(network, handed: str, up: str, unit: str) -> None:
-    """A heightmap in the caller's coordinates gives the same ground as the function that it was made from."""
-    axes = Axes(handed, up, unit)
-
-    def terrain(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        rise = 50 * np.tanh(first / axes.scale / 40) + 20 * np.tanh(second / axes.scale / 90)
-        return rise * axes.scale
-
-    def root(ground) -> np.ndarray:
-        wish = axes.points_out(np.array([0.5, 0, 2.0]))
-        made = walk(ProceduralAnimation(network, axes=axes), 30, target_velocity=wish, terrain=ground)
-        return made[-1].root / axes.scale
-
-    def sampled(cell: float, centre: tuple[float, float] = (0, 0)) -> np.ndarray:
-        along = (np.arange(401) - 200) * cell
-        return terrain(along[None, :] + centre[0], along[:, None] + centre[1])
-
-    asked = root(terrain)
-    cell, centre = 4.0 * axes.scale, (30 * axes.scale, -50 * axes.scale)
-    np.testing.assert_allclose(root(Heightmap(sampled(cell, centre), cell, centre)), asked, atol=0.5)
-    np.testing.assert_allclose(root(sampled(CELL * axes.scale)), asked, atol=0.5)
-    level = root(np.full((8, 8), 1.0))["XYZ".index(up)]
-    assert level == pytest.approx(1 / axes.scale, abs=1e-3)
-
-
-def test_heightmap_is_bilinear_and_goes_on_outside() -> None:
-    ground = Heightmap(np.array([[0.0, 10.0], [20.0, 50.0]]), cell=2.0, centre=(5.0, 7.0))
-    x, z = np.array([4.0, 6.0, 4.0, 6.0, 5.0, 99.0]), np.array([6.0, 6.0, 8.0, 8.0, 7.0, -99.0])
-    np.testing.assert_allclose(ground(x, z), [0, 10, 20, 50, 20, 10])
-
-
-@pytest.mark.parametrize("unit", ["cm", "m"])
-@pytest.mark.parametrize(("handed", "up"), MATRICES)
-def test_the_callers_axes(network, handed: str, up: str, unit: str) -> None:
-    """A walk over hills in the caller's axes equals the walk in Hobble's axes, left and right included."""
-    axes = Axes(handed, up, unit)
-    vertical = "XYZ".index(up)
-    level = [k for k in range(3) if k != vertical]
-
-    def terrain(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        points = np.zeros((len(a), 3))
-        points[:, level] = np.stack([a, b], axis=1)
-        ours = axes.points_in(points)
-        return hills(ours[:, 0], ours[:, 2]) * axes.scale
-
-    native = ProceduralAnimation(network, position=(30, 0, 10), facing=(1, 0, 1))
-    theirs = ProceduralAnimation(
-        network,
-        axes=axes,
-        position=axes.points_out(np.array([30.0, 0, 10])),
-        facing=axes.directions_out(np.array([1.0, 0, 1])),
-    )
-    velocity = np.array([0.5, 0, 2.0])
-    for k in range(25):
-        a = native.next_pose(velocity, (1, 0, 0), terrain=hills)
-        wish = axes.points_out(velocity)
-        b = theirs.next_pose(
-            wish if k % 2 else wish[level], axes.directions_out(np.array([1.0, 0, 0])), terrain=terrain
-        )
-    np.testing.assert_allclose(axes.points_in(b.positions), a.positions, atol=1e-3)
-    np.testing.assert_allclose(axes.points_in(b.root), a.root, atol=1e-3)
-    assert b.positions[:, vertical].mean() > 0.5 * 93 * axes.scale
-    # A rotation takes the same bone to the same place in both conventions: M R v = R' M v.
-    bone = np.array([3.0, -2.0, 5.0])
-    np.testing.assert_allclose(
-        quat.rotate(b.rotations, axes.directions_out(bone)),
-        axes.directions_out(quat.rotate(a.rotations, bone)),
-        atol=1e-5,
-    )
-
-
-@pytest.mark.parametrize("unit", ["cm", "m"])
-@pytest.mark.parametrize(("handed", "up"), MATRICES)
-def test_an_asymmetric_pose_is_the_same_in_every_convention(
-    holden31, handed: str, up: str, unit: str
-) -> None:
-    """Left arm up, right knee bent: the caller's own bones, turned by the rotations it gets, end where it is
-    told that the joints are, and the left hand is on the caller's left."""
-    local = np.tile([1.0, 0, 0, 0], (1, 31, 1))
-    for joint, axis, angle in (("left_shoulder", [0.3, 0, 1.0], 1.1), ("right_hip", [1.0, 0.2, 0], -0.7)):
-        axis = np.array(axis) / np.linalg.norm(axis)
-        local[0, holden31.role(joint)] = quat.from_axis_angle(axis, angle)
-    local[0, 0] = quat.from_axis_angle([0, 1.0, 0], 0.4)
-    ours, placed = forward_kinematics(holden31, local, np.array([[10.0, 95, 20]]))
-    axes = Axes(handed, up, unit)
-    rotations, positions = axes.rotations_out(ours[0]), axes.points_out(placed[0])
-    bones = axes.points_out(holden31.offsets)
-    for joint, parent in enumerate(holden31.parents):
-        if parent >= 0:
-            end = positions[parent] + quat.rotate(rotations[parent], bones[joint])
-            np.testing.assert_allclose(end, positions[joint], atol=1e-9)
-    hand = positions[holden31.role("left_wrist")] - positions[0]
-    across = quat.rotate(rotations[0], axes.directions_out(np.array([1.0, 0, 0])))
-    assert hand @ across > 0.2 * np.linalg.norm(hand)
-    assert hand["XYZ".index(up)] > 60 * axes.scale
-    np.testing.assert_allclose(axes.points_in(positions), placed[0], atol=1e-9)
-
-
-def test_sides_in_unity_and_unreal() -> None:
-    """The left hand of a character that faces ahead is on the left in each engine's axes."""
-    left, up, ahead = np.eye(3)
-    unity, unreal, blender = Axes("left", "Y"), Axes("left", "Z"), Axes("right", "Z")
-    np.testing.assert_array_equal(
-        unity.directions_out(np.array([left, up, ahead])), [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    )
-    np.testing.assert_array_equal(
-        unreal.directions_out(np.array([left, up, ahead])), [[0, -1, 0], [0, 0, 1], [1, 0, 0]]
-    )
-    np.testing.assert_array_equal(
-        blender.directions_out(np.array([left, up, ahead])), [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
-    )
-    with pytest.raises(ValueError, match="handed is right or left"):
-        Axes("both")
-
-
 def test_what_a_game_loads(root: Path) -> None:
     """The runtime imports neither torch nor anything that only the workflow or an export needs."""
     heavy = "{'torch', 'snakemake', 'pydantic', 'onnx', 'onnxruntime', 'matplotlib', 'plotly'}"
@@ -441,13 +212,6 @@ def test_what_a_game_loads(root: Path) -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=root)
     assert done.stderr == ""
     assert done.returncode == 0
-
-
-def test_a_network_without_skeleton_is_refused(tmp_path: Path, network) -> None:
-    with pytest.raises(ValueError, match="skeleton"):
-        ProceduralAnimation(replace(network, skeleton=None))
-    with pytest.raises(InputError, match="no such file"):
-        ProceduralAnimation.load(tmp_path / "missing.npz")
 
 
 @pytest.mark.shared
@@ -504,87 +268,6 @@ def test_the_released_network_keeps_its_feet_on_hills(shared: Path, holden31) ->
     assert np.median(np.array(above)[standing]) < 1.5
     assert np.percentile(np.array(above)[standing], 95) < 5
     assert foot_slide(np.array(toes), np.array(contacts)).mean() < 2
-
-
-def same(a, b) -> bool:
-    """Whether two states are equal, bit for bit."""
-    return all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
-
-
-@pytest.mark.parametrize(
-    ("wishes", "message"),
-    [
-        ({"target_velocity": (1e30, 0)}, "faster than a body"),
-        ({"target_velocity": (0, 31.0)}, "faster than a body"),
-        ({"target_velocity": (np.nan, 0)}, "not a finite"),
-        ({"gait": [0, 1e30, 0, 0, 0, 0]}, "from 0 to 1"),
-        ({"gait": [0, -0.1, 0, 0, 0, 0]}, "from 0 to 1"),
-        ({"terrain": lambda x, z: 1e30 + 0 * x}, "a height of 1e\\+30"),
-        ({"terrain": lambda x, z: x * np.nan}, "not finite"),
-        ({"terrain": lambda x, z: np.zeros(3)}, "heights of shape"),
-        ({"injury": {KNEE: 10.5}}, "from 0 to"),
-    ],
-)
-def test_impossible_wishes_are_refused_and_change_nothing(hurtable, wishes: dict, message: str) -> None:
-    character = ProceduralAnimation(hurtable)
-    walk(character, 5, injury={KNEE: 3.0})
-    before = copy.deepcopy(character.state)
-    with pytest.raises(ValueError, match=message):
-        character.next_pose(**{"target_velocity": (0.5, 2.0), "injury": {KNEE: 9.0}, **wishes})
-    assert same(before, character.state)
-    assert np.isfinite(character.next_pose((0.5, 2.0)).positions).all()
-
-
-def test_a_start_too_far_from_the_origin_is_refused(network) -> None:
-    with pytest.raises(ValueError, match="100 km"):
-        ProceduralAnimation(network, position=(1e30, 0))
-
-
-@pytest.mark.parametrize("call", range(2))
-def test_a_terrain_that_raises_leaves_the_state_as_it_was(hurtable, call: int) -> None:
-    """The terrain function fails at its first call (for the path) or at its second (for the feet)."""
-    calm, troubled = ProceduralAnimation(hurtable), ProceduralAnimation(hurtable)
-    calls = []
-
-    def fails(x, z):
-        calls.append(len(x))
-        if len(calls) == 21 + call:
-            raise RuntimeError("the level is not loaded")
-        return hills(x, z)
-
-    for character, ground in ((calm, hills), (troubled, fails)):
-        walk(character, 10, terrain=ground)
-    before = copy.deepcopy(troubled.state)
-    with pytest.raises(RuntimeError, match="level"):
-        troubled.next_pose((0.5, 2.0), terrain=fails, injury={KNEE: 8.0})
-    assert same(before, troubled.state)
-    a, b = (walk(c, 5, terrain=t)[-1] for c, t in ((calm, hills), (troubled, fails)))
-    np.testing.assert_array_equal(a.positions, b.positions)
-
-
-def test_a_failed_frame_leaves_no_trace(hurtable) -> None:
-    """Both of the calls in a frame are tried, also in the first frame."""
-
-    def hills(x, z):
-        return 40 + 0.2 * z
-
-    for failing in (0, 1, 40, 41):
-        whole, disturbed = ProceduralAnimation(hurtable), ProceduralAnimation(hurtable)
-        looks = iter(range(10**6))
-
-        def once(x, z, looks=looks, failing=failing):
-            if next(looks) == failing:
-                raise OSError("gone")
-            return hills(x, z)
-
-        for frame in range(40):
-            pose = whole.next_pose((0, 2.0), terrain=hills)
-            if frame == failing // 2:
-                with pytest.raises(OSError, match="gone"):
-                    disturbed.next_pose((0, 2.0), terrain=once)
-            again = disturbed.next_pose((0, 2.0), terrain=once)
-            np.testing.assert_array_equal(again.positions, pose.positions)
-            np.testing.assert_array_equal(again.root, pose.root)
 
 
 def test_a_character_starts_on_the_ground_at_any_height(steady) -> None:

@@ -17,9 +17,9 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.models import DEFAULT, MODELS
 
 Model = TypeVar("Model", bound=BaseModel)
-# So that no name leads out of its folder, and none is too long for a file.
+# Names that cannot lead out of their folder and are not too long for a file name.
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
-MOST_PROBLEMS = 20  # of a file that are listed
+MOST_PROBLEMS = 20  # listed for each file
 NOT_STRINGS = (bool, int, float, date)  # types that YAML makes of unquoted 02_01, 1e5, 2020-01-01 or on
 QUOTES_HINT = 'Put the name in quotes, as in "02_01"; otherwise YAML reads it as a number or a date.'
 NAME_HINT = "Names may have letters, digits, dots, dashes and underscores, 100 at most."

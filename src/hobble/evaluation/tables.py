@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def frame(rows: Sequence[Mapping[str, Any]]) -> pandas.DataFrame:
     """A data frame with a row for each mapping. Columns are in the order in which they first occur.
 
-    Values keep their types, so that a count does not become 3.0 where another row has none.
+    Values keep their types, so that a count stays an integer even if another row has no value.
     """
     import pandas  # takes .3 s, which only jobs that have a table should pay
 

@@ -79,7 +79,7 @@ def describe(name: str, seen: Comparison, side: str | None = None) -> str:
         f"  probabilities: {likely}",
         f"  windows: {len(seen.windows)}, called {_listed(seen.named())}",
         f"  mild limps too: {grade.label} {grade.side or ''}, {grade.strength:.2f} of what people showed, "
-        f"{grade.distance:.1f} spreads from it",
+        f"{grade.distance:.1f} standard deviations from it",
         f"  what may hurt: {', '.join(grade.parts) or 'nothing'}; windows called {_listed(seen.graded())}",
         f"  effects, hurt side {side}, beside people ({SOURCE}; mean, spread over people)",
     ]

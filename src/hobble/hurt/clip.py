@@ -134,7 +134,7 @@ def _from_root(source: Source, world: Array, side: int) -> Array:
 
 
 def _reach(leg: Leg, changes: Effects, source: Source, timing: Timing, side: int) -> Array:
-    """(N,) cm from hip to ankle of a standing leg. The knee bends more if it is spared."""
+    """(N,) cm from hip to ankle of a standing leg. It is shorter if the injury makes the knee bend more."""
     crouch = np.radians(changes.sided["crouch"][:, side]) * (1 - source.swing[:, side])
     bent = knee_flexion(leg.reach, leg.upper, leg.lower) + crouch
     return at_frames(

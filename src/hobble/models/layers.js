@@ -1,25 +1,41 @@
 // Layers with K sets of weights each, packed by `packed_rows`. Their outputs are blended by shares, with an ELU between layers.
+// Weights of 8 bits are packed by `hobble.report.rounded`. They have a factor for each group of columns, others for each row.
 import { bytes } from "../report/web/numbers.js";
 
 export const floats = (text) => new Float32Array(bytes(text));
 
-const unpacked = ({ points, rows, columns, weights, scale, biases }) => {
-  const integers = new Int16Array(bytes(weights)), factors = floats(scale), w = new Float32Array(integers.length);
-  for (let r = 0, i = 0; r < points * rows; r++) for (let c = 0; c < columns; c++, i++) w[i] = integers[i] * factors[r];
+export const unpacked = ({ points, rows, columns, weights, scale, biases, bits = 16, group = columns }) => {
+  const integers = new (bits === 8 ? Int8Array : Int16Array)(bytes(weights)), factors = floats(scale), w = new Float32Array(integers.length);
+  for (let r = 0, i = 0, f = 0; r < points * rows; r++) {
+    for (let from = 0; from < columns; from += group, f++) {
+      for (const end = i + Math.min(group, columns - from); i < end; i++) w[i] = integers[i] * factors[f];
+    }
+  }
   return { points, rows, columns, w, b: floats(biases), out: new Float32Array(rows) };
 };
 
-const applied = ({ points, rows, columns, w, b, out }, shares, x, last) => {
-  for (let r = 0; r < rows; r++) {
-    let y = 0;
-    for (let k = 0; k < points; k++) {
-      const share = shares ? shares[k] : 1, start = (k * rows + r) * columns;
-      let sum = b[k * rows + r];
-      for (let c = 0; c < columns; c++) sum += w[start + c] * x[c];
-      y += share * sum;
-    }
-    out[r] = last || y >= 0 ? y : Math.exp(y) - 1;
+// Sum of w[from + c] x[c]. Four sums go on side by side, because an addition has to wait for the one before it.
+const product = (w, from, x, n) => {
+  const whole = n - n % 4;
+  let p = 0, q = 0, s = 0, t = 0;
+  for (let c = 0, i = from; c < whole; c += 4, i += 4) {
+    p += w[i] * x[c];
+    q += w[i + 1] * x[c + 1];
+    s += w[i + 2] * x[c + 2];
+    t += w[i + 3] * x[c + 3];
   }
+  for (let c = whole; c < n; c++) p += w[from + c] * x[c];
+  return p + q + s + t;
+};
+
+// One set of weights after another, so that they are read from memory in their order.
+const applied = ({ points, rows, columns, w, b, out }, shares, x, last) => {
+  out.fill(0);
+  for (let k = 0; k < points; k++) {
+    const share = shares ? shares[k] : 1;
+    for (let r = 0, i = k * rows; r < rows; r++, i++) out[r] += share * (b[i] + product(w, i * columns, x, columns));
+  }
+  if (!last) for (let r = 0; r < rows; r++) if (out[r] < 0) out[r] = Math.exp(out[r]) - 1;
   return out;
 };
 

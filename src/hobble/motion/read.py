@@ -12,25 +12,20 @@ import itertools
 import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.core.untrusted import read_bytes
+from hobble.motion.read_header import EXPORT, Header, read_header
 
-# Limits. The largest known rig has 191 joints. An hour of it at 60 Hz is 41 million joint poses, whose
-# rotations take 1.3 GB.
-MOST_JOINTS = 4096
-LONGEST_NAME = 200
+# Limits. An hour of a rig of 191 joints at 60 Hz is 41 million joint poses, whose rotations take 1.3 GB.
 MOST_BYTES = 1 << 30
 MOST_HEADER = 1 << 24  # bytes before MOTION
 MOST_LINES = 50_000_000  # of frames after MOTION
 LONGEST_LINE = 1 << 22  # bytes; a frame of 4096 joints, six channels and 25 letters has 614,400
 MOST_POSES = 50_000_000
-CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
-_EXPORT = "Export the clip again."
 
 
 @dataclass(frozen=True)
@@ -64,15 +59,6 @@ class Bvh:
         return len(self.values)
 
 
-@dataclass
-class _Header:
-    names: list[str] = field(default_factory=list)
-    parents: list[int] = field(default_factory=list)
-    offsets: list[tuple[float, float, float]] = field(default_factory=list)
-    channels: list[tuple[str, ...]] = field(default_factory=list)
-    end_sites: dict[str, list[tuple[float, float, float]]] = field(default_factory=dict)
-
-
 def read_bvh(path: str | Path) -> Bvh:
     """Read a BVH file.
 
@@ -85,18 +71,18 @@ def read_bvh(path: str | Path) -> Bvh:
     raw = read_bytes(path, MOST_BYTES)
     data = _text(path, raw)
     split = _motion_at(path, data)
-    header = _hierarchy(path, data[:split])
+    header = read_header(path, data[:split])
     bvh = _motion(path, data, split, header)
     return replace(bvh, sha256=hashlib.sha256(raw).hexdigest(), bytes=len(raw))
 
 
 def _text(path: Path, data: bytes) -> bytes:
     if not data.strip():
-        raise InputError(path, "the file is empty", fix=_EXPORT)
+        raise InputError(path, "the file is empty", fix=EXPORT)
     if data.startswith(b"Kaydara FBX"):
         raise InputError(path, "this is an FBX file, not BVH", fix="Export the clip as BVH.")
     if b"\0" in data[:65536] or b"\0" in data[-65536:]:
-        raise InputError(path, "binary data, not a BVH text file", fix=_EXPORT)
+        raise InputError(path, "binary data, not a BVH text file", fix=EXPORT)
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\n" not in data:
         data = data.replace(b"\r", b"\n")  # line ends of old Macintosh files
@@ -113,141 +99,13 @@ def _motion_at(path: Path, data: bytes) -> int:
     found = _MOTION.search(data)
     if not found:
         lines = data.count(b"\n") + 1
-        raise InputError(path, "truncated: there is no MOTION section", line=lines, fix=_EXPORT)
+        raise InputError(path, "truncated: there is no MOTION section", line=lines, fix=EXPORT)
     if found.end() > MOST_HEADER:
-        raise InputError(path, f"MOTION comes after more than {MOST_HEADER >> 20} MB", fix=_EXPORT)
+        raise InputError(path, f"MOTION comes after more than {MOST_HEADER >> 20} MB", fix=EXPORT)
     return found.end() - len(b"MOTION")
 
 
-class _Hierarchy:
-    """Reads the header's lines in one pass. Open joints are on a stack, so deep hierarchies cost nothing."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.line = 0
-        self.header = _Header()
-        self.open: list[int] = []
-        self.pending: int | None = None
-        self.end_placed = True
-        self.seen: dict[str, int] = {}
-
-    def fail(self, problem: str) -> NoReturn:
-        raise InputError(self.path, problem, line=self.line, fix=_EXPORT)
-
-    def statement(self, text: str) -> None:
-        word, _, rest = text.partition(" ")
-        handler = {
-            "HIERARCHY": self._hierarchy,
-            "ROOT": self._joint,
-            "JOINT": self._joint,
-            "END": self._end_site,
-            "{": self._brace,
-            "}": self._close,
-            "OFFSET": self._offset,
-            "CHANNELS": self._channels,
-        }.get(word.upper())
-        if handler is None:
-            self.fail(f"{word[:40]!r} instead of a joint, OFFSET, CHANNELS or a brace")
-        if self.pending is not None and word != "{":
-            self.fail("an opening brace is missing")
-        handler(rest.strip())
-
-    def _hierarchy(self, rest: str) -> None:
-        if rest:
-            self.statement(rest)
-
-    def _joint(self, name: str) -> None:
-        names = self.header.names
-        if not name:
-            self.fail("a joint without a name")
-        if len(name) > LONGEST_NAME:
-            self.fail(f"a joint's name of {len(name)} letters")
-        if name in self.seen:
-            self.fail(f"joint {name!r} occurs twice (first in line {self.seen[name]})")
-        if names and not self.open:
-            self.fail(f"a second root, {name!r}; a file may have only one figure")
-        if len(names) >= MOST_JOINTS:
-            self.fail(f"more than {MOST_JOINTS} joints")
-        self.seen[name] = self.line
-        self.header.parents.append(self.open[-1] if self.open else -1)
-        self.pending = len(names)
-        names.append(name)
-        self.header.offsets.append((np.nan,) * 3)
-        self.header.channels.append(())
-
-    def _end_site(self, rest: str) -> None:
-        if not self.open:
-            self.fail("an end site outside of any joint")
-        self.pending = -1
-        self.end_placed = False
-
-    def _brace(self, rest: str) -> None:
-        if self.pending is None:
-            self.fail("an opening brace without a joint")
-        self.open.append(self.pending)
-        self.pending = None
-
-    def _close(self, rest: str) -> None:
-        if not self.open:
-            self.fail("a closing brace too many")
-        joint = self.open.pop()
-        if joint < 0 and not self.end_placed:
-            self.fail("an end site has no OFFSET")
-        if joint >= 0 and np.isnan(self.header.offsets[joint][0]):
-            self.fail(f"joint {self.header.names[joint]!r} has no OFFSET")
-
-    def _offset(self, rest: str) -> None:
-        if not self.open:
-            self.fail("OFFSET outside of any joint")
-        try:
-            x, y, z = (float(v) for v in rest.replace("_", "?").split())
-        except ValueError:
-            self.fail(f"OFFSET needs three numbers, not {rest[:60]!r}")
-        if not np.all(np.isfinite((x, y, z))):
-            self.fail(f"OFFSET is not finite: {rest[:60]!r}")
-        joint = self.open[-1]
-        if joint >= 0:
-            self.header.offsets[joint] = (x, y, z)
-        else:
-            self.end_placed = True
-            name = self.header.names[self.open[-2]]
-            self.header.end_sites.setdefault(name, []).append((x, y, z))
-
-    def _channels(self, rest: str) -> None:
-        if not self.open or self.open[-1] < 0:
-            self.fail("CHANNELS outside of any joint")
-        count, *words = rest.split()[:100] or [""]
-        if not count.isdecimal() or int(count[:9]) != len(words):
-            self.fail(f"CHANNELS declares {count[:12] or 'nothing'} and names {len(words)}")
-        known = {name.lower(): name for name in CHANNELS}
-        for word in words:
-            if word.lower() not in known:
-                self.fail(f"unknown channel {word[:40]!r}; there are {', '.join(CHANNELS)}")
-        names = tuple(known[word.lower()] for word in words)
-        if len(set(names)) < len(names):
-            self.fail(f"a channel named twice: {rest[:100]}")
-        self.header.channels[self.open[-1]] = names
-
-
-def _hierarchy(path: Path, data: bytes) -> _Header:
-    try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    parser = _Hierarchy(path)
-    for parser.line, raw in enumerate(text.split("\n"), 1):
-        for part in raw.replace("{", "\n{\n").replace("}", "\n}\n").split("\n"):
-            words = " ".join(part.split())
-            if words:
-                parser.statement(words)
-    if parser.open or parser.pending is not None:
-        parser.fail("truncated: a joint is still open where MOTION begins")
-    if not parser.header.names:
-        parser.fail("no joints before MOTION")
-    return parser.header
-
-
-def _motion(path: Path, data: bytes, at: int, header: _Header) -> Bvh:
+def _motion(path: Path, data: bytes, at: int, header: Header) -> Bvh:
     line = data.count(b"\n", 0, at) + 1
     head = data[at + 6 : at + 4096].split(b"\n")
     frames_text, line_frames, at_frames = _declaration(path, head, b"FRAMES:", line)
@@ -263,17 +121,17 @@ def _motion(path: Path, data: bytes, at: int, header: _Header) -> Bvh:
     except ValueError:
         raise InputError(path, f"Frame Time: {time_text[:40]!r} is not a number", line=line_time) from None
     if not 1e-4 <= frame_time <= 10:
-        raise InputError(path, f"Frame Time {time_text[:40]} s makes no sense", line=line_time, fix=_EXPORT)
+        raise InputError(path, f"Frame Time {time_text[:40]} s makes no sense", line=line_time, fix=EXPORT)
     if declared < 1:
-        raise InputError(path, f"declares {declared} frames", line=line_frames, fix=_EXPORT)
+        raise InputError(path, f"declares {declared} frames", line=line_frames, fix=EXPORT)
     if not width:
-        raise InputError(path, "no joint has a channel", fix=_EXPORT)
+        raise InputError(path, "no joint has a channel", fix=EXPORT)
     if (declared - 1) * width * 2 > len(data) - body + 2:
         raise InputError(
             path,
             f"truncated: declares {declared} frames of {width} values, more than the file can hold",
             line=line_frames,
-            fix=_EXPORT,
+            fix=EXPORT,
         )
     if declared * len(header.names) > MOST_POSES:
         raise InputError(
@@ -308,7 +166,7 @@ def _declaration(path: Path, head: list[bytes], key: bytes, line: int) -> tuple[
         if words.upper().startswith(key):
             return words[len(key) :].strip().decode("latin-1"), line + i, end
     name = "Frames" if key == b"FRAMES:" else "Frame Time"
-    raise InputError(path, f"truncated: no {name!r} after MOTION", line=line + 1, fix=_EXPORT)
+    raise InputError(path, f"truncated: no {name!r} after MOTION", line=line + 1, fix=EXPORT)
 
 
 def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_line: int) -> Array:
@@ -330,10 +188,10 @@ def _values(path: Path, data: bytes, at: int, width: int, declared: int, first_l
     if bad.any():
         frame = int(np.argmax(bad))
         line = _line_of(data[at:], frame, first_line)
-        raise InputError(path, "a value is NaN or infinite", line=line, frame=frame + 1, fix=_EXPORT)
+        raise InputError(path, "a value is NaN or infinite", line=line, frame=frame + 1, fix=EXPORT)
     if abs(len(table) - declared) > 1:
         what = "truncated: declares" if len(table) < declared else "declares"
-        raise InputError(path, f"{what} {declared} frames and has {len(table)}", fix=_EXPORT)
+        raise InputError(path, f"{what} {declared} frames and has {len(table)}", fix=EXPORT)
     return table
 
 
@@ -343,7 +201,7 @@ def _check_lines(path: Path, data: bytes, at: int, first_line: int) -> None:
         if data.find(b"\n", start, start + LONGEST_LINE) < 0:
             line = first_line + data.count(b"\n", at, start)
             problem = f"a line of more than {LONGEST_LINE >> 20} MB"
-            raise InputError(path, problem, line=line, fix=_EXPORT)
+            raise InputError(path, problem, line=line, fix=EXPORT)
     if data.count(b"\n", at) > MOST_LINES:
         raise InputError(path, f"more than {MOST_LINES} lines after MOTION", fix="Cut it into shorter clips.")
 
@@ -358,14 +216,14 @@ def _explained(path: Path, body: bytes, width: int, first_line: int) -> Array:
             n, i = int(wrong[0]), int(used[wrong[0]])
             last = " (truncated?)" if i == used[-1] else ""
             problem = f"{counts[i]} values, but the joints have {width} channels{last}"
-            raise InputError(path, problem, line=first_line + i, frame=n + 1, fix=_EXPORT)
+            raise InputError(path, problem, line=first_line + i, frame=n + 1, fix=EXPORT)
     for i, raw in enumerate(io.BytesIO(body)):
         for word in raw.split():
             if not _number(word):
                 shown = word[:40].decode("latin-1")
                 comma = " (a decimal comma?)" if b"," in word else ""
                 problem = f"{shown!r} is not a number{comma}"
-                raise InputError(path, problem, line=first_line + i, fix=_EXPORT)
+                raise InputError(path, problem, line=first_line + i, fix=EXPORT)
     words = (float(word) for raw in io.BytesIO(body) for word in raw.split())
     return np.fromiter(words, float, total).reshape(-1, width)
 

@@ -13,6 +13,7 @@ from hobble.report.formats import embedded
 from hobble.report.hero import body_channel
 from hobble.report.playable import skeleton_of
 from hobble.report.provenance import commit, machine, versions
+from hobble.report.rounded import has_weights, rounded
 from hobble.report.templates import FOLDER, specs, style, template, trusted
 
 LARGEST_PAGE = 19_850_000  # bytes; the page must stay under 20 MB
@@ -21,12 +22,16 @@ NAME = "compare"
 
 
 def render_compared(
-    compared: Mapping[str, Any], playables: Mapping[str, Mapping[str, Any]] | None = None, bundle: str = ""
+    compared: Mapping[str, Any],
+    playables: Mapping[str, Mapping[str, Any]] | None = None,
+    bundle: str = "",
+    errors: Mapping[str, float] | None = None,
 ) -> str:
     """The comparison as one HTML document.
 
     compared: compare.json. playables: configuration -> data from `playable.playable`; as many as fit into the
-    page are kept, in order. bundle: the scripts, from `bundle.bundle`.
+    page are kept, in order. If not all fit, their weights get 8 bits. bundle: the scripts, from
+    `bundle.bundle`. errors: configuration -> centimetres from `rounded.rounding_error`.
     """
     sections: dict[str, dict[str, Any]] = {
         "overview": {
@@ -42,6 +47,11 @@ def render_compared(
     bodies = {spec["body"]: packed_body(skeleton_of(spec)) for spec in (playables or {}).values()}
     used = len(bundle.encode()) + len(embedded(charts).encode()) + len(embedded(bodies).encode())
     kept, left_out = fitting(playables or {}, LARGEST_PAGE - RESERVED - used)
+    small: list[str] = []
+    if left_out:
+        small = [name for name, spec in (playables or {}).items() if has_weights(spec)]
+        smaller = {name: rounded(spec) for name, spec in (playables or {}).items()}
+        kept, left_out = fitting(smaller, LARGEST_PAGE - RESERVED - used)
     bodies = {spec["body"]: bodies[spec["body"]] for spec in kept.values()}
     data = {"name": NAME, "charts": charts, "playable": kept, "bodies": bodies}
     return template("compare.html.j2").render(
@@ -53,6 +63,7 @@ def render_compared(
         embedded={name: embedded(part) for name, part in data.items()},
         playable=list(kept),
         left_out=left_out,
+        rounding=[(name, (errors or {})[name]) for name in small if name in kept and name in (errors or {})],
         hurts=any(body_channel(spec) for spec in kept.values()),
         style=style(),
         bundle=trusted("the bundle", bundle),

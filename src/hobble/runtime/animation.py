@@ -166,6 +166,11 @@ class ProceduralAnimation:
         return self._controller.seconds
 
     @property
+    def last_inputs(self) -> Array:
+        """(C, inputs) of the network in the last frame, in raw units. The next frame overwrites them."""
+        return self._controller.x
+
+    @property
     def predicted_rotations(self) -> Array:
         """(C, J, 4) world rotations that the network predicted for the last frame, before any limit.
 

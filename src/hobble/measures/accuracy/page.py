@@ -9,7 +9,7 @@ import numpy as np
 
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, axis, mark
-from hobble.report.formats import number
+from hobble.report.formats import duration, number
 from hobble.report.gather import Material
 from hobble.report.parts import Fragment, Part, Section, Words
 from hobble.report.published import cited
@@ -172,7 +172,7 @@ def published_table(found: Json, material: Material) -> Table:
         rows.append([entry["label"], entry["mean"], None, None, cited(entry, sources)])
     columns = [
         Column("network"),
-        Column.number("mean"),
+        Column.number("mean error, as a fraction"),
         Column.number("sd"),
         Column.number("position error, cm"),
         Column("source", kind="long"),
@@ -188,6 +188,7 @@ def section(found: Json, material: Material) -> Section:
         "accuracy",
         [
             Part(0, Words(INTRODUCTION + sampled(found))),
+            Part(9, Words(caveat(material))),
             Part(10, published_table(found, material), open=True, short=True),
             Part(20, clip_bars(found, material), tall=True),
             Part(30, clip_boxes(found), tall=True),
@@ -197,6 +198,16 @@ def section(found: Json, material: Material) -> Section:
         title="Accuracy",
         at=10,
         long=True,
+    )
+
+
+def caveat(material: Material) -> str:
+    """Why these errors and the published ones may not be compared."""
+    seconds = sum(clip["seconds"] or 0.0 for clip in material.motion)
+    return (
+        f"Do not compare these errors with the published ones as if the clips were the same: here they are "
+        f"{duration(seconds)} of the data set {material.dataset}, there 80 clips of the original one. A "
+        "small error may only mean that the clips are easy to predict."
     )
 
 

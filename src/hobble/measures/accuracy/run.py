@@ -112,9 +112,9 @@ def measure(
     """accuracy.json: `train` and `held_out` over their frames, and `clips`, one entry a clip in name order.
 
     clips: name -> file of rows. equivalents: names of the joints to measure; all by default. sample: the
-    clips that are measured for all of them; then `sample` says how many, and `interval` how sure means are.
-    `mean_of_clips` is the mean over clips that the published tables print. Raises InputError where rows and
-    network differ.
+    clips to measure in place of all; the result then has `sample` with their number, and confidence
+    intervals. `mean_of_clips` is the mean over clips, as in the published tables. Raises InputError where
+    rows and network differ.
     """
     network = load_network(weights)
     joints = joint_indices(network, equivalents)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
+from hobble.channels.shown import speaker
 from hobble.measures.given import Json
 from hobble.measures.manners.results import OfChannel
 from hobble.measures.manners.windows import EFFECTS, NONE
@@ -26,9 +28,9 @@ def section(found: Json, material: Material) -> Section:
     """
     if not found.get("applies"):
         return Section("manners", [])
-    parts = []
+    parts, say = [], speaker(material.network["skeleton"])
     for i, one in enumerate(found["channels"]):
-        charts = [together_chart(one), *(effect_chart(one, effect) for effect in EFFECTS)]
+        charts = [together_chart(one, say), *(effect_chart(one, effect) for effect in EFFECTS)]
         parts += [Part(10 * i, Words(summary(one))), *(Part(10 * i + 1 + k, c) for k, c in enumerate(charts))]
     title = " and ".join(one["title"] for one in found["channels"])
     return Section("manners", parts, title=title, at=21)
@@ -49,38 +51,42 @@ def summary(found: OfChannel) -> str:
     return text
 
 
-def together_chart(found: OfChannel) -> Chart | None:
+def together_chart(found: OfChannel, say: Callable[[str], str] = str) -> Chart | None:
     """The share of windows in which each manner is named while a column of another channel is highest."""
     rows = found["together"]
     if not rows:
         return None
     manners = list(dict.fromkeys(row["manner"] for row in rows))
     columns = list(dict.fromkeys(row["column"] for row in rows))
+    spoken = [say(column) for column in columns]
     shares = {(row["manner"], row["column"]): row["share"] for row in rows}
     trace = {
         "type": "heatmap",
-        "x": columns,
-        "y": manners,
-        "z": [[shares[m, c] for c in columns] for m in manners],
+        "x": manners,
+        "y": spoken[::-1],
+        "z": [[shares[m, c] for m in manners] for c in columns[::-1]],
         "colorscale": [[0, "@sunken"], [1, "@accent"]],
         "zmin": 0,
         "zmax": 1,
+        "showscale": False,
         "xgap": 2,
         "ygap": 2,
-        "hovertemplate": "%{y} with %{x}: %{z:.0%}<extra></extra>",
+        "hovertemplate": "%{x} with %{y}: %{z:.0%}<extra></extra>",
     }
     manner = sum((row["share"] or 0.0) * row["windows"] for row in rows if row["manner"] != NONE)
     whole = sum(row["windows"] for row in rows if row["manner"] != NONE)
     layout = {
-        "xaxis": {"type": "category", "tickangle": -50, "automargin": True},
-        "yaxis": {"type": "category", "automargin": True},
+        "xaxis": {"type": "category", "side": "top", "automargin": True, "showgrid": False},
+        "yaxis": {"type": "category", "automargin": True, "dtick": 1, "showgrid": False},
     }
     words = (
         f"The share of windows in which the classifier names the right {found['title'].lower()} while the "
-        f"value at the bottom is at its highest. It is {_percent(manner / whole)} over all rows but "
-        f'"{NONE}".'
+        "value at the left is at its highest: none in a pale field, all in a dark one. It is "
+        f'{_percent(manner / whole)} over all columns but "{NONE}".'
     )
-    return Chart(f"{found['channel']}-together", "Two at once", words, [trace], layout, 340)
+    return Chart(
+        f"{found['channel']}-together", "Two at once", words, [trace], layout, 120 + 20 * len(columns)
+    )
 
 
 def effect_chart(found: OfChannel, effect: str) -> Chart:

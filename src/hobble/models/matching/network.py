@@ -24,7 +24,7 @@ MOST_ROWS = 1 << 24  # the page keeps row numbers in float32, which is exact up 
 MOST_WEIGHT = 1e9
 MOST_FRAMES = 1_000_000  # frames
 FEWEST_LEFT = 20  # a search finds only rows followed by at least this many frames of their run
-MOST_ON_PAGE = 8000  # rows, about 8 MB of text; a page with several characters should stay below 20 MB
+MOST_ON_PAGE = 5500  # rows, about 5.5 MB of text; a page with several characters should stay below 20 MB
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,9 @@
 // The phase-functioned network: a prediction from a row of inputs and a phase. As Python's `Predictor` in
 // cubic mode it blends the outputs of the four control points around the phase, and not their weights.
-import { bytes } from "../../report/web/numbers.js";
+import { floats, unpacked } from "../layers.js";
 
 export const createNetwork = (spec) => {
-  const floats = (text) => new Float32Array(bytes(text));
-  const layers = spec.network.layers.map(({ points, rows, columns, weights, scale, biases }) => {
-    const integers = new Int16Array(bytes(weights)), factors = floats(scale);
-    const w = new Float32Array(integers.length);
-    for (let r = 0, i = 0; r < points * rows; r++) for (let c = 0; c < columns; c++, i++) w[i] = integers[i] * factors[r];
-    return { rows, columns, w, b: floats(biases), out: new Float32Array(rows) };
-  });
+  const layers = spec.network.layers.map(unpacked);
   const K = spec.network.layers[0].points, mean = floats(spec.xMean), inverse = floats(spec.xScale);
   const seen = Int32Array.from(spec.seen), yMean = floats(spec.yMean), yStd = floats(spec.yStd), z = new Float32Array(mean.length);
   const index = new Int32Array(4), share = new Float64Array(4);

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from hobble.channels.injury.response.page import in_words
+from hobble.channels.shown import speaker
 from hobble.measures.given import Json
 from hobble.report.charts import Chart, Trace, axis, line
 from hobble.report.formats import number
@@ -13,6 +15,8 @@ from hobble.report.parts import Part, Section, Words
 from hobble.report.tables import Column, Table
 
 SHOWN = ("speed", "stance", "step_hurt", "knee_hurt", "hip_hurt", "lean", "pelvis_drop", "arm_hurt")
+MOST_NAMED = 8  # links that a sentence lists
+COLOURS = {"hip": "@g1", "thigh": "@g2", "shank": "@g3", "foot": "@g4", "back": "@g5"}  # of parts; arms: @g0
 IMPAIRMENTS = {
     "hip": "trendelenburg",
     "pelvis": "trendelenburg",
@@ -29,11 +33,11 @@ def section(found: Json, material: Material) -> Section:
     """
     if not found.get("applies"):
         return Section("injury", [])
-    name = material.name
+    name, say, found = material.name, speaker(material.network["skeleton"]), in_words(found, material)
     return Section(
         "injury",
         [
-            Part(1, Words(provenance(found["hurt_seconds"]))),
+            Part(1, Words(provenance(found["hurt_seconds"], say))),
             Part(2, size_chart(found)),
             Part(
                 3,
@@ -44,21 +48,21 @@ def section(found: Json, material: Material) -> Section:
                 ),
             ),
             Part(5, together_table(name, found["named_together"])),
-            Part(4, held_out_table(name, found["held_out_limps"])),
+            Part(4, held_out_table(name, found["held_out_limps"], say)),
             Part(80, size_table(name, found["sizes"])),
-            Part(81, captured_table(name, found["captured"])),
+            Part(81, captured_table(name, found["captured"], say)),
             Part(82, second_table(name, found["second"])),
         ],
     )
 
 
-def provenance(hurt_seconds: Mapping[str, Mapping[str, float]]) -> str:
+def provenance(hurt_seconds: Mapping[str, Mapping[str, float]], say: Callable[[str], str] = str) -> str:
     """Which injuries of the training data were captured and which were generated from healthy clips."""
     parts = []
     for kind, words in (("captured", "were captured"), ("made", "were generated from healthy clips")):
         if some := hurt_seconds[kind]:
-            seconds = sum(some.values())
-            parts.append(f"{len(some)} links {words} ({number(seconds, 3)} s: {', '.join(sorted(some))})")
+            names = f": {', '.join(map(say, sorted(some)))}" if len(some) <= MOST_NAMED else ""
+            parts.append(f"{len(some)} links {words} ({number(sum(some.values()), 3)} s{names})")
     return f"Of the injuries in training, {'; '.join(parts)}." if parts else "No link was hurt in training."
 
 
@@ -72,16 +76,22 @@ def size_chart(found: Json) -> Chart:
             row["link"] for row in rows if row["part"] in IMPAIRMENTS or "arm" in row["part"]
         ):
             some = [row for row in rows if row["link"] == link]
-            colour = "@accent" if some[0]["side"] == "left" else "@g2"
-            traces.append(line(link, [r["severity"] for r in some], [r[effect] for r in some], colour))
-        for gait, values in found["people"].items():
+            trace = line(
+                link,
+                [r["severity"] for r in some],
+                [r[effect] for r in some],
+                COLOURS.get(some[0]["part"].replace("pelvis", "hip"), "@g0"),
+            )
+            trace["line"]["dash"] = "dot" if some[0]["side"] == "right" else "solid"
+            traces.append(trace)
+        for i, (gait, values) in enumerate(found["people"].items()):
             mean, spread = values[effect]
             traces.append(
                 {
                     "type": "scatter",
                     "mode": "markers",
                     "name": f"people, {gait.replace('_', ' ')}",
-                    "x": [10.4],
+                    "x": [10.3 + 0.1 * i],
                     "y": [mean],
                     "error_y": {"type": "data", "array": [spread], "visible": True},
                     "marker": {"color": "@muted", "size": 8},
@@ -92,10 +102,10 @@ def size_chart(found: Json) -> Chart:
         "limp-sizes",
         "Size of the limp",
         "The character walks at a target speed of 1.2 m/s with one link at severity 3, 5, 7 or 10, and is "
-        "compared with its healthy walk. Grey: mean and standard deviation of ten people who imitated strong "
-        "limps.",
+        "compared with its healthy walk. Lines of the right side are dotted. Grey: mean and standard "
+        "deviation of ten people who imitated strong limps.",
         layout={"xaxis": axis("severity", range=[2.5, 11]), "yaxis": axis("size")},
-        height=360,
+        height=560,
         choose="Effect",
         options=options,
     )
@@ -112,7 +122,7 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> tuple[list[Column], list[list[A
     return columns, [[r["severity"], r["walks"], r["impaired"], r["named"], r["wrong_side"]] for r in rows]
 
 
-def held_out_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+def held_out_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[str], str]) -> Table | None:
     """Captured limps that were held out of training, compared with the character."""
     if not rows:
         return None
@@ -127,7 +137,7 @@ def held_out_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
     table = [
         [
             r["clip"],
-            ", ".join(f"{k} {v:g}" for k, v in r["hurt_links"].items()),
+            ", ".join(f"{say(k)} {v:g}" for k, v in r["hurt_links"].items()),
             r["compared_with"],
             r["healthy"],
             r["hurt"],
@@ -169,7 +179,7 @@ def together_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
     return Table(f"{name}-limp-together", columns, [[row.get(key) for key in keys] for row in rows], title)
 
 
-def captured_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None:
+def captured_table(name: str, rows: Sequence[Mapping[str, Any]], say: Callable[[str], str]) -> Table | None:
     """Captured limps with the same effects."""
     if not rows:
         return None
@@ -182,7 +192,7 @@ def captured_table(name: str, rows: Sequence[Mapping[str, Any]]) -> Table | None
     table = [
         [
             r["clip"],
-            ", ".join(f"{k} {v:g}" for k, v in r["hurt"].items()),
+            ", ".join(f"{say(k)} {v:g}" for k, v in r["hurt"].items()),
             r["healthy"],
             *(r[k] for k in SHOWN),
         ]

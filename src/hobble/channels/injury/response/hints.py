@@ -51,10 +51,20 @@ def injury_hints(found: Json) -> Iterator[Hint]:
         felt = [r["from_healthy_cm"] for r in walks]
         yield Hint(
             "good",
-            f"{len(walks)} of {_plural(len(responses), 'link')} were hurt in training and change the walk "
-            "at severity 10",
-            f"by {number(min(felt))} to {number(max(felt))} cm per joint.",
+            f"{len(walks)} of {_plural(len(responses), 'link')} {'was' if len(walks) == 1 else 'were'} hurt "
+            "in training.",
+            f"Severity 10 of {'it' if len(walks) == 1 else 'each of them'} changes the walk by "
+            f"{_span(min(felt), max(felt))} cm per joint.",
         )
+
+
+def _span(low: float, high: float) -> str:
+    """Two numbers as a range, one if they are equal.
+
+    >>> _span(3.472, 7.018), _span(2.0, 2.0)
+    ('3.47 to 7.02', '2.00')
+    """
+    return number(low) if low == high else f"{number(low)} to {number(high)}"
 
 
 def _unhurt(responses: Sequence[Mapping[str, Any]], key: str) -> float:

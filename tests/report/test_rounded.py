@@ -1,0 +1,96 @@
+"""Weights of 8 bits for a page with several characters."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hobble.core.quat import Array
+from hobble.models.network import Network
+from hobble.models.pfnn.network import Pfnn
+from hobble.report.rounded import GROUP, has_weights, rounded, rounding_error
+from hobble.runtime.animation import ProceduralAnimation
+
+FRAMES = 60
+
+
+def weights_of(layer: dict[str, Any]) -> tuple[Array, Array]:
+    """The weights of a packed layer of 8 bits, one by one, and the factor of each."""
+    shape = layer["points"], layer["rows"], layer["columns"]
+    integers = np.frombuffer(base64.b64decode(layer["weights"]), np.int8).reshape(shape)
+    groups = np.frombuffer(base64.b64decode(layer["scale"]), "<f4").reshape(*shape[:2], -1)
+    factors = np.repeat(groups, GROUP, axis=-1)[..., : shape[2]]
+    return integers * factors, factors
+
+
+@pytest.fixture(scope="module")
+def network_of_8_bits(network: Network, character: dict[str, Any]) -> Pfnn:
+    """The network of the examples with the weights that lie in the page."""
+    assert isinstance(network, Pfnn)
+    kept = [w.copy() for w in network.weights]
+    small = [weights_of(layer)[0] for layer in rounded(character)["network"]["layers"]]
+    start = network.layout.y_joint_rotation.start
+    turns = start + 3 * np.asarray(character["turning"])[:, None] + np.arange(3)
+    kept[0][..., character["seen"]] = small[0]
+    for own, theirs in zip(kept[1:-1], small[1:-1], strict=True):
+        own[...] = theirs
+    kept[-1][:, np.concatenate([np.arange(start), turns.ravel()])] = small[-1]
+    return replace(network, weights=type(network.weights)(kept))
+
+
+def test_a_weight_is_off_by_half_of_its_groups_factor_at_most(
+    network: Network, character: dict[str, Any]
+) -> None:
+    assert has_weights(character)
+    assert isinstance(network, Pfnn)
+    layer = rounded(character)["network"]["layers"][0]
+    found, factors = weights_of(layer)
+    exact = network.weights[0][:, :, character["seen"]]
+    assert np.all(np.abs(found - exact) <= 0.505 * factors + 1e-12)
+    assert np.abs(found - exact).max() > 0
+    assert len(layer["weights"]) < 0.51 * len(character["network"]["layers"][0]["weights"])
+
+
+@pytest.fixture(scope="module")
+def tab(page: str, tools: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    yield from tools.opened(page, tmp_path_factory.mktemp("rounded"))
+
+
+def test_the_page_moves_as_python_does_with_the_same_weights(
+    tab: Any, network_of_8_bits: Pfnn, character: dict[str, Any], examples: ModuleType
+) -> None:
+    animation = ProceduralAnimation(network_of_8_bits, **dict(examples.RUNTIME))
+    expected = [animation.next_pose((0.4, 2.4), None, "walk").positions for _ in range(FRAMES)]
+    found = tab.run(f"""(() => {{
+      const c = Hobble.character({json.dumps(rounded(character))}), out = [];
+      for (let f = 0; f < {FRAMES}; f++) {{
+        c.frame([.4, 2.4], null, "walk", () => 0);
+        out.push(Array.from(c.pose));
+      }}
+      return out;
+    }})()""")
+    np.testing.assert_allclose(np.reshape(found, (FRAMES, -1, 3)), expected, atol=1e-2)
+
+
+def test_the_error_is_that_of_predictions_with_rounded_weights(
+    network: Network, network_of_8_bits: Pfnn, examples: ModuleType
+) -> None:
+    """Groups begin at other columns there, so the two are about equal."""
+    animation = ProceduralAnimation(network, **dict(examples.RUNTIME))
+    rows, phases = [], []
+    for _ in range(60):
+        phases.append(float(animation.state.phase[0]))
+        animation.next_pose((0.0, 2.5), None, "walk")
+        rows.append(animation.last_inputs[0].copy())
+    block = network.layout.y_joint_position
+    of = [n.predict(np.array(rows), np.array(phases))[:, block] for n in (network, network_of_8_bits)]
+    off = np.linalg.norm((of[1] - of[0]).reshape(60, -1, 3), axis=-1).mean()
+    assert off > 0
+    assert rounding_error(network, examples.RUNTIME) == pytest.approx(off, rel=0.5)

@@ -1,0 +1,159 @@
+"""The caller's axes, units and ground."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hobble.core import quat
+from hobble.core.skeleton import forward_kinematics
+from hobble.runtime import ProceduralAnimation
+from hobble.runtime.axes import MATRICES, Axes
+from hobble.runtime.ground import CELL, Heightmap
+from tests.runtime.walking import hills, walk
+
+
+def test_the_ground_may_be_one_height(network) -> None:
+    level, flat = ProceduralAnimation(network), ProceduralAnimation(network)
+    for _ in range(9):
+        a, b = level.next_pose((0, 2), terrain=lambda x, z: 30.0), flat.next_pose((0, 2))
+    np.testing.assert_allclose(a.positions - a.root, b.positions - b.root, atol=15)
+    assert a.root[1] == 30.0
+
+
+def test_terrain_as_function_heightmap_and_array(network) -> None:
+    cell = 4.0
+    grid = (np.arange(401) - 200) * cell
+    heights = hills(grid[None, :], grid[:, None])
+    coarse = Heightmap(heights, cell)
+    motions = [
+        [p.positions for p in walk(ProceduralAnimation(network, steering=1.0), 40, terrain=terrain)]
+        for terrain in (hills, coarse, None)
+    ]
+    np.testing.assert_allclose(motions[0], motions[1], atol=0.2)
+    assert np.abs(np.subtract(motions[0], motions[2])).max() > 2
+    one, other = ProceduralAnimation(network), ProceduralAnimation(network)
+    np.testing.assert_array_equal(
+        walk(one, 9, terrain=heights)[-1].positions, walk(other, 9, terrain=Heightmap(heights))[-1].positions
+    )
+    with pytest.raises(TypeError, match="not str"):
+        ProceduralAnimation(network).next_pose((0, 1), terrain="hill")
+    with pytest.raises(ValueError, match="2 x 2"):
+        Heightmap(np.zeros((1, 5)))
+
+
+@pytest.mark.parametrize("unit", ["cm", "m"])
+@pytest.mark.parametrize(("handed", "up"), MATRICES)
+def test_a_heightmap_is_in_the_callers_axes_and_unit(network, handed: str, up: str, unit: str) -> None:
+    """A heightmap in the caller's coordinates gives the same ground as the function that it was made from."""
+    axes = Axes(handed, up, unit)
+
+    def terrain(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        rise = 50 * np.tanh(first / axes.scale / 40) + 20 * np.tanh(second / axes.scale / 90)
+        return rise * axes.scale
+
+    def root(ground) -> np.ndarray:
+        wish = axes.points_out(np.array([0.5, 0, 2.0]))
+        made = walk(ProceduralAnimation(network, axes=axes), 30, target_velocity=wish, terrain=ground)
+        return made[-1].root / axes.scale
+
+    def sampled(cell: float, centre: tuple[float, float] = (0, 0)) -> np.ndarray:
+        along = (np.arange(401) - 200) * cell
+        return terrain(along[None, :] + centre[0], along[:, None] + centre[1])
+
+    asked = root(terrain)
+    cell, centre = 4.0 * axes.scale, (30 * axes.scale, -50 * axes.scale)
+    np.testing.assert_allclose(root(Heightmap(sampled(cell, centre), cell, centre)), asked, atol=0.5)
+    np.testing.assert_allclose(root(sampled(CELL * axes.scale)), asked, atol=0.5)
+    level = root(np.full((8, 8), 1.0))["XYZ".index(up)]
+    assert level == pytest.approx(1 / axes.scale, abs=1e-3)
+
+
+def test_heightmap_is_bilinear_and_goes_on_outside() -> None:
+    ground = Heightmap(np.array([[0.0, 10.0], [20.0, 50.0]]), cell=2.0, centre=(5.0, 7.0))
+    x, z = np.array([4.0, 6.0, 4.0, 6.0, 5.0, 99.0]), np.array([6.0, 6.0, 8.0, 8.0, 7.0, -99.0])
+    np.testing.assert_allclose(ground(x, z), [0, 10, 20, 50, 20, 10])
+
+
+@pytest.mark.parametrize("unit", ["cm", "m"])
+@pytest.mark.parametrize(("handed", "up"), MATRICES)
+def test_the_callers_axes(network, handed: str, up: str, unit: str) -> None:
+    """A walk over hills in the caller's axes equals the walk in Hobble's axes, left and right included."""
+    axes = Axes(handed, up, unit)
+    vertical = "XYZ".index(up)
+    level = [k for k in range(3) if k != vertical]
+
+    def terrain(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        points = np.zeros((len(a), 3))
+        points[:, level] = np.stack([a, b], axis=1)
+        ours = axes.points_in(points)
+        return hills(ours[:, 0], ours[:, 2]) * axes.scale
+
+    native = ProceduralAnimation(network, position=(30, 0, 10), facing=(1, 0, 1))
+    theirs = ProceduralAnimation(
+        network,
+        axes=axes,
+        position=axes.points_out(np.array([30.0, 0, 10])),
+        facing=axes.directions_out(np.array([1.0, 0, 1])),
+    )
+    velocity = np.array([0.5, 0, 2.0])
+    for k in range(25):
+        a = native.next_pose(velocity, (1, 0, 0), terrain=hills)
+        wish = axes.points_out(velocity)
+        b = theirs.next_pose(
+            wish if k % 2 else wish[level], axes.directions_out(np.array([1.0, 0, 0])), terrain=terrain
+        )
+    np.testing.assert_allclose(axes.points_in(b.positions), a.positions, atol=1e-3)
+    np.testing.assert_allclose(axes.points_in(b.root), a.root, atol=1e-3)
+    assert b.positions[:, vertical].mean() > 0.5 * 93 * axes.scale
+    # A rotation takes the same bone to the same place in both conventions: M R v = R' M v.
+    bone = np.array([3.0, -2.0, 5.0])
+    np.testing.assert_allclose(
+        quat.rotate(b.rotations, axes.directions_out(bone)),
+        axes.directions_out(quat.rotate(a.rotations, bone)),
+        atol=1e-5,
+    )
+
+
+@pytest.mark.parametrize("unit", ["cm", "m"])
+@pytest.mark.parametrize(("handed", "up"), MATRICES)
+def test_an_asymmetric_pose_is_the_same_in_every_convention(
+    holden31, handed: str, up: str, unit: str
+) -> None:
+    """Left arm up, right knee bent: the caller's own bones, turned by the rotations it gets, end where it is
+    told that the joints are, and the left hand is on the caller's left."""
+    local = np.tile([1.0, 0, 0, 0], (1, 31, 1))
+    for joint, axis, angle in (("left_shoulder", [0.3, 0, 1.0], 1.1), ("right_hip", [1.0, 0.2, 0], -0.7)):
+        axis = np.array(axis) / np.linalg.norm(axis)
+        local[0, holden31.role(joint)] = quat.from_axis_angle(axis, angle)
+    local[0, 0] = quat.from_axis_angle([0, 1.0, 0], 0.4)
+    ours, placed = forward_kinematics(holden31, local, np.array([[10.0, 95, 20]]))
+    axes = Axes(handed, up, unit)
+    rotations, positions = axes.rotations_out(ours[0]), axes.points_out(placed[0])
+    bones = axes.points_out(holden31.offsets)
+    for joint, parent in enumerate(holden31.parents):
+        if parent >= 0:
+            end = positions[parent] + quat.rotate(rotations[parent], bones[joint])
+            np.testing.assert_allclose(end, positions[joint], atol=1e-9)
+    hand = positions[holden31.role("left_wrist")] - positions[0]
+    across = quat.rotate(rotations[0], axes.directions_out(np.array([1.0, 0, 0])))
+    assert hand @ across > 0.2 * np.linalg.norm(hand)
+    assert hand["XYZ".index(up)] > 60 * axes.scale
+    np.testing.assert_allclose(axes.points_in(positions), placed[0], atol=1e-9)
+
+
+def test_sides_in_unity_and_unreal() -> None:
+    """The left hand of a character that faces ahead is on the left in each engine's axes."""
+    left, up, ahead = np.eye(3)
+    unity, unreal, blender = Axes("left", "Y"), Axes("left", "Z"), Axes("right", "Z")
+    np.testing.assert_array_equal(
+        unity.directions_out(np.array([left, up, ahead])), [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    )
+    np.testing.assert_array_equal(
+        unreal.directions_out(np.array([left, up, ahead])), [[0, -1, 0], [0, 0, 1], [1, 0, 0]]
+    )
+    np.testing.assert_array_equal(
+        blender.directions_out(np.array([left, up, ahead])), [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    )
+    with pytest.raises(ValueError, match="handed is right or left"):
+        Axes("both")
