@@ -17,7 +17,7 @@ from runtime import SKELETON, load_skeleton, random_network
 
 from hobble.channels.injury.walks import severities
 from hobble.evaluation.crowd import Stretch, run
-from hobble.measures.rollouts.run import Inputs, roll_out
+from hobble.measures.rollouts.crowd import Inputs, roll_out
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor

@@ -34,6 +34,7 @@ def clip_rows(name: str, rows: int, fits: int, seed: int) -> ClipRows:
     rng = np.random.default_rng(seed)
     columns = layout.x_terrain.start
     x = rng.normal(0, 2, (rows, columns)).astype(np.float32)
+    x[:, layout.x_gait] *= 0.05  # all rows have about the same gait
     p = np.linspace(0, 3, rows, endpoint=False).astype(np.float32) % 1
     mix = np.random.default_rng(7).normal(0, 0.2, (2, 2, layout.y_size))
     turn = np.cos(2 * np.pi * p)[:, None]

@@ -22,6 +22,7 @@ from hobble.training import train as module
 from hobble.training.batches import Batch, HostRows
 from hobble.training.device_rows import DeviceRows
 from hobble.training.options import Training
+from hobble.training.other_poses import OtherPoses
 from hobble.training.processes import ALONE, Processes, joined
 from hobble.training.rollout import RollOut
 
@@ -42,16 +43,23 @@ def in_double() -> None:
     """Make networks, batches and carried errors use float64."""
     widen(HostRows)
     widen(DeviceRows)
-    to, begin = Trainable.to, RollOut.__init__
+    to = Trainable.to
     Trainable.to = lambda self, device, dtype=None: to(self, device, torch.float64)  # type: ignore[method-assign]
+
+    for kind in (RollOut, OtherPoses):
+        widen_state(kind)
+
+
+def widen_state(kind: Any) -> None:
+    begin = kind.__init__
 
     def double(self: Any, *arguments: Any) -> None:
         begin(self, *arguments)
         for name, value in vars(self).items():
-            if isinstance(value, torch.Tensor):
+            if isinstance(value, torch.Tensor) and value.is_floating_point():
                 setattr(self, name, value.double())
 
-    RollOut.__init__ = double  # type: ignore[method-assign]
+    kind.__init__ = double
 
 
 def main(jobs: list[dict[str, Any]]) -> None:

@@ -29,10 +29,12 @@ from hobble.workflow.training_processes import command, on_machines, train_toget
 from .conftest import SPLITS, Recipe, clip_rows
 
 IN_FLOAT64 = Path(__file__).with_name("in_float64.py")
-# Short batches, roll-outs, dropout, a rate that changes: all that goes by the place of a row in a batch.
+# Short batches, roll-outs, poses of other clips, dropout, a rate that changes: all that goes by the place of
+# a row in a batch.
 HARD = {
     "batch": 90,
     "rollout": 4,
+    "other_poses": 0.5,
     "dropout": 0.2,
     "l1": 0.1,
     "learning_rate": 1e-3,

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from hobble.database.reader import Database
-from hobble.measures.rollouts.run import Inputs, roll_out
+from hobble.measures.rollouts.crowd import Inputs, roll_out
 from hobble.models.pfnn.fused import FusedStep
 from hobble.models.pfnn.step import Step
 from hobble.models.pfnn.trainable import initialise

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from hobble.database.manifest import Manifest
 from hobble.database.precision import STORED
@@ -13,13 +13,28 @@ RELEASED_FLAT = 0.479  # share of them on flat ground, which have one fit and no
 INDEX_BYTES = 16  # bytes of a row besides its floats: count of fits, clip, frame, phase
 
 
-def sizes(manifest: Manifest) -> dict[str, Any]:
-    """The sizes as plain data.
+class Sizes(TypedDict):
+    """Sizes of a database.
 
     frames, pairs: of both splits; pairs are the samples of a pass. bytes: of all chunks. original_bytes: the
     same pairs as rows of X, Y and P in float32. share: bytes / original_bytes. bytes_a_frame: with its fits.
     released_bytes: size of all frames of the released clips in this layout and type.
     """
+
+    joints: int
+    dtype: str
+    frames: int
+    pairs: int
+    bytes: int
+    original_bytes: int
+    share: float
+    bytes_a_frame: float
+    released_frames: int
+    released_bytes: int
+
+
+def sizes(manifest: Manifest) -> Sizes:
+    """The sizes of a database."""
     frames = sum(manifest.rows(split) for split in manifest.chunks)
     layout, item = manifest.layout, STORED[manifest.dtype].itemsize
     a_frame = item * (x_columns(layout) + layout.y_size) + INDEX_BYTES

@@ -83,7 +83,8 @@ def stage_sizes(all_measured: Sequence[ConfigurationResults], published: Json) -
     for row in published["stages"]:
         m = found.get(row["configuration"])
         if row["stage"] == "database":
-            ours = (m.pipeline.get("database") or {}).get("bytes") if m else None
+            database = m.pipeline.get("database") if m else None
+            ours: float | None = database["bytes"] if database else None
             out.append(published_row("database", row, row["bytes"], ours, "bytes"))
         elif row["stage"] == "terrain":
             ours = m.of_stage("terrain", "bytes") if m else None

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import yaml
 
 from hobble.core.files import read_json
+from hobble.evaluation.pipeline_results import Pipeline
 from hobble.evaluation.tables import read_numbers
 from hobble.measures.given import Json
 
@@ -24,7 +26,7 @@ class ConfigurationResults:
     name: str
     resolved: Json = field(repr=False)
     measured: Mapping[str, Json] = field(repr=False)
-    pipeline: Json = field(repr=False)
+    pipeline: Pipeline = field(repr=False)
     history: Mapping[str, list[float | None]] = field(repr=False)
 
     def found(self, measure: str) -> Json:
@@ -36,8 +38,8 @@ class ConfigurationResults:
         """The name of its data set."""
         return self.resolved["configuration"]["dataset"]
 
-    def of_stage(self, stage: str, key: str) -> float | None:
-        """A value of one stage in pipeline.json, such as "seconds" or "bytes"; None without that stage."""
+    def of_stage(self, stage: str, key: Literal["seconds", "bytes"]) -> float | None:
+        """A value of one stage in pipeline.json; None without that stage."""
         return next((s[key] for s in self.pipeline["stages"] if s["stage"] == stage), None)
 
 

@@ -47,6 +47,17 @@ class Walks:
     acceleration: Array = field(repr=False)
     starts: np.ndarray
 
+    def of(self, figures: slice) -> Walks:
+        """The walks of some figures."""
+        return Walks(
+            self.local[:, figures],
+            self.contacts[:, figures],
+            self.phase[:, figures],
+            self.root[:, figures],
+            self.acceleration[:, figures],
+            self.starts,
+        )
+
     def measured(self, stretch: int, figure: int) -> slice:
         """The frames of a stretch to measure: whole cycles of the figure at the end of the stretch.
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Literal
 
 from hobble.report.charts import Chart, axis
 from hobble.report.formats import duration, number, size
@@ -15,6 +17,7 @@ def stage_charts(material: Material) -> list[Chart]:
     stages = list(material.pipeline.get("stages") or ())[::-1]
     names = [stage["stage"] for stage in stages]
     charts = []
+    key: Literal["seconds", "bytes"]
     for key, title, label, show, caption in (
         ("seconds", "Time of each stage", "seconds, sum over all jobs", duration,
          "The sum over all jobs of a stage. Jobs run in parallel, so the run itself takes less time. The "
@@ -44,7 +47,7 @@ def stage_charts(material: Material) -> list[Chart]:
     return charts
 
 
-def log_range(values: list[float]) -> list[float]:
+def log_range(values: Sequence[float]) -> list[float]:
     """Range of a logarithmic axis: whole decades around the positive values, with room for text."""
     some = [math.log10(value) for value in values if value > 0] or [0.0, 1.0]
     return [math.floor(min(some)), max(some) + 0.4 * (max(some) - math.floor(min(some)) + 1)]

@@ -9,6 +9,7 @@ from typing import Any
 
 from hobble.core.files import read_json
 from hobble.core.untrusted import read_yaml
+from hobble.evaluation.pipeline_results import Pipeline
 from hobble.evaluation.tables import read_numbers
 from hobble.measures.given import Json
 from hobble.models.load import load_network
@@ -32,7 +33,7 @@ class Material:
     splits: Mapping[str, str] = field(repr=False)
     resolved: Mapping[str, Any] = field(repr=False)
     measured: Mapping[str, Json] = field(repr=False)
-    pipeline: Mapping[str, Any] = field(repr=False)
+    pipeline: Pipeline = field(repr=False)
     history: Mapping[str, list[float | None]] = field(repr=False)
     network: Mapping[str, Any] = field(repr=False)
     motion: list[dict[str, Any]] = field(repr=False)

@@ -6,18 +6,18 @@ import csv
 from collections import defaultdict
 from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
-from typing import Any
 
 from hobble.core.errors import InputError
 from hobble.database.manifest import FILE as MANIFEST
 from hobble.database.manifest import Manifest
-from hobble.database.sizes import sizes
+from hobble.database.sizes import Sizes, sizes
+from hobble.evaluation.pipeline_results import OfStage, Pipeline, Total
 from hobble.evaluation.tables import read_numbers
 from hobble.report.provenance import machine, versions
 from hobble.workflow.kept import recorded_seconds
 
 
-def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]) -> dict[str, Any]:
+def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str]]]) -> Pipeline:
     """The content of `pipeline.json`.
 
     stages: in the order of the pipeline, stage -> {"benchmarks": tsv files or folders of them, "files":
@@ -31,12 +31,12 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
     database), `missing`, `machine`, `versions`. Raises InputError for a malformed benchmark or history.
     """
     missing: list[str] = []
-    entries = []
+    entries: list[OfStage] = []
     for stage, paths in stages.items():
         made = {Path(folder).name: recorded_seconds(Path(folder)) for folder in paths.get("made", ())}
         jobs = _jobs(paths.get("benchmarks", ()), missing, made, set(paths.get("batches", ())))
         trained = _trained(paths.get("files", ()))
-        sizes = _sizes(paths.get("files", ()), missing)
+        of_files = _sizes(paths.get("files", ()), missing)
         by_rule: dict[str, list[dict[str, float]]] = defaultdict(list)
         for rule, row in jobs:
             if rule == "training":
@@ -48,8 +48,8 @@ def summarise(configuration: str, stages: Mapping[str, Mapping[str, Iterable[str
             {
                 "stage": stage,
                 **_total([row for _, row in jobs]),
-                "files": len(sizes),
-                "bytes": sum(sizes),
+                "files": len(of_files),
+                "bytes": sum(of_files),
                 "rules": [{"rule": rule, **_total(rows)} for rule, rows in sorted(by_rule.items()) if rows],
             }
         )
@@ -143,7 +143,7 @@ def _trained(paths: Iterable[str]) -> float:
     return 0.0
 
 
-def _database(paths: Iterable[str]) -> dict[str, Any] | None:
+def _database(paths: Iterable[str]) -> Sizes | None:
     """The sizes of the database among the artefacts of its stage."""
     for path in map(Path, paths):
         if (path / MANIFEST).is_file():
@@ -151,7 +151,7 @@ def _database(paths: Iterable[str]) -> dict[str, Any] | None:
     return None
 
 
-def _total(rows: list[dict[str, float]]) -> dict[str, Any]:
+def _total(rows: list[dict[str, float]]) -> Total:
     seconds = [row.get("s", 0.0) for row in rows]
     memory = [row["max_rss"] for row in rows if "max_rss" in row]
     return {

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hobble.core.processors import processor
+from hobble.evaluation.pipeline_results import Machine
 
 WEB = Path(__file__).parent / "web"
 PACKAGES = ("hobble", "torch", "numpy", "scipy", "numba", "snakemake", "pydantic", "jinja2")
@@ -27,7 +28,7 @@ def versions() -> dict[str, str]:
     return found | json.loads((WEB / "package.json").read_text(encoding="utf-8"))["dependencies"]
 
 
-def machine() -> dict[str, Any]:
+def machine() -> Machine:
     """System, processor, cores and memory of this machine. No host or user name."""
     return {
         "system": f"{platform.system()} {platform.machine()}",

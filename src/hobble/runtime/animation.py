@@ -19,7 +19,7 @@ from hobble.models.network import Network
 from hobble.runtime.axes import Axes
 from hobble.runtime.channel_values import ChannelValues, UnknownName
 from hobble.runtime.character import Character, Snapshot, start
-from hobble.runtime.controller import Controller
+from hobble.runtime.controller import Controller, ControllerOptions
 from hobble.runtime.ground import as_ground
 from hobble.runtime.limits import JOG_FROM, SpeedLimiter
 from hobble.runtime.trajectory import STILL, facing_wish
@@ -91,7 +91,7 @@ class ProceduralAnimation:
         self.characters, self.axes = characters, axes or Axes()
         self._channel_values = ChannelValues(network, scales or {})
         self._limited = limits
-        self._of_controller: dict[str, Any] = {
+        self._of_controller: ControllerOptions = {
             "rates": {name: channel(name).rate for name in network.channels} | dict(rates or {}),
             "foot_locking": foot_locking,
             "steering": steering,

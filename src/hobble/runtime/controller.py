@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from time import perf_counter
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numba.extending import register_jitable
@@ -61,6 +61,15 @@ Ground = Callable[[Array, Array], Array]
 Joints = tuple[Any, Any, Any]
 # The caller's copy of the pose: root (C, 3), yaw (C,), position (C, J, 3), rotation (C, J, 4).
 Drawn = tuple[Any, Any, Any, Any]
+
+
+class ControllerOptions(TypedDict):
+    """The keywords of a `Controller`."""
+
+    rates: Mapping[str, float]
+    foot_locking: bool
+    steering: float
+    side: float
 
 
 class Controller:

@@ -31,6 +31,11 @@ class Recipe(Section):
     rollout: Positive = Field(
         1, description="frames over which the network's errors are carried in its input pose; 1: none"
     )
+    other_poses: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0,
+        description="share of the samples whose input pose is moved towards that of another clip, for "
+        "channels that say how a whole clip walks",
+    )
     keep: Literal["last", "best"] = Field(
         "last",
         description="weights to write: those at the end, as in the original, or those with the lowest "

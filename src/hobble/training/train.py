@@ -18,6 +18,7 @@ from hobble.training.device_rows import rows_for
 from hobble.training.held_out import SPLIT, HeldOut
 from hobble.training.history import duration
 from hobble.training.options import Training
+from hobble.training.other_poses import OtherPoses
 from hobble.training.processes import ALONE, Processes
 from hobble.training.rollout import RollOut
 from hobble.training.schedule import learning_rate_share
@@ -77,6 +78,7 @@ def _run(
     update = update_for(step, state.adam, batch_size, processes)
     rows = rows_for(database, device, processes, training.stretches)
     places = processes.places(batch_size)
+    others = OtherPoses(database, training.other_poses, len(places), device, places.start)
     roll_out = RollOut(database, training.rollout, len(places), device, places.start)
     pairs = database.pairs(TRAIN)
     for turn in range(state.sections, passes * sections):
@@ -87,8 +89,10 @@ def _run(
         where = f"pass {pass_index + 1} of {passes}, section {section + 1} of {sections}"
         watch = Watch(where, database.clips, processes)
         step.seed(section_seed(seed, turn))
+        others.begin()
         roll_out.begin()
         for batch in rows.batches(pass_index, section, sections, seed, batch_size):
+            others.mix(batch.x, batch.p)
             roll_out.add(batch.x)
             rate = learning_rate_share(training, (state.samples + watch.seen) / pairs)
             watch.add(update(batch.x, batch.y, batch.p, rate, batch.total), batch)

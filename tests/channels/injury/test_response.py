@@ -14,7 +14,7 @@ from scipy.stats import spearmanr
 
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
 from hobble.channels.injury.response.run import GAITS, injury_response, largest_accelerations
-from hobble.channels.injury.response.sweep import SEVERITIES, Sweep
+from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
 from hobble.channels.injury.walks import severities
 from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import SPEEDS, Stretch, run
@@ -163,7 +163,7 @@ def test_each_gait_is_held_against_its_own_healthy_one(hurtable) -> None:
 
 def test_falling_severity_is_measured_on_its_own(hurtable) -> None:
     """The rows of rising and falling severity differ."""
-    sweep = Sweep(hurtable, [KNEE], "walk", 0.2, RUNTIME)
+    (sweep,) = sweeps(hurtable, [KNEE], ["walk"], 0.2, RUNTIME)
     rows = sweep.rows(0)
     rng = np.random.default_rng(2)
     for row in rows:
@@ -266,9 +266,21 @@ def test_a_cycle_bridges_what_was_not_seen() -> None:
     assert cycle[1] == 0
 
 
+def test_gaits_side_by_side_give_the_rows_of_each_alone(hurtable) -> None:
+    links = [KNEE, "Neck1-Head"]
+    together = list(sweeps(hurtable, links, GAITS, 0.2, RUNTIME))
+    assert [sweep.gait for sweep in together] == list(GAITS)
+    for sweep in together:
+        (alone,) = sweeps(hurtable, links, [sweep.gait], 0.2, RUNTIME)
+        for figure in range(len(links)):
+            rows = sweep.rows(figure)
+            assert rows == alone.rows(figure)
+            assert sweep.response(figure, rows) == alone.response(figure, rows)
+
+
 def test_all_walk_healthy_before_the_onset(hurtable) -> None:
     links = [KNEE, "Neck1-Head", "LowerBack-Spine"]
-    sweep = Sweep(hurtable, links, "walk", 0.5, RUNTIME)
+    (sweep,) = sweeps(hurtable, links, ["walk"], 0.5, RUNTIME)
     for walks in (sweep.walks, sweep.at_once):
         same = walks.local[: walks.starts[2]]
         np.testing.assert_allclose(same, same[:, :1].repeat(3, axis=1), atol=1e-3)

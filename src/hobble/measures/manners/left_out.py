@@ -22,10 +22,10 @@ def left_out(
 ) -> LeftOut:
     """Recognise the windows of each person (or clip, with its mirror) after learning from all others.
 
-    The result is for the shrinkage that names most windows right; of equal ones, the largest. people:
-    number of persons, `people_of` those of each manner. right: share of windows named right, `by_manner` too.
-    presence_right: share in which it is right whether there is a manner at all. A manner that only one person
-    has cannot be named.
+    The result is for the shrinkage that names most windows right; of equal ones, the largest. people: number
+    of persons, `people_of` those of each manner. right: share of windows named right, `by_manner` too.
+    presence_right: share of windows in which it says correctly whether there is any manner. A manner that
+    only one person has cannot be named.
     """
     values = table(windows)
     manner, person = (

@@ -33,5 +33,5 @@ MEASURE = Measure(
     inputs=("weights", "clips", "facts", "skeleton"),
     options=Options,
     runtime=("mode",),
-    cost=Cost(memory_each=27, seconds_each=0.6, minutes=30),
+    cost=Cost(memory_mb=120, memory_each=27, seconds_each=0.6, minutes=30),
 )

@@ -9,17 +9,16 @@ come from the clip. All roll-outs of a stretch are computed together.
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hobble.character.rule import joint_place, moving, phase_change
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
-from hobble.evaluation.captured import rotate_by_yaw, unbroken
+from hobble.evaluation.captured import unbroken
 from hobble.measures.accuracy.run import (
     SPLITS,
     check_layout,
@@ -29,16 +28,17 @@ from hobble.measures.accuracy.run import (
 )
 from hobble.measures.given import Given, Outcome
 from hobble.measures.rollouts import Options
+from hobble.measures.rollouts.crowd import Crowd, RollOuts, inputs
 from hobble.measures.sample import Sample, drawn
 from hobble.models.load import load_network
-from hobble.models.network import Predictor
-from hobble.rows.clip_rows import ClipRows, load_clip_rows, pairs
+from hobble.models.network import Network, Predictor
+from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.facts import load_facts
-from hobble.rows.layout import GAITS, RowLayout
+from hobble.rows.layout import RowLayout
 
 LENGTHS = (1, 10, 60, 300)  # frames
 OVERLAP = 4  # roll-outs of one length that contain each frame
-BATCH = 1024  # roll-outs computed at once
+AT_ONCE = 6000  # frames of clips whose roll-outs go at once, which takes about 100 MB
 
 log = logging.getLogger("hobble")
 
@@ -89,90 +89,6 @@ class RollOutErrors:
         }
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """The inputs and targets of F consecutive frames of a clip, on one terrain fit.
-
-    x: (F, X) with the captured joints; y: (F, Y) targets; both in raw units, with heights minus `mean` (F,).
-    phase: (F,). turn: (F,) and velocity: (F, 2) of the root until the next frame. moving: (F,) the share of
-    the predicted movement that is applied, see `hobble.character.rule.moving`.
-    """
-
-    x: Array
-    y: Array
-    mean: Array
-    phase: Array
-    turn: Array
-    velocity: Array
-    moving: Array
-
-
-def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
-    """The inputs of the rows `chosen` (F,), on the first fit of each, in the network's `layout`."""
-    fit = rows.first_fit[chosen]
-    x, y, *_ = pairs(rows, layout, chosen, fit)
-    gait = x[:, layout.x_gait].reshape(len(x), len(GAITS), layout.samples)
-    stand = gait[:, GAITS.index("stand"), layout.samples // 2]
-    return Inputs(
-        x,
-        y,
-        rows.mean[fit].astype(np.float32),
-        rows.p[chosen].astype(float),
-        y[:, layout.y_turn][:, 0].astype(float),
-        y[:, layout.y_root_velocity].astype(float),
-        moving(stand),
-    )
-
-
-def roll_out(
-    predictor: Predictor, clip_inputs: Inputs, starts: np.ndarray, length: int
-) -> tuple[list[Array], Array]:
-    """The joints of roll-outs that begin at frames `starts` (n,), which rise, and their last phases (n,).
-
-    For each age from 1 to `length` there is an array (n', J, 3), in the root frame of frame start + age - 1,
-    with heights minus that frame's mean. It holds the first n' roll-outs, those still inside the stretch.
-    """
-    layout = predictor.network.layout
-    joints = (len(starts), layout.joints, 3)
-    x = clip_inputs.x[starts]
-    place = x[:, layout.x_joint_position].reshape(joints).astype(float)
-    phase = clip_inputs.phase[starts].copy()
-    speed = np.zeros(joints)
-    memory = np.zeros((len(starts), predictor.network.memory))
-    made = []
-    for age in range(length):
-        alive = int(np.searchsorted(starts, len(clip_inputs.x) - age))
-        at = starts[:alive] + age
-        if not alive:
-            break
-        row = clip_inputs.x[at].copy()
-        if age:
-            # The predicted pose, still in the last frame's root. Heights are made relative to this frame's
-            # mean.
-            lower = place[:alive].copy()
-            lower[..., 1] += (clip_inputs.mean[at - 1] - clip_inputs.mean[at])[:, None]
-            row[:, layout.x_joint_position] = lower.reshape(alive, -1)
-            row[:, layout.x_joint_velocity] = speed[:alive].reshape(alive, -1)
-        kept = {"memory": memory[:alive]} if predictor.network.memory else {}
-        y = predictor.predict(row, phase[:alive], **kept)
-        before = row[:, layout.x_joint_position].reshape(alive, -1, 3).astype(float)
-        speed[:alive] = y[:, layout.y_joint_velocity].reshape(alive, -1, 3)
-        guess = y[:, layout.y_joint_position].reshape(alive, -1, 3)
-        place[:alive] = joint_place(_carried(before, clip_inputs, at) + speed[:alive], guess)
-        made.append(place[:alive].copy())
-        moved = phase_change(clip_inputs.moving[at], y[:, layout.y_phase_change][:, 0])
-        phase[:alive] = np.mod(phase[:alive] + moved, 1.0)
-    return made, phase
-
-
-def _carried(place: Array, clip_inputs: Inputs, at: np.ndarray) -> Array:
-    """Joints (n, J, 3) moved from the root frame of frames at - 1 to that of frames `at`."""
-    out = place.copy()
-    level = place[..., ::2] - clip_inputs.velocity[at - 1][:, None]
-    out[..., ::2] = rotate_by_yaw(level, clip_inputs.turn[at - 1][:, None])
-    return out
-
-
 def clip_roll_outs(
     predictor: Predictor, rows: ClipRows, joints: Sequence[int], lengths: Sequence[int]
 ) -> dict[int, RollOutErrors]:
@@ -181,39 +97,58 @@ def clip_roll_outs(
     No roll-out begins at the first frame of a stretch, because the movement of the root to it is unknown.
     Each frame is in OVERLAP roll-outs of a length, or in one if they are one frame long.
     """
-    layout = predictor.network.layout
-    out = {length: RollOutErrors() for length in lengths}
+    return _errors(predictor, [_groups(rows, predictor.network.layout, lengths)], joints, lengths)[0]
+
+
+def _groups(rows: ClipRows, layout: RowLayout, lengths: Sequence[int]) -> list[RollOuts]:
+    """The roll-outs of a clip."""
+    out = []
     for chosen in unbroken(rows.frame):
-        clip_inputs = inputs(rows, chosen, layout)
+        asked = inputs(rows, chosen, layout)
         for length in lengths:
-            all_starts = np.arange(1, len(chosen), max(1, length // OVERLAP))
-            for first in range(0, len(all_starts), BATCH):
-                starts = all_starts[first : first + BATCH]
-                out[length] += _errors(predictor, clip_inputs, starts, length, joints)
+            starts = np.arange(1, len(chosen), max(1, length // OVERLAP))
+            if len(starts):
+                out.append(RollOuts(asked, starts, length))
     return out
 
 
 def _errors(
-    predictor: Predictor, clip_inputs: Inputs, starts: np.ndarray, length: int, joints: Sequence[int]
-) -> RollOutErrors:
+    predictor: Predictor, clips: Sequence[list[RollOuts]], joints: Sequence[int], lengths: Sequence[int]
+) -> list[dict[int, RollOutErrors]]:
+    """Length -> errors, for each clip's roll-outs. All go at once."""
+    out = [{length: RollOutErrors() for length in lengths} for _ in clips]
+    owners = [(found, group) for found, groups in zip(out, clips, strict=True) for group in groups]
+    if not owners:
+        return out
+    crowd = Crowd(predictor, [group for _, group in owners])
     layout = predictor.network.layout
-    truth = clip_inputs.y[:, layout.y_joint_position].reshape(len(clip_inputs.y), -1, 3)[:, joints]
-    made, phase = roll_out(predictor, clip_inputs, starts, length)
-    frames, moments = 0, Moments.nothing(2)
-    errors: Array = np.zeros((0, len(joints), 2))
-    for age, place in enumerate(made):
-        at = starts[: len(place)] + age
+    truth = crowd.y[:, layout.y_joint_position].reshape(len(crowd.y), -1, 3)[:, joints]
+    moments = [Moments.nothing(2) for _ in owners]
+    last: list[Array] = [np.zeros((0, len(joints), 2)) for _ in owners]
+    for age, (at, place, bounds) in enumerate(crowd.frames()):
         errors = relative_and_distance(truth[at].astype(float), place[:, joints])
-        weights = np.full(errors[..., 0].size, 1 / len(joints))
-        moments = moments + Moments.of(errors.reshape(-1, 2), weights)
-        frames += len(place)
+        for g in np.flatnonzero(np.diff(bounds)):
+            own = errors[bounds[g] : bounds[g + 1]]
+            weights = np.full(own[..., 0].size, 1 / len(joints))
+            moments[g] = moments[g] + Moments.of(own.reshape(-1, 2), weights)
+            if age == owners[g][1].length - 1:
+                last[g] = own
+    for (found, group), some, end, phase in zip(owners, moments, last, crowd.phases(), strict=True):
+        found[group.length] += _of_group(group, some, end, phase)
+    return out
+
+
+def _of_group(group: RollOuts, moments: Moments, end: Array, phase: Array) -> RollOutErrors:
+    """The errors of a group. end: (n', joints, 2) in the last frame; phase: (n,) after it."""
+    frames = int(np.minimum(group.length, len(group.asked.x) - group.starts).sum())
     # The phase is already that of the next frame, so that one has to be in the stretch too.
-    ended = int(np.searchsorted(starts, len(clip_inputs.x) - length))
+    ended = int(np.searchsorted(group.starts, len(group.asked.x) - group.length))
     if not ended:
-        return RollOutErrors(frames, len(starts), moments)
-    off = np.abs(np.mod(phase[:ended] - clip_inputs.phase[starts[:ended] + length] + 0.5, 1.0) - 0.5)
-    last = np.stack([errors[:ended, :, 1].mean(axis=1), off], axis=1)
-    return RollOutErrors(frames, len(starts), moments, Moments.of(last), ended)
+        return RollOutErrors(frames, len(group.starts), moments)
+    truth = group.asked.phase[group.starts[:ended] + group.length]
+    off = np.abs(np.mod(phase[:ended] - truth + 0.5, 1.0) - 0.5)
+    last = np.stack([end[:ended, :, 1].mean(axis=1), off], axis=1)
+    return RollOutErrors(frames, len(group.starts), moments, Moments.of(last), ended)
 
 
 def measure_roll_outs(
@@ -228,7 +163,7 @@ def measure_roll_outs(
 ) -> dict[str, Any]:
     """The content of rollouts.json: for each of `lengths`, the splits and the clips in name order.
 
-    clips: name -> file of rows, one in memory at a time. equivalents: names of the joints to measure. mode:
+    clips: name -> file of rows. equivalents: names of the joints to measure. mode:
     how the phase is looked up. sample: measure only these clips; the result then has their number in `sample`
     and 95 % confidence intervals in `interval`. Raises InputError if rows and network have different layouts.
     """
@@ -237,13 +172,13 @@ def measure_roll_outs(
     joints = joint_indices(network, equivalents)
     total = {length: dict.fromkeys(SPLITS, RollOutErrors()) for length in lengths}
     entries: dict[int, list[dict[str, Any]]] = {length: [] for length in lengths}
-    for name, weight in (sample.weights if sample else dict.fromkeys(sorted(clips), 1.0)).items():
-        rows = load_clip_rows(clips[name])
-        check_layout(clips[name], rows, network)
-        for length, found in clip_roll_outs(predictor, rows, joints, lengths).items():
-            total[length][splits[name]] += found.weighing(weight)
-            entries[length].append({"clip": name, "split": splits[name], **found.to_dict(network.phase)})
-        log.info("%s: %s", name, entries[lengths[-1]][-1])
+    chosen = sample.weights if sample else dict.fromkeys(sorted(clips), 1.0)
+    for some in _together(chosen, clips, network, lengths):
+        for name, errors in zip(some, _errors(predictor, list(some.values()), joints, lengths), strict=True):
+            for length, found in errors.items():
+                total[length][splits[name]] += found.weighing(chosen[name])
+                entries[length].append({"clip": name, "split": splits[name], **found.to_dict(network.phase)})
+            log.info("%s: %s", name, entries[lengths[-1]][-1])
     result: dict[str, Any] = {
         "configuration": configuration,
         "joints": len(joints),
@@ -258,6 +193,24 @@ def measure_roll_outs(
         ],
     }
     return result if sample is None else _with_sample(result, sample)
+
+
+def _together(
+    names: Iterable[str], clips: Mapping[str, str | Path], network: Network, lengths: Sequence[int]
+) -> Iterator[dict[str, list[RollOuts]]]:
+    """The roll-outs of clips by name, as many clips at a time as have AT_ONCE frames together."""
+    some: dict[str, list[RollOuts]] = {}
+    frames = 0
+    for name in names:
+        rows = load_clip_rows(clips[name])
+        check_layout(clips[name], rows, network)
+        some[name] = _groups(rows, network.layout, lengths)
+        frames += len(rows)
+        if frames >= AT_ONCE:
+            yield some
+            some, frames = {}, 0
+    if some:
+        yield some
 
 
 def _with_sample(result: dict[str, Any], sample: Sample) -> dict[str, Any]:

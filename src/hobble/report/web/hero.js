@@ -91,7 +91,7 @@ const createHero = (spec, asked) => {
       words.much.textContent = `${dial.value} of 10`;
       if (!one.on) find("hero-on").textContent = part;
       const same = "One neural network moves both figures at the same target speed, "; // the whole text is one sentence
-      if (dial.value) line.replaceChildren(`${same}and only for the solid one it gets the input ${before}`, words.part, `${after}, `, words.much, ".");
+      if (dial.value) line.replaceChildren(`${same}and the input for the solid one says ${before}`, words.part, `${after}, `, words.much, ".");
       else line.replaceChildren(`${same}and at 0 they walk alike.`);
       chips.forEach((chip) => chip.setAttribute("aria-pressed", String(chip.textContent === part)));
     };

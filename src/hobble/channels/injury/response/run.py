@@ -9,7 +9,7 @@ import numpy as np
 
 from hobble.channels.injury.response import Options
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
-from hobble.channels.injury.response.sweep import SEVERITIES, Sweep
+from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
 from hobble.channels.injury.walks import hurt_links
 from hobble.channels.injury.walks import links as links_of
 from hobble.evaluation.captured import Captured, captured_clips
@@ -59,8 +59,8 @@ def injury_response(
     rows: list[dict[str, Any]] = []
     falling: list[dict[str, Any]] = []
     responses = []
-    for gait in GAITS:
-        sweep = Sweep(network, links, gait, seconds, runtime)
+    for sweep in sweeps(network, links, GAITS, seconds, runtime):
+        gait = sweep.gait
         for figure, link in enumerate(links):
             found = sweep.rows(figure)
             rows += found[: len(SEVERITIES)]

@@ -7,12 +7,13 @@ walk follows.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from hobble.channels.injury.walks import severities
+from hobble.core.skeleton import Skeleton
 from hobble.evaluation.crowd import FPS, Stretch, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle, period, settling
@@ -21,6 +22,7 @@ from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 SEVERITIES = np.arange(11.0)
+STEPS = [*SEVERITIES, *SEVERITIES[-2::-1]]
 WALK_IN = 0.75  # stretches until a figure has its speed
 HURT = 2  # stretches for which a figure is hurt at once, and then healed
 # Columns of a row that are not measures of the walk.
@@ -28,24 +30,18 @@ NAMES = ("gait", "link", "direction", "severity")
 
 
 class Sweep:
-    """The walks of one gait, a figure for each of `links`; `seconds` at each severity."""
+    """The walks of one gait, a figure for each of `links`.
+
+    steps: the severities. walks: the figures' way through them, after a stretch in which they begin to walk.
+    at_once: the figures hurt at once and healed at once. See `sweeps`.
+    """
 
     def __init__(
-        self, network: Network, links: Sequence[str], gait: str, seconds: float, runtime: Runtime
+        self, skeleton: Skeleton, links: Sequence[str], gait: str, walks: Walks, at_once: Walks
     ) -> None:
-        assert network.skeleton is not None
-        self.skeleton, self.links, self.gait = network.skeleton, list(links), gait
-        names = [gait] * len(self.links)
-
-        def stretch(share: float, severity: float) -> Stretch:
-            hurt = severities(network, [{link: severity} for link in self.links])
-            return Stretch(max(4, round(share * seconds * FPS)), names, hurt)
-
-        self.steps = [*SEVERITIES, *SEVERITIES[-2::-1]]
-        self.walks = run(network, [stretch(WALK_IN, 0), *(stretch(1, s) for s in self.steps)], runtime)
-        self.at_once = run(
-            network, [stretch(WALK_IN, 0), stretch(1, 0), stretch(HURT, 10), stretch(HURT, 0)], runtime
-        )
+        self.skeleton, self.links, self.gait = skeleton, list(links), gait
+        self.steps = STEPS
+        self.walks, self.at_once = walks, at_once
 
     def rows(self, figure: int) -> list[dict[str, Any]]:
         """One row for each step.
@@ -118,3 +114,21 @@ class Sweep:
         hurt = settling(distance[a:b], normal, period(phase[late]))
         healed = settling(distance[c:d], float(np.mean(distance[late])), period(phase[(c + d) // 2 : d]))
         return hurt, healed
+
+
+def sweeps(
+    network: Network, links: Sequence[str], gaits: Sequence[str], seconds: float, runtime: Runtime
+) -> Iterator[Sweep]:
+    """The sweep of each gait, `seconds` at each severity. The figures of all gaits go in one crowd."""
+    assert network.skeleton is not None
+    names = [gait for gait in gaits for _ in links]
+
+    def stretch(share: float, severity: float) -> Stretch:
+        hurt = severities(network, [{link: severity} for link in links] * len(gaits))
+        return Stretch(max(4, round(share * seconds * FPS)), names, hurt)
+
+    walks = run(network, [stretch(WALK_IN, 0), *(stretch(1, s) for s in STEPS)], runtime)
+    at_once = run(network, [stretch(WALK_IN, 0), stretch(1, 0), stretch(HURT, 10), stretch(HURT, 0)], runtime)
+    for number, gait in enumerate(gaits):
+        own = slice(number * len(links), (number + 1) * len(links))
+        yield Sweep(network.skeleton, links, gait, walks.of(own), at_once.of(own))

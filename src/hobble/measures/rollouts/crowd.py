@@ -1,0 +1,165 @@
+"""Roll-outs: a network continues from its own poses, with the path and the other inputs of a clip.
+
+Roll-outs of many stretches and lengths go at once, because a network predicts many poses faster than one. The
+prediction of each has the same bits in any crowd.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hobble.character.rule import joint_place, moving, phase_change
+from hobble.core.quat import Array
+from hobble.evaluation.captured import rotate_by_yaw
+from hobble.models.network import Predictor
+from hobble.rows.clip_rows import ClipRows, pairs
+from hobble.rows.layout import GAITS, RowLayout
+
+BATCH = 256  # poses predicted at once; with more, their inputs do not fit the cache
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The inputs and targets of F consecutive frames of a clip, on one terrain fit.
+
+    x: (F, X) with the captured joints; y: (F, Y) targets; both in raw units, with heights minus `mean` (F,).
+    phase: (F,). turn: (F,) and velocity: (F, 2) of the root until the next frame. moving: (F,) the share of
+    the predicted movement that is applied, see `hobble.character.rule.moving`.
+    """
+
+    x: Array
+    y: Array
+    mean: Array
+    phase: Array
+    turn: Array
+    velocity: Array
+    moving: Array
+
+
+def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
+    """The inputs of the rows `chosen` (F,), on the first fit of each, in the network's `layout`."""
+    fit = rows.first_fit[chosen]
+    x, y, *_ = pairs(rows, layout, chosen, fit)
+    gait = x[:, layout.x_gait].reshape(len(x), len(GAITS), layout.samples)
+    stand = gait[:, GAITS.index("stand"), layout.samples // 2]
+    return Inputs(
+        x,
+        y,
+        rows.mean[fit].astype(np.float32),
+        rows.p[chosen].astype(float),
+        y[:, layout.y_turn][:, 0].astype(float),
+        y[:, layout.y_root_velocity].astype(float),
+        moving(stand),
+    )
+
+
+@dataclass(frozen=True)
+class RollOuts:
+    """Roll-outs over `length` frames of a stretch, from its frames `starts` (n,), which rise."""
+
+    asked: Inputs
+    starts: np.ndarray
+    length: int
+
+
+class Crowd:
+    """All roll-outs of some groups, frame by frame. Iterate over `frames` once, then read `phases`."""
+
+    def __init__(self, predictor: Predictor, groups: Sequence[RollOuts]) -> None:
+        self.predictor, self.groups = predictor, groups
+        stretches = list({id(group.asked): group.asked for group in groups}.values())
+        begins = np.cumsum([0, *(len(asked.x) for asked in stretches)])
+        begin = {id(asked): int(at) for asked, at in zip(stretches, begins[:-1], strict=True)}
+        self.x, self.y, self.mean, phase, self.turn, self.velocity, self.moving = (
+            np.concatenate([getattr(asked, name) for asked in stretches])
+            for name in ("x", "y", "mean", "phase", "turn", "velocity", "moving")
+        )
+        self.first = np.concatenate([begin[id(group.asked)] + group.starts for group in groups])
+        self.stop = np.concatenate(
+            [
+                begin[id(group.asked)] + np.minimum(group.starts + group.length, len(group.asked.x))
+                for group in groups
+            ]
+        )
+        self.bounds = np.cumsum([0, *(len(group.starts) for group in groups)])
+        self.phase = phase[self.first]
+        layout = predictor.network.layout
+        joints = (len(self.first), layout.joints, 3)
+        self.place = self.x[self.first][:, layout.x_joint_position].reshape(joints).astype(float)
+        self.speed = np.zeros(joints)
+        self.memory = np.zeros((len(self.first), predictor.network.memory))
+
+    def frames(self) -> Iterator[tuple[np.ndarray, Array, np.ndarray]]:
+        """For each age, of the roll-outs not yet over: frames (n,), joints (n, J, 3), bounds (groups + 1,).
+
+        frames: indices into `y`. Joints are in the root frame of that frame, with heights minus its mean.
+        Those of group g lie between bounds[g] and bounds[g + 1]. They are its first roll-outs, because later
+        ones end earlier.
+        """
+        for age in range(max((group.length for group in self.groups), default=0)):
+            alive = np.flatnonzero(self.first + age < self.stop)
+            if not len(alive):
+                return
+            at = self.first[alive] + age
+            yield at, self._advanced(alive, at, age > 0), np.searchsorted(alive, self.bounds)
+
+    def phases(self) -> list[Array]:
+        """(n,) phase of each roll-out after its last frame, for each group."""
+        return np.split(self.phase, self.bounds[1:-1])
+
+    def _advanced(self, alive: np.ndarray, at: np.ndarray, own: bool) -> Array:
+        """The joints of the roll-outs `alive` (n,) at frames `at` (n,), which become their state.
+
+        own: whether the input has the roll-out's own pose, not that of the clip.
+        """
+        layout = self.predictor.network.layout
+        row = self.x[at]
+        if own:
+            # The predicted pose, still in the last frame's root. Heights are made relative to this frame's
+            # mean.
+            lower = self.place[alive]
+            lower[..., 1] += (self.mean[at - 1] - self.mean[at])[:, None]
+            row[:, layout.x_joint_position] = lower.reshape(len(at), -1)
+            row[:, layout.x_joint_velocity] = self.speed[alive].reshape(len(at), -1)
+        y = self._predicted(row, alive)
+        before = row[:, layout.x_joint_position].reshape(len(at), -1, 3).astype(float)
+        speed = y[:, layout.y_joint_velocity].reshape(len(at), -1, 3).astype(float)
+        guess = y[:, layout.y_joint_position].reshape(len(at), -1, 3)
+        place: Array = joint_place(self._carried(before, at) + speed, guess)
+        self.place[alive], self.speed[alive] = place, speed
+        moved = phase_change(self.moving[at], y[:, layout.y_phase_change][:, 0])
+        self.phase[alive] = np.mod(self.phase[alive] + moved, 1.0)
+        return place
+
+    def _predicted(self, row: Array, alive: np.ndarray) -> Array:
+        """Y (n, Y) of X (n, X), a batch at a time. Brings what the network remembers up to date."""
+        y = np.empty((len(row), self.predictor.network.layout.y_size), np.float32)
+        for first in range(0, len(row), BATCH):
+            part = slice(first, first + BATCH)
+            kept = {"memory": self.memory[alive[part]]} if self.predictor.network.memory else {}
+            y[part] = self.predictor.predict(row[part], self.phase[alive[part]], **kept)
+            if kept:
+                self.memory[alive[part]] = kept["memory"]
+        return y
+
+    def _carried(self, place: Array, at: np.ndarray) -> Array:
+        """Joints (n, J, 3) moved from the root frame of frames at - 1 to that of frames `at`."""
+        out = place.copy()
+        level = place[..., ::2] - self.velocity[at - 1][:, None]
+        out[..., ::2] = rotate_by_yaw(level, self.turn[at - 1][:, None])
+        return out
+
+
+def roll_out(
+    predictor: Predictor, asked: Inputs, starts: np.ndarray, length: int
+) -> tuple[list[Array], Array]:
+    """The joints of roll-outs that begin at frames `starts` (n,), which rise, and their last phases (n,).
+
+    For each age from 1 to `length` there is an array (n', J, 3), in the root frame of frame start + age - 1,
+    with heights minus that frame's mean. It holds the first n' roll-outs, those still inside the stretch.
+    """
+    crowd = Crowd(predictor, [RollOuts(asked, starts, length)])
+    return [place for _, place, _ in crowd.frames()], crowd.phase

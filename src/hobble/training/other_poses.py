@@ -1,0 +1,89 @@
+"""Input poses moved towards those of clips with other channel values, so that a network uses its channels."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+from hobble.database.reader import Database
+from hobble.rows.layout import GAITS
+
+KEPT = 32  # rows that each place in a batch remembers
+NEAR = 1 / 16  # of a cycle: largest difference in phase between two poses that are mixed
+SAME_GAIT = 0.5  # poses are mixed if no share of a gait differs by this much
+OTHER_VALUE = 1e-3  # standardised: a larger difference is another value of a channel
+# Multiples of these irrational numbers, less their whole part, are spread evenly over 0..1.
+STEP_OF_PLACE, STEP_OF_BATCH = (math.sqrt(5) - 1) / 2, math.sqrt(2) - 1
+
+
+class OtherPoses:
+    """Moves the pose in some rows of X towards the pose of a row with other channel values. Y is unchanged.
+
+    If channels say how a whole clip walks, its poses show that, too. Then a network can continue the walk
+    that it sees and needs no channels, and a running character keeps whatever walk its pose has drifted to:
+    of 24 people with three diagnoses or none, it walked like one of another group than was asked. With these
+    rows, only the channels tell which walk Y belongs to.
+
+    Each place in a batch remembers its last rows. Of those with the same gait and other channel values, the
+    one with the nearest phase is taken. So several processes get what one gets. The pose moves by a part of
+    the way between 0 and 1, spread evenly over places and batches.
+
+    share: share of the rows that are moved; 0 changes nothing. batch: largest number of this process's rows
+    in a batch. first: the place of its first row in the whole batch.
+    """
+
+    def __init__(
+        self, database: Database, share: float, batch: int, device: torch.device, first: int = 0
+    ) -> None:
+        layout, middle = database.layout, database.layout.samples // 2
+        self.share = share if batch and layout.channels else 0.0
+        blocks = (layout.x_joint_position, layout.x_joint_velocity)
+        self.pose = torch.cat([torch.arange(b.start, b.stop) for b in blocks]).to(device)
+        start, each = layout.x_gait.start, layout.samples
+        self.gait = torch.tensor([start + k * each + middle for k in range(len(GAITS))], device=device)
+        std = torch.from_numpy(database.statistics.x_std).to(device, torch.float32)
+        self.gait_std = std[self.gait]
+        values = [torch.arange(0)] + [
+            torch.arange(layout.x_size)[layout.x_channel(name)] for name, _ in layout.channels
+        ]
+        self.values = torch.cat(values).to(device)
+        self.places = torch.arange(batch, device=device)
+        self.spread = torch.remainder((first + self.places.double()) * STEP_OF_PLACE, 1.0)
+        rows = batch if self.share else 0
+        self.poses, self.gaits, self.channels = (
+            torch.zeros(rows, KEPT, len(columns), device=device)
+            for columns in (self.pose, self.gait, self.values)
+        )
+        self.phases = torch.full((rows, KEPT), torch.nan, device=device)  # nan: no row yet
+        self.batches = 0
+
+    def begin(self) -> None:
+        """Forget all rows, so that a section does not depend on the previous one."""
+        self.phases.fill_(torch.nan)
+        self.batches = 0
+
+    def mix(self, x: Tensor, p: Tensor) -> None:
+        """Move the poses of standardised inputs x (B, X) in place. p: (B,) phases, 0 to 1."""
+        if not self.share or not len(x):
+            return
+        rows, slot = len(x), self.batches % KEPT
+        own, gait, values = x[:, self.pose], x[:, self.gait] * self.gait_std, x[:, self.values]
+        alike = (gait[:, None] - self.gaits[:rows]).abs().amax(dim=2) < SAME_GAIT
+        differ = (values[:, None] - self.channels[:rows]).abs().amax(dim=2) > OTHER_VALUE
+        away = (torch.remainder(p[:, None] - self.phases[:rows] + 0.5, 1.0) - 0.5).abs()
+        away = torch.where(alike & differ & (away < NEAR), away, torch.inf)
+        nearest, chosen = away.min(dim=1)
+        part = torch.where(nearest < NEAR, self._parts(rows).to(x.dtype), 0.0)
+        other = self.poses[self.places[:rows], chosen]
+        x[:, self.pose] = torch.lerp(own, other, part[:, None])
+        kept = (self.poses, self.gaits, self.channels, self.phases)
+        for table, row in zip(kept, (own, gait, values, p), strict=True):
+            table[:rows, slot] = row
+        self.batches += 1
+
+    def _parts(self, rows: int) -> Tensor:
+        """(rows,) how far each pose moves: 0, or in `share` of the rows evenly spread up to 1."""
+        even = torch.remainder(self.spread[:rows] + self.batches * STEP_OF_BATCH, 1.0)
+        return (1 - (1 - even) / self.share).clamp(min=0.0)
