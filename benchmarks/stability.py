@@ -37,12 +37,14 @@ def main() -> int:
         print(error, file=sys.stderr)
         return 2
     found = stability(network, options.minutes, options.seed, mode=options.mode, steering=options.steering)
-    print(f"{'':<8}{'frames':>8}{'hips, cm':>16}{'turn, deg':>11}{'slide, cm':>11}{'steps':>7}")
+    print(f"{'':<8}{'frames':>8}{'hips, cm':>16}{'turn, deg':>11}{'slide, cm':>11}{'steps':>7}", end="")
+    print(f"{'foot down':>11}{'skating, cm':>13}")
     for name, row in {**found["kinds"], "all": found}.items():
         hips = f"{row['hips_lowest_cm']:.1f} to {row['hips_highest_cm']:.1f}"
         slide = "-" if row["foot_slide_cm"] is None else f"{row['foot_slide_cm']:.2f}"
         print(
-            f"{name:<8}{row['frames']:>8}{hips:>16}{row['largest_turn_degrees']:>11.1f}{slide:>11}{row['steps']:>7}"
+            f"{name:<8}{row['frames']:>8}{hips:>16}{row['largest_turn_degrees']:>11.1f}{slide:>11}"
+            f"{row['steps']:>7}{row['foot_down_share']:>11.3f}{row['skating_cm']:>13.3f}"
         )
     print(f"{'stable' if found['stable'] else 'NOT STABLE'}: {LIMITS}")
     return 0 if found["stable"] else 1

@@ -1,17 +1,18 @@
-"""Estimate jobs, bytes and hours of each stage for more motion, from the rates of a finished run.
+"""Estimate jobs, bytes and hours of each stage for more motion, from the rates of one or two finished runs.
 
-    benchmarks/thousand_hours.py [FOLDER] [--configuration holden] [--hours 1000] [--clips 2500] [--nodes 79]
-        [--parts 1] [--training-nodes 1] [--batch 0] [--passes 0]
+    benchmarks/thousand_hours.py [FOLDER] [--configuration holden] [--against NAME] [--hours 1000]
+        [--clips 2500] [--nodes 80] [--shards 1] [--training-nodes 1] [--batch 0] [--passes 0]
 
-FOLDER is the folder in which Snakemake ran. Seconds and bytes of jobs over clips are scaled with the amount
-of motion that the configuration uses; all else is unchanged. Each batch pays for the start of its jobs, so
-longer clips take fewer hours than estimated. Mirrored clips count as motion: with them, the hours double.
-Under `synthetic` the bytes are those of the BVH files, which are the user's own.
+FOLDER is the folder in which Snakemake ran. From one run, seconds and bytes of jobs over clips are scaled
+with the amount of motion that the configuration uses; all else is unchanged. --against: a run with less
+motion. It prints the growth of each stage from one to the other, as ratios. Then a rule's seconds are a fixed
+part and a part that grows with the motion, from both runs.
 
---parts: jobs that merge the database at the same time (`database.parts`). --training-nodes: machines that
-train together; each step then also takes a ring all-reduce of the gradient at 10 Gb/s. --batch, --passes:
-samples of a step and passes, if they differ from the run. Accuracy and roll-outs measure at most
-`evaluation.sample_frames`.
+Mirrored clips count as motion: with them, the hours double. Under `synthetic` the bytes are those of the BVH
+files, which are the user's own. --shards: those of the database (`database.shards`). --training-nodes:
+machines that train together, whose network of 10 Gb/s adds to each step what a ring all-reduce of the
+gradient takes; --batch: samples of a step then, and --passes, where not those of the run. Accuracy and
+roll-outs measure at most `evaluation.sample_frames`.
 """
 
 from __future__ import annotations
@@ -21,127 +22,166 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import yaml
 
+from hobble.measures.registry import MEASURES
 from hobble.measures.sampling import Sampling
 from hobble.workflow.batches import batch_count
 from hobble.workflow.costs import BATCH_RULES
 
 ROOT = Path(__file__).resolve().parents[1]
-# Rules with one job whose work grows with the motion. The work of other single jobs stays the same.
-GROWING = {"database_merge", "training", "recognition", "report"}
-SAMPLED = {"accuracy", "rollouts"}  # whose work grows up to so many frames
+OF_BATCHES = {rule for rules in BATCH_RULES.values() for rule in rules}
+# Rules whose work grows with the motion, as far as one run can tell.
+GROWING = {*OF_BATCHES, "database_shard", "database_merge", "training", "recognition", "manners"}
+SAMPLED = {one.name for one in MEASURES if "sample_frames" in one.options.model_fields}
 FPS = 60
 LINK, DELAY = 1.25e9, 30e-6  # bytes and seconds of a message between machines
 CONSTANT_BYTES = {"training", "runtime", "evaluation"}
 
 
-def motion_seconds(folder: Path, configuration: str) -> float:
-    """Seconds of motion of the configuration's data set that were made."""
-    resolved = yaml.safe_load((folder / f"results/{configuration}/configuration.yaml").read_text())
-    reports = (folder / "results/datasets" / resolved["dataset"]["name"] / "motion").glob("*.json")
-    accuracy = json.loads((folder / f"results/{configuration}/evaluation/accuracy.json").read_text())
-    used = {clip["clip"] for clip in accuracy["clips"]}
-    return sum(json.loads(p.read_text())["seconds"] for p in reports if p.stem in used)
+class Run:
+    """A finished run of a configuration. motion: seconds of motion in its database."""
+
+    def __init__(self, folder: Path, name: str) -> None:
+        self.home = folder / "results" / name
+        self.resolved = yaml.safe_load((self.home / "configuration.yaml").read_text())
+        pipeline = json.loads((self.home / "pipeline.json").read_text())
+        self.stages = {stage["stage"]: stage for stage in pipeline["stages"]}
+        dataset = folder / "results/datasets" / self.resolved["dataset"]["name"]
+        channels = "+".join(self.resolved["configuration"]["channels"]) or "plain"
+        manifest = json.loads((dataset / "database" / channels / "manifest.json").read_text())
+        reports = [dataset / "motion" / f"{clip['clip']}.json" for clip in manifest["clips"]]
+        self.motion = sum(json.loads(report.read_text())["seconds"] for report in reports)
+
+    def seconds(self, stage: str) -> dict[str, float]:
+        """Rule -> seconds of all its jobs."""
+        return {rule["rule"]: rule["seconds"] for rule in self.stages[stage]["rules"]}
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Seconds of a rule: a fixed part, and one for each second of motion."""
+
+    fixed: float
+    each: float
+
+    @classmethod
+    def of(cls, rule: str, stage: str, run: Run, less: Run | None) -> Rate:
+        """From a run, and from one with less motion if there is one."""
+        seconds = run.seconds(stage)[rule]
+        if less is None or rule not in less.seconds(stage):
+            grows = rule in GROWING | SAMPLED
+            return cls(0.0, seconds / run.motion) if grows else cls(seconds, 0.0)
+        before = less.seconds(stage)[rule]
+        each = max(0.0, (seconds - before) / (run.motion - less.motion))
+        return cls(max(0.0, seconds - each * run.motion), each)
+
+    def hours(self, motion: float) -> float:
+        """Hours for so many seconds of motion."""
+        return (self.fixed + self.each * motion) / 3600
 
 
 @dataclass(frozen=True)
 class Plan:
-    """factor: how much more motion than in the run. clips, nodes, parts: as requested. sampled: how much more
-    motion is measured. training: hours on the clock."""
+    """motion: seconds asked for. clips, nodes, shards: as asked. training: hours on the clock."""
 
-    factor: float
+    motion: float
     clips: int
     nodes: int
-    parts: int
-    sampled: float
+    shards: int
     training: float
 
-    def growth(self, rule: str, per_clip: set[str]) -> float:
-        """How much more work a rule has."""
-        if rule in SAMPLED:
-            return self.sampled
-        return self.factor if rule in per_clip or rule in GROWING else 1.0
+    def line(self, stage: str, run: Run, less: Run | None) -> dict[str, float]:
+        """One line of the table: jobs, hours of processors, hours on the clock, longest job, bytes.
+
+        The jobs of a rule go side by side over the nodes, two on each, and the rules one after another.
+        """
+        line = {"jobs": 0.0, "work": 0.0, "clock": 0.0, "longest": 0.0, "bytes": run.stages[stage]["bytes"]}
+        for rule in run.seconds(stage):
+            # Without shards, the merge does their work.
+            sharded = rule == "database_shard" or (
+                rule == "database_merge" and "database_shard" not in run.seconds(stage)
+            )
+            jobs = batch_count(self.clips) if rule in OF_BATCHES else self.shards if sharded else 1
+            most = Sampling().sample_frames / FPS if rule in SAMPLED else self.motion
+            hours = Rate.of(rule, stage, run, less).hours(min(most, self.motion))
+            # The largest shard has about twice the average.
+            one = self.training if rule == "training" else hours / jobs * (2 if sharded and jobs > 1 else 1)
+            line["jobs"] += jobs
+            line["work"] += hours
+            line["clock"] += one * math.ceil(jobs / (2 * self.nodes))
+            line["longest"] = max(line["longest"], one)
+        if stage not in CONSTANT_BYTES:
+            line["bytes"] *= self.motion / run.motion
+        return line
 
 
-def scaled(stage: dict[str, Any], plan: Plan) -> dict[str, float]:
-    """One line of the table: jobs, hours of processors, hours on the clock, longest job, bytes.
-
-    The batches of a stage run at the same time on the nodes; its other jobs run one after another.
-    """
-    per_clip = {rule for rules in BATCH_RULES.values() for rule in rules}
-    batches = batch_count(plan.clips)
-    line = {"jobs": 0, "work": 0.0, "clock": 0.0, "longest": 0.0, "bytes": stage["bytes"]}
-    for rule in stage["rules"]:
-        name = rule["rule"]
-        hours = rule["seconds"] / 3600 * plan.growth(name, per_clip)
-        line["work"] += hours
-        if name in per_clip:
-            line["jobs"] += batches
-            line["clock"] += hours / min(2 * plan.nodes, batches)
-            line["longest"] = max(line["longest"], hours / batches)
-            continue
-        # A merge in parts is two jobs for each part, one after the other, and one that joins them.
-        jobs = 2 * plan.parts + 1 if name == "database_merge" and plan.parts > 1 else 1
-        alone = plan.training if name == "training" else hours / plan.parts if jobs > 1 else hours
-        line["jobs"] += jobs
-        line["clock"] += alone * (math.ceil(plan.parts / plan.nodes) if jobs > 1 else 1)
-        line["longest"] = max(line["longest"], alone)
-    if stage["stage"] not in CONSTANT_BYTES:
-        line["bytes"] *= plan.factor
-    return line
-
-
-def training_hours(
-    folder: Path, stages: list[dict[str, Any]], factor: float, asked: argparse.Namespace
-) -> float:
-    """Hours on the clock with this many nodes, each as fast as the machine of the run."""
-    resolved = yaml.safe_load((folder / f"results/{asked.configuration}/configuration.yaml").read_text())
-    recipe = resolved["configuration"]["training"]
-    history = folder / f"results/{asked.configuration}/network/history.csv"
-    samples = int(history.read_text().splitlines()[-1].split(",")[2]) * factor
-    rules = [rule for stage in stages for rule in stage["rules"] if rule["rule"] == "training"]
-    seconds = sum(rule["seconds"] for rule in rules) * factor
+def training_hours(run: Run, less: Run | None, asked: argparse.Namespace) -> float:
+    """Hours on the clock of so many nodes, each as fast as the one of the run."""
+    recipe = run.resolved["configuration"]["training"]
+    motion = 3600 * asked.hours
+    history = (run.home / "network/history.csv").read_text()
+    samples = int(history.splitlines()[-1].split(",")[2]) * motion / run.motion
     share = asked.passes / recipe["passes"] if asked.passes else 1.0
     nodes, steps = asked.training_nodes, samples * share / (asked.batch or recipe["batch"])
-    with np.load(folder / f"results/{asked.configuration}/network/checkpoint.npz") as checkpoint:
+    with np.load(run.home / "network/checkpoint.npz") as checkpoint:
         sent = 4 * checkpoint["weights"].size
     ring = 2 * (nodes - 1) * (sent / nodes / LINK + DELAY)
-    return (seconds * share / nodes + steps * ring) / 3600
+    return Rate.of("training", "training", run, less).hours(motion) * share / nodes + steps * ring / 3600
 
 
-def main() -> None:
+def show_growth(run: Run, less: Run) -> None:
+    """Print seconds, memory and bytes of each stage of both runs, and their ratios."""
+    times, hours = run.motion / less.motion, run.motion / 3600
+    print(f"{hours:.1f} hours of motion, {times:.2f} times as much as in the other run\n")
+    print("| stage | s | s | ratio | peak MB of a job | peak MB | ratio | GB | GB | ratio |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for name, stage in run.stages.items():
+        cells = []
+        for key, unit, form in (("seconds", 1, ",.0f"), ("max_rss_mb", 1, ",.0f"), ("bytes", 1e9, ",.2f")):
+            before, now = (one[key] / unit for one in (less.stages[name], stage))
+            cells += [f"{before:{form}}", f"{now:{form}}", f"{now / before:.2f}" if before else ""]
+        print(f"| {name} | {' | '.join(cells)} |")
+    print()
+
+
+def arguments() -> argparse.Namespace:
+    """The arguments of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("folder", nargs="?", default=".", type=Path)
     parser.add_argument("--configuration", default="holden")
+    parser.add_argument("--against", help="configuration of a run with less motion")
     parser.add_argument("--hours", type=float, default=1000.0, help="of motion")
     parser.add_argument("--clips", type=int, default=2500)
-    parser.add_argument("--nodes", type=int, default=79, help="that run two jobs at once each")
-    parser.add_argument("--parts", type=int, default=1, help="jobs that merge the database side by side")
+    parser.add_argument("--nodes", type=int, default=80, help="that run two jobs at once each")
+    parser.add_argument("--shards", type=int, default=1, help="of the database")
     parser.add_argument("--training-nodes", type=int, default=1)
     parser.add_argument("--batch", type=int, default=0, help="samples of a step; 0: that of the run")
     parser.add_argument("--passes", type=int, default=0, help="0: those of the run")
-    options = parser.parse_args()
-    pipeline = json.loads((options.folder / f"results/{options.configuration}/pipeline.json").read_text())
-    seconds = motion_seconds(options.folder, options.configuration)
-    factor = options.hours * 3600 / seconds
-    print(f"from {seconds:.0f} s of motion of `{options.configuration}` to {options.hours:g} hours\n")
+    return parser.parse_args()
+
+
+def main() -> None:
+    asked = arguments()
+    run = Run(asked.folder, asked.configuration)
+    less = Run(asked.folder, asked.against) if asked.against else None
+    if less is not None:
+        if less.motion >= run.motion:
+            raise SystemExit("--against needs a run with less motion")
+        show_growth(run, less)
+    print(f"from {run.motion:.0f} s of motion of `{asked.configuration}` to {asked.hours:g} hours\n")
     print("| stage | jobs | hours of work | on the clock | longest job | GB |")
     print("|---|---|---|---|---|---|")
-    total = {"jobs": 0.0, "work": 0.0, "clock": 0.0, "longest": 0.0, "bytes": 0.0}
-    sampled = min(factor, max(1.0, Sampling().sample_frames / (FPS * seconds)))
-    hours = training_hours(options.folder, pipeline["stages"], factor, options)
-    plan = Plan(factor, options.clips, options.nodes, options.parts, sampled, hours)
-    for stage in pipeline["stages"]:
-        line = scaled(stage, plan)
-        longest = max(total["longest"], line["longest"])
-        total = {key: total[key] + line[key] for key in total} | {"longest": longest}
-        show(stage["stage"], line)
-    show("all", total)
-    print(f"\n{options.clips} clips in {batch_count(options.clips)} batches")
+    training = training_hours(run, less, asked)
+    plan = Plan(3600 * asked.hours, asked.clips, asked.nodes, asked.shards, training)
+    lines = {stage: plan.line(stage, run, less) for stage in run.stages}
+    for stage, line in lines.items():
+        show(stage, line)
+    total = {key: sum(line[key] for line in lines.values()) for key in next(iter(lines.values()))}
+    show("all", {**total, "longest": max(line["longest"] for line in lines.values())})
+    print(f"\n{asked.clips} clips in {batch_count(asked.clips)} batches")
 
 
 def show(name: str, line: dict[str, float]) -> None:

@@ -34,6 +34,8 @@ def test_the_released_network_holds_for_ten_minutes(shared: Path, holden31) -> N
     assert found["largest_turn_degrees"] < 60
     assert found["foot_slide_cm"] < 2
     assert found["steps"] > 800
+    assert found["foot_down_share"] > 0.7
+    assert found["skating_cm"] < 0.25
     assert found["stable"]
 
 

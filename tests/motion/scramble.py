@@ -1,8 +1,8 @@
 """Clips rewritten as other programs would have written them: the oracle of everything that reads a rig.
 
-A real clip of the 31 joints is told anew under other names, from another zero pose, with other bone lengths,
-joints added and left out, in other axes and units and at another rate. Where its joints are in the world
-stays known, so that what comes of it has to be what comes of the clip itself.
+A real clip of the 31 joints is written with other names, another zero pose, other bone lengths, more or fewer
+joints, other axes and units, and at another rate. The world positions of its joints are known, so the result
+for it must equal the result for the clip itself.
 
     python -m tests.motion.scramble ../shared/mocap/cmu --count 240
 """

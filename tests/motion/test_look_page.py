@@ -4,18 +4,33 @@ from __future__ import annotations
 
 import json
 import re
+from typing import Any
 
 import numpy as np
 import pytest
 
-from hobble.motion.look_page import figure, foot_down, look_page
+from hobble.motion import look_page as module
+from hobble.motion.look_page import chosen, figure, foot_down, look_page
+
+REPORT = {"rig": "<rig>", "source_fps": 120.0, "seconds": 4.0, "sha256": "a", "repairs": [], "retarget": None}
+
+
+def many(count: int, **changes: dict[int, Any]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Reports and labels of clips. changes: key -> number of a clip -> its value."""
+    reports = [{**REPORT, "clip": f"clip-{n:05}", "sha256": str(n)} for n in range(count)]
+    labels: list[dict[str, Any]] = [{"cycles": 3, "seconds": {"walk": 4.0}, "warnings": []} for _ in reports]
+    for key, values in changes.items():
+        for n, value in values.items():
+            (labels if key == "warnings" else reports)[n][key] = value
+    return reports, labels
 
 
 def test_a_page_has_a_line_and_a_walking_figure_for_each_clip(walker, holden31):
     clip = walker(holden31, 240, 60.0)
-    report = {"rig": "<rig>", "source_fps": 120.0, "sha256": "a", "repairs": [], "retarget": None}
+    report = {**REPORT, "clip": clip.name}
     labels = {"cycles": 3, "seconds": {"walk": 4.0, "jog": 0.0}, "warnings": ["odd & new"]}
-    page = look_page("mine", [clip, clip], [report, report], [labels, labels], [0.98, 1.0])
+    contacts = [np.arange(200).reshape(50, 4) > 3, np.ones((10, 4))]
+    page = look_page("mine", [report] * 2, [labels] * 2, lambda n: (clip, contacts[n]))
     assert page.count("<canvas") == 2
     assert "&lt;rig&gt;" in page
     assert "odd &amp; new" in page
@@ -39,3 +54,46 @@ def test_a_figure_walks_on_the_spot_to_its_right(walker, holden31):
 
 def test_a_foot_is_down_where_one_of_four_is():
     assert foot_down(np.array([[0, 0, 0, 1], [0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 0, 0]])) == 0.5
+
+
+def test_of_very_many_clips_a_sample_is_read_and_every_clip_has_a_line(walker, holden31):
+    clip, asked = walker(holden31, 240, 60.0), []
+
+    def read(n: int) -> tuple[Any, np.ndarray]:
+        asked.append(n)
+        return clip, np.ones((10, 4))
+
+    reports, labels = many(10_000, warnings={7: ["odd"], 9_876: ["odd"]}, unsure={123: ["no idea"]})
+    page = look_page("mine", reports, labels, read)
+    assert len(asked) == module.MOST_READ == page.count("<canvas")
+    assert {7, 123, 9_876} <= set(asked)
+    assert page.count("<tr>") == 10_001
+    assert "clip-04321" in page
+    assert "only 600 clips were read" in page
+    assert len(json.loads(re.search(r'id="d">(.*?)</script>', page)[1])) == 600
+    assert len(page.encode()) < 25e6
+
+
+def test_what_is_read_is_spread_over_the_clips():
+    reports, labels = many(10_000)
+    some = chosen(reports, labels)
+    assert len(set(some)) == module.MOST_READ
+    assert np.diff(np.sort(some)).max() < 3 * 10_000 / module.MOST_READ
+
+
+def test_warned_clips_leave_room_for_others_and_long_clips_are_fewer():
+    warned = {n: ["odd"] for n in range(5_000)}
+    some = np.array(chosen(*many(10_000, warnings=warned)))
+    assert (some < 5_000).sum() == module.MOST_READ // 2
+    assert sorted(chosen(*many(8, seconds=dict.fromkeys(range(8), 1e4)))) == [0]
+    assert len(chosen(*many(8, seconds=dict.fromkeys(range(8), 6_000.0)))) == 3
+    assert sorted(chosen(*many(20))) == list(range(20))
+    assert chosen([], []) == []
+
+
+def test_very_many_duplicates_are_counted(walker, holden31):
+    clip = walker(holden31, 240, 60.0)
+    reports, labels = many(50)
+    page = look_page("mine", reports, labels, lambda n: (clip, np.ones((10, 4))))
+    assert page.count("are the same motion") == module.MOST_NOTES - 1  # and that nobody stands
+    assert f"And {50 * 49 // 2 + 1 - module.MOST_NOTES} more notes" in page

@@ -157,7 +157,7 @@ def test_the_top_of_the_page_has_a_hurt_figure_and_a_healthy_one_beside_it(tab: 
     line = "document.getElementById('hero-line').textContent"
     part = tab.run(f"{hero}.chips[0].textContent")
     tab.run(f"{hero}.chips[0].click()")
-    assert f"the input that its {part} hurts, 7 of 10." in tab.run(line)
+    assert f"that its {part} hurts, 7 of 10." in tab.run(line)
     tab.run("document.getElementById('hero-dial').focus()")
     for _ in range(2):
         tab.press("ArrowDown")

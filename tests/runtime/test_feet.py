@@ -15,6 +15,7 @@ from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.feet import (
     BODY_FREE,
+    FASTEST_LIFT,
     FLOATING,
     FOOT,
     STRETCH,
@@ -236,6 +237,26 @@ def test_a_foot_waits_while_the_other_is_in_the_air(holden31: Skeleton) -> None:
     both = Feet(holden31)
     glide(both, 2.0, 12, other=1.0)
     assert (both.step > 0).sum() == 1, "never both at once"
+
+
+def test_a_foot_that_steps_goes_along_when_the_network_moves_it_far(holden31: Skeleton) -> None:
+    """A metre within a step: the shown foot is never far from the network's, and never much faster."""
+    feet = Feet(holden31)
+    toe = holden31.role("left_toe")
+    moves = np.concatenate([np.full(12, 2.0), np.full(8, 20.0), np.zeros(12)]).cumsum()
+    shown = np.array([feet(np.array([0.0, 0, z]), 1.0, other=1.0)[toe] for z in moves])
+    away = np.abs(shown[:, 2] - feet.base[0][toe, 2] - moves)
+    assert away.max() < TOO_FAR_ALONE + 2
+    assert np.linalg.norm(np.diff(shown, axis=0), axis=1).max() < 20 + 10
+
+
+def test_a_foot_that_the_network_holds_high_comes_down_gradually(holden31: Skeleton) -> None:
+    feet = Feet(holden31, 0.9, 1.6)
+    toe = holden31.role("left_toe")
+    ground = feet.base[0][toe, 1] - 70.0
+    high = np.array([feet(np.zeros(3), 1.0, ground=ground)[toe, 1] for _ in range(30)])
+    assert high[0] - high[-1] > 15
+    assert np.abs(np.diff(high)).max() < FASTEST_LIFT + 0.5
 
 
 def test_a_foot_that_its_leg_cannot_reach_steps(holden31: Skeleton) -> None:

@@ -76,6 +76,25 @@ def test_the_file_says_what_was_seen_in_training_and_not_what_was_held_out(
     assert seen.fastest == pytest.approx(float(speed.max()), rel=1e-5)
 
 
+@pytest.mark.parametrize("memory", [64, 0])
+def test_what_was_seen_is_that_of_every_row_with_every_fit(small_database: Path, memory: int) -> None:
+    data = Database.open(small_database, memory)
+    s = data.statistics
+    seen = Seen.of(data.layout, data.each_row("train"), s)
+    (block,) = data.blocks("train", 0, 0, 1, 0, data.pairs("train"))
+    x, y = block.x * s.x_std + s.x_mean, block.y * s.y_std + s.y_mean
+    for name, values in (("x", x), ("y", y)):
+        np.testing.assert_array_equal(getattr(seen, f"{name}_low"), values.min(axis=0))
+        np.testing.assert_array_equal(getattr(seen, f"{name}_high"), values.max(axis=0))
+    same = np.flatnonzero((x == seen.start_x).all(axis=1))  # the row to start from, with one of its grounds
+    assert len(same)
+    assert block.p[same[0]] == np.float32(seen.start_phase)
+    columns = np.r_[data.layout.x_position, data.layout.x_direction]
+    columns = np.r_[columns, data.layout.x_joint_position, data.layout.x_joint_velocity]
+    far = np.square(block.x[:, columns]).mean(axis=1)
+    assert (far < far[same[0]] - 1e-6).mean() < 0.01  # of many grounds, another may be nearer to the mean
+
+
 def test_equal_networks_give_equal_bytes_and_others_do_not(data: Database, tmp_path: Path) -> None:
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         write(tmp_path / name, data, seed)

@@ -92,8 +92,8 @@ def together(allowed: Sequence[Array], usual: Array) -> Array:
     """(C, G) highest speeds of bodies with values of several channels.
 
     allowed: (C, G) for each channel. usual: (G,). Each channel leaves a share of the usual speed, and the
-    shares multiply: whoever is sad and limps is slower than by either. A channel that leaves more than the
-    usual speed takes nothing from it.
+    shares multiply: a sad person who limps is slower than one who is only sad or only limps. A channel that
+    leaves more than the usual speed takes nothing from it.
     """
     shares = [
         np.minimum(1.0, np.divide(one, usual, out=np.ones_like(one), where=usual > 0)) for one in allowed

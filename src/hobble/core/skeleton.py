@@ -17,7 +17,7 @@ SIDE_WORDS = (("Left", "Right"), ("left", "right"), ("LEFT", "RIGHT"))
 # L_Leg, leg.r and Bip01 L Leg; LLeg and rLeg
 SIDE_LETTER = re.compile(r"(?<![^_. -])[LRlr](?![^_. -])|^[LRlr](?=[A-Z])")
 OTHER_LETTER = str.maketrans("LRlr", "RLrl")
-PAIRED_NAMES = "alike but for Left and Right, or L and R, as in LeftLeg, L_Leg, Leg.L, LLeg"
+PAIRED_NAMES = "the same except for Left and Right, or L and R, as in LeftLeg, L_Leg, Leg.L, LLeg"
 
 
 def other_side(name: str) -> str:

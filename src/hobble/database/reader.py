@@ -43,6 +43,19 @@ class Block(NamedTuple):
     frame: np.ndarray
 
 
+class Rows(NamedTuple):
+    """n rows that are not composed, standardised float32: x (n, X without terrain), y (n, Y), p (n,) phase.
+
+    fits: (m, columns) heights, then the mean height, of all fits of these rows. first: (n,) each row's first.
+    """
+
+    x: Array
+    y: Array
+    p: Array
+    fits: Array
+    first: np.ndarray
+
+
 @dataclass(frozen=True)
 class Database:
     """A database opened for reading; see `open`."""
@@ -131,6 +144,24 @@ class Database:
             for layer, start, stop in spans
         )
         return ahead(self._composed(_own(parts, stretch), stretch.rows, block_rows))
+
+    def each_row(self, split: str) -> Iterator[Rows]:
+        """Every row of a split once, with all its fits, in the order of the chunks."""
+        most = len(self.manifest.chunks[split])
+        window = self.window(split, BLOCK_ROWS)
+        if window < most:
+            every, buffers = range(most), self._buffers(split, window)
+            groups = (every[start : start + window] for start in range(0, most, window))
+            windows = ahead(self.load(split, some, next(buffers)) for some in groups)
+        else:
+            windows = iter([self._whole(split)] if most else [])
+        for read in windows:
+            for start in range(0, len(read.count), BLOCK_ROWS):
+                part = slice(start, start + BLOCK_ROWS)
+                first, count = read.first[part], read.count[part]
+                fits = widen(read.fits[first[0] : first[-1] + count[-1]]).astype(np.float32)
+                x, y = (widen(table[part]).astype(np.float32) for table in (read.x, read.y))
+                yield Rows(x, y, read.phase[part], fits, first - first[0])
 
     def _parts(
         self,

@@ -14,6 +14,7 @@ from hobble.core.skeleton import Skeleton
 
 STANCE = 0.5  # predicted contact from which a foot counts as standing
 SHORTEST_STANCE = 4  # frames; shorter contacts do not count as steps
+SKATING_BELOW = 2.5  # cm above a standing toe; a toe that moves lower than this skates (Zhang et al. 2018)
 
 
 def runs(on: np.ndarray) -> np.ndarray:
@@ -40,6 +41,18 @@ def foot_slide(toes: Array, contacts: Array) -> Array:
             if b - a >= SHORTEST_STANCE:
                 out.append(step[a : b - 1].sum())
     return np.array(out)
+
+
+def skating(toes: Array, standing_height: float) -> Array:
+    """(F - 1, 2) how far each toe moves over the ground in a frame, cm, whatever contact is predicted.
+
+    After Zhang, Starke, Komura, Saito (2018): the horizontal movement v counts as
+    v (2 - 2^(h / SKATING_BELOW)) at a height h from 0 to SKATING_BELOW. h is the larger one of the two
+    frames. toes: (F, 2, 3) above the ground. standing_height: of the toe joint in a standing foot, cm.
+    """
+    moved = np.linalg.norm(np.diff(toes[..., ::2], axis=0), axis=-1)
+    height = np.maximum(toes[1:, :, 1], toes[:-1, :, 1]) - standing_height
+    return np.asarray(moved * (2.0 - 2.0 ** (np.clip(height, 0.0, SKATING_BELOW) / SKATING_BELOW)))
 
 
 def largest_turn(rotations: Array) -> float:

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.evaluation.motion_measures import foot_slide, largest_turn
+from hobble.evaluation.motion_measures import foot_slide, largest_turn, skating, stance
 from hobble.models.network import Network
 from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.feet import leg_joints, sole_heights
 
 FPS = 60
 # kind -> speed in cm a frame, whether to face a random direction, gait
@@ -61,12 +62,14 @@ def stability(network: Network, minutes: float = 10.0, seed: int = 1, **options:
 
     `finite`: whether all numbers are finite. `hips_lowest_cm`, `hips_highest_cm`: above the ground.
     `largest_turn_degrees`: of a joint in a frame, in the world. `foot_slide_cm`: mean of a step. `steps`:
-    their number. `stable`: whether all values are within LIMITS.
+    their number. `foot_down_share`: share of the frames in which a foot stands. `skating_cm`: mean of a foot
+    and frame, see `motion_measures.skating`. `stable`: whether all values are within LIMITS.
     """
     animation = ProceduralAnimation(network, **options)
     assert network.skeleton is not None
     role = network.skeleton.role
     toes = [role("left_toe"), role("right_toe")]
+    toe_height = float(sole_heights(network, leg_joints(network.skeleton))[1])
     parts: dict[str, list[dict[str, Array]]] = {kind: [] for kind in KINDS}
     last = None
     for stretch in stretches(minutes, seed):
@@ -74,6 +77,9 @@ def stability(network: Network, minutes: float = 10.0, seed: int = 1, **options:
             animation.next_pose(stretch.velocity, stretch.facing, stretch.gait) for _ in range(stretch.frames)
         ]
         rotations = np.array([p.rotations for p in poses])
+        contacts = np.array([p.contacts for p in poses])
+        feet = np.array([p.positions[toes] for p in poses])
+        above = feet - np.array([[0.0, p.root[1], 0.0] for p in poses])[:, None]
         parts[stretch.kind].append(
             {
                 "finite": np.array([np.isfinite(p.positions).all() for p in poses]),
@@ -81,9 +87,9 @@ def stability(network: Network, minutes: float = 10.0, seed: int = 1, **options:
                 "turn": np.array(
                     [largest_turn(rotations if last is None else np.concatenate([last, rotations]))]
                 ),
-                "slide": foot_slide(
-                    np.array([p.positions[toes] for p in poses]), np.array([p.contacts for p in poses])
-                ),
+                "slide": foot_slide(feet, contacts),
+                "down": np.asarray(stance(contacts).any(axis=1)),
+                "skating": skating(above, toe_height).ravel(),
             }
         )
         last = rotations[-1:]
@@ -105,6 +111,8 @@ def _worst(parts: list[dict[str, Array]]) -> dict[str, Any]:
         "largest_turn_degrees": round(float(one["turn"].max()), 2),
         "foot_slide_cm": round(float(one["slide"].mean()), 3) if len(one["slide"]) else None,
         "steps": len(one["slide"]),
+        "foot_down_share": round(float(one["down"].mean()), 3),
+        "skating_cm": round(float(one["skating"].mean()), 3) if len(one["skating"]) else None,
     }
     out["stable"] = (
         out["finite"]

@@ -27,7 +27,7 @@ HEALTHY = Path(__file__).with_name("healthy.npz")
 GUARDED_ARM, LEANING = "guarded_arm", "leaning_trunk"
 WAYS = {"forward": (1, 0), "backward": (-1, 0), "to the left": (0, 1), "to the right": (0, -1)}
 # label -> the parts of the body that it can mean. Pain in thigh, shank or foot looks alike in people's data.
-# An arm is known only by its swing, wherever the pain is.
+# Pain anywhere in an arm is recognised by the arm's swing only.
 PARTS: Mapping[str, tuple[str, ...]] = {
     NORMAL: (),
     "antalgic": ("thigh", "shank", "foot"),

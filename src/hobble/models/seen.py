@@ -12,6 +12,7 @@ import numpy as np
 from hobble.core.errors import InputError
 from hobble.core.quat import Array
 from hobble.models import checks
+from hobble.rows.compose import compose
 from hobble.rows.layout import GAITS, RowLayout
 
 ARRAYS = {
@@ -49,28 +50,36 @@ class Seen:
         return {**of_rows, "start_phase": np.float64(self.start_phase), "fastest": np.float64(self.fastest)}
 
     @classmethod
-    def of(cls, layout: RowLayout, blocks: Iterable[Any], statistics: Any) -> Seen:
-        """From blocks of standardised rows, as `Database.blocks` gives them, and their statistics."""
+    def of(cls, layout: RowLayout, parts: Iterable[Any], statistics: Any) -> Seen:
+        """From all rows, as `Database.each_row` gives them, and their statistics.
+
+        Only the ground depends on the fit of a row. So a row is composed with its highest and its lowest
+        ground instead of with each fit. A row to start from has its first fit.
+        """
         s = statistics
         stand = layout.x_gait.start + GAITS.index("stand") * layout.samples + layout.samples // 2
         rest = s.x_mean[stand] > MIN_STANDING_SHARE
         body = np.r_[layout.x_position, layout.x_direction, layout.x_joint_position, layout.x_joint_velocity]
         low, high = (np.inf, np.inf), (-np.inf, -np.inf)
         best, start, fastest = np.inf, None, 0.0
-        for block in blocks:
-            x, y = block.x * s.x_std + s.x_mean, block.y * s.y_std + s.y_mean
-            low = tuple(np.minimum(a, rows.min(axis=0)) for a, rows in zip(low, (x, y), strict=True))
-            high = tuple(np.maximum(a, rows.max(axis=0)) for a, rows in zip(high, (x, y), strict=True))
+        for part in parts:
+            least, most = (f.reduceat(part.fits, part.first, axis=0) for f in (np.minimum, np.maximum))
+            rows = _raw(layout, part, least[:, :-1], most[:, -1:], s)
+            low = tuple(np.minimum(a, found.min(axis=0)) for a, found in zip(low, rows, strict=True))
+            rows = _raw(layout, part, most[:, :-1], least[:, -1:], s)
+            high = tuple(np.maximum(a, found.max(axis=0)) for a, found in zip(high, rows, strict=True))
+            own = part.fits[part.first]
+            x, y = _raw(layout, part, own[:, :-1], own[:, -1:], s)
             speed = np.linalg.norm(y[:, layout.y_joint_velocity].reshape(len(y), -1, 3), axis=-1)
             fastest = max(fastest, float(speed.max()))
             if rest:  # the stillest standing row
                 far = np.square(x[:, layout.x_position]).sum(axis=1) + np.square(speed).sum(axis=1)
                 far = np.where(x[:, stand] >= STANDING_GAIT, far, np.inf)
             else:
-                far = np.square(block.x[:, body]).mean(axis=1)
+                far = np.square((x[:, body] - s.x_mean[body]) / s.x_std[body]).mean(axis=1)
             k = int(far.argmin())
             if start is None or far[k] < best:
-                best, start = float(far[k]), (x[k], y[k], float(block.p[k]))
+                best, start = float(far[k]), (x[k], y[k], float(part.p[k]))
         assert start is not None, "a database has rows"
         found = (low[0], high[0], low[1], high[1], *start[:2])
         of_rows: dict[str, Any] = {
@@ -100,3 +109,10 @@ class Seen:
             if (found[f"{block}_low"] > found[f"{block}_high"]).any():
                 raise InputError(path, f"{block.upper()}low is above {block.upper()}high in a column")
         return cls(**found)
+
+
+def _raw(layout: RowLayout, part: Any, ground: Array, lift: Array, s: Any) -> tuple[Array, Array]:
+    """x (n, X) and y (n, Y) in raw units, of rows with these heights and mean heights of the ground."""
+    x, y = np.empty((len(part.x), layout.x_size), np.float32), part.y.copy()
+    compose(layout, part.x, ground, lift, x, y, s.x_std, s.y_std)
+    return x * s.x_std + s.x_mean, y * s.y_std + s.y_mean

@@ -91,9 +91,9 @@ def _write_tile(  # type: ignore[no-untyped-def]
 
 
 def _fetch_ahead(builder, weights, of_panel, step, k, depth):  # type: ignore[no-untyped-def]
-    """Fetch each panel's weights of AHEAD inputs later, or at the end of these panels, of those after them.
+    """Fetch the weights of the panels AHEAD inputs early; at their end, fetch those of the next panels.
 
-    The processor does so by itself, but begins anew at each panel, and one row has nothing else to do then.
+    The processor also fetches ahead by itself, but starts again at each panel, and waits if there is one row.
     """
     index, flag, cell = ir.IntType(64), ir.IntType(32), ir.IntType(8).as_pointer()
     fetch = cgutils.get_or_insert_function(

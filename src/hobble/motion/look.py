@@ -95,6 +95,18 @@ def _one(file: Path, skeleton: Path, maps: Path, options: ClipMotion) -> Look:
     return seen(clip, report)
 
 
+def reported(report: Mapping[str, Any]) -> Look:
+    """What the report of a clip says (`motion/<clip>.json`), without reading the clip."""
+    return Look(
+        report["clip"],
+        rig=report["rig"],
+        fps=report["source_fps"],
+        seconds=report["seconds"],
+        off=worst(report["retarget"]) if report.get("retarget") else None,
+        warnings=(*report.get("unsure", []), *_first(report)),
+    )
+
+
 def seen(clip: Clip, report: Mapping[str, Any]) -> Look:
     """The summary of a clip. report: its `motion/<clip>.json`."""
     hips = clip.positions[:, clip.skeleton.role("hips")]
@@ -104,22 +116,17 @@ def seen(clip: Clip, report: Mapping[str, Any]) -> Look:
     speed, cadence = float(path.sum() / seconds), 60.0 * steps / seconds
     stands = stand_seconds(path * clip.fps, clip.fps)
     moving = max(seconds - stands, 1e-9)
-    return Look(
-        clip.name,
-        rig=report["rig"],
-        fps=report["source_fps"],
+    known = reported(report)
+    return replace(
+        known,
+        name=clip.name,
         seconds=seconds,
         hips=float(np.median(hips[:, 1])),
         speed=speed,
         steps=steps,
         cadence=cadence,
         stands=stands,
-        off=worst(report["retarget"]) if report.get("retarget") else None,
-        warnings=(
-            *rate_warnings(steps, moving, float(path.sum()), clip, report),
-            *report.get("unsure", []),
-            *_first(report),
-        ),
+        warnings=(*rate_warnings(steps, moving, float(path.sum()), clip, report), *known.warnings),
         like=likeness(clip, report["sha256"]),
     )
 

@@ -1,20 +1,28 @@
-"""Makes the page of a data set before training: a line for each clip, with a small walking figure."""
+"""Makes the page of a data set before training: a line for each clip, with a small walking figure.
+
+Of very many clips, a sample is read; the lines of the others have what their reports say.
+"""
 
 from __future__ import annotations
 
 import html
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from hobble.core.clip import Clip
 from hobble.core.quat import Array
-from hobble.motion.look import Look, same_notes, seen, shared_warnings, standing_notes
+from hobble.motion.look import Look, reported, same_notes, seen, shared_warnings, standing_notes
 from hobble.motion.root import facing
 
 FRAMES, SECONDS = 40, 4.0  # of the picture, from the middle of the clip
+MOST_READ, MOST_SECONDS = 600, 5 * 3600.0  # clips that are read, and their length: 10 MB, about half a minute
+MOST_NOTES = 40  # on clips together, such as duplicates
+LABELS = ("cycles", "seconds", "warnings")  # what the page shows of the labels
+GOLDEN = 0.6180339887498949
 HEAD = (
     "clip",
     "",
@@ -74,34 +82,90 @@ def foot_down(contacts: Array) -> float:
     return float((np.asarray(contacts) > 0.5).any(axis=1).mean())
 
 
+@dataclass(frozen=True)
+class _Line:
+    """A line of the page. figure, down: None if the clip was not read."""
+
+    look: Look
+    labels: Mapping[str, Any]
+    figure: dict[str, Any] | None = None
+    down: float | None = None
+
+
 def look_page(
     name: str,
-    clips: Sequence[Clip],
     reports: Sequence[Mapping[str, Any]],
     labels: Sequence[Mapping[str, Any]],
-    down: Sequence[float],
+    read: Callable[[int], tuple[Clip, Array]],
 ) -> str:
     """The page of data set `name` as one file.
 
-    reports, labels: `motion/<clip>.json` and `labels/<clip>.json` of each clip. down: see `foot_down`.
+    reports, labels: of each clip `motion/<clip>.json`, and the keys LABELS of `labels/<clip>.json`. read:
+    returns a clip, by its place among them, and its contacts (F, 4). It is called for the clips of `chosen`,
+    one after another.
     """
-    looks, common = shared_warnings([seen(clip, report) for clip, report in zip(clips, reports, strict=True)])
-    rows = [_row(*of) for of in zip(looks, reports, labels, down, strict=True)]
-    notes = [*common, *same_notes(looks), *standing_notes(looks)]
-    seconds = sum(look.seconds for look in looks)
-    data = json.dumps([figure(clip) for clip in clips], separators=(",", ":"))
+    some = chosen(reports, labels)
+    lines = [_Line(reported(report), told) for report, told in zip(reports, labels, strict=True)]
+    for n in sorted(some):
+        clip, contacts = read(n)
+        lines[n] = _Line(seen(clip, reports[n]), labels[n], figure(clip), foot_down(contacts))
+    looks, common = shared_warnings([line.look for line in lines])
+    lines = [replace(line, look=look) for line, look in zip(lines, looks, strict=True)]
+    whole = len(some) == len(lines)
+    notes = standing_notes(looks) if whole else [_sample_note(len(some))]
+    notes += [*common, *same_notes(looks)]
+    if (more := len(notes) - MOST_NOTES) > 0:
+        notes[MOST_NOTES:] = [f"And {more} more notes, most of them on duplicates."]
+    return _written(name, lines, notes)
+
+
+def chosen(reports: Sequence[Mapping[str, Any]], labels: Sequence[Mapping[str, Any]]) -> list[int]:
+    """The clips that are read for the page: all, or a sample of many, those with warnings first.
+
+    The others are spread evenly over the names. At least one clip is chosen, if there are any.
+    """
+    warned = [
+        bool(reported(report).warnings or told["warnings"])
+        for report, told in zip(reports, labels, strict=True)
+    ]
+    # The first so many numbers in this order are spread evenly, however many they are.
+    spread = sorted(range(len(reports)), key=lambda n: n * GOLDEN % 1)
+    first, rest = ([n for n in spread if warned[n] is which] for which in (True, False))
+    out: list[int] = []
+    seconds = 0.0
+    for n in [*first[: MOST_READ // 2], *rest, *first[MOST_READ // 2 :]][:MOST_READ]:
+        seconds += reports[n]["seconds"]
+        if out and seconds > MOST_SECONDS:
+            break
+        out.append(n)
+    return out
+
+
+def _sample_note(count: int) -> str:
+    return (
+        f"To keep this page small, only {count} clips were read, those with warnings first. Only these have "
+        "a figure and all numbers, and were compared with each other to find duplicates."
+    )
+
+
+def _written(name: str, lines: Sequence[_Line], notes: Sequence[str]) -> str:
+    """The page of lines and notes."""
+    seconds = sum(line.look.seconds for line in lines)
+    figures = [line.figure for line in lines if line.figure is not None]
+    data = json.dumps(figures, separators=(",", ":"))
     title = html.escape(name)
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
-        f"<h1>{title}</h1><p>{len(looks)} clips, {seconds:.0f} s. Left is red, right is blue.</p>"
+        f"<h1>{title}</h1><p>{len(lines)} clips, {seconds:.0f} s. Left is red, right is blue.</p>"
         + "".join(f'<p class="said">{html.escape(note)}</p>' for note in notes)
         + f"<table><thead><tr>{''.join(f'<th>{head}</th>' for head in HEAD)}</tr></thead>"
-        + f"<tbody>{''.join(rows)}</tbody></table>"
+        + f"<tbody>{''.join(_row(line) for line in lines)}</tbody></table>"
         + f'<script type="application/json" id="d">{data}</script><script>{SCRIPT}</script></html>\n'
     )
 
 
-def _row(look: Look, report: Mapping[str, Any], labels: Mapping[str, Any], down: float) -> str:
+def _row(line: _Line) -> str:
+    look, labels = line.look, line.labels
     gaits = ", ".join(f"{gait} {s:.1f}" for gait, s in labels["seconds"].items() if s >= 0.05)
     off = "as it is"
     if look.off:
@@ -110,10 +174,14 @@ def _row(look: Look, report: Mapping[str, Any], labels: Mapping[str, Any], down:
         off = f"{bar}{html.escape(joint)} {degrees:.0f}&deg;"
     remarks = "; ".join([*look.warnings, *labels["warnings"]])
     name = html.escape(look.name) + (f"<br><small>{html.escape(remarks)}</small>" if remarks else "")
-    numbers = [f"{look.fps:.4g}", f"{look.seconds:.1f}", f"{look.hips:.0f}", f"{look.cadence:.0f}"]
-    cells = "".join(f'<td class="n">{value}</td>' for value in [*numbers, str(labels["cycles"])])
+    picture, measured, down = "", ["", ""], ""
+    if line.down is not None:
+        picture = '<canvas width="80" height="80"></canvas>'
+        measured, down = [f"{look.hips:.0f}", f"{look.cadence:.0f}"], f"{100 * line.down:.0f} %"
+    numbers = [f"{look.fps:.4g}", f"{look.seconds:.1f}", *measured, str(labels["cycles"])]
+    cells = "".join(f'<td class="n">{value}</td>' for value in numbers)
     return (
-        f'<tr><td>{name}</td><td><canvas width="80" height="80"></canvas></td>'
+        f"<tr><td>{name}</td><td>{picture}</td>"
         f"<td>{html.escape(look.rig)}</td>{cells}<td>{html.escape(gaits)}</td>"
-        f'<td class="n">{100 * down:.0f} %</td><td>{off}</td></tr>'
+        f'<td class="n">{down}</td><td>{off}</td></tr>'
     )

@@ -37,6 +37,8 @@ SMALL = {
     "correction": "correction",
     "lock": "foot_lock",
     "hold": "foot_hold",
+    "step": "foot_step",
+    "missed": "foot_missed",
     "lift": "foot_lift",
     "raised": "body_lift",
     "added": "foot_added",

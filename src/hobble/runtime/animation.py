@@ -36,9 +36,9 @@ class Pose:
     """One frame. The caller may keep and change it. A single character has no leading axis C.
 
     positions: (C, J, 3); rotations: (C, J, 4) world, w first; contacts: (C, 4) left heel, left toe, right
-    heel, right toe, 0..1; phase: (C,) in cycles; root: (C, 3) on the trajectory; yaw: (C,) radians of the
-    root's facing, 0 for +Z, growing to the left; channels: name -> (C, columns), the values that
-    the network got.
+    heel, right toe, 0..1, as predicted, but 0 while the runtime makes a foot step; phase: (C,) in cycles;
+    root: (C, 3) on the trajectory; yaw: (C,) radians of the root's facing, 0 for +Z, growing to the left;
+    channels: name -> (C, columns), the values that the network got.
     """
 
     positions: Array = field(repr=False)
@@ -176,9 +176,14 @@ class ProceduralAnimation:
 
         In Hobble's axes: Y up, Z forward.
         """
+        return world_rotations(*self.predicted_turns)
+
+    @property
+    def predicted_turns(self) -> tuple[Array, Array]:
+        """The same before `world_rotations`, which is quicker for many frames at once: copies."""
         made = self._controller
         turns = made.y[:, self.network.layout.y_joint_rotation].reshape(self.characters, -1, 3)
-        return quat.mul(quat.yaw(made.yaw)[:, None], quat.exp(turns.astype(float)))
+        return turns.copy(), made.yaw.copy()
 
     def next_pose(
         self,
@@ -341,3 +346,8 @@ class ProceduralAnimation:
             float(c.yaw[0]),
             {name: values[0] for name, values in channels.items()},
         )
+
+
+def world_rotations(turns: Array, yaw: Array) -> Array:
+    """(..., J, 4) world rotations of vectors (..., J, 3) relative to a root that faces `yaw` (...)."""
+    return quat.mul(quat.yaw(yaw)[..., None, :], quat.exp(turns.astype(float)))

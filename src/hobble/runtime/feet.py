@@ -13,6 +13,8 @@ from hobble.runtime.foot_lock import Hold, hold_foot, note_missed, step_rise
 from hobble.runtime.leg_reach import MOST_ADDED, bend, turn, turned
 
 HEIGHT_MIX = 0.5  # share of the remaining foot lift that is applied each frame
+# cm a frame by which the foot lift may change. A network may predict contact with a foot at knee height.
+FASTEST_LIFT = 8.0
 # Share of its length to which foot placement may stretch the leg of a held foot behind the hips, unless the
 # network stretches it further. Beyond that the heel rises. Otherwise a foot that is 5 cm behind the network's
 # straightens a knee that is bent by 26 degrees, and a stiff leg would look as if it bent and stretched.
@@ -183,7 +185,8 @@ def place_feet(
             rise = max(deep, 0.0)
             if step[c, f] == 0.0:
                 rise += lock[c, f] * min(deep + FLOATING, 0.0)
-            lift[c, f] += HEIGHT_MIX * (rise - lift[c, f])
+            change = HEIGHT_MIX * (rise - lift[c, f])
+            lift[c, f] += min(max(change, -FASTEST_LIFT), FASTEST_LIFT)
             shift[1] = lift[c, f]
             if step[c, f] > 0.0:
                 shift[1] += step_rise(step[c, f], -deep)

@@ -44,6 +44,11 @@ def hold_foot(c: int, f: int, x: float, z: float, contact: float, locking: bool,
     if not locking:
         lock[c, f], step[c, f] = 0.0, 0.0
         return 0.0, 0.0
+    far = np.sqrt(away_x * away_x + away_z * away_z)
+    if lock[c, f] < 1.0 and far > TOO_FAR_ALONE:
+        # The network may move its foot by a metre in the meantime. A foot in the air goes along with it.
+        away_x, away_z = away_x * TOO_FAR_ALONE / far, away_z * TOO_FAR_ALONE / far
+        hold[c, f, 0], hold[c, f, 1] = x + away_x, z + away_z
     if step[c, f] > 0.0:
         step[c, f] += 1.0 / STEP_FRAMES
         if step[c, f] > 1.0 - 1e-6:
@@ -57,8 +62,8 @@ def hold_foot(c: int, f: int, x: float, z: float, contact: float, locking: bool,
             hold[c, f, 0], hold[c, f, 1] = x + away_x, z + away_z
             lock[c, f] = 1.0
         else:
-            far, most = (TOO_FAR, MISSED) if lock[c, 1 - f] == 1.0 else (TOO_FAR_ALONE, MISSED_ALONE)
-            if away_x * away_x + away_z * away_z >= far * far or missed[c, f] > most:
+            longest, most = (TOO_FAR, MISSED) if lock[c, 1 - f] == 1.0 else (TOO_FAR_ALONE, MISSED_ALONE)
+            if far >= longest or missed[c, f] > most:
                 step[c, f] = 1.0 / STEP_FRAMES
     if step[c, f] > 0.0:
         lock[c, f] = 1.0 - step[c, f] * step[c, f] * (3.0 - 2.0 * step[c, f])

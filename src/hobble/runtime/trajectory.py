@@ -26,7 +26,9 @@ CORRECTION_RATE = 0.01  # integral gain a frame: a steady error is corrected wit
 CORRECTION_WITHIN = 0.8  # share of the wish; with a larger error the character is still turning or starting
 MOST_CORRECTION = 1.0  # largest integral correction, as a share of the wish
 FURTHEST_TURN = np.radians(137)  # largest turn to ask for; a larger one may come out the other way round
-PULL = 0.1  # with `Network.rooted`: largest change of a frame's movement toward the wish, as a share of it
+# With `Network.rooted`: largest change of a frame's movement across the wish, as a share of the movement.
+PULL = 0.2
+PULL_AHEAD = 0.5  # the same along the wish, as a share of PULL; a faster character takes corners wider
 UNWISHED_LOSS = 0.5  # share of movement against the wish that is removed; removing all would drag the feet
 STRAFE_FROM = np.radians(45)  # angle between facing and velocity from which the strafe share is 1
 STILL = 0.1  # cm a frame: a slower wish means standing
@@ -224,8 +226,9 @@ def prepare(
 def _pull(share: float, wish_x: float, wish_z: float, x: float, z: float) -> tuple[float, float]:
     """What to add to a movement (x, z) so that it comes nearer to the wish.
 
-    Along the wish and across it, each at most `share` times the movement's length. If the two shared one
-    limit, a clip that is too slow would use all of it, and the character would leave its path sideways.
+    Across the wish by at most `share` times the movement's length, and along it by PULL_AHEAD of that. If the
+    two shared one limit, a clip that is too slow would use all of it, and the character would leave its path
+    sideways.
     """
     most = share * np.sqrt(x * x + z * z)
     size = np.sqrt(wish_x * wish_x + wish_z * wish_z)
@@ -233,7 +236,7 @@ def _pull(share: float, wish_x: float, wish_z: float, x: float, z: float) -> tup
     lack_x, lack_z = wish_x - x, wish_z - z
     along = lack_x * ahead_x + lack_z * ahead_z
     lack_x, lack_z = lack_x - along * ahead_x, lack_z - along * ahead_z
-    along = min(max(along, -most), most)
+    along = min(max(along, -PULL_AHEAD * most), PULL_AHEAD * most)
     part = min(1.0, most / max(np.sqrt(lack_x * lack_x + lack_z * lack_z), 1e-9))
     return along * ahead_x + part * lack_x, along * ahead_z + part * lack_z
 

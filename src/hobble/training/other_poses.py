@@ -23,8 +23,8 @@ class OtherPoses:
 
     If channels say how a whole clip walks, its poses show that, too. Then a network can continue the walk
     that it sees and needs no channels, and a running character keeps whatever walk its pose has drifted to:
-    of 24 people with three diagnoses or none, it walked like one of another group than was asked. With these
-    rows, only the channels tell which walk Y belongs to.
+    of 24 people with three diagnoses or none, it walked like one of a group that was not requested. With
+    these rows, only the channels tell which walk Y belongs to.
 
     Each place in a batch remembers its last rows. Of those with the same gait and other channel values, the
     one with the nearest phase is taken. So several processes get what one gets. The pose moves by a part of

@@ -30,7 +30,7 @@ def write_weights(
     """
     s = database.statistics
     arrays = {**network.arrays(), "Xmean": s.x_mean, "Xstd": s.x_std, "Ymean": s.y_mean, "Ystd": s.y_std}
-    arrays |= Seen.of(database.layout, database.blocks(TRAIN, 0, 0, 1, 0), s).arrays()
+    arrays |= Seen.of(database.layout, database.each_row(TRAIN), s).arrays()
     save_npz(path, **arrays, meta=np.array(meta(network, database, configuration, facts)))
 
 

@@ -15,7 +15,7 @@ from hobble.channels.injury.limp import page, together
 from hobble.channels.injury.limp import run as module
 from hobble.channels.injury.limp.captured import VERSION, HurtSeconds, Limp, healthy_of
 from hobble.channels.injury.limp.run import SEVERITIES, distance, hurt_side, limp
-from hobble.channels.injury.limp.walks import Shown
+from hobble.channels.injury.limp.walks import FigureWalk
 from hobble.gait.cycles import SCALARS, Cycle, Walk
 from hobble.gait.people import NORMAL, people
 from hobble.gait.profile import profile
@@ -40,7 +40,7 @@ def mirrored(cycle: Cycle) -> Cycle:
     return Cycle(cycle.start, cycle.end, scalars, np.array(curves))
 
 
-def walking(limp: dict[str, float], speed: float) -> Shown:
+def walking(limp: dict[str, float], speed: float) -> FigureWalk:
     """A figure that walks like people and limps on one side, by a share of the limp of people with pain in
     the right leg.
     """
@@ -54,7 +54,7 @@ def walking(limp: dict[str, float], speed: float) -> Shown:
     cycles = [Cycle(start, start + 70, scalars, curves) for start in range(0, FRAMES - 70, 70)]
     walk = Walk(60.0, tuple(cycles), tuple(map(mirrored, cycles)))
     walk = walk.mirrored() if "left" in limp else walk
-    return Shown(walk, profile(walk), speed, FRAMES)
+    return FigureWalk(walk, profile(walk), speed, FRAMES)
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def measured(hurtable, holden31, monkeypatch):
     """
 
     def run(effect, other_side: bool = False, every: tuple[Limp, ...] = (), splits=None) -> dict[str, Any]:
-        def shown(network, each, speeds, gait, seconds, runtime):
+        def walk_figures(network, each, speeds, gait, seconds, runtime):
             out = []
             for hurt in each:
                 amount = {hurt_side(holden31, link): effect(s) for link, s in hurt.items()}
@@ -74,7 +74,7 @@ def measured(hurtable, holden31, monkeypatch):
                 out.append(walking(amount, speeds * (1 - 0.5 * worst)))
             return out
 
-        monkeypatch.setattr(module, "shown", shown)
+        monkeypatch.setattr(module, "walk_figures", walk_figures)
         options = {
             "configuration": "x",
             "runtime": Runtime(),
@@ -137,7 +137,7 @@ def test_a_limp_is_measured_beside_the_walk_of_the_same_mood(
     links = hurtable.channels["injury"][:25]
     network = replace(hurtable, layout=layout, channels={"injury": links, "mood": moods})
 
-    def shown(network, each, speeds, gait, seconds, runtime, others):
+    def walk_figures(network, each, speeds, gait, seconds, runtime, others):
         out = []
         for hurt, felt in zip(each, others["mood"], strict=True):
             assert set(felt.values()) == {1.0}
@@ -147,10 +147,10 @@ def test_a_limp_is_measured_beside_the_walk_of_the_same_mood(
             out.append(replace(figure, profile=None) if "tired" in felt else figure)
         return out
 
-    def row(link: str, figure: Shown, healthy: Shown) -> dict[str, Any]:
+    def row(link: str, figure: FigureWalk, healthy: FigureWalk) -> dict[str, Any]:
         return module._row(network, "walk", link, 10.0, figure, healthy)
 
-    monkeypatch.setattr(together, "shown", shown)
+    monkeypatch.setattr(together, "walk_figures", walk_figures)
     rows = together.limps_together(network, [LEFT_KNEE, RIGHT_KNEE], 2.0, 8.0, Runtime(), row)
     assert [r["column"] for r in rows] == [m for m in moods if m != "tired" for _ in range(2)]
     assert {r["speed_share"] for r in rows} == {0.6}

@@ -15,7 +15,7 @@ from hobble.measures.given import Given, Outcome
 from hobble.measures.responsivity import Options
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.runtime.animation import ProceduralAnimation
+from hobble.runtime.animation import ProceduralAnimation, world_rotations
 from hobble.runtime.controller import STEPS
 from hobble.runtime.options import Runtime
 from hobble.runtime.waypoints import TRACK, Waypoint
@@ -173,7 +173,7 @@ def _lap(
     start = int(follower.reached[0])
     goal = start + len(follower.track)
     positions, rotations, contacts, off = [], [], [], []
-    predicted, taken, places = [], [], []
+    turned, yaws, taken, places = [], [], [], []
     times: list[tuple[float, ...]] = []
     while follower.reached[0] < goal and len(times) < longest:
         before = perf_counter()
@@ -182,13 +182,16 @@ def _lap(
         times.append((*animation.seconds, whole))
         positions.append(pose.positions[toes])
         rotations.append(pose.rotations.astype(np.float32))
-        predicted.append(animation.predicted_rotations[0])
+        turns, yaw = animation.predicted_turns
+        turned.append(turns[0])
+        yaws.append(yaw[0])
         taken.append(animation.state.joint_rotation[0].copy())
         contacts.append(pose.contacts)
         off.append(follower.off_path[0])
         places.append(np.array(pose.root)[[0, 2]])
     slide = foot_slide(np.array(positions), np.array(contacts))
     seconds = np.array(times)
+    predicted = world_rotations(np.array(turned), np.array(yaws))
     lap = {
         "lap": number,
         "finished": bool(follower.reached[0] >= goal),
@@ -200,8 +203,8 @@ def _lap(
         "foot_slide_cm": round(float(slide.mean()), 4) if len(slide) else None,
         "steps": len(slide),
         "largest_turn_degrees": round(largest_turn(np.array(rotations)), 3),
-        "predicted_turn_degrees": round(largest_turn(np.array(predicted)), 3),
-        "turns_held_back": _held_back(np.array(predicted), np.array(taken)),
+        "predicted_turn_degrees": round(largest_turn(predicted), 3),
+        "turns_held_back": _held_back(predicted, np.array(taken)),
         "milliseconds": _milliseconds(seconds),
     }
     return lap, seconds, _run(number, np.array(places), np.array(off))

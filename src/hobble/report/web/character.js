@@ -276,11 +276,11 @@ export const createCharacter = (spec, place = [0, 0], heading = 0) => {
       [a, b] = [a - against * wish[0], b - against * wish[1]];
     }
     // With motion matching, change the movement a little toward the wish, because clips have only some directions and speeds.
-    // Along the wish and across it, each by a share of the movement.
+    // Across the wish by a share of the movement, and along it by half of that.
     const most = spec.steering > 0 && spec.rooted ? k.pull * hypot(a, b) : 0, size = hypot(...wish);
     const ahead = size >= k.still ? wish.map((v) => v / size) : [0, 0], lack = [wish[0] - a, wish[1] - b];
     const along = lack[0] * ahead[0] + lack[1] * ahead[1], across = lack.map((v, i) => v - along * ahead[i]);
-    const share = min(1, most / max(hypot(...across), 1e-9)), limited = min(max(along, -most), most);
+    const share = min(1, most / max(hypot(...across), 1e-9)), limited = min(max(along, -k.pullAhead * most), k.pullAhead * most);
     c.px[M] += a + limited * ahead[0] + share * across[0];
     c.pz[M] += b + limited * ahead[1] + share * across[1];
     yaw -= moving * y[Y.turn];

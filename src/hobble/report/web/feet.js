@@ -33,7 +33,7 @@ export const createFeet = (spec, c) => {
     const [hip, knee, heel, toe] = spec.legs[f], point = joint(toe);
     const [a, b] = holdFoot(f, point), deep = soleDepth(f, ground);
     const rise = max(deep, 0) + (c.step[f] ? 0 : c.lock[f] * min(deep + k.floating, 0));
-    c.lift[f] += k.heightMix * (rise - c.lift[f]);
+    c.lift[f] += min(max(k.heightMix * (rise - c.lift[f]), -k.fastestLift), k.fastestLift);
     const shift = [a, c.lift[f], b];
     if (c.step[f]) {
       shift[1] += max(4 * k.stepHeight * c.step[f] * (1 - c.step[f]) - max(-deep, 0), 0);
@@ -52,15 +52,20 @@ export const createFeet = (spec, c) => {
       c.lock[f] = c.step[f] = 0;
       return [0, 0];
     }
+    const far = hypot(...away);
+    if (c.lock[f] < 1 && far > k.tooFarAlone) { // a foot in the air goes along with the network's
+      away = away.map((v) => v * k.tooFarAlone / far);
+      c.hold[f] = [point[0] + away[0], point[2] + away[1]];
+    }
     if (c.step[f] > 0 && (c.step[f] += 1 / k.stepFrames) > 1 - 1e-6) c.step[f] = c.lock[f] = 0;
     if (c.step[f] === 0) {
-      const alone = c.lock[1 - f] !== 1, far = alone ? k.tooFarAlone : k.tooFar;
+      const alone = c.lock[1 - f] !== 1; // the other foot is in the air
       if (c.contacts[2 * f + 1] < k.lockAt) c.lock[f] = max(0, c.lock[f] - k.release);
       else if (c.lock[f] < 1) {
         away = away.map((v) => v * c.lock[f]);
         c.hold[f] = [point[0] + away[0], point[2] + away[1]];
         c.lock[f] = 1;
-      } else if (hypot(...away) >= far || c.missed[f] > (alone ? k.missedAlone : k.missed)) c.step[f] = 1 / k.stepFrames;
+      } else if (far >= (alone ? k.tooFarAlone : k.tooFar) || c.missed[f] > (alone ? k.missedAlone : k.missed)) c.step[f] = 1 / k.stepFrames;
     }
     if (c.step[f] > 0) c.lock[f] = 1 - c.step[f] * c.step[f] * (3 - 2 * c.step[f]);
     return away.map((v) => c.lock[f] * v);

@@ -26,7 +26,7 @@ const createHero = (spec, asked) => {
   const view = createView(canvas, { yaw: .62, pitch: .1, distance: 460, nearest: 240, furthest: 800 }, (now) => {
     if (walks) advance(now);
     draw(now);
-    if (!walks || hero.frames > 1) drawn();
+    if (!walks || hero.frames) drawn();
     if (walks) view.ask();
   });
   view.onHidden = () => { last = null; };

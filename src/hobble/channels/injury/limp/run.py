@@ -15,7 +15,7 @@ import numpy as np
 from hobble.channels.injury.limp import Options
 from hobble.channels.injury.limp.captured import HurtSeconds, Limp, healthy_of, limps
 from hobble.channels.injury.limp.together import limps_together, named_together
-from hobble.channels.injury.limp.walks import Shown, shown
+from hobble.channels.injury.limp.walks import FigureWalk, walk_figures
 from hobble.channels.injury.walks import hurt_links
 from hobble.channels.injury.walks import links as links_of
 from hobble.core.errors import HobbleError
@@ -74,7 +74,9 @@ def limp(
     rows: list[dict[str, Any]] = []
     for gait, speed in SPEEDS.items():
         cases = [(link, s) for link in links for s in SEVERITIES]
-        figures = shown(network, [{}, *({link: s} for link, s in cases)], speed, gait, seconds, runtime)
+        figures = walk_figures(
+            network, [{}, *({link: s} for link, s in cases)], speed, gait, seconds, runtime
+        )
         healthy = figures[0]
         if healthy.profile is None:
             if gait == "walk":
@@ -114,7 +116,7 @@ def _together(
     skeleton = network.skeleton
     legs = [link for link in links if part_of_link(skeleton, _pair(skeleton, link)).name in LEG]
 
-    def row(link: str, figure: Shown, healthy: Shown) -> dict[str, Any]:
+    def row(link: str, figure: FigureWalk, healthy: FigureWalk) -> dict[str, Any]:
         return _row(network, "walk", link, SEVERITIES[-1], figure, healthy)
 
     rows = limps_together(network, legs, SPEEDS["walk"], seconds, runtime, row)
@@ -132,7 +134,7 @@ def _pair(skeleton: Skeleton, link: str) -> tuple[str, str]:
 
 
 def _row(
-    network: Network, gait: str, link: str, severity: float, figure: Shown, healthy: Shown
+    network: Network, gait: str, link: str, severity: float, figure: FigureWalk, healthy: FigureWalk
 ) -> dict[str, Any]:
     """The row of one walk: its case, its effects (None without a cycle) and the recognised limp."""
     assert network.skeleton is not None
@@ -224,7 +226,9 @@ def compare_held_out(
     limps = [one for one in every if one.hurt and splits.get(one.clip) == "held_out"]
     if not limps:
         return []
-    figures = shown(network, [{}, *(one.hurt for one in limps)], SPEEDS["walk"], "walk", seconds, runtime)
+    figures = walk_figures(
+        network, [{}, *(one.hurt for one in limps)], SPEEDS["walk"], "walk", seconds, runtime
+    )
     own = figures[0].profile
     out = []
     for one, figure in zip(limps, figures[1:], strict=True):
@@ -253,7 +257,7 @@ def second_injuries(
         return []
     pairs = [(a, b, s) for a in FIRST_SEVERITIES for b in links if b != first for s in SECOND_SEVERITIES[1:]]
     each = [{}, *({first: a} for a in FIRST_SEVERITIES), *({first: a, b: s} for a, b, s in pairs)]
-    figures = shown(network, each, SPEEDS["walk"], "walk", min(seconds, 4.0), runtime)
+    figures = walk_figures(network, each, SPEEDS["walk"], "walk", min(seconds, 4.0), runtime)
     healthy = max(figures[0].speed, 1e-9)
     alone = dict(zip(FIRST_SEVERITIES, figures[1:], strict=False))
     return [

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 
 from hobble.channels import channel
-from hobble.channels.injury.limp.walks import Shown, shown
+from hobble.channels.injury.limp.walks import FigureWalk, walk_figures
 from hobble.channels.injury.walks import INJURY
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
 SEVERITY = 10.0
-RowOf = Callable[[str, Shown, Shown], dict[str, Any]]  # link, hurt walk, healthy walk -> its effects
+RowOf = Callable[
+    [str, FigureWalk, FigureWalk], dict[str, Any]
+]  # link, hurt walk, healthy walk -> its effects
 
 
 def limps_together(
@@ -35,7 +37,9 @@ def limps_together(
         for name in names
     }
     each = [{} if link is None else {link: SEVERITY} for *_, link in cases]
-    figures = dict(zip(cases, shown(network, each, speed, "walk", seconds, runtime, others), strict=True))
+    figures = dict(
+        zip(cases, walk_figures(network, each, speed, "walk", seconds, runtime, others), strict=True)
+    )
     return [
         {"channel": other, "column": column, **row_of(link, figures[other, column, link], healthy)}
         for other, column in found

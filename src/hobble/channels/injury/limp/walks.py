@@ -21,7 +21,7 @@ STANDING = 0.1  # cm a frame; slower figures stand
 
 
 @dataclass(frozen=True)
-class Shown:
+class FigureWalk:
     """The walk of one figure: its number of `frames`, its cycles, their profile (or None) and its speed, cm a
     frame.
     """
@@ -32,7 +32,7 @@ class Shown:
     frames: int
 
 
-def shown(
+def walk_figures(
     network: Network,
     each: Sequence[Mapping[str, float]],
     speeds: float | Sequence[float],
@@ -40,7 +40,7 @@ def shown(
     seconds: float,
     runtime: Runtime,
     others: Mapping[str, Sequence[Mapping[str, float]]] | None = None,
-) -> list[Shown]:
+) -> list[FigureWalk]:
     """Let figures walk straight ahead. each: link -> severity of each figure. speeds: wanted, cm a frame.
 
     others: other channel -> column -> value of each figure.
@@ -59,12 +59,12 @@ def shown(
         pose = animation.next_pose(velocity, gait=shares.copy(), **channels)
         if frame >= 0:
             places[frame] = pose.positions.reshape(count, -1, 3)
-    return [_shown(network, places[:, i].astype(float)) for i in range(count)]
+    return [_figure_walk(network, places[:, i].astype(float)) for i in range(count)]
 
 
-def _shown(network: Network, places: Array) -> Shown:
+def _figure_walk(network: Network, places: Array) -> FigureWalk:
     assert network.skeleton is not None
     hips = network.skeleton.role("hips")
     speed = float(np.linalg.norm((places[-1, hips] - places[0, hips])[::2])) / (len(places) - 1)
     walk = measure(network.skeleton, places, FPS)
-    return Shown(walk, profile(walk) if len(walk) else None, speed, len(places))
+    return FigureWalk(walk, profile(walk) if len(walk) else None, speed, len(places))

@@ -14,7 +14,7 @@ FLUID = range(1, 6)
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownFilm:
     """A film of the questionnaire, and the parts that hurt in it."""
 
     number: int
@@ -32,7 +32,7 @@ class Study:
     name: str
     configuration: str
     parts: tuple[str, ...]
-    films: tuple[Shown, ...]
+    films: tuple[ShownFilm, ...]
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def read_study(path: str | Path) -> Study:
     """Read films.json, which the rule `questionnaire` writes. Raises InputError."""
     data = _object(path, read_json(path))
     try:
-        films = tuple(Shown(row["film"], row["kind"], tuple(row["parts"])) for row in data["films"])
+        films = tuple(ShownFilm(row["film"], row["kind"], tuple(row["parts"])) for row in data["films"])
         return Study(data["study"], data["configuration"], tuple(data["parts"]), films)
     except (KeyError, TypeError) as error:
         fix = "Use the films.json in the folder of questionnaire.html."

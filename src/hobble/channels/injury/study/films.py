@@ -68,7 +68,7 @@ FILMS = (
 
 
 @dataclass(frozen=True)
-class Motion:
+class FilmMotion:
     """What a film shows at 60 Hz.
 
     positions: (F, J, 3) cm. rotations: (F, J, 4). from_healthy: mean distance (cm) of the joints from those
@@ -106,13 +106,13 @@ def part_links(network: Network, parts: Sequence[str]) -> list[str]:
     return out
 
 
-def act(network: Network, film: Film, runtime: Runtime) -> Motion:
+def act(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
     """The character in a film. It walks straight ahead. The injury begins after HEALTHY seconds."""
     severities = dict.fromkeys(part_links(network, film.parts), SEVERITY)
     hurt, well = _walked(network, film, severities, runtime), _walked(network, film, {}, runtime)
     begun = round(HEALTHY * FPS)
     apart = np.linalg.norm(_local(hurt[0]) - _local(well[0]), axis=-1)[begun:].mean()
-    return Motion(*hurt, float(apart))
+    return FilmMotion(*hurt, float(apart))
 
 
 def wish(film: Film, frame: int) -> tuple[bool, str]:

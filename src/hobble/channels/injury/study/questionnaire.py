@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from hobble.channels.injury.study.films import FILMS, FPS, PARTS, SEVERITY, Film, Motion, act, part_links
+from hobble.channels.injury.study.films import FILMS, FPS, PARTS, SEVERITY, Film, FilmMotion, act, part_links
 from hobble.channels.injury.walks import hurt_links
 from hobble.core.files import write_json, write_text
 from hobble.core.skeleton import Skeleton
@@ -77,7 +77,7 @@ def write_questionnaire(
     return solution
 
 
-def _row(network: Network, film: Film, motion: Motion) -> dict[str, Any]:
+def _row(network: Network, film: Film, motion: FilmMotion) -> dict[str, Any]:
     links = part_links(network, film.parts)
     return {
         "film": film.number,
@@ -99,7 +99,7 @@ def doubts(solution: dict[str, Any]) -> list[str]:
     return out + ([f"Never hurt in training: {', '.join(never)}."] if never else [])
 
 
-def pictures(studio: Studio, skeleton: Skeleton, motion: Motion, size: int) -> list[NDArray[np.uint8]]:
+def pictures(studio: Studio, skeleton: Skeleton, motion: FilmMotion, size: int) -> list[NDArray[np.uint8]]:
     """The pictures (size, size, 3) of a film, without colours for injuries. The camera follows smoothly."""
     keep = body(skeleton).bones
     world, places = jointed(skeleton, motion.positions, motion.rotations)

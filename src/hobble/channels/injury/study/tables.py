@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.study.answers import Answer, Shown, Study
+from hobble.channels.injury.study.answers import Answer, ShownFilm, Study
 from hobble.channels.injury.study.films import without_side
 from hobble.core.files import write_text
 from hobble.evaluation.tables import write_csv
@@ -31,7 +31,7 @@ def tables(study: Study, people: Sequence[Sequence[Answer]]) -> dict[str, Rows]:
     return out
 
 
-def film_rows(study: Study, film: Shown, answers: Sequence[Answer]) -> Rows:
+def film_rows(study: Study, film: ShownFilm, answers: Sequence[Answer]) -> Rows:
     """For each part how many people ticked it in one film: `people` and their `share`. hurts: whether it
     hurt.
     """
@@ -59,7 +59,7 @@ def summary_rows(study: Study, of: Mapping[int, Sequence[Answer]]) -> Rows:
     return rows
 
 
-def scores(answers: Sequence[tuple[Shown, Answer]]) -> dict[str, Any]:
+def scores(answers: Sequence[tuple[ShownFilm, Answer]]) -> dict[str, Any]:
     """How well people answered. answers: pairs of a film and an answer.
 
     seen: share of the hurt parts that were ticked. seen_without_side: the same if left and right are not
