@@ -28,6 +28,7 @@ BOTH_SIDES = ("back",)  # parts whose profile is applied to both sides
 GAIN: dict[str, float] = {"pelvis": 1.6, "hip": 2.1, "thigh": 1.25, "shank": 1.0, "foot": 0.9}
 # Ratios: speed; stride (time); lift (height of the swing); push and strike (pitch of the foot with heel up
 # and with toe up); arms (swing of both arms); back and head (movement within trunk and head).
+# Shares: vault (how far the standing knee straightens while the other leg swings).
 # Lengths: out (leg lengths that the foot swings outward).
 # Degrees: toe_out; crouch (knee flexion added in stance); forward and side (lean of the trunk forward and to
 # the hurt side); list (pelvis up on the hurt side while that leg swings); nod (head forward).
@@ -42,6 +43,7 @@ OWN: dict[str, dict[str, float]] = {
         "out": 0.07,
         "strike": 0.4,
         "list": 5.0,
+        "vault_sound": 0.8,
     },
     "shank": {
         "speed": 0.62,
@@ -53,6 +55,7 @@ OWN: dict[str, dict[str, float]] = {
         "crouch": 6.0,
         "toe_out": 4.0,
         "list": 4.0,
+        "vault_sound": 0.8,
     },
     "foot": {"speed": 0.66, "stride": 1.03, "push": 0.3, "lift": 0.7, "strike": 0.9, "toe_out": 14.0},
     "back": {

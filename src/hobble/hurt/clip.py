@@ -24,6 +24,9 @@ from hobble.hurt.source import Source, read_source
 from hobble.hurt.timing import Timing, retime
 from hobble.labels.model import Labels
 
+# Radians. In people's recordings the sound knee is bent by 8 to 10 degrees while a stiff leg swings.
+STRAIGHT = np.radians(9.0)
+
 
 @dataclass(frozen=True)
 class HurtClip:
@@ -134,9 +137,15 @@ def _from_root(source: Source, world: Array, side: int) -> Array:
 
 
 def _reach(leg: Leg, changes: Effects, source: Source, timing: Timing, side: int) -> Array:
-    """(N,) cm from hip to ankle of a standing leg. It is shorter if the injury makes the knee bend more."""
+    """(N,) cm from hip to ankle of a standing leg.
+
+    Its knee bends more if it is spared, and less while a stiff leg swings, which lifts the hips.
+    """
+    own, other = timing.legs[:, side], timing.legs[:, 1 - side]
     crouch = np.radians(changes.sided["crouch"][:, side]) * (1 - source.swing[:, side])
-    bent = knee_flexion(leg.reach, leg.upper, leg.lower) + crouch
-    return at_frames(
-        np.where(crouch > 0, reach_of(bent, leg.upper, leg.lower), leg.reach), timing.legs[:, side]
-    )
+    bend = at_frames(knee_flexion(leg.reach, leg.upper, leg.lower) + crouch, own)
+    lifts = np.clip(changes.sided["vault"][:, side], 0.0, 1.0) * source.swing[:, 1 - side]
+    vault = at_frames(lifts, other)
+    bend = bend - vault * np.maximum(bend - STRAIGHT, 0.0)
+    changed = (at_frames(crouch, own) > 0) | (vault > 0)
+    return np.where(changed, reach_of(bend, leg.upper, leg.lower), at_frames(leg.reach, own))

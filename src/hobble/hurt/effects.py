@@ -31,6 +31,7 @@ SIDED = (
         "width",
         "toe_out",
         "crouch",
+        "vault",
         "arm",
         "side",
         "list",

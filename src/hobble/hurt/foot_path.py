@@ -60,9 +60,28 @@ def rolled_foot(source: Source, effects: Effects, side: int) -> Foot:
     tilt = quat.from_axis_angle(axis, raised * (share - 1))
     new_along = quat.rotate(tilt, along)
     ankle = ankle + np.where(raised < 0, 1.0, 0.0)[:, None] * (along - new_along)
+    ankle = ankle - UP * _not_risen(source, ball[:, 1], push, side)[:, None]
     rest = quat.normalize(gaussian(quat.continuous(clip.rotations[:, toe]), 0.5 * clip.fps))
     toes = quat.slerp(rest, clip.rotations[:, toe], share)
     return Foot(ankle, ankle + new_along, quat.mul(tilt, turn), toes)
+
+
+def _not_risen(source: Source, ball: Array, push: Array, side: int) -> Array:
+    """(F,) cm by which a foot that does not push off is lower.
+
+    A healthy foot rolls over its toes, so its ball rises before it leaves the ground. ball: (F,) its height.
+    push: (F,) ratio of the push-off. The difference fades over the swing.
+    """
+    lower, stances = np.zeros(len(ball)), source.stances[side]
+    for stance, following in itertools.zip_longest(stances, stances[1:]):
+        middle, off = int(stance.middle), int(stance.off)
+        part = slice(middle, off + 1)
+        rise = np.maximum.accumulate(np.maximum(ball[part] - _middle(ball, stance), 0.0))
+        lower[part] = (1 - push[part]) * rise
+        if following and following.land > off:
+            land = int(following.land)
+            lower[off : land + 1] = lower[off] * smoothstep(np.linspace(1.0, 0.0, land + 1 - off))
+    return lower
 
 
 def _hinge(turn: Array, along: Array, stands: np.ndarray) -> Array:
