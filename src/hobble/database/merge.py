@@ -7,10 +7,11 @@ the previous database, or none.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
 from pathlib import Path
@@ -45,9 +46,7 @@ def write_database(
     float16 or bfloat16. The statistics are those of the training clips. The same rows and options give the
     same bytes. Raises HobbleError if no training clip has rows, InputError if a clip does not fit the others.
     """
-    path = Path(path)
-    work = _work(path)
-    try:
+    with _work(Path(path)) as work:
         shard = work / "0"
         write_shard(
             shard,
@@ -60,11 +59,7 @@ def write_database(
             seed=seed,
             chunk_bytes=chunk_bytes,
         )
-        return _merged(path, work, [shard], joint_weight, dtype)
-    except OSError as error:
-        raise write_error(error, path) from error
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
+        return _merged(Path(path), work, [shard], joint_weight, dtype)
 
 
 def merge_shards(
@@ -74,23 +69,27 @@ def merge_shards(
 
     Raises HobbleError if no training clip has rows, InputError if a shard does not fit the others.
     """
-    path = Path(path)
-    work = _work(path)
-    try:
-        return _merged(path, work, shards, joint_weight, dtype)
-    except OSError as error:
-        raise write_error(error, path) from error
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
+    with _work(Path(path)) as work:
+        return _merged(Path(path), work, shards, joint_weight, dtype)
 
 
-def _work(path: Path) -> Path:
-    """A new folder in the database's folder for what is not finished, without those of killed builds."""
+@contextlib.contextmanager
+def _work(path: Path) -> Iterator[Path]:
+    """A new folder in the database's folder for what is not finished. It is gone afterwards.
+
+    The folders of killed builds are removed first. Raises HobbleError for a file that cannot be written
+    there.
+    """
     path.mkdir(parents=True, exist_ok=True)
     _remove_others(path, keep=None)
     work = path / f"part-{os.getpid()}"
     work.mkdir()
-    return work
+    try:
+        yield work
+    except OSError as error:
+        raise write_error(error, path) from error
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
 
 
 def _merged(path: Path, work: Path, folders: Sequence[Path], joint_weight: float, dtype: str) -> Manifest:
