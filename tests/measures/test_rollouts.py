@@ -15,13 +15,14 @@ from hobble.evaluation.motion_measures import in_root_frame
 from hobble.measures.given import Given
 from hobble.measures.measure import Measure
 from hobble.measures.registry import MEASURES
-from hobble.measures.rollouts.crowd import Inputs, inputs, roll_out
+from hobble.measures.rollouts.crowd import Inputs, inputs
 from hobble.measures.rollouts.run import clip_roll_outs, measure_roll_outs, roll_out_rows
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
 from hobble.rows.clip_rows import ClipRows, save_clip_rows
 from hobble.rows.layout import RowLayout
 from hobble.runtime.animation import ProceduralAnimation
+from tests.measures.whole_roll_outs import roll_out
 
 
 def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from hobble.database.reader import Database
-from hobble.measures.rollouts.crowd import Inputs, roll_out
+from hobble.measures.rollouts.crowd import Inputs
 from hobble.models.pfnn.fused import FusedStep
 from hobble.models.pfnn.step import Step
 from hobble.models.pfnn.trainable import initialise
@@ -19,6 +19,7 @@ from hobble.training.batches import HostRows
 from hobble.training.rollout import RollOut
 from hobble.training.train import train
 from hobble.training.update import Update
+from tests.measures.whole_roll_outs import roll_out
 
 CPU = torch.device("cpu")
 FRAMES, STARTS = 5, 9

@@ -36,9 +36,9 @@ class Pose:
     """One frame. The caller may keep and change it. A single character has no leading axis C.
 
     positions: (C, J, 3); rotations: (C, J, 4) world, w first; contacts: (C, 4) left heel, left toe, right
-    heel, right toe, 0..1, as predicted, but 0 while the runtime makes a foot step; phase: (C,) in cycles;
-    root: (C, 3) on the trajectory; yaw: (C,) radians of the root's facing, 0 for +Z, growing to the left;
-    channels: name -> (C, columns), the values that the network got.
+    heel, right toe, 0..1: as predicted, and 0 while the runtime lifts a foot to set it down elsewhere; phase:
+    (C,) in cycles; root: (C, 3) on the trajectory; yaw: (C,) radians of the root's facing, 0 for +Z, growing
+    to the left; channels: name -> (C, columns), the values that the network got.
     """
 
     positions: Array = field(repr=False)

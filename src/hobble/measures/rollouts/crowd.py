@@ -151,15 +151,3 @@ class Crowd:
         level = place[..., ::2] - self.velocity[at - 1][:, None]
         out[..., ::2] = rotate_by_yaw(level, self.turn[at - 1][:, None])
         return out
-
-
-def roll_out(
-    predictor: Predictor, asked: Inputs, starts: np.ndarray, length: int
-) -> tuple[list[Array], Array]:
-    """The joints of roll-outs that begin at frames `starts` (n,), which rise, and their last phases (n,).
-
-    For each age from 1 to `length` there is an array (n', J, 3), in the root frame of frame start + age - 1,
-    with heights minus that frame's mean. It holds the first n' roll-outs, those still inside the stretch.
-    """
-    crowd = Crowd(predictor, [RollOuts(asked, starts, length)])
-    return [place for _, place, _ in crowd.frames()], crowd.phase
