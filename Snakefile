@@ -7,7 +7,7 @@ from pathlib import Path
 from hobble.channels import modules_of, shown_modules
 from hobble.core.errors import HobbleError
 from hobble.measures.registry import modules
-from hobble.workflow import lifetime, named_outputs
+from hobble.workflow import lifetime, lock_files, named_outputs
 from hobble.workflow.account import check_may_write, ensure_user_name
 from hobble.workflow.costs import stages
 from hobble.workflow.demands import Demands
@@ -20,6 +20,7 @@ from hobble.workflow.channel_sources import channels_of_folder
 # time for 2,500 clips.
 gc.set_threshold(200_000, 50, 1000)
 named_outputs.use()
+lock_files.use()
 ensure_user_name()
 try:
     if workflow.is_main_process:

@@ -17,7 +17,7 @@ from runtime import SKELETON, load_skeleton, random_network
 
 from hobble.channels.injury.walks import severities
 from hobble.evaluation.crowd import Stretch, run
-from hobble.measures.rollouts.crowd import Inputs, roll_out
+from hobble.measures.rollouts.crowd import Crowd, Inputs, RollOuts
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
@@ -68,10 +68,13 @@ def roll_outs(network: Network) -> tuple[float, float]:
     starts = np.arange(1, count - length, 6)
     predictor = PfnnPredictor(network)
     per = 1e6 / length / len(starts)
-    together = seconds(lambda: roll_out(predictor, asked, starts, length))
-    apart = seconds(
-        lambda: [roll_out(predictor, asked, starts[i : i + 1], length) for i in range(len(starts))]
-    )
+
+    def roll_out(chosen: np.ndarray) -> None:
+        for _ in Crowd(predictor, [RollOuts(asked, chosen, length)]).frames():
+            pass
+
+    together = seconds(lambda: roll_out(starts))
+    apart = seconds(lambda: [roll_out(starts[i : i + 1]) for i in range(len(starts))])
     return per * together, per * apart
 
 
