@@ -16,7 +16,7 @@ from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle
 from hobble.evaluation.spearman import spearman
-from hobble.hurt.parts import part_of_link
+from hobble.hurt.body_parts import part_of_link
 from hobble.models.network import Network
 from hobble.runtime.options import Runtime
 
