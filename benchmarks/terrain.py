@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from hobble.config.sections import Database, Labels, Synthetic, Terrain
+from hobble.config.sections import DatabaseOptions, Labels, Synthetic, Terrain
 from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.labels.label import label_clip, mirror_labels
@@ -36,12 +36,12 @@ from hobble.synthetic.clip import write_clip
 from hobble.terrain import search
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import Sampling
+from hobble.terrain.options import HeightSampling
 from hobble.terrain.patches import Patches, draw_patches
 
 SKELETONS = Path(__file__).resolve().parents[1] / "config/skeletons"
 OPTIONS = Terrain()
-SAMPLING = Sampling(**Database().model_dump(include=set(Sampling.model_fields)))
+SAMPLING = HeightSampling(**DatabaseOptions().model_dump(include=set(HeightSampling.model_fields)))
 Labelled = tuple[Clip, ClipLabels]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import secrets
 import sys
 import tempfile
@@ -100,19 +101,23 @@ def _texts(lab: Lab, folder: Path, seed: int, examples: int) -> list[Throw]:
 
 
 def _table(thrown: list[Throw]) -> str:
-    counts: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
     for throw in thrown:
-        counts[throw.what, throw.at][throw.happened] += 1
+        counts[_kind(throw.what)][throw.happened] += 1
+    counts = dict(sorted(counts.items())) | {"all": Counter(throw.happened for throw in thrown)}
+    head = ["| thrown | times | " + " | ".join(COLUMNS) + " |", "|---" * (2 + len(COLUMNS)) + "|"]
     rows = [
-        f"| {what} | {at} | {sum(found.values())} | "
-        + " | ".join(str(found[c] or "") for c in COLUMNS)
-        + " |"
-        for (what, at), found in sorted(counts.items())
+        f"| {kind} | {sum(found.values())} | " + " | ".join(str(found[c] or "") for c in COLUMNS) + " |"
+        for kind, found in counts.items()
     ]
-    head = ["| thrown | at | times | " + " | ".join(COLUMNS) + " |", "|---" * (3 + len(COLUMNS)) + "|"]
-    total = Counter(throw.happened for throw in thrown)
-    last = f"| all | | {len(thrown)} | " + " | ".join(str(total[c] or "") for c in COLUMNS) + " |"
-    return "\n".join([*head, *rows, last])
+    return "\n".join([*head, *rows])
+
+
+def _kind(what: str) -> str:
+    """The row of the table. Faults that differ only in number, kind of damage or leftovers share one."""
+    if what.startswith("bytes "):
+        return "damaged bytes of a file"
+    return re.sub(r" with \d+ mutations?$", " with mutations", what).split(", ")[0]
 
 
 def _write(command: str, table: str) -> None:

@@ -22,7 +22,7 @@ from hobble.measures.manners.windows import (
     USED,
     WINDOW,
     Figure,
-    Window,
+    MannerWindow,
     captured_windows,
 )
 from hobble.models.network import Network
@@ -85,8 +85,8 @@ def test_windows_with_an_injury_or_half_a_mood_are_left_out(both: Network) -> No
     assert captured_windows(clip(both, "a", "sad", lean=0, value=0.5), both, "mood") == []
 
 
-def window(who: str, manner: str, *values: float) -> Window:
-    return Window(who, manner, dict(enumerate(map(float, values))), dict.fromkeys(EFFECTS, 0.0))
+def window(who: str, manner: str, *values: float) -> MannerWindow:
+    return MannerWindow(who, manner, dict(enumerate(map(float, values))), dict.fromkeys(EFFECTS, 0.0))
 
 
 def test_whole_people_are_left_out() -> None:

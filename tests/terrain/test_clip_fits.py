@@ -16,7 +16,7 @@ from hobble.motion.root import RootFrames, root_frames
 from hobble.terrain.clip_fits import clip_fits, heights_under, sample_points, save_fits
 from hobble.terrain.ground import fit_cycle
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import Heightmap
+from hobble.terrain.options import HeightmapOptions
 from hobble.terrain.patches import Patches, draw_patches
 from hobble.terrain.soles import IS_HEEL, Feet, find_soles, heel_above_toe, held_above_other
 
@@ -271,7 +271,7 @@ def test_a_single_low_frame_lowers_the_soles_a_fault_of_capture_does_not(made: S
 def honest_over(heightmap: dict, files: list[Path], made: SimpleNamespace) -> None:
     """A walk over waves, fitted to patches of one heightmap."""
     options = made.options(patches=100)
-    maps = heightmaps([Heightmap(**heightmap)], files, cell=options.cell, height_scale=3.0)
+    maps = heightmaps([HeightmapOptions(**heightmap)], files, cell=options.cell, height_scale=3.0)
     drawn = options.model_dump(include={"cell", "size", "highest", "seed"})
     patches = draw_patches(maps, count=100, **drawn)
     walk = made.walk(GROUNDS["waves"])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.terrain.heightmaps import Heightmap
+from hobble.terrain.heightmaps import TerrainMap
 from hobble.terrain.patches import Patches, draw_patches
 from hobble.terrain.search import Footing, best_patches, patch_errors
 
@@ -72,7 +72,7 @@ def test_the_search_finds_the_lowest_of_all(
 
 
 def test_feet_on_a_plane_have_no_error_and_feet_below_it_their_depth() -> None:
-    slope = Heightmap("plane", np.add.outer(0.2 * np.arange(200), np.zeros(200)), CELL)
+    slope = TerrainMap("plane", np.add.outer(0.2 * np.arange(200), np.zeros(200)), CELL)
     patches = draw_patches([slope], count=4, cell=CELL, size=128, highest=50.0, seed=1)
     rng = np.random.default_rng(0)
     place = rng.uniform(-60, 60, (90, 2)).astype(np.float32)
@@ -92,7 +92,7 @@ def test_feet_on_a_plane_have_no_error_and_feet_below_it_their_depth() -> None:
 
 
 def test_among_equal_patches_the_first_are_found() -> None:
-    flat = Heightmap("flat", np.zeros((200, 200)), CELL)
+    flat = TerrainMap("flat", np.zeros((200, 200)), CELL)
     patches = draw_patches([flat], count=20, cell=CELL, size=128, highest=50.0, seed=1)
     chosen, error = best_patches(patches, made_up(1), 10)
     assert chosen.tolist() == list(range(10))

@@ -12,8 +12,8 @@ import torch
 
 from hobble.database.reader import Database
 from hobble.measures.rollouts.crowd import Inputs
-from hobble.models.pfnn.fused import FusedStep
-from hobble.models.pfnn.step import Step
+from hobble.models.pfnn.fused import FusedPfnnStep
+from hobble.models.pfnn.step import PfnnStep
 from hobble.models.pfnn.trainable import initialise
 from hobble.training.batches import HostRows
 from hobble.training.rollout import RollOut
@@ -147,8 +147,8 @@ def test_training_uses_the_roll_outs(
     assert number == len(given) == 8
 
 
-@pytest.mark.parametrize("kind", [Step, FusedStep])
-def test_a_step_keeps_its_errors(kind: type[Step]) -> None:
+@pytest.mark.parametrize("kind", [PfnnStep, FusedPfnnStep])
+def test_a_step_keeps_its_errors(kind: type[PfnnStep]) -> None:
     network = initialise((6, 5, 4), 4, 1)
     generator = torch.Generator().manual_seed(1)
     x, y = (torch.randn(7, n, generator=generator) for n in (6, 4))

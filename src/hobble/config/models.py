@@ -89,7 +89,7 @@ class Dataset(s.Section):
     labels: s.Labels = s.Labels()
     hurt: s.Hurt | None = Field(None, description="hurt versions of the healthy clips, as further clips")
     terrain: s.Terrain = s.Terrain()
-    database: s.Database = s.Database()
+    database: s.DatabaseOptions = s.DatabaseOptions()
 
     @field_validator("channels")
     @classmethod

@@ -15,7 +15,7 @@ from hobble.core.section import (
     Section,
     Share,
 )
-from hobble.database.options import Database
+from hobble.database.options import DatabaseOptions
 from hobble.evaluation.options import Evaluation
 from hobble.hurt.options import Hurt
 from hobble.labels.options import Labels
@@ -23,18 +23,18 @@ from hobble.motion.options import Download, Motion
 from hobble.report.options import Report
 from hobble.runtime.options import Runtime
 from hobble.synthetic.options import Synthetic
-from hobble.terrain.options import Heightmap, Terrain
+from hobble.terrain.options import HeightmapOptions, Terrain
 from hobble.training.options import Training
 
 __all__ = [
     "COMPARED",
-    "Database",
+    "DatabaseOptions",
     "Download",
     "Evaluation",
     "Finite",
     "Gait",
     "Ground",
-    "Heightmap",
+    "HeightmapOptions",
     "Hurt",
     "Inside",
     "Labels",

@@ -23,13 +23,13 @@ from hobble.core.files import save_npz, sync_folder, write_error
 from hobble.database.chunks import Chunk
 from hobble.database.manifest import FILE, SCALES, SPLITS, STATISTICS, Manifest, ShardCounts
 from hobble.database.pace import paces_of
-from hobble.database.plan import Source, fit_together
+from hobble.database.plan import RowSource, fit_together
 from hobble.database.shard import CHUNK_BYTES, Shard, add, statistics_of, write_shard
 
 
 def write_database(
     path: str | Path,
-    clips: Mapping[str, Source],
+    clips: Mapping[str, RowSource],
     splits: Mapping[str, str],
     *,
     channels: Sequence[str],

@@ -21,7 +21,7 @@ from hobble.database.chunks import HINT, Chunk
 from hobble.database.manifest import SPLITS
 from hobble.database.ordered import write_chunks
 from hobble.database.pace import gather, paces_of
-from hobble.database.plan import Plan, Source, make_plan
+from hobble.database.plan import Plan, RowSource, make_plan
 from hobble.database.precision import STORED
 from hobble.database.scatter import make_buckets, scatter
 from hobble.database.statistics import Moments, Statistics, clip_moments, finish, unseen_joints
@@ -33,7 +33,7 @@ Sums = tuple[Moments, Moments]  # of X and of Y
 
 def write_shard(
     folder: Path,
-    clips: Mapping[str, Source],
+    clips: Mapping[str, RowSource],
     splits: Mapping[str, str],
     *,
     channels: Sequence[str],

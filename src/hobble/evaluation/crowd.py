@@ -19,7 +19,7 @@ SETTLING_SHARE = 0.25  # share of a stretch, at its beginning, in which channels
 
 
 @dataclass(frozen=True)
-class Stretch:
+class CrowdTarget:
     """A number of frames with constant wishes for C figures.
 
     gait: (C,) names. channels: name -> (C, columns). speed: (C,) cm a frame, or None for SPEEDS of the gait.
@@ -72,7 +72,7 @@ class Walks:
         return slice(start + int(np.searchsorted(turned, turned[-1] - whole)), stop)
 
 
-def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
+def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
     """Run figures through `script`, from a stand, straight ahead on flat ground."""
     assert network.skeleton is not None
     count, frames = len(script[0].gait), sum(s.frames for s in script)

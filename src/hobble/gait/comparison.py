@@ -11,7 +11,7 @@ from hobble.gait.effects import effects
 from hobble.gait.graded import Grade, grade
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
-from hobble.gait.recogniser import RIGHT, SIDES, Answer, recognise, windows
+from hobble.gait.recogniser import RIGHT, SIDES, Impairment, recognise, windows
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Comparison:
 
     walk: Walk = field(repr=False)
     profile: Profile = field(repr=False)
-    answer: Answer
+    answer: Impairment
     grade: Grade
-    windows: Sequence[tuple[int, Answer]] = field(repr=False)
+    windows: Sequence[tuple[int, Impairment]] = field(repr=False)
     grades: Sequence[tuple[int, Grade]] = field(repr=False)
     effects: Mapping[str, Mapping[str, float]] = field(repr=False)
 
@@ -45,7 +45,7 @@ class Comparison:
         return _shares([answer for _, answer in self.grades])
 
 
-def _shares(answers: Sequence[Answer | Grade]) -> dict[str, float]:
+def _shares(answers: Sequence[Impairment | Grade]) -> dict[str, float]:
     names = [f"{a.label} {a.side}" if a.side else a.label for a in answers]
     return {name: names.count(name) / len(names) for name in dict.fromkeys(names)}
 

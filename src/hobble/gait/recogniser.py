@@ -27,7 +27,7 @@ SIDES = (RIGHT, LEFT)
 
 
 @dataclass(frozen=True)
-class Answer:
+class Impairment:
     """The impairment of a walk.
 
     label: one of people.GAITS. side: of the impaired leg, None if the label is normal. probabilities: of each
@@ -68,7 +68,7 @@ def classifier() -> Discriminant:
     return learn(*examples(people(), range(people().count)), shrinkage=SHRINKAGE)
 
 
-def recognise(walk: Profile, healthy: Profile, judge: Discriminant | None = None) -> Answer:
+def recognise(walk: Profile, healthy: Profile, judge: Discriminant | None = None) -> Impairment:
     """The impairment of a walk, relative to the figure's healthy walk."""
     judge = judge or classifier()
     scores = judge.scores(np.array([list(features(walk, healthy).values())]))[0]
@@ -82,7 +82,7 @@ def recognise(walk: Profile, healthy: Profile, judge: Discriminant | None = None
             sides[gait, which] = p
     label = max(labels, key=labels.__getitem__)
     side = None if label == NORMAL else max(SIDES, key=lambda s: sides[label, s])
-    return Answer(label, side, labels, sides)
+    return Impairment(label, side, labels, sides)
 
 
 def windows(walk: Walk, frames: int, seconds: float = 4.0, step: float = 1.0) -> list[tuple[int, Walk]]:

@@ -15,7 +15,7 @@ from hobble.hurt.effects import Effects
 from hobble.hurt.parts import SIDES
 from hobble.hurt.path import Path
 from hobble.hurt.sampling import smoothstep
-from hobble.hurt.source import UP, Source, Stance
+from hobble.hurt.source import UP, HealthyClip, Stance
 
 SIGN = (1.0, -1.0)  # +X is the figure's left
 # Radians of pitch over which the ratio changes from that of the heel strike to that of the push-off.
@@ -41,7 +41,7 @@ class Foot:
     toes: Array = field(repr=False)
 
 
-def rolled_foot(source: Source, effects: Effects, side: int) -> Foot:
+def rolled_foot(source: HealthyClip, effects: Effects, side: int) -> Foot:
     """The source's foot with less pitch: turned about its ball while the heel is up, else about its ankle."""
     clip, skeleton = source.clip, source.clip.skeleton
     heel, toe = (skeleton.role(f"{SIDES[side]}_{role}") for role in ("heel", "toe"))
@@ -66,7 +66,7 @@ def rolled_foot(source: Source, effects: Effects, side: int) -> Foot:
     return Foot(ankle, ankle + new_along, quat.mul(tilt, turn), toes)
 
 
-def _not_risen(source: Source, ball: Array, push: Array, side: int) -> Array:
+def _not_risen(source: HealthyClip, ball: Array, push: Array, side: int) -> Array:
     """(F,) cm by which a foot that does not push off is lower.
 
     A healthy foot rolls over its toes, so its ball rises before it leaves the ground. ball: (F,) its height.
@@ -104,7 +104,7 @@ def places(foot: Foot, stances: list[Stance]) -> list[Array]:
     return [_middle(foot.ankle, stance) for stance in stances]
 
 
-def move_foot(source: Source, effects: Effects, path: Path, foot: Foot, side: int) -> Foot:
+def move_foot(source: HealthyClip, effects: Effects, path: Path, foot: Foot, side: int) -> Foot:
     """The foot's path for the body's new path."""
     stances = source.stances[side]
     old = places(foot, stances)
@@ -154,7 +154,7 @@ def _way(ankle: Array) -> Array:
     return ((((level - level[0]) @ way) + SHORT**2 * time) / (way @ way + SHORT**2))[:, None]
 
 
-def _moved(place: Array, when: float, source: Source, effects: Effects, path: Path, side: int) -> Array:
+def _moved(place: Array, when: float, source: HealthyClip, effects: Effects, path: Path, side: int) -> Array:
     """A footprint in the new world.
 
     It moves with the body; the hurt foot lands less far ahead, both wider apart.

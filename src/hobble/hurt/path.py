@@ -9,7 +9,7 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
 from hobble.hurt.effects import Effects
-from hobble.hurt.source import Source
+from hobble.hurt.source import HealthyClip
 
 SLOPE = 0.3  # seconds: sigma of the Gaussian over the heights of the ground under the feet
 
@@ -35,7 +35,7 @@ class Path:
         )
 
 
-def shorten(source: Source, effects: Effects, slower: Array, ground: Array | None) -> Path:
+def shorten(source: HealthyClip, effects: Effects, slower: Array, ground: Array | None) -> Path:
     """The path at the speed of `effects`.
 
     slower: (F,) factor of the stride time. ground: (F,) height of the ground below the body, None if flat.
@@ -50,7 +50,7 @@ def shorten(source: Source, effects: Effects, slower: Array, ground: Array | Non
     )
 
 
-def ground_below(source: Source, heights: list[list[tuple[float, float]]]) -> Array:
+def ground_below(source: HealthyClip, heights: list[list[tuple[float, float]]]) -> Array:
     """(F,) cm: the ground below the body, from the standing feet.
 
     heights: (middle, height) of each foot's stances. They are relative to each foot's median, so that legs of

@@ -39,7 +39,7 @@ class Stance:
 
 
 @dataclass(frozen=True)
-class Source:
+class HealthyClip:
     """A healthy clip of F frames and its measurements. Pairs are left and right.
 
     stances: of each foot in order, at least one. up: (F, 2) whether a foot swings. swing: (F, 2) from 0 to 1
@@ -66,7 +66,7 @@ class Source:
         return len(self.clip)
 
 
-def read_source(clip: Clip, labels: Labels) -> Source:
+def read_source(clip: Clip, labels: Labels) -> HealthyClip:
     """Measure a healthy clip. labels: as `hobble.labels` makes them."""
     frames, skeleton = len(clip), clip.skeleton
     options = LabelOptions()
@@ -90,7 +90,7 @@ def read_source(clip: Clip, labels: Labels) -> Source:
     step = np.diff(phase, prepend=phase[:1])
     phase = phase[0] + np.cumsum(np.where(step < -0.5, step + 1.0, step)) if frames else phase
     legs = [_length(clip, side) for side in SIDES]
-    return Source(
+    return HealthyClip(
         clip,
         labels,
         (stances[LEFT], stances[RIGHT]),

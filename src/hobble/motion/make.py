@@ -23,7 +23,7 @@ from hobble.motion.resample import sample_positions, sample_rotations, sample_ti
 from hobble.motion.retarget import plan, retarget_clip
 from hobble.motion.rig import load_skeleton
 from hobble.motion.root import facing
-from hobble.motion.source import FOUND, Source, load_source
+from hobble.motion.source import FOUND, FileMotion, load_source
 from hobble.motion.stance import upright
 
 SAME = 1e-3  # cm: offsets that differ less from the skeleton's are equal
@@ -142,7 +142,7 @@ class Fitted:
     unsure: list[str] = field(default_factory=list)
 
 
-def fit_skeleton(clip: Clip, source: Source, target: Skeleton, proportions: str) -> Fitted:
+def fit_skeleton(clip: Clip, source: FileMotion, target: Skeleton, proportions: str) -> Fitted:
     """The clip's motion on the target skeleton, or on its joints with the clip's own bone lengths.
 
     clip: the source's, at another frame rate.
@@ -176,7 +176,7 @@ def _reordered(clip: Clip, order: Array, target: Skeleton) -> Clip:
     return Clip(clip.name, skeleton, clip.fps, clip.rotations[:, order], clip.root, translations)
 
 
-def _report(file: Bvh, source: Source, made: Clip) -> dict[str, Any]:
+def _report(file: Bvh, source: FileMotion, made: Clip) -> dict[str, Any]:
     return {
         "clip": made.name,
         "source": file.path.name,

@@ -44,7 +44,7 @@ FOUND = "found"  # name in reports of a rig without a skeleton file
 
 
 @dataclass(frozen=True)
-class Source:
+class FileMotion:
     """A file's motion at its own frame rate, on its own rig, or on the parts of its body.
 
     stance: where its rest pose comes from, in words. moving: whether joints below the hips move in their
@@ -65,7 +65,7 @@ class Source:
     unsure: list[str] = field(default_factory=list)
 
 
-def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion) -> Source:
+def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion) -> FileMotion:
     """A file's motion, checked and, if allowed, repaired.
 
     maps: the folder of the skeleton files. A rig with a skeleton file and an equal rest pose is taken as that
@@ -81,7 +81,7 @@ def load_source(file: Bvh, target: Target, maps: str | Path, options: ClipMotion
     return _unknown(file, target, known, repairs, options)
 
 
-def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: ClipMotion) -> Source:
+def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: ClipMotion) -> FileMotion:
     """The source of a file whose rig has a skeleton file."""
     rig = replace(rig_of(below_hips(file, hips)), roles=match.roles)
     unit, unit_name = _unit(file.path, leg_length(rig), options.unit)
@@ -109,7 +109,7 @@ def _known(file: Bvh, hips: int, match: Match, repairs: list[str], options: Clip
 
 def _unknown(
     file: Bvh, target: Target, known: Match | None, repairs: list[str], options: ClipMotion
-) -> Source:
+) -> FileMotion:
     """The source of a file on any other rig. Its parts and a standing rest pose are found."""
     rig = rig_of(file)
     decoded = _decoded(file)
@@ -210,7 +210,7 @@ def _mended(
     moving: bool,
     straightened: bool,
     options: ClipMotion,
-) -> Source:
+) -> FileMotion:
     """The source with broken frames repaired and its floor at height zero."""
     leave = options.defects == "leave"
     repaired = Repaired(clip, 0, []) if leave else repair(clip)
@@ -220,7 +220,7 @@ def _mended(
     if mended and options.defects == "refuse":
         raise InputError(file.path, mended[0], fix="Set motion.defects: repair to repair it this way.")
     notes = notes + uneven + flips(clip, repaired.first)
-    return Source(
+    return FileMotion(
         clip, match, *unit, axes, repaired.first, repairs + mended, notes, stance, moving, straightened
     )
 

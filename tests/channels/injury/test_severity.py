@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hobble.channels import Source
+from hobble.channels import ClipSource
 from hobble.channels.files import load_values, save_values, write_report
 from hobble.channels.injury.channel import CHANNEL
 from hobble.channels.injury.severity import (
@@ -150,11 +150,11 @@ def test_on_a_skeleton_without_links_a_clip_is_hurt_and_has_no_column(clip):
     figure = replace(clip, skeleton=replace(clip.skeleton, links=()))
     severity, warnings = clip_severity(figure, None, f"{THIGH}[4]", motion())
     assert (severity.shape, warnings) == ((300, 0), [])
-    said = Source("walk", {}, f"{THIGH}[4]")
+    said = ClipSource("walk", {}, f"{THIGH}[4]")
     CHANNEL.check(said, figure.skeleton)
     assert not CHANNEL.is_neutral(said)
     with pytest.raises(InputError, match="no such link"):
-        CHANNEL.check(Source("walk", {}, "Thigh[4]"), clip.skeleton)
+        CHANNEL.check(ClipSource("walk", {}, "Thigh[4]"), clip.skeleton)
 
 
 def test_a_healthy_clip_is_all_zero(clip):

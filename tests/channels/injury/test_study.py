@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from hobble.channels.injury.study.answers import Answer, Study, read_answers, read_study
+from hobble.channels.injury.study.answers import FilmAnswer, Study, read_answers, read_study
 from hobble.channels.injury.study.films import FILMS, FPS, GAIT, ONE, PARTS, SEVERAL, wish
 from hobble.channels.injury.study.tables import NUMERALS, tables
 from hobble.cli.__main__ import main
@@ -110,8 +110,8 @@ def test_a_part_of_the_parts_is_seen_in_part(study: Study) -> None:
     """In film 9 three parts hurt, and one of two people ticks one of them. In film 1 both tick one part too
     many.
     """
-    first = [Answer(f.number, f.parts[:1] if f.number == 9 else f.parts, 4) for f in FILMS]
-    second = [Answer(f.number, () if f.number == 9 else f.parts, 2) for f in FILMS]
+    first = [FilmAnswer(f.number, f.parts[:1] if f.number == 9 else f.parts, 4) for f in FILMS]
+    second = [FilmAnswer(f.number, () if f.number == 9 else f.parts, 2) for f in FILMS]
     rows = {row["film"]: row for row in tables(study, [first, second])["XVI"][:13]}
     assert rows["9"]["seen"] == pytest.approx(1 / 6, abs=1e-5)
     assert rows["9"]["exact"] == 0

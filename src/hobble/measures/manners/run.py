@@ -24,7 +24,7 @@ from hobble.measures.manners.windows import (
     EFFECTS,
     NONE,
     Figure,
-    Window,
+    MannerWindow,
     captured_windows,
     generated,
     mean_effect,
@@ -56,7 +56,7 @@ def manners(
     names = [name for name in network.channels if channel(name).manner]
     if not names or network.skeleton is None:
         return {"applies": False, "reason": REASON}
-    windows: dict[str, list[Window]] = {name: [] for name in names}
+    windows: dict[str, list[MannerWindow]] = {name: [] for name in names}
     for clip in motion:
         for name, some in windows.items():
             some += captured_windows(clip, network, name)
@@ -68,7 +68,7 @@ def manners(
 def of_channel(
     network: Network,
     name: str,
-    windows: Sequence[Window],
+    windows: Sequence[MannerWindow],
     splits: Mapping[str, str],
     people: Mapping[str, str],
     runtime: Runtime,
@@ -163,7 +163,7 @@ def run(given: Given, options: Section) -> Outcome:
     return Outcome(result, tables, says or result.get("reason", ""))
 
 
-def _named(judge: Discriminant, values: Mapping[str, float], windows: Sequence[Window]) -> Named:
+def _named(judge: Discriminant, values: Mapping[str, float], windows: Sequence[MannerWindow]) -> Named:
     names = judge.names(table(windows))
     wanted = set(values) or {NONE}
     return {
@@ -183,10 +183,10 @@ def _effect(
     name: str,
     manner: str,
     effect: str,
-    known: Sequence[Window],
-    plain: Sequence[Window],
-    half: Sequence[Window],
-    full: Sequence[Window],
+    known: Sequence[MannerWindow],
+    plain: Sequence[MannerWindow],
+    half: Sequence[MannerWindow],
+    full: Sequence[MannerWindow],
 ) -> Effect:
     """One effect. Windows: captured ones, and generated ones without a manner, with it at .5 and at 1."""
     neutral = [w for w in known if w.manner == NONE]
@@ -208,7 +208,7 @@ def _between(both: Array, first: Array, second: Array) -> float:
     return round(float((both - first) @ way / max(float(way @ way), 1e-9)), 4)
 
 
-def _mean(windows: Sequence[Window]) -> Array:
+def _mean(windows: Sequence[MannerWindow]) -> Array:
     return np.asarray(table(windows).mean(axis=0))
 
 

@@ -12,7 +12,7 @@ from hobble.channels.injury.response.sweep import WALK_IN
 from hobble.channels.injury.walks import severities
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.crowd import FPS, Stretch, Walks, run
+from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle
 from hobble.evaluation.spearman import spearman
@@ -70,8 +70,8 @@ def second_injuries(
         return severities(network, each)
 
     healthy = severities(network, [{}] * len(pairs))
-    script = [Stretch(_frames(WALK_IN, seconds), gait, healthy)]
-    script += [Stretch(_frames(1, seconds), gait, hurt(s)) for s in SECOND]
+    script = [CrowdTarget(_frames(WALK_IN, seconds), gait, healthy)]
+    script += [CrowdTarget(_frames(1, seconds), gait, hurt(s)) for s in SECOND]
     walks = run(network, script, runtime)
     last = len(SECOND)
     alone = {b: i for i, (a, b) in enumerate(pairs) if a is None}
@@ -120,7 +120,11 @@ def into_a_jog(network: Network, links: Sequence[str], seconds: float, runtime: 
     walk, jog = ["walk"] * len(figures), ["jog"] * len(figures)
     walks = run(
         network,
-        [Stretch(frames, walk, hurt), Stretch(frames, walk, hurt), Stretch(2 * frames, jog, hurt)],
+        [
+            CrowdTarget(frames, walk, hurt),
+            CrowdTarget(frames, walk, hurt),
+            CrowdTarget(2 * frames, jog, hurt),
+        ],
         runtime,
     )
     healthy = {stretch: _cycle(walks, stretch, 0) for stretch in (1, 2)}
@@ -153,9 +157,9 @@ def divided_severities(
 ) -> list[Divided]:
     """The walk with severities divided by 1, 2 and 5: how much of each link's effect remains."""
     gait = ["walk"] * len(links)
-    script = [Stretch(_frames(WALK_IN, seconds), gait, severities(network, [{}] * len(links)))]
+    script = [CrowdTarget(_frames(WALK_IN, seconds), gait, severities(network, [{}] * len(links)))]
     script += [
-        Stretch(_frames(1, seconds), gait, severities(network, [{link: s} for link in links]))
+        CrowdTarget(_frames(1, seconds), gait, severities(network, [{link: s} for link in links]))
         for s in DIVIDED
     ]
     out: list[Divided] = []

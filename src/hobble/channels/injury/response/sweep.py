@@ -15,7 +15,7 @@ import numpy as np
 from hobble.channels.injury.response.results import Response, SweepRow
 from hobble.channels.injury.walks import severities
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.crowd import FPS, Stretch, Walks, run
+from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
 from hobble.evaluation.motion_measures import gait_measures
 from hobble.evaluation.pose_distance import distance_to_cycle, mean_cycle, period, settling
 from hobble.evaluation.spearman import spearman
@@ -30,7 +30,7 @@ HURT = 2  # stretches for which a figure is hurt at once, and then healed
 NAMES = ("gait", "link", "direction", "severity")
 
 
-class Sweep:
+class SeveritySweep:
     """The walks of one gait, a figure for each of `links`.
 
     steps: the severities. walks: the figures' way through them, after a stretch in which they begin to walk.
@@ -124,17 +124,17 @@ class Sweep:
 
 def sweeps(
     network: Network, links: Sequence[str], gaits: Sequence[str], seconds: float, runtime: Runtime
-) -> Iterator[Sweep]:
+) -> Iterator[SeveritySweep]:
     """The sweep of each gait, `seconds` at each severity. The figures of all gaits go in one crowd."""
     assert network.skeleton is not None
     names = [gait for gait in gaits for _ in links]
 
-    def stretch(share: float, severity: float) -> Stretch:
+    def stretch(share: float, severity: float) -> CrowdTarget:
         hurt = severities(network, [{link: severity} for link in links] * len(gaits))
-        return Stretch(max(4, round(share * seconds * FPS)), names, hurt)
+        return CrowdTarget(max(4, round(share * seconds * FPS)), names, hurt)
 
     walks = run(network, [stretch(WALK_IN, 0), *(stretch(1, s) for s in STEPS)], runtime)
     at_once = run(network, [stretch(WALK_IN, 0), stretch(1, 0), stretch(HURT, 10), stretch(HURT, 0)], runtime)
     for number, gait in enumerate(gaits):
         own = slice(number * len(links), (number + 1) * len(links))
-        yield Sweep(network.skeleton, links, gait, walks.of(own), at_once.of(own))
+        yield SeveritySweep(network.skeleton, links, gait, walks.of(own), at_once.of(own))
