@@ -17,7 +17,7 @@ from runtime import SKELETON, load_skeleton, random_network
 
 from hobble.channels.injury.walks import severities
 from hobble.evaluation.crowd import CrowdTarget, run
-from hobble.measures.rollouts.crowd import Crowd, Inputs, RollOuts
+from hobble.measures.rollouts.crowd import Crowd, RollOutInputs, RollOuts
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
@@ -56,7 +56,7 @@ def roll_outs(network: Network) -> tuple[float, float]:
     rng = np.random.default_rng(1)
     x = (network.x_mean + 0.1 * rng.normal(size=(count, layout.x_size))).astype(np.float32)
     still = np.zeros(count)
-    asked = Inputs(
+    asked = RollOutInputs(
         x,
         np.zeros((count, layout.y_size), np.float32),
         still,

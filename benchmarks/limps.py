@@ -32,7 +32,7 @@ from hobble.gait.recogniser import SHRINKAGE, examples, learn, recognise
 from hobble.hurt.clip import hurt_clip
 from hobble.labels.label import label_clip
 from hobble.labels.model import Labels
-from hobble.labels.options import Labels as LabelOptions
+from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
 

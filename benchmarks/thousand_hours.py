@@ -27,8 +27,8 @@ import numpy as np
 import yaml
 
 from hobble.measures.registry import MEASURES
-from hobble.measures.sampling import SampleOptions
-from hobble.workflow.batches import batch_count
+from hobble.measures.sample_options import SampleOptions
+from hobble.workflow.clip_batches import batch_count
 from hobble.workflow.costs import BATCH_RULES
 
 ROOT = Path(__file__).resolve().parents[1]

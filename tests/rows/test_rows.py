@@ -70,7 +70,7 @@ def rows_as_configured(shared: Path, root: Path, margins: str = "drop", **terrai
         ClipMotion(**options("motion")),
     )
     files = [folder / f"{NAME}{end}" for end in (".phase", ".gait", "_footsteps.txt", "_gait.txt")]
-    labelling = sections.Labels.model_validate(options("labels", margins=margins))
+    labelling = sections.LabelOptions.model_validate(options("labels", margins=margins))
     labels = vars(label_clip(clip, files, report, "walk", "flat", labelling)[0])
     ground, database = options("terrain", **terrain), options("database")
     any_map = TerrainMap("any", np.zeros((200, 200)), ground["cell"])

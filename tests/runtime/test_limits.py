@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.channels.limits import UNLIMITED, Limits
+from hobble.channels.speed_limits import UNLIMITED, Limits
 from hobble.core.errors import InputError
 from hobble.models.load import load_network
 from hobble.models.network import Network

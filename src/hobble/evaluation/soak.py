@@ -77,7 +77,7 @@ def grounds(characters: int, rng: np.random.Generator) -> Callable[[Array, Array
 
 
 @dataclass
-class Slides:
+class StanceSlides:
     """Distance that toes slide in each stance of C characters, as in `motion_measures.foot_slide`.
 
     far: (C, 2) distance in this stance, cm. frames: (C, 2) its length. done: distances of past stances.
@@ -123,7 +123,7 @@ def soak(
     hips = skeleton.role("hips")
     toes = [skeleton.role("left_toe"), skeleton.role("right_toe")]
     low, high, worst = np.inf, -np.inf, dict.fromkeys(("network", "pose", "added", "speed"), 0.0)
-    slides = Slides(np.zeros((characters, 2)), np.zeros((characters, 2), int))
+    slides = StanceSlides(np.zeros((characters, 2)), np.zeros((characters, 2), int))
     old: tuple[Array, ...] | None = None
     finite, wild = True, 0
     for _ in range(frames):

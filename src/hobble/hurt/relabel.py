@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hobble.hurt.parts import LEFT, RIGHT
+from hobble.hurt.body_parts import LEFT, RIGHT
 from hobble.hurt.sampling import at_frames
 from hobble.hurt.timing import Timing
 from hobble.labels.model import Labels

@@ -19,7 +19,7 @@ from hobble.labels.footfall import Swing, find_swings, landings
 from hobble.labels.gait import automatic_gait, overwrite_crouch
 from hobble.labels.label_picture import label_picture
 from hobble.labels.model import GAITS, LabelReport, Labels
-from hobble.labels.options import Labels as Options
+from hobble.labels.options import LabelOptions as Options
 from hobble.labels.phase import (
     MARGINS,
     dropped_frames,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hobble.channels.limits import together
+from hobble.channels.speed_limits import together
 from hobble.core.quat import Array
 from hobble.models.network import Network
 

@@ -27,7 +27,7 @@ from hobble.gait.features import features
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile
 from hobble.gait.recogniser import RIGHT, SIDES, examples
-from hobble.hurt.parts import part_of_link
+from hobble.hurt.body_parts import part_of_link
 from hobble.measures.given import Given, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network

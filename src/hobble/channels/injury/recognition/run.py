@@ -25,7 +25,7 @@ from hobble.evaluation.crowd import FPS, CrowdTarget
 from hobble.evaluation.crowd import run as run_walks
 from hobble.evaluation.gait_features import features
 from hobble.gait.discriminant import Discriminant, learn
-from hobble.hurt.parts import part_of_link
+from hobble.hurt.body_parts import part_of_link
 from hobble.measures.given import Given, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network

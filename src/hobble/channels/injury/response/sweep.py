@@ -8,10 +8,11 @@ walk follows.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import cast
 
 import numpy as np
 
+from hobble.channels.injury.response.results import Response, SweepRow
 from hobble.channels.injury.walks import severities
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run
@@ -43,7 +44,7 @@ class SeveritySweep:
         self.steps = STEPS
         self.walks, self.at_once = walks, at_once
 
-    def rows(self, figure: int) -> list[dict[str, Any]]:
+    def rows(self, figure: int) -> list[SweepRow]:
         """One row for each step.
 
         It has the gait's measures, the distances of the pose from the healthy and the fully hurt walk (cm,
@@ -56,7 +57,7 @@ class SeveritySweep:
         rows = []
         for step, (span, severity) in enumerate(zip(spans, self.steps, strict=True)):
             local, phase = walks.local[span, figure], walks.phase[span, figure]
-            row: dict[str, Any] = {
+            row: dict[str, float | str | None] = {
                 "gait": self.gait,
                 "link": self.links[figure],
                 "direction": "rising" if step <= worst else "falling",
@@ -69,10 +70,11 @@ class SeveritySweep:
             same = cycles[step if step <= worst else 2 * worst - step]
             row["from_rising"] = float(np.mean(distance_to_cycle(local, phase, same)))
             row["largest_acceleration"] = float(walks.acceleration[span, figure].max())
-            rows.append({k: round(v, 5) if isinstance(v, float) else v for k, v in row.items()})
+            rounded = {k: round(v, 5) if isinstance(v, float) else v for k, v in row.items()}
+            rows.append(cast(SweepRow, rounded))
         return rows
 
-    def response(self, figure: int, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    def response(self, figure: int, rows: Sequence[SweepRow]) -> Response:
         """How the measures respond to severity.
 
         Spearman's rho for rising and falling severity (None if a measure is constant). At severity 10:
@@ -84,12 +86,16 @@ class SeveritySweep:
         worst = len(SEVERITIES) - 1
         rising, falling = rows[: worst + 1], rows[worst:]
         names = [k for k in rows[0] if k not in (*NAMES, "from_rising")]
+        numbers = cast(Sequence[Mapping[str, float | None]], rows)
+        measures = {name: [row[name] for row in numbers] for name in names}
         own = rows[0]["from_healthy"]
         largest = float(self.walks.acceleration[int(self.walks.starts[1]) :, figure].max())
         hurt, healed = self._settling(figure)
         return {
-            "spearman": {n: spearman(SEVERITIES, [row[n] for row in rising]) for n in names},
-            "spearman_falling": {n: spearman(SEVERITIES[::-1], [row[n] for row in falling]) for n in names},
+            "spearman": {n: spearman(SEVERITIES, values[: worst + 1]) for n, values in measures.items()},
+            "spearman_falling": {
+                n: spearman(SEVERITIES[::-1], values[worst:]) for n, values in measures.items()
+            },
             "from_healthy_cm": round(rising[-1]["from_healthy"] - own, 5),
             "after_healing_cm": round(rows[-1]["from_healthy"] - own, 5),
             "hysteresis_cm": round(max(row["from_rising"] for row in falling[1:]) - own, 5),
