@@ -15,9 +15,9 @@ from time import process_time
 import numpy as np
 from runtime import SKELETON, load_skeleton, random_network
 
-from hobble.channels.injury.walks import severities
+from hobble.channels.injury.crowd_severities import severities
 from hobble.evaluation.crowd import CrowdTarget, run
-from hobble.measures.rollouts.crowd import Crowd, RollOutInputs, RollOuts
+from hobble.measures.rollouts.roll_outs import Crowd, RollOutInputs, RollOuts
 from hobble.models.load import load_network
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor

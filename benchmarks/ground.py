@@ -26,7 +26,7 @@ from hobble.labels.label import label_clip, mirror_labels
 from hobble.motion.make import make_clip
 from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import ClipMotion
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import heightmaps
 from hobble.terrain.options import HeightSampling

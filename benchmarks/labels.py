@@ -22,7 +22,7 @@ from hobble.labels.gait import automatic_gait
 from hobble.labels.label import label_clip
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 
 ROOT = Path(__file__).resolve().parents[1]
 

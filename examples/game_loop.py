@@ -8,7 +8,7 @@ import sys
 import numpy as np
 
 from hobble.runtime import ProceduralAnimation
-from hobble.runtime.axes import Axes
+from hobble.runtime.caller_axes import Axes
 
 # These are Unity's axes. For Unreal use Axes("left", "Z"), for Blender Axes("right", "Z", "m").
 character = ProceduralAnimation.load(sys.argv[1], axes=Axes("left", "Y", "m"), mode="cubic")

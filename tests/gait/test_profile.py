@@ -7,7 +7,7 @@ import pytest
 
 from hobble.core.errors import HobbleError
 from hobble.gait.cycles import WalkCycles, measure
-from hobble.gait.effects import effects
+from hobble.gait.effect_sizes import effects
 from hobble.gait.features import features
 from hobble.gait.graded import grade
 from hobble.gait.profile import NAMES, mirrored, profile

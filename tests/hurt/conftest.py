@@ -18,7 +18,7 @@ from hobble.labels.model import Labels
 from hobble.labels.options import LabelOptions
 from hobble.motion.make import make_clip
 from hobble.motion.options import ClipMotion
-from hobble.synthetic.clip import walk
+from hobble.synthetic.generate_clip import walk
 from hobble.synthetic.recipes import Segment
 
 # The tests of this folder measure walks alike; as a module of its own, since tests are no package.

@@ -15,7 +15,7 @@ from hobble.evaluation.motion_measures import in_root_frame
 from hobble.measures.given import Given
 from hobble.measures.measure import Measure
 from hobble.measures.registry import MEASURES
-from hobble.measures.rollouts.crowd import RollOutInputs, inputs
+from hobble.measures.rollouts.roll_outs import RollOutInputs, inputs
 from hobble.measures.rollouts.run import clip_roll_outs, measure_roll_outs, roll_out_rows
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
@@ -171,7 +171,7 @@ def test_splits_add_up_and_come_out_the_same(hurtable: Network, tmp_path: Path, 
     assert rows[0]["clip"] is None
     json.dumps(result, allow_nan=False)
     # The same bits, however many poses and clips go at once.
-    monkeypatch.setattr("hobble.measures.rollouts.crowd.BATCH", 7)
+    monkeypatch.setattr("hobble.measures.rollouts.roll_outs.BATCH", 7)
     assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result
     monkeypatch.setattr("hobble.measures.rollouts.run.AT_ONCE", 1)
     assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result

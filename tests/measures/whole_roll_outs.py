@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.measures.rollouts.crowd import Crowd, RollOutInputs, RollOuts
+from hobble.measures.rollouts.roll_outs import Crowd, RollOutInputs, RollOuts
 from hobble.models.network import Predictor
 
 

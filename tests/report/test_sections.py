@@ -13,7 +13,7 @@ from hobble.channels.injury.response import page as injury_page
 from hobble.channels.injury.response import page_cases
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
-from hobble.evaluation.tables import read_numbers
+from hobble.evaluation.csv_tables import read_numbers
 from hobble.measures.accuracy import page as accuracy_page
 from hobble.measures.responsivity import lap_charts
 from hobble.measures.responsivity import page as responsivity_page

@@ -65,7 +65,7 @@ def figures(found, material):
 def hints(found, material):
     yield Hint("note", "The hips were looked at.", f"In {len(found['clips'])} clips.")
 """
-COMPARISON = """from hobble.evaluation.side_by_side import SideBySide
+COMPARISON = """from hobble.evaluation.comparison_rows import SideBySide
 
 
 def compared(all_measured, published):

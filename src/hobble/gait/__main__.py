@@ -9,10 +9,10 @@ from pathlib import Path
 
 from hobble.core.errors import HobbleError, InputError
 from hobble.gait.comparison import WalkComparison, compare, healthy_profile, measure_clip
-from hobble.gait.effects import EFFECTS, effects_of_people
+from hobble.gait.effect_sizes import EFFECTS, effects_of_people
 from hobble.gait.people import GAITS, SOURCE, people
 from hobble.gait.profile import NO_CYCLE, Profile
-from hobble.gait.read import SKELETONS, read_clip
+from hobble.gait.read_clip import SKELETONS, read_clip
 from hobble.gait.recogniser import RIGHT
 
 NO_HEALTHY = "No healthy walk was given. Compared with the mean of people, a person's build counts, too."

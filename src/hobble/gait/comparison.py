@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from hobble.core.clip import Clip
 from hobble.gait.cycles import WalkCycles, joined, measure
-from hobble.gait.effects import effects
+from hobble.gait.effect_sizes import effects
 from hobble.gait.graded import Grade, grade
 from hobble.gait.people import people
 from hobble.gait.profile import Profile, profile

@@ -24,7 +24,7 @@ from hobble.gait.cycles import WalkCycles
 from hobble.gait.features import features
 from hobble.gait.graded import HEALTHY
 from hobble.gait.profile import Profile, mirrored, profile
-from hobble.gait.read import SKELETONS, read_clip
+from hobble.gait.read_clip import SKELETONS, read_clip
 from hobble.gait.recogniser import windows
 
 # performer -> reference walks, and other walks: slow, quick, on curves

@@ -14,7 +14,7 @@ from hobble.core.smooth import gaussian
 from hobble.hurt.body_parts import SIDES
 from hobble.hurt.effects import Effects
 from hobble.hurt.healthy_clip import UP, HealthyClip, SourceStance
-from hobble.hurt.sampling import smoothstep
+from hobble.hurt.interpolate import smoothstep
 from hobble.hurt.shortened_path import ShortenedPath
 
 SIGN = (1.0, -1.0)  # +X is the figure's left

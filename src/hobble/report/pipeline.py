@@ -11,8 +11,8 @@ from hobble.core.errors import InputError
 from hobble.database.manifest import FILE as MANIFEST
 from hobble.database.manifest import Manifest
 from hobble.database.sizes import Sizes, sizes
+from hobble.evaluation.csv_tables import read_numbers
 from hobble.evaluation.pipeline_results import JobTotal, Pipeline, StageTotal
-from hobble.evaluation.tables import read_numbers
 from hobble.report.provenance import machine, versions
 from hobble.workflow.kept import recorded_seconds
 

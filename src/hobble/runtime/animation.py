@@ -16,7 +16,7 @@ from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.runtime.axes import Axes
+from hobble.runtime.caller_axes import Axes
 from hobble.runtime.channel_values import ChannelValues, UnknownName
 from hobble.runtime.character import Character, Snapshot, start
 from hobble.runtime.controller import Controller, ControllerOptions

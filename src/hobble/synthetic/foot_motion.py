@@ -11,7 +11,7 @@ from scipy.ndimage import maximum_filter1d
 from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.synthetic.footsteps import FOOT, PlannedStance
-from hobble.synthetic.ground import Ground
+from hobble.synthetic.planned_ground import Ground
 from hobble.synthetic.style import Style
 
 X_AXIS = np.array([1.0, 0.0, 0.0])

@@ -8,7 +8,7 @@ import numpy as np
 
 from hobble.core import quat
 from hobble.core.quat import Array
-from hobble.synthetic.ground import Ground
+from hobble.synthetic.planned_ground import Ground
 from hobble.synthetic.planned_path import PlannedPath
 from hobble.synthetic.style import LEFT, RIGHT, SIGN, Style
 

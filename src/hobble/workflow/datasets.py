@@ -6,7 +6,7 @@ import functools
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.core.errors import HobbleError
 from hobble.core.section import Section
 from hobble.workflow.clip_batches import batch_of

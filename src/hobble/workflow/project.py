@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.config.sections import COMPARED
 from hobble.core.errors import HobbleError
 from hobble.workflow.clip_batches import Batches

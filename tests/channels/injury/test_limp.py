@@ -13,9 +13,9 @@ import pytest
 from hobble.channels import channel
 from hobble.channels.injury.limp import page, together
 from hobble.channels.injury.limp import run as module
-from hobble.channels.injury.limp.captured import VERSION, HurtSeconds, Limp, healthy_of
+from hobble.channels.injury.limp.captured_limps import VERSION, HurtSeconds, Limp, healthy_of
+from hobble.channels.injury.limp.crowd_walks import FigureWalk
 from hobble.channels.injury.limp.run import SEVERITIES, distance, hurt_side, limp
-from hobble.channels.injury.limp.walks import FigureWalk
 from hobble.gait.cycles import SCALARS, Cycle, WalkCycles
 from hobble.gait.people import NORMAL, people
 from hobble.gait.profile import profile

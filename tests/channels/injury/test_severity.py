@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hobble.channels import ClipSource
-from hobble.channels.files import load_values, save_values, write_report
+from hobble.channels.clip_values import load_values, save_values, write_report
 from hobble.channels.injury.channel import CHANNEL
 from hobble.channels.injury.severity import (
     clip_severity,

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
+from hobble.channels.injury.study.answer_tables import NUMERALS, tables
 from hobble.channels.injury.study.answers import FilmAnswer, Study, read_answers, read_study
 from hobble.channels.injury.study.films import FILMS, FPS, GAIT, ONE, PARTS, SEVERAL, wish
-from hobble.channels.injury.study.tables import NUMERALS, tables
 from hobble.cli.__main__ import main
 from hobble.core.errors import InputError
 

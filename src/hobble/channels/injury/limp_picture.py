@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from hobble.channels.injury.crowd_severities import hurt_links, links
 from hobble.channels.injury.shown import body_parts
-from hobble.channels.injury.walks import hurt_links, links
 from hobble.core.errors import HobbleError
 from hobble.core.files import atomic_path
 from hobble.figure.mesh import body

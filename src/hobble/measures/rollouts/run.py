@@ -27,8 +27,8 @@ from hobble.measures.accuracy.run import (
 from hobble.measures.given import Given, Outcome, Row
 from hobble.measures.results import SPLITS
 from hobble.measures.rollouts import Options
-from hobble.measures.rollouts.crowd import Crowd, RollOuts, inputs
 from hobble.measures.rollouts.results import ErrorsOf, ErrorsOfClip, RollOutsFound
+from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs
 from hobble.measures.sample import Sample, drawn
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor

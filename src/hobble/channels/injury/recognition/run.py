@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from hobble.channels.injury.limp.captured import VERSION
-from hobble.channels.injury.walks import links as links_of
-from hobble.channels.injury.walks import severities
+from hobble.channels.injury.crowd_severities import links as links_of
+from hobble.channels.injury.crowd_severities import severities
+from hobble.channels.injury.limp.captured_limps import VERSION
 from hobble.core.quat import Array
 from hobble.core.section import Section
 from hobble.core.skeleton import Skeleton

@@ -7,9 +7,9 @@ from itertools import product
 
 import numpy as np
 
+from hobble.channels.injury.crowd_severities import severities
 from hobble.channels.injury.response.results import Divided, IntoAJog, SecondInjury
 from hobble.channels.injury.response.sweep import WALK_IN
-from hobble.channels.injury.walks import severities
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.crowd import FPS, CrowdTarget, Walks, run

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hobble.channels.injury.crowd_severities import INJURY, hurt_links
+from hobble.channels.injury.crowd_severities import links as links_of
 from hobble.channels.injury.shown import OTHERS, links_between
 from hobble.channels.injury.shown import PARTS as SLIDERS
-from hobble.channels.injury.walks import INJURY, hurt_links
-from hobble.channels.injury.walks import links as links_of
 from hobble.core.errors import HobbleError
 from hobble.core.quat import Array
 from hobble.models.network import Network

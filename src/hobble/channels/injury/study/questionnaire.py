@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from hobble.channels.injury.crowd_severities import hurt_links
 from hobble.channels.injury.study.films import FILMS, FPS, PARTS, SEVERITY, Film, FilmMotion, act, part_links
-from hobble.channels.injury.walks import hurt_links
 from hobble.core.files import write_json, write_text
 from hobble.core.skeleton import Skeleton
 from hobble.core.smooth import gaussian

@@ -14,11 +14,11 @@ from hobble.core.clip import Clip
 from hobble.core.errors import HobbleError
 from hobble.core.files import write_text
 from hobble.core.skeleton import Skeleton
-from hobble.synthetic import files
+from hobble.synthetic import label_files
 from hobble.synthetic.foot_motion import move_foot
 from hobble.synthetic.footsteps import landings, phase_curve, stances
-from hobble.synthetic.ground import Ground, make_ground
 from hobble.synthetic.options import Synthetic
+from hobble.synthetic.planned_ground import Ground, make_ground
 from hobble.synthetic.planned_path import gait_keys, walk_path
 from hobble.synthetic.pose import pose
 from hobble.synthetic.recipes import GROUND, Segment, generator, plan
@@ -101,5 +101,5 @@ def write_clip(
     rig = Skeleton.from_dict(skeleton)
     walk = generate(clip, rig, frames, recipe, options.fps, options.seed)
     write_bvh(bvh, walk.clip)
-    write_text(footsteps, files.footsteps_text(walk.right, walk.left))
-    write_text(gait, files.gait_text(walk.gait))
+    write_text(footsteps, label_files.footsteps_text(walk.right, walk.left))
+    write_text(gait, label_files.gait_text(walk.gait))

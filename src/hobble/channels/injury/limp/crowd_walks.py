@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hobble.channels.injury.walks import severities
+from hobble.channels.injury.crowd_severities import severities
 from hobble.core.quat import Array
 from hobble.evaluation.crowd import FPS, channel_values
 from hobble.gait.cycles import WalkCycles, measure

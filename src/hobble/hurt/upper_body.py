@@ -12,7 +12,7 @@ from hobble.core.smooth import gaussian
 from hobble.hurt.body_parts import LEFT, RIGHT, SIDES, ancestors
 from hobble.hurt.effects import Effects
 from hobble.hurt.healthy_clip import HealthyClip
-from hobble.hurt.people import HARMONICS
+from hobble.hurt.impairment_profiles import HARMONICS
 
 X, Y, Z = np.eye(3)
 PELVIS = 0.35  # the pelvis tilts by this share of the trunk's lean

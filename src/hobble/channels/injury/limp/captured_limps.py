@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hobble.channels.injury.walks import INJURY
+from hobble.channels.injury.crowd_severities import INJURY
 from hobble.core.quat import Array
 from hobble.core.skeleton import Skeleton
 from hobble.evaluation.captured import captured, rotate_by_yaw
