@@ -1,4 +1,4 @@
-"""A game loop: 60 times a second it passes a wish to the character and gets a pose.
+"""A game loop: 60 times a second it passes a target velocity to the character and gets a pose.
 
 python examples/game_loop.py results/injured/network
 """

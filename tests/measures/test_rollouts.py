@@ -40,8 +40,8 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[RollOutInputs,
     for f in range(frames):
         rows["phase"].append(float(state.phase[0]))
         speed = 0.0 if 25 <= f < 45 else 2.5
-        wish = (speed * np.sin(f / 40), speed * np.cos(f / 40))
-        figure.next_pose(wish, injury={"LeftUpLeg-LeftLeg": 4}, terrain=ground)
+        target = (speed * np.sin(f / 40), speed * np.cos(f / 40))
+        figure.next_pose(target, injury={"LeftUpLeg-LeftLeg": 4}, terrain=ground)
         root, yaw = controller.root[0].copy(), float(controller.yaw[0])
         local = in_root_frame(state.joint_position[0], root, np.array(yaw))
         rows["x"].append(controller.x[0].copy())

@@ -34,12 +34,12 @@ def walked(network: Pfnn, fastest: float = 4.0) -> SeenInTraining:
     )
 
 
-def wishes(frames: int):
+def targets(frames: int):
     rng = np.random.default_rng(4)
     for k in range(frames):
         if k % 30 == 0:
-            wish = rng.uniform(-8, 8, 2) * rng.integers(2), rng.normal(size=2)
-        yield wish
+            target = rng.uniform(-8, 8, 2) * rng.integers(2), rng.normal(size=2)
+        yield target
 
 
 def run(network: Pfnn, frames: int = 600) -> tuple[np.ndarray, np.ndarray]:
@@ -47,7 +47,7 @@ def run(network: Pfnn, frames: int = 600) -> tuple[np.ndarray, np.ndarray]:
     character = ProceduralAnimation(network, foot_locking=False)
     role = network.skeleton.role
     kept = []
-    for velocity, facing in wishes(frames):
+    for velocity, facing in targets(frames):
         character.next_pose(velocity, facing, "jog")
         kept.append(character.state.joint_position[0].copy())
     positions = np.array(kept)

@@ -14,13 +14,13 @@ from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
 FPS = 60
-SPEEDS = {"walk": 2.5, "jog": 7.0}  # wished speeds, cm a frame
+SPEEDS = {"walk": 2.5, "jog": 7.0}  # target speeds, cm a frame
 SETTLING_SHARE = 0.25  # share of a stretch, at its beginning, in which channels and gait still change
 
 
 @dataclass(frozen=True)
 class CrowdTarget:
-    """A number of frames with constant wishes for C figures.
+    """A number of frames with a constant target for each of C figures.
 
     gait: (C,) names. channels: name -> (C, columns). speed: (C,) cm a frame, or None for SPEEDS of the gait.
     """

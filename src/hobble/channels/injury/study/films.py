@@ -115,7 +115,7 @@ def act(network: Network, film: Film, runtime: Runtime) -> FilmMotion:
     return FilmMotion(*hurt, float(apart))
 
 
-def wish(film: Film, frame: int) -> tuple[bool, str]:
+def hurts_and_gait(film: Film, frame: int) -> tuple[bool, str]:
     """Whether it hurts at a frame of a film, and which gait is asked for."""
     hurts = frame >= HEALTHY * FPS
     changed = frame >= (HEALTHY + HURT) * FPS - CHANGED * FPS / 2
@@ -129,7 +129,7 @@ def _walked(
     before, frames = round(WARM_UP * FPS), round(film.seconds * FPS)
     positions, rotations = [], []
     for frame in range(-before, frames):
-        hurts, gait = wish(film, frame)
+        hurts, gait = hurts_and_gait(film, frame)
         pose = animation.next_pose(
             np.array([0.0, SPEEDS[gait]]), None, gait, **{INJURY: severities if hurts else {}}
         )
