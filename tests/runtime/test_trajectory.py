@@ -198,7 +198,7 @@ def test_steering_adds_the_error_to_the_target(steering: float, target: tuple, a
 
 
 def follow(target, facing, steering: float, frames: int = 1, speed: float = 1.5, correction=None):
-    """Target velocity (2,) and direction (2,), and the correction (2,), of a figure that glides ahead
+    """Smoothed velocity (2,) and direction (2,), and the correction (2,), of a figure that glides ahead
     whatever the target.
     """
     position, heading, gait = path(speed)
@@ -206,8 +206,8 @@ def follow(target, facing, steering: float, frames: int = 1, speed: float = 1.5,
     correction = np.zeros((1, 2)) if correction is None else np.array([correction], float)
     for _ in range(frames):
         wanted = np.array([target]), np.array([facing]), np.zeros(1), np.eye(6)[[1]]
-        target = velocity, direction, np.zeros(1), correction
-        trajectory.follow_target(wanted, steering, target, (position, heading, gait))
+        smoothed = velocity, direction, np.zeros(1), correction
+        trajectory.follow_target(wanted, steering, smoothed, (position, heading, gait))
     return velocity[0], direction[0], correction[0]
 
 
