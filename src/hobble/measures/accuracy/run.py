@@ -19,13 +19,14 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.measures.accuracy import Options
+from hobble.measures.chosen import chosen, sample_of
 from hobble.measures.given import Given, Outcome
 from hobble.measures.joints import Joints
-from hobble.measures.sample import Sample, drawn
+from hobble.measures.sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network
-from hobble.rows.clip_rows import ClipRows, expanded, load_clip_rows
-from hobble.rows.facts import load_facts
+from hobble.rows.clip_rows import ClipRows, expanded
+from hobble.rows.excerpts import Excerpt
 from hobble.rows.layout import RowLayout
 
 LEAST = 1e-3  # cm; a joint nearer to the root has no meaningful relative error
@@ -112,43 +113,57 @@ def measure(
     """accuracy.json: `train` and `held_out` over their frames, and `clips`, one entry a clip in name order.
 
     clips: name -> file of rows. equivalents: names of the joints to measure; all by default. sample: the
-    clips to measure in place of all; the result then has `sample` with their number, and confidence
-    intervals. `mean_of_clips` is the mean over clips, as in the published tables. Raises InputError where
-    rows and network differ.
+    excerpts to measure in place of all clips; the result then has `sample` with their number, confidence
+    intervals, and the excerpts with their frames. `mean_of_clips` is the mean over clips, as in the published
+    tables. Raises InputError where rows and network differ.
     """
     network = load_network(weights)
     joints = joint_indices(network, equivalents)
-    entries = []
+    of_clip: dict[str, Errors] = {}
+    excerpts: dict[Excerpt, dict[str, Any]] = {}
     totals = dict.fromkeys(SPLITS, Errors())
-    for name, weight in (sample.weights if sample else dict.fromkeys(sorted(clips), 1.0)).items():
-        rows = load_clip_rows(clips[name])
-        check_layout(clips[name], rows, network)
-        errors = clip_errors(network, rows, joints)
-        totals[splits[name]] += errors.weighing(weight)
-        entries.append({"clip": name, "split": splits[name], **errors.to_dict()})
-        log.info("%s: %s", name, entries[-1])
+    for one in chosen(clips, sample):
+        read = one.load()
+        check_layout(one.path, read.rows, network)
+        errors = clip_errors(network, read.rows, joints)
+        totals[splits[one.clip]] += errors.weighing(one.weight)
+        of_clip[one.clip] = of_clip.get(one.clip, Errors()) + errors.weighing(one.weight)
+        if one.excerpt is not None:
+            first, last = read.frames
+            excerpts[one.excerpt] = {"first_frame": first, "last_frame": last, **errors.to_dict()}
+        log.info("%s: %s", one.excerpt or one.clip, errors.to_dict())
+    entries = [{"clip": name, "split": splits[name], **found.to_dict()} for name, found in of_clip.items()]
     result: dict[str, Any] = {"configuration": configuration, "joints": len(joints), "clips": entries}
     for split in SPLITS:
         means = [e["mean"] for e in entries if e["split"] == split and e["frames"]]
         result[split] = {**totals[split].to_dict(), "clips": len(means)}
         result[split]["mean_of_clips"] = float(np.mean(means)) if means else None
-    return result if sample is None else with_sample(result, sample)
+    return result if sample is None else _with_intervals(result, sample, excerpts, splits)
 
 
-def with_sample(result: dict[str, Any], sample: Sample) -> dict[str, Any]:
-    """The result with the sample, and half the width of the 95 % confidence interval of each split."""
+def _with_intervals(
+    result: dict[str, Any],
+    sample: Sample,
+    excerpts: Mapping[Excerpt, Mapping[str, Any]],
+    splits: Mapping[str, str],
+) -> dict[str, Any]:
+    """The result with the sample, and half the width of the 95 % confidence interval of each split.
+
+    excerpts: the entry of each excerpt that was measured.
+    """
     for split in SPLITS:
-        clips = [clip for clip in result["clips"] if clip["split"] == split]
-        weights = [sample.clip_weights[clip["clip"]] for clip in clips]
-        if clips:
-            means = [clip["mean"] for clip in clips]
+        own = {one: entry for one, entry in excerpts.items() if splits[one.clip] == split}
+        if own:
+            weights = [sample.clip_weights[one] for one in own]
+            means = [entry["mean"] for entry in own.values()]
             result[split]["mean_of_clips"] = float(np.average(means, weights=weights))
         result[split]["interval"] = {
-            key: sample.half_width(split, {clip["clip"]: clip[key] for clip in clips})
+            key: sample.half_width(split, {one: entry[key] for one, entry in own.items()})
             for key in ("mean", "position_error_cm")
-            if clips
+            if own
         }
-    return {**result, "sample": sample.to_dict()}
+    named = [{"clip": one.clip, "split": splits[one.clip], **entry} for one, entry in excerpts.items()]
+    return {**result, "sample": sample.to_dict(), "excerpts": named}
 
 
 def equivalent_joints(skeleton: Mapping[str, Any], of: str = REFERENCE) -> list[str] | None:
@@ -191,9 +206,10 @@ def clip_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def run(given: Given, options: Options) -> Outcome:
-    """accuracy.json, and its `clips` as a table."""
-    sample = drawn(map(load_facts, given.facts), given.splits, options.sample_frames)
+    """accuracy.json, and its clips and excerpts as tables."""
+    sample = sample_of(given, options)
     result = measure(
         given.weights, given.clips, given.splits, given.configuration, chosen_joints(given, options), sample
     )
-    return Outcome(result, {"clips": clip_rows(result)})
+    excerpts = {"excerpts": result.pop("excerpts")} if sample else {}
+    return Outcome(result, {"clips": clip_rows(result), **excerpts})

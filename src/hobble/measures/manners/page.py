@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Literal
 
 from hobble.channels.shown import speaker
+from hobble.measures.chosen import captured_sampled
 from hobble.measures.given import Json
 from hobble.measures.manners.results import OfChannel
 from hobble.measures.manners.windows import EFFECTS, NONE
@@ -31,7 +32,10 @@ def section(found: Json, material: Material) -> Section:
     parts, say = [], speaker(material.network["skeleton"])
     for i, one in enumerate(found["channels"]):
         charts = [together_chart(one, say), *(effect_chart(one, effect) for effect in EFFECTS)]
-        parts += [Part(10 * i, Words(summary(one))), *(Part(10 * i + 1 + k, c) for k, c in enumerate(charts))]
+        parts += [
+            Part(10 * i, Words(summary(one) + captured_sampled(found))),
+            *(Part(10 * i + 1 + k, c) for k, c in enumerate(charts)),
+        ]
     title = " and ".join(one["title"] for one in found["channels"])
     return Section("manners", parts, title=title, at=21)
 

@@ -12,8 +12,9 @@ from hobble.channels.injury.response.cases import divided_severities, into_a_jog
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
 from hobble.channels.injury.walks import hurt_links
 from hobble.channels.injury.walks import links as links_of
-from hobble.evaluation.captured import Captured, captured_clips
+from hobble.evaluation.captured import Captured
 from hobble.evaluation.crowd import SPEEDS
+from hobble.measures.chosen import captured_motion, sample_of, with_sample
 from hobble.measures.given import Given, Outcome
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -143,13 +144,14 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 def run(given: Given, options: Options) -> Outcome:
     """injury.json, and its sweeps as tables."""
+    sample = sample_of(given, options)
     result = injury_response(
         load_network(given.weights),
-        captured_clips(given.clips.values()),
+        captured_motion(given.clips, sample),
         configuration=given.configuration,
         runtime=given.runtime,
         seconds=options.seconds,
     )
     tables = {name: result.get(name, []) for name in ("second", "into_a_jog", "divided")}
     tables["sweep"] = [*result.get("rows", []), *result.get("falling", [])]
-    return Outcome(result, tables, str(result.get("summary", result.get("reason"))))
+    return Outcome(with_sample(result, sample), tables, str(result.get("summary", result.get("reason"))))
