@@ -10,7 +10,7 @@ from typing import Any
 from hobble.evaluation.captured import Captured, captured
 from hobble.measures.given import Given, Json
 from hobble.measures.sample import Sample, drawn
-from hobble.measures.sampling import Sampling
+from hobble.measures.sample_options import SampleOptions
 from hobble.rows.clip_rows import ClipRows, load_clip_rows
 from hobble.rows.excerpts import LONGEST, Excerpt, load_excerpt
 from hobble.rows.facts import load_facts
@@ -65,7 +65,7 @@ def captured_motion(clips: Mapping[str, str | Path], sample: Sample | None) -> I
         yield from captured(one.load().rows)
 
 
-def sample_of(given: Given, options: Sampling) -> Sample | None:
+def sample_of(given: Given, options: SampleOptions) -> Sample | None:
     """The excerpts to measure; None for all clips."""
     return drawn(map(load_facts, given.facts), given.splits, options.sample_frames)
 

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from hobble.measures.results import SampleSize
 from hobble.rows.excerpts import Excerpt, Kind
 from hobble.rows.facts import Facts
 
@@ -75,7 +76,7 @@ class Sample:
         variance = sum((stratum.rows / total) ** 2 * _variance(stratum, values) for stratum in strata)
         return SURE * math.sqrt(variance)
 
-    def to_dict(self) -> dict[str, int]:
+    def to_dict(self) -> SampleSize:
         """Plain data for a measurement's JSON."""
         drawn = [one for stratum in self.strata for one in stratum.drawn]
         return {

@@ -12,7 +12,6 @@ import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,16 +19,17 @@ from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.evaluation.captured import unbroken
 from hobble.measures.accuracy.run import (
-    SPLITS,
     check_layout,
     chosen_joints,
     joint_indices,
     relative_and_distance,
 )
 from hobble.measures.chosen import Chosen, Loaded, chosen, sample_of
-from hobble.measures.given import Given, Outcome
+from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.results import SPLITS
 from hobble.measures.rollouts import Options
-from hobble.measures.rollouts.crowd import Crowd, RollOuts, inputs
+from hobble.measures.rollouts.results import ErrorsOf, RollOutsFound
+from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs
 from hobble.measures.sample import Sample
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor
@@ -73,7 +73,7 @@ class RollOutErrors:
             return self
         return RollOutErrors(self.frames, self.starts, self.moments * weight, self.last * weight, self.ended)
 
-    def to_dict(self, phase: bool = True) -> dict[str, Any]:
+    def to_dict(self, phase: bool = True) -> ErrorsOf:
         """Plain data, with None if there were no frames, or if no roll-out reached its full length.
 
         phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
@@ -163,7 +163,7 @@ def measure_roll_outs(
     lengths: Sequence[int] = LENGTHS,
     mode: str = "cubic",
     sample: Sample | None = None,
-) -> dict[str, Any]:
+) -> RollOutsFound:
     """The content of rollouts.json: for each of `lengths`, the splits and the clips in name order.
 
     clips: name -> file of rows. equivalents: names of the joints to measure. mode: how the phase is looked
@@ -174,6 +174,7 @@ def measure_roll_outs(
     network = load_network(weights)
     predictor = network.predictor(mode)
     joints = joint_indices(network, equivalents)
+    total: dict[int, dict[str, RollOutErrors]]
     total = {length: dict.fromkeys(SPLITS, RollOutErrors()) for length in lengths}
     of_clip: dict[int, dict[str, RollOutErrors]] = {length: {} for length in lengths}
     excerpts: dict[int, dict[Excerpt, float | None]] = {length: {} for length in lengths}
@@ -186,14 +187,15 @@ def measure_roll_outs(
                 if one.excerpt is not None:
                     excerpts[length][one.excerpt] = found.to_dict()["position_error_cm"]
             log.info("%s: %s", one.excerpt or one.clip, errors[lengths[-1]].to_dict(network.phase))
-    result: dict[str, Any] = {
+    result: RollOutsFound = {
         "configuration": configuration,
         "joints": len(joints),
         "mode": mode,
         "lengths": [
             {
                 "length": length,
-                **{split: total[length][split].to_dict(network.phase) for split in SPLITS},
+                "train": total[length]["train"].to_dict(network.phase),
+                "held_out": total[length]["held_out"].to_dict(network.phase),
                 "clips": [
                     {"clip": name, "split": splits[name], **found.to_dict(network.phase)}
                     for name, found in of_clip[length].items()
@@ -225,11 +227,11 @@ def _together(
 
 
 def _with_intervals(
-    result: dict[str, Any],
+    result: RollOutsFound,
     sample: Sample,
     excerpts: Mapping[int, Mapping[Excerpt, float | None]],
     splits: Mapping[str, str],
-) -> dict[str, Any]:
+) -> RollOutsFound:
     """The result with what was drawn, and the half widths of the 95 % intervals of each split and length.
 
     excerpts: length -> position error of each excerpt. One too short for any roll-out counts as the others of
@@ -238,19 +240,19 @@ def _with_intervals(
     for entry in result["lengths"]:
         for split in SPLITS:
             usual = entry[split]["position_error_cm"]
-            values = {
-                one: usual if error is None else error
-                for one, error in excerpts[entry["length"]].items()
-                if splits[one.clip] == split
-            }
             if usual is not None:
+                values = {
+                    one: usual if error is None else error
+                    for one, error in excerpts[entry["length"]].items()
+                    if splits[one.clip] == split
+                }
                 entry[split]["interval"] = {"position_error_cm": sample.half_width(split, values)}
     return {**result, "sample": sample.to_dict()}
 
 
-def roll_out_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+def roll_out_rows(result: RollOutsFound) -> list[Row]:
     """The clips' entries, and those of the splits with an empty `clip`, as flat rows."""
-    rows = []
+    rows: list[Row] = []
     for entry in result["lengths"]:
         for split in SPLITS:
             rows.append({"length": entry["length"], "clip": None, "split": split, **entry[split]})

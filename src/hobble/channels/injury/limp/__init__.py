@@ -8,11 +8,11 @@ from pydantic import Field
 
 from hobble.core.section import PositiveFloat
 from hobble.measures.measure import Cost, Measure
-from hobble.measures.sampling import Sampling
+from hobble.measures.sample_options import SampleOptions
 from hobble.runtime.options import Runtime
 
 
-class Options(Sampling):
+class Options(SampleOptions):
     """The keys of this measurement in the section `evaluation`."""
 
     limp_seconds: PositiveFloat = Field(8.0, description="length of each walk whose limp is measured")

@@ -6,11 +6,11 @@ from pydantic import Field
 
 from hobble.core.section import PositiveFloat
 from hobble.measures.measure import Cost, Measure
-from hobble.measures.sampling import Sampling
+from hobble.measures.sample_options import SampleOptions
 from hobble.runtime.options import Runtime
 
 
-class Options(Sampling):
+class Options(SampleOptions):
     """The keys of this measurement in the section `evaluation`."""
 
     seconds: PositiveFloat = Field(4.0, description="time at each severity of the injury sweeps")
