@@ -125,10 +125,10 @@ def _errors(
     truth = crowd.y[:, layout.y_joint_position].reshape(len(crowd.y), -1, 3)[:, joints]
     moments = [Moments.nothing(2) for _ in owners]
     last: list[Array] = [np.zeros((0, len(joints), 2)) for _ in owners]
-    for age, (at, place, bounds) in enumerate(crowd.frames()):
+    for age, (at, place, places) in enumerate(crowd.frames()):
         errors = relative_and_distance(truth[at].astype(float), place[:, joints])
-        for g in np.flatnonzero(np.diff(bounds)):
-            own = errors[bounds[g] : bounds[g + 1]]
+        for g, of_group in places.items():
+            own = errors[of_group]
             weights = np.full(own[..., 0].size, 1 / len(joints))
             moments[g] = moments[g] + Moments.of(own.reshape(-1, 2), weights)
             if age == owners[g][1].length - 1:
