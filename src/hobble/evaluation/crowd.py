@@ -14,14 +14,14 @@ from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
 FPS = 60
-SPEEDS = {"walk": 2.5, "jog": 7.0}  # wished speeds, cm a frame
-VELOCITY, GAIT = "target_velocity", "gait"  # the names of wishes that are no channel
+SPEEDS = {"walk": 2.5, "jog": 7.0}  # target speeds, cm a frame
+VELOCITY, GAIT = "target_velocity", "gait"  # the names of targets that are no channel
 SETTLING_SHARE = 0.25  # share of a stretch, at its beginning, in which channels and gait still change
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A number of frames with constant wishes for C figures.
+class CrowdTarget:
+    """A number of frames with a constant target for each of C figures.
 
     gait: (C,) names. channels: name -> (C, columns). speed: (C,) cm a frame, or None for SPEEDS of the gait.
     """
@@ -73,11 +73,11 @@ class Walks:
         return slice(start + int(np.searchsorted(turned, turned[-1] - whole)), stop)
 
 
-def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
+def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
     """Run figures through `script`, from a stand, straight ahead on flat ground.
 
-    Figures with the same wishes from the beginning on do the same, to the last bit. So one of them walks for
-    all until their wishes differ.
+    Figures with the same targets from the beginning on do the same, to the last bit. So one of them walks for
+    all until their targets differ.
     """
     assert network.skeleton is not None
     count, frames = len(script[0].gait), sum(s.frames for s in script)
@@ -89,12 +89,12 @@ def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
     before: list[Array] = []
     f = 0
     for stretch in script:
-        wish = _wishes(network, stretch)
-        first, now = _unlike(of, *wish.values())
+        target = _targets(network, stretch)
+        first, now = _unlike(of, *target.values())
         if len(first) > animation.characters:
             came_from = of[first]
             animation, before, of = animation.copies(came_from), [p[came_from] for p in before], now
-        asked = {name: values[_first_of(of)] for name, values in wish.items()}
+        asked = {name: values[_first_of(of)] for name, values in target.items()}
         velocity, shares = asked.pop(VELOCITY), asked.pop(GAIT)
         for _ in range(stretch.frames):
             pose = animation.next_pose(velocity, gait=shares, **asked)
@@ -112,21 +112,21 @@ def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
     return Walks(local, contacts, phase, root, rough, starts)
 
 
-def _wishes(network: Network, stretch: Stretch) -> dict[str, Array]:
-    """The wishes of C figures in a stretch: VELOCITY (C, 2), GAIT (C, 6) shares, channel -> (C, columns)."""
+def _targets(network: Network, stretch: CrowdTarget) -> dict[str, Array]:
+    """The targets of C figures in a stretch: VELOCITY (C, 2), GAIT (C, 6) shares, channel -> (C, columns)."""
     velocity = np.zeros((len(stretch.gait), 2))
     velocity[:, 1] = [SPEEDS[name] for name in stretch.gait] if stretch.speed is None else stretch.speed
     shares = np.array([[float(name == gait) for name in network.gaits] for gait in stretch.gait])
     return {VELOCITY: velocity, GAIT: shares, **stretch.channels}
 
 
-def _unlike(of: np.ndarray, *wishes: Array) -> tuple[np.ndarray, np.ndarray]:
+def _unlike(of: np.ndarray, *targets: Array) -> tuple[np.ndarray, np.ndarray]:
     """Which figures now need a character of their own.
 
-    of: (C,) the character that has walked for each figure. wishes: (C, n) arrays. Returns the first figure of
-    each set of figures with the same character and the same wishes, and the number of each figure's set (C,).
+    of: (C,) the character that has walked for each figure. targets: (C, n) arrays. Figures with the same
+    character and the same targets form a set. Returns the first figure of each set, and the set of each (C,).
     """
-    _, first, now = np.unique(np.column_stack([of, *wishes]), axis=0, return_index=True, return_inverse=True)
+    _, first, now = np.unique(np.column_stack([of, *targets]), axis=0, return_index=True, return_inverse=True)
     return first, now.reshape(-1)
 
 
