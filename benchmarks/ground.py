@@ -26,10 +26,10 @@ from hobble.labels.label import label_clip, mirror_labels
 from hobble.motion.make import make_clip
 from hobble.motion.mirror import mirror_clip
 from hobble.motion.options import ClipMotion
-from hobble.synthetic.clip import write_clip
+from hobble.synthetic.generate_clip import write_clip
 from hobble.terrain.clip_fits import clip_fits
 from hobble.terrain.heightmaps import heightmaps
-from hobble.terrain.options import Sampling
+from hobble.terrain.options import HeightSampling
 from hobble.terrain.patches import Patches, draw_patches
 from hobble.workflow.project import Project
 
@@ -108,7 +108,7 @@ def found(job: Job) -> list[Found]:
     """The fits of one clip and its mirror."""
     project = Project(BASE, {"mocap": str(job.mocap)})
     options = project.catalogue.dataset(job.dataset).terrain
-    sampling = Sampling(**project.datasets.part(job.dataset, "database", Sampling))
+    sampling = HeightSampling(**project.datasets.part(job.dataset, "database", HeightSampling))
     out = []
     with tempfile.TemporaryDirectory() as folder:
         try:

@@ -27,8 +27,8 @@ import numpy as np
 import yaml
 
 from hobble.measures.registry import MEASURES
-from hobble.measures.sampling import Sampling
-from hobble.workflow.batches import batch_count
+from hobble.measures.sample_options import SampleOptions
+from hobble.workflow.clip_batches import batch_count
 from hobble.workflow.costs import BATCH_RULES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -105,7 +105,7 @@ class Plan:
                 rule == "database_merge" and "database_shard" not in run.seconds(stage)
             )
             jobs = batch_count(self.clips) if rule in OF_BATCHES else self.shards if sharded else 1
-            most = Sampling().sample_frames / FPS if rule in SAMPLED else self.motion
+            most = SampleOptions().sample_frames / FPS if rule in SAMPLED else self.motion
             hours = Rate.of(rule, stage, run, less).hours(min(most, self.motion))
             # The largest shard has about twice the average.
             one = self.training if rule == "training" else hours / jobs * (2 if sharded and jobs > 1 else 1)

@@ -7,7 +7,7 @@ from itertools import accumulate, chain, pairwise, product
 import numpy as np
 import pytest
 
-from hobble.database.stretches import Sharing, Stretch
+from hobble.database.stretches import SampleRange, Sharing
 
 
 def read(sharing: Sharing) -> list[list[int]]:
@@ -48,7 +48,7 @@ def test_with_as_many_stretches_as_processes_each_reads_one_of_its_own():
 
 
 def test_samples_of_a_stretch_are_kept_wherever_it_is_cut():
-    stretch = Stretch(10, 33, 5, 1, 4)
+    stretch = SampleRange(10, 33, 5, 1, 4)
     whole = np.arange(23)[stretch.kept(0, 23)]
     cuts = list(accumulate([0, 3, 9, 1, 10]))
     parts = [np.arange(a, b)[stretch.kept(a, b - a)] for a, b in pairwise(cuts)]

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hobble.evaluation.soak import LIMITS, Slides, grounds, soak
+from hobble.evaluation.soak import LIMITS, StanceSlides, grounds, soak
 from hobble.models.pfnn.network import Pfnn
-from hobble.models.seen import Seen
+from hobble.models.seen import SeenInTraining
 from hobble.runtime import controller, feet
 
 HIPS = 93.0  # cm above the ground, of the figures of `mean_output`
@@ -24,7 +24,7 @@ def on_its_feet(network: Pfnn) -> Pfnn:
     x[network.layout.x_direction][network.layout.samples :] = 1
     x[network.layout.x_gait].reshape(-1, network.layout.samples)[1] = 1
     x[network.layout.x_joint_position] = mean[network.layout.y_joint_position]
-    seen = Seen(x - 50, x + 50, mean - 8, mean + 8, x, mean, start_phase=0.3, fastest=9.0)
+    seen = SeenInTraining(x - 50, x + 50, mean - 8, mean + 8, x, mean, start_phase=0.3, fastest=9.0)
     return replace(network, y_mean=mean, seen=seen)
 
 
@@ -74,7 +74,7 @@ def test_a_leg_that_snaps_is_seen(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatc
 
 
 def test_slides_are_those_of_whole_stances() -> None:
-    slides = Slides(np.zeros((1, 2)), np.zeros((1, 2), int))
+    slides = StanceSlides(np.zeros((1, 2)), np.zeros((1, 2), int))
     before = np.zeros((1, 2, 3))
     for k in range(8):
         toes = before + np.array([[0.5, 1.0, 0.0], [0.0, 0.0, 0.0]])

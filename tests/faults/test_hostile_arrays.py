@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.config.load import Catalogue
+from hobble.config.load_configuration import Catalogue
 from hobble.core.clip import load_clip
 from hobble.core.errors import InputError
 from hobble.core.files import load_npz, read_json
@@ -22,7 +22,7 @@ from hobble.models import checks
 from hobble.models.load import load_network
 from hobble.motion.rig import load_skeleton
 from hobble.terrain.heightmaps import heightmaps, read_heights
-from hobble.terrain.options import Heightmap
+from hobble.terrain.options import HeightmapOptions
 
 from .refusals import MB, refused, write
 
@@ -97,7 +97,7 @@ def test_a_layer_of_the_release_is_no_larger_than_it_may_be(tmp_path: Path) -> N
 @pytest.mark.parametrize("text", ["1e308 2\n3 4\n", "nan 2\n3 -1e9\n"])
 def test_impossible_heights_are_refused(tmp_path: Path, text: str) -> None:
     path = write(tmp_path / "a.txt", text)
-    entry = Heightmap.model_validate({"kind": "file", "path": "a.txt"})
+    entry = HeightmapOptions.model_validate({"kind": "file", "path": "a.txt"})
     refused(lambda: heightmaps([entry], [path], cell=4.0, height_scale=10.0), "a.txt: a height of")
 
 

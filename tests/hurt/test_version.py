@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hurt_gait import measures
 
-from hobble.hurt.clip import hurt_clip
 from hobble.hurt.effects import POWER
+from hobble.hurt.hurt_clip import hurt_clip
 from hobble.hurt.options import Hurt
 from hobble.hurt.version import NEAR, hurt_version
 from hobble.labels.label import mirror_labels

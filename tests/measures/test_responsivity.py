@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hobble.evaluation.tables import write_csv
+from hobble.evaluation.csv_tables import write_csv
 from hobble.measures.responsivity import run as module
 from hobble.measures.responsivity.run import lap_rows, parameter_counts, responsivity
 from hobble.runtime.controller import STEPS

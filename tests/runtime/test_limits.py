@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hobble.channels.limits import UNLIMITED, Limits
+from hobble.channels.speed_limits import UNLIMITED, Limits
 from hobble.core.errors import InputError
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -40,20 +40,20 @@ def asked(
     for _ in range(frames):
         animation.next_pose(velocity, gait=gait, injury=hurt)
     middle = network.layout.window
-    return float(np.hypot(*animation.state.target_velocity[0])), animation.state.gait[0, middle]
+    return float(np.hypot(*animation.state.smoothed_velocity[0])), animation.state.gait[0, middle]
 
 
 @pytest.mark.parametrize(
     ("hurt", "speed"),
     [({}, 2.5), ({KNEE: 10}, 1.0), ({KNEE: 5}, 1.5), ({ARM: 10}, 1.8), ({KNEE: 5, ARM: 10}, 1.5)],
 )
-def test_the_wish_stops_at_what_the_worst_injury_allows(limited: Network, hurt, speed: float) -> None:
+def test_the_target_stops_at_what_the_worst_injury_allows(limited: Network, hurt, speed: float) -> None:
     assert asked(limited, (0, 2.5), hurt)[0] == pytest.approx(speed, abs=1e-6)
     assert asked(limited, (2.5, 0), hurt)[0] == pytest.approx(speed, abs=1e-6)
     assert asked(limited, (0, 2.5), hurt, limits=False)[0] == pytest.approx(2.5, abs=1e-6)
 
 
-def test_a_slower_wish_is_left_alone(limited: Network) -> None:
+def test_a_slower_target_is_left_alone(limited: Network) -> None:
     assert asked(limited, (0, 0.8), {KNEE: 10})[0] == pytest.approx(0.8, abs=1e-6)
     assert asked(limited, (0, 0.0), {KNEE: 10})[0] == 0.0
 
@@ -80,7 +80,7 @@ def test_each_of_a_crowd_has_its_own_limit(limited: Network) -> None:
     crowd = ProceduralAnimation(limited, characters=3, steering=0.0)
     for _ in range(90):
         crowd.next_pose((0, 2.5), injury={KNEE: np.array([0.0, 5.0, 10.0])})
-    np.testing.assert_allclose(crowd.state.target_velocity[:, 1], [2.5, 1.5, 1.0], atol=1e-6)
+    np.testing.assert_allclose(crowd.state.smoothed_velocity[:, 1], [2.5, 1.5, 1.0], atol=1e-6)
 
 
 def test_a_network_file_keeps_its_limits(limited: Network, tmp_path) -> None:

@@ -14,13 +14,13 @@ from hobble.runtime.animation import ProceduralAnimation
 from hobble.runtime.options import Runtime
 
 FPS = 60
-SPEEDS = {"walk": 2.5, "jog": 7.0}  # wished speeds, cm a frame
+SPEEDS = {"walk": 2.5, "jog": 7.0}  # target speeds, cm a frame
 SETTLING_SHARE = 0.25  # share of a stretch, at its beginning, in which channels and gait still change
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A number of frames with constant wishes for C figures.
+class CrowdTarget:
+    """A number of frames with a constant target for each of C figures.
 
     gait: (C,) names. channels: name -> (C, columns). speed: (C,) cm a frame, or None for SPEEDS of the gait.
     """
@@ -72,7 +72,7 @@ class Walks:
         return slice(start + int(np.searchsorted(turned, turned[-1] - whole)), stop)
 
 
-def run(network: Network, script: Sequence[Stretch], runtime: Runtime) -> Walks:
+def run(network: Network, script: Sequence[CrowdTarget], runtime: Runtime) -> Walks:
     """Run figures through `script`, from a stand, straight ahead on flat ground."""
     assert network.skeleton is not None
     count, frames = len(script[0].gait), sum(s.frames for s in script)

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from hobble.measures.results import SampleSize
 from hobble.rows.facts import Facts
 
 LEAST = 2  # clips drawn from a stratum, because the variance needs at least two
@@ -65,7 +66,7 @@ class Sample:
         variance = sum((stratum.rows / total) ** 2 * _variance(stratum, values) for stratum in strata)
         return SURE * math.sqrt(variance)
 
-    def to_dict(self) -> dict[str, int]:
+    def to_dict(self) -> SampleSize:
         """Plain data for a measurement's JSON."""
         drawn = sum(len(stratum.drawn) for stratum in self.strata)
         return {"clips": drawn, "of": self.of, "strata": len(self.strata)}

@@ -170,7 +170,7 @@ def _constants() -> dict[str, float]:
         "correctionRate": trajectory.CORRECTION_RATE,
         "correctionWithin": trajectory.CORRECTION_WITHIN,
         "mostCorrection": trajectory.MOST_CORRECTION,
-        "unwishedLoss": trajectory.UNWISHED_LOSS,
+        "unwishedLoss": trajectory.BACKWARD_LOSS,
         "pull": trajectory.PULL,
         "pullAhead": trajectory.PULL_AHEAD,
         "furthestTurn": float(trajectory.FURTHEST_TURN),

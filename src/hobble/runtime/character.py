@@ -21,7 +21,8 @@ class Character:
     ground: (C, samples, 3) heights at left, path, right; root_height: (C,) mean of the heights on the path.
     joint_position, joint_velocity: (C, J, 3); joint_rotation: (C, J, 4) world. This is the network's copy.
     phase: (C,). channel_values, channel_targets: (C, K) present and wanted values of all channels' columns.
-    target_velocity, target_direction: (C, 2); strafe: (C,); correction: (C, 2): see `trajectory.follow_wish`.
+    smoothed_velocity, smoothed_direction: (C, 2); strafe: (C,); correction: (C, 2): see
+    `trajectory.follow_target`.
     foot_lock (C, 2), foot_hold (C, 2, 2), foot_step (C, 2), foot_missed (C, 2): see `foot_lock`.
     foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): see `feet`.
     placed: (C,) whether the joints have been lifted to the ground at the start.
@@ -39,8 +40,8 @@ class Character:
     phase: Array
     channel_values: Array
     channel_targets: Array
-    target_velocity: Array
-    target_direction: Array
+    smoothed_velocity: Array
+    smoothed_direction: Array
     strafe: Array
     correction: Array
     foot_lock: Array
@@ -100,8 +101,8 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         phase=np.full(count, 0.0 if seen is None else seen.start_phase),
         channel_values=np.zeros((count, columns)),
         channel_targets=np.zeros((count, columns)),
-        target_velocity=np.zeros((count, 2)),
-        target_direction=facing.copy(),
+        smoothed_velocity=np.zeros((count, 2)),
+        smoothed_direction=facing.copy(),
         strafe=np.zeros(count),
         correction=np.zeros((count, 2)),
         foot_lock=np.zeros((count, 2)),

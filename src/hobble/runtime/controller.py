@@ -1,6 +1,6 @@
 """One frame of a character in six timed steps: prepare, input, insert, predict, output, update.
 
-- prepare: smooth the caller's wish into targets, bend the future trajectory toward them, look up the ground;
+- prepare: smooth the caller's target, bend the future trajectory toward it, look up the ground;
 - input: write trajectory, gait, ground, last pose and channel values into a row X, in the root frame;
 - insert: standardise the row;
 - predict: evaluate the network at the present phase, which gives Y;
@@ -33,8 +33,8 @@ STEPS = ("prepare", "input", "insert", "predict", "output", "update")
 FPS = 60
 HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; beyond it, heights are imprecise
 # Radians a frame (1500 degrees a second). No joint of a walking or running person turns as fast. A prediction
-# can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation, and a new wish
-# changes the next pose at once.
+# can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation, and a new
+# target changes the next pose at once.
 FASTEST_TURN = np.radians(25)
 # cm a frame by which the body rises with the mean height of the path. When a new wish turns the path around
 # on a hill, that height may change by 20 cm at once, while the ground under the feet stays.
@@ -45,8 +45,8 @@ CHECKED = (
     *("position", "direction", "gait", "joint_position", "joint_velocity", "joint_rotation", "phase"),
     *(
         "channel_values",
-        "target_velocity",
-        "target_direction",
+        "smoothed_velocity",
+        "smoothed_direction",
         "correction",
         "foot_hold",
         "foot_lift",
@@ -80,7 +80,7 @@ class Controller:
     """Runs the characters of one network. `seconds` (6,) holds the time of each of STEPS in the last frame.
 
     rates: channel -> largest change of its values per second; foot_locking: hold feet in contact where they
-    landed; steering: see `trajectory.follow_wish`; side: cm from the path to the side heights.
+    landed; steering: see `trajectory.follow_target`; side: cm from the path to the side heights.
     """
 
     def __init__(
@@ -138,7 +138,7 @@ class Controller:
     def _group(self, c: Character) -> None:
         """Group the arrays for the compiled functions. They only change in place, so this is done once."""
         self._path = (c.position, c.direction, c.gait)
-        self._target = (c.target_velocity, c.target_direction, c.strafe, c.correction)
+        self._smoothed = (c.smoothed_velocity, c.smoothed_direction, c.strafe, c.correction)
         self._channels = (c.channel_values, c.channel_targets, self._channel_steps)
         self._joints = (c.joint_position, c.joint_velocity, c.joint_rotation)
         self._drawn = (self.root, self.yaw, self.pose_position, self.pose_rotation)
@@ -149,14 +149,14 @@ class Controller:
         self._contacts = self.y[:, self.layout.y_contacts]
         self._checked = tuple(getattr(c, name).reshape(len(c.phase), -1) for name in CHECKED)
 
-    def frame(self, wish: trajectory.Wish, ground: Ground | None) -> None:
+    def frame(self, target: trajectory.Target, ground: Ground | None) -> None:
         """Run one frame. ground returns heights (N,) at x, z (N,)."""
         clock = perf_counter
         t0 = clock()
         c = self.character
         if find_unsound(self._checked, self._unsound):
             self._restore("the state")
-        self._prepare(wish, ground)
+        self._prepare(target, ground)
         t1 = clock()
         self._input()
         clip_rows(self.x, self.bounds.x_low, self.bounds.x_high, self._unsound)
@@ -169,7 +169,7 @@ class Controller:
         t4 = clock()
         self._output(ground)
         t5 = clock()
-        self._update(wish[0])
+        self._update(target[0])
         t6 = clock()
         self.seconds[:] = (t1 - t0, t2 - t1, t3 - t2, t4 - t3, t5 - t4, t6 - t5)
 
@@ -192,10 +192,10 @@ class Controller:
             )
         self._warned = True
 
-    def _prepare(self, wish: trajectory.Wish, ground: Ground | None) -> None:
+    def _prepare(self, target: trajectory.Target, ground: Ground | None) -> None:
         c = self.character
         trajectory.prepare(
-            wish, self.steering, self._target, self._path, self._channels, self.layout.step, self.side,
+            target, self.steering, self._smoothed, self._path, self._channels, self.layout.step, self.side,
             self._points,
         )  # fmt: skip
         if ground is None:
@@ -240,7 +240,7 @@ class Controller:
     def _update(self, velocity: Array) -> None:
         rooted = self.predictor.network.rooted
         steered = self.steering > 0
-        loss = trajectory.UNWISHED_LOSS if steered and not rooted else 0.0
+        loss = trajectory.BACKWARD_LOSS if steered and not rooted else 0.0
         pull = trajectory.PULL if steered and rooted else 0.0
         trajectory.advance(
             self.y, self._y_columns, velocity, loss, rooted, pull, self._path, self.character.phase

@@ -19,7 +19,7 @@ from hobble.database.reader import Database
 from hobble.models import model
 from hobble.models.model import Trained
 from hobble.models.options import Options
-from hobble.models.trainable import Step, Trainable
+from hobble.models.trainable import Trainable, TrainingStep
 from hobble.training.checkpoint import State, unpack
 from hobble.training.optimiser import Adam
 from hobble.training.options import Machines, Training
@@ -180,8 +180,8 @@ def device(wanted: str, processes: Processes = ALONE) -> torch.device:
     return torch.device("cuda") if processes.alone else torch.device("cuda", processes.local)
 
 
-def step_for(network: Trainable, training: Training) -> Step:
-    """The `Step` for the device, the precision and the batch size.
+def step_for(network: Trainable, training: Training) -> TrainingStep:
+    """The `TrainingStep` for the device, the precision and the batch size.
 
     Sums are always float32. TF32, which rounds factors to 11 bits, is set for the whole process.
     """

@@ -19,7 +19,7 @@ from hobble.models import model
 from hobble.models.model import Trained
 from hobble.rows.layout import RowLayout
 from hobble.training.options import Machines
-from hobble.workflow.batches import Batch
+from hobble.workflow.clip_batches import ClipBatch
 from hobble.workflow.clips import original
 from hobble.workflow.project import Project
 
@@ -43,11 +43,11 @@ class Demands:
     def __init__(self, project: Project) -> None:
         self.project = project
 
-    def batch_memory(self, batch: Batch, rate: float, attempt: int = 1) -> int:
+    def batch_memory(self, batch: ClipBatch, rate: float, attempt: int = 1) -> int:
         """MB for a job of a batch, whose longest clip takes `rate` MB for a thousand frames of 31 joints."""
         return _megabytes(rate * max(self._thousands_of(batch)), attempt)
 
-    def batch_minutes(self, batch: Batch, rate: float, attempt: int = 1, least: int = 1) -> int:
+    def batch_minutes(self, batch: ClipBatch, rate: float, attempt: int = 1, least: int = 1) -> int:
         """Minutes (at least `least`) for a job of a batch that takes `rate` seconds for 1,000 frames."""
         return _minutes(sum(rate * some + CLIP_SECONDS for some in self._thousands_of(batch)), attempt, least)
 
@@ -161,7 +161,7 @@ class Demands:
         """Thousands of frames of a clip, scaled by the number of joints / 31."""
         return self._frames(dataset, original(clip)) / 1e3 * self._joints(dataset) / MEASURED_JOINTS
 
-    def _thousands_of(self, batch: Batch) -> list[float]:
+    def _thousands_of(self, batch: ClipBatch) -> list[float]:
         return [self.thousands(batch.dataset, clip) for clip in batch.clips]
 
     def parameters(self, configuration: str) -> float:

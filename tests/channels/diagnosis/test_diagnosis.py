@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hobble.channels import Source, channel
+from hobble.channels import ClipSource, channel
+from hobble.channels.clip_values import clip_values
 from hobble.channels.diagnosis.channel import read_table
-from hobble.channels.files import clip_values
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
 from hobble.core.skeleton import Skeleton
@@ -67,7 +67,7 @@ def test_a_table_that_cannot_be_understood_is_refused(tmp_path: Path, text: str,
 
 def test_an_entry_that_is_no_diagnosis_is_refused(holden31: Skeleton) -> None:
     with pytest.raises(InputError, match=r"walk\.channels\.diagnosis: cannot be 'flu'"):
-        channel("diagnosis").check(Source("walk", value="flu"), holden31)
+        channel("diagnosis").check(ClipSource("walk", value="flu"), holden31)
 
 
 @pytest.mark.shared

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hobble.channels.injury.recognition import run as module
-from hobble.channels.injury.recognition.run import HEALTHY, Window, recognition, rows, walking_windows
+from hobble.channels.injury.recognition.run import HEALTHY, InjuryWindow, recognition, rows, walking_windows
 from hobble.core import quat
 from hobble.core.skeleton import Skeleton, forward_kinematics
 from hobble.evaluation.captured import Captured
@@ -169,7 +169,7 @@ def test_without_side_a_leg_is_not_told_from_the_other(holden31: Skeleton) -> No
     assert parts(HEALTHY) == () != parts("LowerBack-Spine")
     hurt = ["LeftLeg-LeftFoot", "LeftLeg-LeftFoot", "RightUpLeg-RightLeg", HEALTHY]
     named = ["RightLeg-RightFoot", "LeftLeg-LeftFoot", "LeftLeg-LeftFoot", HEALTHY]
-    windows = [Window("a", link, 5.0, {}, 0) for link in hurt]
+    windows = [InjuryWindow("a", link, 5.0, {}, 0) for link in hurt]
     found = module._confusion(sorted(set(named)), windows, named, parts)
     assert found["right"] == 0.5
     assert found["right_without_side"] == 0.75
@@ -179,7 +179,9 @@ def test_what_is_judged_was_not_learnt() -> None:
     """If windows differ only in their labels, the names are guesses."""
     rng = np.random.default_rng(6)
     windows = [
-        Window("a", f"{n % 2}", 5.0, {f"{d}": float(v) for d, v in enumerate(rng.normal(size=60))}, n // 10)
+        InjuryWindow(
+            "a", f"{n % 2}", 5.0, {f"{d}": float(v) for d, v in enumerate(rng.normal(size=60))}, n // 10
+        )
         for n in range(40)
     ]
     found = module._cross_validated(windows, lambda name: (name,))

@@ -12,12 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
+from hobble.channels.injury.crowd_severities import severities
 from hobble.channels.injury.response.cases import divided_severities, into_a_jog, second_injuries
 from hobble.channels.injury.response.run import GAITS, injury_response, largest_accelerations
 from hobble.channels.injury.response.sweep import SEVERITIES, sweeps
-from hobble.channels.injury.walks import severities
 from hobble.evaluation.captured import Captured
-from hobble.evaluation.crowd import SPEEDS, Stretch, run
+from hobble.evaluation.crowd import SPEEDS, CrowdTarget, run
 from hobble.evaluation.pose_distance import mean_cycle, settling
 from hobble.evaluation.spearman import spearman
 from hobble.runtime.options import Runtime
@@ -191,10 +191,10 @@ def test_divided_severities_are_smaller_ones(hurtable) -> None:
 def test_figures_of_a_crowd_do_not_mind_each_other(hurtable) -> None:
     """A character walks in a crowd as it does alone."""
     hurt = severities(hurtable, [{}, {KNEE: 4.0}, {KNEE: 10.0}])
-    together = run(hurtable, [Stretch(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
+    together = run(hurtable, [CrowdTarget(30, ["walk", "jog", "walk"], hurt)], RUNTIME)
     for figure, gait in enumerate(("walk", "jog", "walk")):
         own = {name: each[figure : figure + 1] for name, each in hurt.items()}
-        alone = run(hurtable, [Stretch(30, [gait], own)], RUNTIME)
+        alone = run(hurtable, [CrowdTarget(30, [gait], own)], RUNTIME)
         np.testing.assert_allclose(together.local[:, figure], alone.local[:, 0], atol=2e-3)
         np.testing.assert_allclose(together.root[:, figure], alone.root[:, 0], atol=2e-3)
     assert SPEEDS["jog"] > SPEEDS["walk"]
@@ -202,7 +202,7 @@ def test_figures_of_a_crowd_do_not_mind_each_other(hurtable) -> None:
 
 def test_whole_cycles_are_measured(hurtable) -> None:
     unhurt = severities(hurtable, [{}])
-    walks = run(hurtable, [Stretch(n, ["walk"], unhurt) for n in (20, 400, 10)], RUNTIME)
+    walks = run(hurtable, [CrowdTarget(n, ["walk"], unhurt) for n in (20, 400, 10)], RUNTIME)
     phase = np.zeros((430, 1))
     phase[:, 0] = np.mod(0.013 * np.arange(430), 1)
     known = replace(walks, phase=phase)

@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
-from hobble.channels.injury.study.answers import Answer, Study, read_answers, read_study
-from hobble.channels.injury.study.films import FILMS, FPS, GAIT, ONE, PARTS, SEVERAL, wish
-from hobble.channels.injury.study.tables import NUMERALS, tables
+from hobble.channels.injury.study.answer_tables import NUMERALS, tables
+from hobble.channels.injury.study.answers import FilmAnswer, Study, read_answers, read_study
+from hobble.channels.injury.study.films import FILMS, FPS, GAIT, ONE, PARTS, SEVERAL, hurts_and_gait
 from hobble.cli.__main__ import main
 from hobble.core.errors import InputError
 
@@ -55,11 +55,11 @@ def test_the_thirteen_are_those_of_the_study() -> None:
 
 @pytest.mark.parametrize("film", FILMS)
 def test_each_begins_healthy_hurts_and_changes_its_gait_while_it_hurts(film) -> None:
-    told = [wish(film, f) for f in range(round(film.seconds * FPS))]
-    hurts = [hurt for hurt, _ in told]
+    states = [hurts_and_gait(film, f) for f in range(round(film.seconds * FPS))]
+    hurts = [hurt for hurt, _ in states]
     assert hurts.index(True) == 3 * FPS
     assert all(hurts[3 * FPS :])
-    gaits = [gait for _, gait in told]
+    gaits = [gait for _, gait in states]
     assert (gaits[0], gaits[-1]) == film.gaits
     assert len(set(gaits[: 5 * FPS])) == 1, "two seconds hurt before the gait changes"
 
@@ -110,8 +110,8 @@ def test_a_part_of_the_parts_is_seen_in_part(study: Study) -> None:
     """In film 9 three parts hurt, and one of two people ticks one of them. In film 1 both tick one part too
     many.
     """
-    first = [Answer(f.number, f.parts[:1] if f.number == 9 else f.parts, 4) for f in FILMS]
-    second = [Answer(f.number, () if f.number == 9 else f.parts, 2) for f in FILMS]
+    first = [FilmAnswer(f.number, f.parts[:1] if f.number == 9 else f.parts, 4) for f in FILMS]
+    second = [FilmAnswer(f.number, () if f.number == 9 else f.parts, 2) for f in FILMS]
     rows = {row["film"]: row for row in tables(study, [first, second])["XVI"][:13]}
     assert rows["9"]["seen"] == pytest.approx(1 / 6, abs=1e-5)
     assert rows["9"]["exact"] == 0

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from hobble.channels import Source, channel
-from hobble.channels.files import clip_values
+from hobble.channels import ClipSource, channel
+from hobble.channels.clip_values import clip_values
 from hobble.channels.mood import CHANNEL
 from hobble.core.clip import Clip
 from hobble.core.errors import InputError
@@ -16,8 +16,8 @@ from hobble.core.skeleton import Skeleton
 PATTERNS = {"patterns": {"*_sad_*": {"sad": 1.0}, "*_tired_*": {"tired": 0.5, "old": 0.25}, "*_normal_*": {}}}
 
 
-def source(clip: str, value: object = None) -> Source:
-    return Source(clip, value=value, options=CHANNEL.options_of(PATTERNS))
+def source(clip: str, value: object = None) -> ClipSource:
+    return ClipSource(clip, value=value, options=CHANNEL.options_of(PATTERNS))
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 import numpy as np
 
@@ -19,8 +19,10 @@ from hobble.core.errors import HobbleError, InputError
 from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.measures.accuracy import Options
-from hobble.measures.given import Given, Outcome
+from hobble.measures.accuracy.results import Accuracy, ErrorsOf, ErrorsOfClip, ErrorsOfSplit
+from hobble.measures.given import Given, Json, Outcome, Row
 from hobble.measures.joints import Joints
+from hobble.measures.results import SPLITS
 from hobble.measures.sample import Sample, drawn
 from hobble.models.load import load_network
 from hobble.models.network import Network
@@ -29,8 +31,9 @@ from hobble.rows.facts import load_facts
 from hobble.rows.layout import RowLayout
 
 LEAST = 1e-3  # cm; a joint nearer to the root has no meaningful relative error
-SPLITS = ("train", "held_out")
 REFERENCE = "holden31"
+# What has a confidence interval.
+MEASURED: tuple[Literal["mean"], Literal["position_error_cm"]] = ("mean", "position_error_cm")
 QUANTILES = {"p05": 0.05, "p25": 0.25, "p50": 0.5, "p75": 0.75, "p95": 0.95}
 COLUMNS = ("clip", "split", "frames", "mean", "sd", "position_error_cm", *QUANTILES)
 # Bins of the relative error, each 2 % wide. Quantiles come from them, so that no single errors are stored.
@@ -61,7 +64,7 @@ class Errors:
         below = np.concatenate([[0.0], np.cumsum(self.histogram)])
         return float(np.interp(share * below[-1], below, EDGES))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> ErrorsOf:
         """Plain data, with quantiles of the relative error; None values if there was no frame."""
         if not self.frames:
             return {"frames": 0, "mean": None, "sd": None, "position_error_cm": None}
@@ -71,7 +74,11 @@ class Errors:
             "mean": float(mean[0]),
             "sd": float(sd[0]),
             "position_error_cm": float(mean[1]),
-            **{name: self.quantile(share) for name, share in QUANTILES.items()},
+            "p05": self.quantile(QUANTILES["p05"]),
+            "p25": self.quantile(QUANTILES["p25"]),
+            "p50": self.quantile(QUANTILES["p50"]),
+            "p75": self.quantile(QUANTILES["p75"]),
+            "p95": self.quantile(QUANTILES["p95"]),
         }
 
 
@@ -108,7 +115,7 @@ def measure(
     configuration: str,
     equivalents: Sequence[str] | None = None,
     sample: Sample | None = None,
-) -> dict[str, Any]:
+) -> Accuracy:
     """accuracy.json: `train` and `held_out` over their frames, and `clips`, one entry a clip in name order.
 
     clips: name -> file of rows. equivalents: names of the joints to measure; all by default. sample: the
@@ -118,8 +125,8 @@ def measure(
     """
     network = load_network(weights)
     joints = joint_indices(network, equivalents)
-    entries = []
-    totals = dict.fromkeys(SPLITS, Errors())
+    entries: list[ErrorsOfClip] = []
+    totals: dict[str, Errors] = dict.fromkeys(SPLITS, Errors())
     for name, weight in (sample.weights if sample else dict.fromkeys(sorted(clips), 1.0)).items():
         rows = load_clip_rows(clips[name])
         check_layout(clips[name], rows, network)
@@ -127,31 +134,39 @@ def measure(
         totals[splits[name]] += errors.weighing(weight)
         entries.append({"clip": name, "split": splits[name], **errors.to_dict()})
         log.info("%s: %s", name, entries[-1])
-    result: dict[str, Any] = {"configuration": configuration, "joints": len(joints), "clips": entries}
-    for split in SPLITS:
-        means = [e["mean"] for e in entries if e["split"] == split and e["frames"]]
-        result[split] = {**totals[split].to_dict(), "clips": len(means)}
-        result[split]["mean_of_clips"] = float(np.mean(means)) if means else None
+    train, held_out = (_of_split(split, totals[split], entries) for split in SPLITS)
+    result: Accuracy = {
+        "configuration": configuration,
+        "joints": len(joints),
+        "clips": entries,
+        "train": train,
+        "held_out": held_out,
+    }
     return result if sample is None else with_sample(result, sample)
 
 
-def with_sample(result: dict[str, Any], sample: Sample) -> dict[str, Any]:
+def _of_split(split: str, errors: Errors, entries: Sequence[ErrorsOfClip]) -> ErrorsOfSplit:
+    means = [e["mean"] for e in entries if e["split"] == split and e["mean"] is not None]
+    mean = float(np.mean(means)) if means else None
+    return {**errors.to_dict(), "clips": len(means), "mean_of_clips": mean}
+
+
+def with_sample(result: Accuracy, sample: Sample) -> Accuracy:
     """The result with the sample, and half the width of the 95 % confidence interval of each split."""
     for split in SPLITS:
         clips = [clip for clip in result["clips"] if clip["split"] == split]
         weights = [sample.clip_weights[clip["clip"]] for clip in clips]
+        # Every clip of a sample has rows, so no value is None.
+        means, distances = ({clip["clip"]: clip[key] or 0.0 for clip in clips} for key in MEASURED)
+        found = result[split]
         if clips:
-            means = [clip["mean"] for clip in clips]
-            result[split]["mean_of_clips"] = float(np.average(means, weights=weights))
-        result[split]["interval"] = {
-            key: sample.half_width(split, {clip["clip"]: clip[key] for clip in clips})
-            for key in ("mean", "position_error_cm")
-            if clips
-        }
+            found["mean_of_clips"] = float(np.average(list(means.values()), weights=weights))
+        pairs = zip(MEASURED, (means, distances), strict=True) if clips else ()
+        found["interval"] = {key: sample.half_width(split, values) for key, values in pairs}
     return {**result, "sample": sample.to_dict()}
 
 
-def equivalent_joints(skeleton: Mapping[str, Any], of: str = REFERENCE) -> list[str] | None:
+def equivalent_joints(skeleton: Json, of: str = REFERENCE) -> list[str] | None:
     """Names of the joints that have a counterpart on the skeleton `of`; None (all) without such a map.
 
     skeleton: as config/skeletons/<name>.yaml holds it.
@@ -185,7 +200,7 @@ def check_layout(where: str | Path, rows: ClipRows, network: Network) -> None:
         raise InputError(where, f"its rows ({rows.layout}) are not those the network has learnt ({layout})")
 
 
-def clip_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+def clip_rows(result: Accuracy) -> list[Row]:
     """The entries of the clips as table rows with equal keys."""
     return [{key: clip.get(key) for key in COLUMNS} for clip in result["clips"]]
 

@@ -12,7 +12,6 @@ import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,15 +19,16 @@ from hobble.core.quat import Array
 from hobble.database.statistics import Moments
 from hobble.evaluation.captured import unbroken
 from hobble.measures.accuracy.run import (
-    SPLITS,
     check_layout,
     chosen_joints,
     joint_indices,
     relative_and_distance,
 )
-from hobble.measures.given import Given, Outcome
+from hobble.measures.given import Given, Outcome, Row
+from hobble.measures.results import SPLITS
 from hobble.measures.rollouts import Options
-from hobble.measures.rollouts.crowd import Crowd, RollOuts, inputs
+from hobble.measures.rollouts.results import ErrorsOf, ErrorsOfClip, RollOutsFound
+from hobble.measures.rollouts.roll_outs import Crowd, RollOuts, inputs
 from hobble.measures.sample import Sample, drawn
 from hobble.models.load import load_network
 from hobble.models.network import Network, Predictor
@@ -72,7 +72,7 @@ class RollOutErrors:
             return self
         return RollOutErrors(self.frames, self.starts, self.moments * weight, self.last * weight, self.ended)
 
-    def to_dict(self, phase: bool = True) -> dict[str, Any]:
+    def to_dict(self, phase: bool = True) -> ErrorsOf:
         """Plain data, with None if there were no frames, or if no roll-out reached its full length.
 
         phase: whether the network uses the phase. If not, the phase error has no meaning and is None.
@@ -160,7 +160,7 @@ def measure_roll_outs(
     lengths: Sequence[int] = LENGTHS,
     mode: str = "cubic",
     sample: Sample | None = None,
-) -> dict[str, Any]:
+) -> RollOutsFound:
     """The content of rollouts.json: for each of `lengths`, the splits and the clips in name order.
 
     clips: name -> file of rows. equivalents: names of the joints to measure. mode:
@@ -170,8 +170,9 @@ def measure_roll_outs(
     network = load_network(weights)
     predictor = network.predictor(mode)
     joints = joint_indices(network, equivalents)
+    total: dict[int, dict[str, RollOutErrors]]
     total = {length: dict.fromkeys(SPLITS, RollOutErrors()) for length in lengths}
-    entries: dict[int, list[dict[str, Any]]] = {length: [] for length in lengths}
+    entries: dict[int, list[ErrorsOfClip]] = {length: [] for length in lengths}
     chosen = sample.weights if sample else dict.fromkeys(sorted(clips), 1.0)
     for some in _together(chosen, clips, network, lengths):
         for name, errors in zip(some, _errors(predictor, list(some.values()), joints, lengths), strict=True):
@@ -179,14 +180,15 @@ def measure_roll_outs(
                 total[length][splits[name]] += found.weighing(chosen[name])
                 entries[length].append({"clip": name, "split": splits[name], **found.to_dict(network.phase)})
             log.info("%s: %s", name, entries[lengths[-1]][-1])
-    result: dict[str, Any] = {
+    result: RollOutsFound = {
         "configuration": configuration,
         "joints": len(joints),
         "mode": mode,
         "lengths": [
             {
                 "length": length,
-                **{split: total[length][split].to_dict(network.phase) for split in SPLITS},
+                "train": total[length]["train"].to_dict(network.phase),
+                "held_out": total[length]["held_out"].to_dict(network.phase),
                 "clips": entries[length],
             }
             for length in lengths
@@ -213,7 +215,7 @@ def _together(
         yield some
 
 
-def _with_sample(result: dict[str, Any], sample: Sample) -> dict[str, Any]:
+def _with_sample(result: RollOutsFound, sample: Sample) -> RollOutsFound:
     """The result with what was drawn, and the half widths of the 95 % intervals of each split and length.
 
     A clip too short for any roll-out counts as the others of its split.
@@ -221,19 +223,19 @@ def _with_sample(result: dict[str, Any], sample: Sample) -> dict[str, Any]:
     for entry in result["lengths"]:
         for split in SPLITS:
             usual = entry[split]["position_error_cm"]
-            values = {
-                clip["clip"]: usual if clip["position_error_cm"] is None else clip["position_error_cm"]
-                for clip in entry["clips"]
-                if clip["split"] == split
-            }
             if usual is not None:
+                values = {
+                    clip["clip"]: usual if clip["position_error_cm"] is None else clip["position_error_cm"]
+                    for clip in entry["clips"]
+                    if clip["split"] == split
+                }
                 entry[split]["interval"] = {"position_error_cm": sample.half_width(split, values)}
     return {**result, "sample": sample.to_dict()}
 
 
-def roll_out_rows(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+def roll_out_rows(result: RollOutsFound) -> list[Row]:
     """The clips' entries, and those of the splits with an empty `clip`, as flat rows."""
-    rows = []
+    rows: list[Row] = []
     for entry in result["lengths"]:
         for split in SPLITS:
             rows.append({"length": entry["length"], "clip": None, "split": split, **entry[split]})

@@ -7,7 +7,7 @@ from pydantic import Field
 from hobble.core.section import Section
 
 
-class Sampling(Section):
+class SampleOptions(Section):
     """An option of all measurements of clips."""
 
     sample_frames: int = Field(

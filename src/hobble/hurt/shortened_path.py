@@ -9,13 +9,13 @@ import numpy as np
 from hobble.core.quat import Array
 from hobble.core.smooth import gaussian
 from hobble.hurt.effects import Effects
-from hobble.hurt.source import Source
+from hobble.hurt.healthy_clip import HealthyClip
 
 SLOPE = 0.3  # seconds: sigma of the Gaussian over the heights of the ground under the feet
 
 
 @dataclass(frozen=True)
-class Path:
+class ShortenedPath:
     """Old and new horizontal path (F, 2) and height of the ground (F,) at each source frame.
 
     Flat ground stays at 0. On other ground, rises shrink like the path, so that slopes stay.
@@ -35,14 +35,14 @@ class Path:
         )
 
 
-def shorten(source: Source, effects: Effects, slower: Array, ground: Array | None) -> Path:
+def shorten(source: HealthyClip, effects: Effects, slower: Array, ground: Array | None) -> ShortenedPath:
     """The path at the speed of `effects`.
 
     slower: (F,) factor of the stride time. ground: (F,) height of the ground below the body, None if flat.
     """
     share = effects.ratio("speed") * slower
     flat = np.zeros(len(source))
-    return Path(
+    return ShortenedPath(
         source.path,
         _shrunk(source.path, share[:, None]),
         flat if ground is None else ground,
@@ -50,7 +50,7 @@ def shorten(source: Source, effects: Effects, slower: Array, ground: Array | Non
     )
 
 
-def ground_below(source: Source, heights: list[list[tuple[float, float]]]) -> Array:
+def ground_below(source: HealthyClip, heights: list[list[tuple[float, float]]]) -> Array:
     """(F,) cm: the ground below the body, from the standing feet.
 
     heights: (middle, height) of each foot's stances. They are relative to each foot's median, so that legs of

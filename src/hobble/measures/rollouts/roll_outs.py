@@ -22,7 +22,7 @@ BATCH = 256  # poses predicted at once; with more, their inputs do not fit the c
 
 
 @dataclass(frozen=True)
-class Inputs:
+class RollOutInputs:
     """The inputs and targets of F consecutive frames of a clip, on one terrain fit.
 
     x: (F, X) with the captured joints; y: (F, Y) targets; both in raw units, with heights minus `mean` (F,).
@@ -39,13 +39,13 @@ class Inputs:
     moving: Array
 
 
-def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
+def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> RollOutInputs:
     """The inputs of the rows `chosen` (F,), on the first fit of each, in the network's `layout`."""
     fit = rows.first_fit[chosen]
     x, y, *_ = pairs(rows, layout, chosen, fit)
     gait = x[:, layout.x_gait].reshape(len(x), len(GAITS), layout.samples)
     stand = gait[:, GAITS.index("stand"), layout.samples // 2]
-    return Inputs(
+    return RollOutInputs(
         x,
         y,
         rows.mean[fit].astype(np.float32),
@@ -60,7 +60,7 @@ def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> Inputs:
 class RollOuts:
     """Roll-outs over `length` frames of a stretch, from its frames `starts` (n,), which rise."""
 
-    asked: Inputs
+    asked: RollOutInputs
     starts: np.ndarray
     length: int
 
