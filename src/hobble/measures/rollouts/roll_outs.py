@@ -61,7 +61,7 @@ def inputs(rows: ClipRows, chosen: np.ndarray, layout: RowLayout) -> RollOutInpu
 class RollOuts:
     """Roll-outs over `length` frames of a stretch, from its frames `starts` (n,), which rise."""
 
-    asked: RollOutInputs
+    given: RollOutInputs
     starts: np.ndarray
     length: int
 
@@ -75,16 +75,16 @@ class Crowd:
 
     def __init__(self, predictor: Predictor, groups: Sequence[RollOuts]) -> None:
         self.predictor, self.groups = predictor, groups
-        stretches = list({id(group.asked): group.asked for group in groups}.values())
-        begins = np.cumsum([0, *(len(asked.x) for asked in stretches)])
-        begin = {id(asked): int(at) for asked, at in zip(stretches, begins[:-1], strict=True)}
+        stretches = list({id(group.given): group.given for group in groups}.values())
+        begins = np.cumsum([0, *(len(given.x) for given in stretches)])
+        begin = {id(given): int(at) for given, at in zip(stretches, begins[:-1], strict=True)}
         self.x, self.y, self.mean, phase, self.turn, self.velocity, self.moving = (
-            np.concatenate([getattr(asked, name) for asked in stretches])
+            np.concatenate([getattr(given, name) for given in stretches])
             for name in ("x", "y", "mean", "phase", "turn", "velocity", "moving")
         )
-        firsts = [begin[id(group.asked)] + group.starts for group in groups]
+        firsts = [begin[id(group.given)] + group.starts for group in groups]
         stops = [
-            begin[id(group.asked)] + np.minimum(group.starts + group.length, len(group.asked.x))
+            begin[id(group.given)] + np.minimum(group.starts + group.length, len(group.given.x))
             for group in groups
         ]
         self.first, each = np.unique(np.concatenate(firsts), return_inverse=True)

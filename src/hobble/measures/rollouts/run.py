@@ -104,11 +104,11 @@ def _groups(rows: ClipRows, layout: RowLayout, lengths: Sequence[int]) -> list[R
     """The roll-outs of a clip."""
     out = []
     for chosen in unbroken(rows.frame):
-        asked = inputs(rows, chosen, layout)
+        given = inputs(rows, chosen, layout)
         for length in lengths:
             starts = np.arange(1, len(chosen), max(1, length // OVERLAP))
             if len(starts):
-                out.append(RollOuts(asked, starts, length))
+                out.append(RollOuts(given, starts, length))
     return out
 
 
@@ -140,12 +140,12 @@ def _errors(
 
 def _of_group(group: RollOuts, moments: Moments, end: Array, phase: Array) -> RollOutErrors:
     """The errors of a group. end: (n', joints, 2) in the last frame; phase: (n,) after it."""
-    frames = int(np.minimum(group.length, len(group.asked.x) - group.starts).sum())
+    frames = int(np.minimum(group.length, len(group.given.x) - group.starts).sum())
     # The phase is already that of the next frame, so that one has to be in the stretch too.
-    ended = int(np.searchsorted(group.starts, len(group.asked.x) - group.length))
+    ended = int(np.searchsorted(group.starts, len(group.given.x) - group.length))
     if not ended:
         return RollOutErrors(frames, len(group.starts), moments)
-    truth = group.asked.phase[group.starts[:ended] + group.length]
+    truth = group.given.phase[group.starts[:ended] + group.length]
     off = np.abs(np.mod(phase[:ended] - truth + 0.5, 1.0) - 0.5)
     last = np.stack([end[:ended, :, 1].mean(axis=1), off], axis=1)
     return RollOutErrors(frames, len(group.starts), moments, Moments.of(last), ended)
