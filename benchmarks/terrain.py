@@ -211,13 +211,13 @@ def main() -> None:
     parser.add_argument("--cycles", type=int, help="make and time so many cycles instead")
     parser.add_argument("--flat", type=float, default=0.48, help="share of them on flat ground")
     parser.add_argument("--workers", type=int, default=2)
-    asked = parser.parse_args()
+    arguments = parser.parse_args()
     clips = synthetic()
-    if asked.folder:
-        clips = [c for path in sorted(asked.folder.glob("*.bvh")) for c in made(path, "rocky")]
+    if arguments.folder:
+        clips = [c for path in sorted(arguments.folder.glob("*.bvh")) for c in made(path, "rocky")]
     print(f"{len(clips)} clips with {sum(len(labels.cycles) for _, labels in clips)} cycles")
-    if asked.cycles:
-        released(clips, asked.cycles, asked.flat, asked.workers)
+    if arguments.cycles:
+        released(clips, arguments.cycles, arguments.flat, arguments.workers)
     else:
         parts(clips)
 

@@ -45,21 +45,23 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=secrets.randbelow(10**6))
     parser.add_argument("--only", type=int, help="this one round of the seed")
     parser.add_argument("--page", action="store_true", help=f"write the list into {PAGE.relative_to(ROOT)}")
-    asked = parser.parse_args()
-    print(f"seed {asked.seed}", flush=True)
+    arguments = parser.parse_args()
+    print(f"seed {arguments.seed}", flush=True)
     with tempfile.TemporaryDirectory(prefix="faults-") as scratch:
         Path(scratch).chmod(0o755)
         lab = Lab(Path(scratch) / "lab", fresh=True)
         lab.undisturbed(TARGET)
         print(f"{len(lab.jobs)} jobs of an undisturbed run are ready", flush=True)
-        thrown = _rounds(lab, asked.seed, range(asked.rounds) if asked.only is None else [asked.only])
-        if asked.only is None:
-            thrown += _texts(lab, Path(scratch), asked.seed, asked.rounds * TEXTS_PER_ROUND)
+        thrown = _rounds(
+            lab, arguments.seed, range(arguments.rounds) if arguments.only is None else [arguments.only]
+        )
+        if arguments.only is None:
+            thrown += _texts(lab, Path(scratch), arguments.seed, arguments.rounds * TEXTS_PER_ROUND)
             thrown += attacks.thrown(Path(scratch))
     listed = _list(thrown)
     print(listed)
-    if asked.page:
-        _write(f"make faults N={asked.rounds} SEED={asked.seed}", listed)
+    if arguments.page:
+        _write(f"make faults N={arguments.rounds} SEED={arguments.seed}", listed)
     faults = [throw for throw in thrown if throw.happened == FAULT]
     print(f"{len(thrown)} thrown, {len(faults)} faults")
     return 1 if faults else 0

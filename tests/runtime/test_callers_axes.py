@@ -61,10 +61,10 @@ def test_a_heightmap_is_in_the_callers_axes_and_unit(network, handed: str, up: s
         along = (np.arange(401) - 200) * cell
         return terrain(along[None, :] + centre[0], along[:, None] + centre[1])
 
-    asked = root(terrain)
+    expected = root(terrain)
     cell, centre = 4.0 * axes.scale, (30 * axes.scale, -50 * axes.scale)
-    np.testing.assert_allclose(root(Heightmap(sampled(cell, centre), cell, centre)), asked, atol=0.5)
-    np.testing.assert_allclose(root(sampled(CELL * axes.scale)), asked, atol=0.5)
+    np.testing.assert_allclose(root(Heightmap(sampled(cell, centre), cell, centre)), expected, atol=0.5)
+    np.testing.assert_allclose(root(sampled(CELL * axes.scale)), expected, atol=0.5)
     level = root(np.full((8, 8), 1.0))["XYZ".index(up)]
     assert level == pytest.approx(1 / axes.scale, abs=1e-3)
 

@@ -32,7 +32,7 @@ def limited(make_network) -> Network:
     return replace(network, limits={"injury": Limits(np.array([0.0, 10.0]), speeds, speeds.max(axis=(1, 2)))})
 
 
-def asked(
+def speed_and_gait(
     network: Network, velocity, hurt, gait=None, frames: int = 90, **options
 ) -> tuple[float, np.ndarray]:
     """The target speed after some seconds, and the shares of the gaits."""
@@ -48,31 +48,31 @@ def asked(
     [({}, 2.5), ({KNEE: 10}, 1.0), ({KNEE: 5}, 1.5), ({ARM: 10}, 1.8), ({KNEE: 5, ARM: 10}, 1.5)],
 )
 def test_the_target_stops_at_what_the_worst_injury_allows(limited: Network, hurt, speed: float) -> None:
-    assert asked(limited, (0, 2.5), hurt)[0] == pytest.approx(speed, abs=1e-6)
-    assert asked(limited, (2.5, 0), hurt)[0] == pytest.approx(speed, abs=1e-6)
-    assert asked(limited, (0, 2.5), hurt, limits=False)[0] == pytest.approx(2.5, abs=1e-6)
+    assert speed_and_gait(limited, (0, 2.5), hurt)[0] == pytest.approx(speed, abs=1e-6)
+    assert speed_and_gait(limited, (2.5, 0), hurt)[0] == pytest.approx(speed, abs=1e-6)
+    assert speed_and_gait(limited, (0, 2.5), hurt, limits=False)[0] == pytest.approx(2.5, abs=1e-6)
 
 
 def test_a_slower_target_is_left_alone(limited: Network) -> None:
-    assert asked(limited, (0, 0.8), {KNEE: 10})[0] == pytest.approx(0.8, abs=1e-6)
-    assert asked(limited, (0, 0.0), {KNEE: 10})[0] == 0.0
+    assert speed_and_gait(limited, (0, 0.8), {KNEE: 10})[0] == pytest.approx(0.8, abs=1e-6)
+    assert speed_and_gait(limited, (0, 0.0), {KNEE: 10})[0] == 0.0
 
 
 def test_a_body_that_cannot_jog_walks_faster(limited: Network) -> None:
-    speed, gait = asked(limited, (0, 7.0), {KNEE: 8})
+    speed, gait = speed_and_gait(limited, (0, 7.0), {KNEE: 8})
     assert speed == pytest.approx(1.25 * 1.2, abs=1e-6)
     assert gait[WALK] > 0.99
-    speed, gait = asked(limited, (0, 7.0), {KNEE: 3})  # 5.8 is a jog still
+    speed, gait = speed_and_gait(limited, (0, 7.0), {KNEE: 3})  # 5.8 is a jog still
     assert speed == pytest.approx(5.8, abs=1e-6)
     assert gait[JOG] > 0.99
-    assert asked(limited, (0, 7.0), {KNEE: 8}, limits=False)[1][JOG] > 0.99
+    assert speed_and_gait(limited, (0, 7.0), {KNEE: 8}, limits=False)[1][JOG] > 0.99
 
 
 def test_steering_makes_up_to_the_limit_and_not_beyond(limited: Network) -> None:
     """The network always glides at 1.5, which is above the limit of 1."""
-    speed, _ = asked(limited, (0, 2.5), {KNEE: 10}, steering=2.0)
+    speed, _ = speed_and_gait(limited, (0, 2.5), {KNEE: 10}, steering=2.0)
     assert speed < 1.0
-    speed, _ = asked(limited, (0, 2.5), {}, steering=2.0)
+    speed, _ = speed_and_gait(limited, (0, 2.5), {}, steering=2.0)
     assert speed > 2.5
 
 

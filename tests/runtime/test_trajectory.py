@@ -106,7 +106,7 @@ def test_a_rooted_network_is_not_held_while_standing() -> None:
 @pytest.mark.parametrize(
     ("target", "moved"),
     [
-        ((0.0, 0.0), (0.375, 1.5)),  # nobody asked it to go anywhere
+        ((0.0, 0.0), (0.375, 1.5)),  # the target is to stand
         ((0.0, 3.0), (0.5, 2.0)),
         ((2.0, 2.0), (0.5, 2.0)),
         ((0.0, -3.0), (0.5, 1.5)),  # against the target, but not across it
@@ -179,7 +179,7 @@ def test_targets_are_taken_up_at_their_rates() -> None:
 
 
 @pytest.mark.parametrize(
-    ("steering", "target", "asked"),
+    ("steering", "target", "corrected"),
     [
         (0.0, (0.0, 2.0), (0.0, 2.0)),
         (1.0, (0.0, 1.5), (0.0, 1.5)),  # what is reached is not corrected
@@ -191,10 +191,10 @@ def test_targets_are_taken_up_at_their_rates() -> None:
         (1.0, (0.0, 0.0), (0.0, 0.0)),
     ],
 )
-def test_steering_adds_the_error_to_the_target(steering: float, target: tuple, asked: tuple) -> None:
+def test_steering_adds_the_error_to_the_target(steering: float, target: tuple, corrected: tuple) -> None:
     """The figure glides ahead at 1.5 cm a frame."""
     velocity, _, _ = follow(target, (0.0, 1.0), steering)
-    np.testing.assert_allclose(velocity, 0.9 * np.array(asked), atol=1e-9)
+    np.testing.assert_allclose(velocity, 0.9 * np.array(corrected), atol=1e-9)
 
 
 def follow(target, facing, steering: float, frames: int = 1, speed: float = 1.5, correction=None):
@@ -213,7 +213,7 @@ def follow(target, facing, steering: float, frames: int = 1, speed: float = 1.5,
 
 def test_a_steady_error_is_integrated_along_and_across_the_target() -> None:
     for frames in (1, 40, 1000):
-        asked, _, correction = follow((0.5, 1.5), (0.0, 1.0), 2.0, frames)
+        corrected, _, correction = follow((0.5, 1.5), (0.0, 1.0), 2.0, frames)
         speed = np.hypot(0.5, 1.5)
         ahead = np.array([0.5, 1.5]) / speed
         lack = np.array([0.5, 0.0])
@@ -224,7 +224,7 @@ def test_a_steady_error_is_integrated_along_and_across_the_target() -> None:
     # Asked for from the next frame on: here all of it, and the shortfall of the moment, within the limit.
     more = speed * (correction[0] * ahead + correction[1] * np.array([ahead[1], -ahead[0]])) + 2.0 * lack
     more *= min(1.0, trajectory.STEERING_LIMIT * speed / np.linalg.norm(more))
-    np.testing.assert_allclose(asked, np.array([0.5, 1.5]) + more, atol=1e-3)
+    np.testing.assert_allclose(corrected, np.array([0.5, 1.5]) + more, atol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -55,9 +55,9 @@ def straight(data: Database) -> RollOutInputs:
 def test_poses_carry_the_errors_of_a_character(data: Database) -> None:
     """On consecutive rows, the result equals that of the evaluation's roll-out of the same clip."""
     layout, s = data.layout, data.statistics
-    asked, predictor = straight(data), Mixer(data)
+    given, predictor = straight(data), Mixer(data)
     starts = np.arange(STARTS)
-    made, _ = roll_out(predictor, asked, starts, FRAMES)  # type: ignore[arg-type]
+    made, _ = roll_out(predictor, given, starts, FRAMES)  # type: ignore[arg-type]
     carried = RollOut(data, 2 * STARTS, STARTS, CPU)
     carried.begin()
     whole = slice(FRAMES, None)  # places whose roll-out does not end meanwhile
@@ -68,13 +68,13 @@ def test_poses_carry_the_errors_of_a_character(data: Database) -> None:
         carried.add(added)
         off = added.numpy() * s.x_std
         if age:
-            truth = asked.y[at - 1][:, layout.y_joint_position]
+            truth = given.y[at - 1][:, layout.y_joint_position]
             expected = (made[age - 1].reshape(STARTS, -1) - truth)[whole]
             assert off[whole, layout.x_joint_position] == pytest.approx(expected, rel=1e-3, abs=1e-3)
             assert np.abs(expected).max() > 1
         off[:, pose] = 0
         assert np.all(off == 0)
-        error = predictor.predict(asked.x[at] + added.numpy() * s.x_std, None) - asked.y[at]
+        error = predictor.predict(given.x[at] + added.numpy() * s.x_std, None) - given.y[at]
         carried.remember(torch.from_numpy(error / s.y_std).float())
 
 

@@ -14,12 +14,12 @@ from hobble.runtime.options import Runtime
 from hobble.workflow.job import job
 
 with job(snakemake):
-    given, asked = snakemake.input, snakemake.params
+    given, params = snakemake.input, snakemake.params
     material = gather(
-        name=asked.configuration,
-        dataset=asked.dataset,
-        title=asked.title,
-        splits=asked.splits,
+        name=params.configuration,
+        dataset=params.dataset,
+        title=params.title,
+        splits=params.splits,
         configuration=given.configuration,
         measured=given.measured,
         pipeline=given.pipeline,
@@ -37,6 +37,6 @@ with job(snakemake):
     runtime = Runtime.model_validate(material.resolved["configuration"]["runtime"])
     character = playable_with_recogniser(trained, runtime)
     hero = opened(trained, runtime, character, material.measured.values())
-    compared = comparisons(trained, given.rows, asked.splits)
+    compared = comparisons(trained, given.rows, params.splits)
     bundle = Path(given.bundle).read_text(encoding="utf-8")
     write_text(snakemake.output.html, render(material, play, character, compared, bundle, hero))
