@@ -38,7 +38,10 @@ def test_hips_stay_above_the_ground_under_them(hurtable: Pfnn) -> None:
 
 
 def test_hips_without_ground_under_them_are_found(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatch) -> None:
-    still = {name: getattr(feet, name) for name in ("leg_joints", "sole_heights", "carried", "place_feet")}
+    still = {
+        name: getattr(feet, name)
+        for name in ("leg_joints", "sole_heights", "carried", "knees_ahead", "place_feet")
+    }
     monkeypatch.setattr(controller, "feet", SimpleNamespace(**still, carry_body=lambda *_: None))
     found = soak(on_its_feet(hurtable), 20, 150)
     assert found["hips_lowest_cm"] < HIPS - 10
@@ -54,7 +57,10 @@ def test_a_leg_that_snaps_is_seen(hurtable: Pfnn, monkeypatch: pytest.MonkeyPatc
         plain(*given)
         given[-1][3, 1] = np.roll(given[-1][3, 1], 1)  # a joint of the fourth character is turned about
 
-    still = {name: getattr(feet, name) for name in ("leg_joints", "sole_heights", "carried", "carry_body")}
+    still = {
+        name: getattr(feet, name)
+        for name in ("leg_joints", "sole_heights", "carried", "knees_ahead", "carry_body")
+    }
     turns = iter(range(10**6))
     monkeypatch.setattr(
         controller,

@@ -63,6 +63,7 @@ def playable(network: Network, runtime: Runtime) -> dict[str, Any]:
         "gaits": list(network.gaits),
         "channels": shown_channels(network, runtime),
         "legs": legs.tolist(),
+        "ahead": feet.knees_ahead(skeleton).tolist(),
         "carried": [np.flatnonzero(row).tolist() for row in carried],
         "toes": [np.flatnonzero(row == feet.TOES).tolist() for row in carried],
         "sole": sole,
@@ -193,7 +194,9 @@ def _constants() -> dict[str, float]:
         "bodyMix": feet.BODY_MIX,
         "bodyFree": feet.BODY_FREE,
         "bodyFrom": feet.BODY_MIN_CONTACT,
+        "mostClimb": controller.MOST_CLIMB,
         "mostAdded": leg_reach.MOST_ADDED,
+        "kneeAhead": leg_reach.KNEE_AHEAD,
         "stretch": feet.STRETCH,
         "behind": feet.BEHIND,
     }

@@ -42,6 +42,7 @@ SMALL = {
     "lift": "foot_lift",
     "raised": "body_lift",
     "added": "foot_added",
+    "shown": "leg_shown",
     "placed": "placed",
 }
 

@@ -10,6 +10,8 @@ from hobble.core import quat
 from hobble.core.quat import Array
 from hobble.models.network import Network
 
+SHOWN = ("knee", "heel", "toe")  # the joints of `leg_shown`
+
 
 @dataclass
 class Character:
@@ -22,7 +24,7 @@ class Character:
     smoothed_velocity, smoothed_direction: (C, 2); strafe: (C,); correction: (C, 2): see
     `trajectory.follow_target`.
     foot_lock (C, 2), foot_hold (C, 2, 2), foot_step (C, 2), foot_missed (C, 2): see `foot_lock`.
-    foot_lift (C, 2), foot_added (C, 2, 2, 4), body_lift (C,): see `feet`.
+    foot_lift (C, 2), foot_added (C, 2, 2, 4), leg_shown (C, 2, 3, 3), body_lift (C,): see `feet`.
     placed: (C,) whether the joints have been lifted to the ground at the start.
     memory: (C, M) the network's own state of the character, see `Network.memory`.
     """
@@ -48,9 +50,14 @@ class Character:
     foot_missed: Array
     foot_lift: Array
     foot_added: Array
+    leg_shown: Array
     body_lift: Array
     placed: np.ndarray
     memory: Array
+
+    def copies(self, of: np.ndarray) -> Character:
+        """A new state, whose character i is a copy of this one's character of[i]. of: (C',) indices."""
+        return Character(**{field.name: getattr(self, field.name)[of] for field in fields(self)})
 
 
 class Snapshot:
@@ -81,6 +88,8 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
     joints = now[layout.y_joint_position].reshape(-1, 3)
     placed = _turned(joints, sin, cos)
     placed[..., ::2] += position[:, None]
+    assert network.skeleton is not None
+    legs = [[network.skeleton.role(f"{side}_{part}") for part in SHOWN] for side in ("left", "right")]
     moving = np.zeros_like(joints) if seen is None else now[layout.y_joint_velocity].reshape(-1, 3)
     turns = now[layout.y_joint_rotation].reshape(-1, 3)
     facing = np.concatenate([sin, cos], axis=1)
@@ -106,6 +115,7 @@ def start(network: Network, characters: int, position: Array, yaw: Array) -> Cha
         foot_missed=np.zeros((count, 2)),
         foot_lift=np.zeros((count, 2)),
         foot_added=np.tile([1.0, 0.0, 0.0, 0.0], (count, 2, 2, 1)),
+        leg_shown=placed[:, legs].copy(),
         body_lift=np.zeros(count),
         placed=np.zeros(count, bool),
         memory=np.zeros((count, network.memory)),

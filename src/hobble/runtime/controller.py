@@ -36,6 +36,9 @@ HIGHEST = 1e7  # cm, 100 km: largest height of the ground above or below 0; beyo
 # can: if clips have rotations half a turn apart, as in hands, their mean may be any rotation, and a new
 # target changes the next pose at once.
 FASTEST_TURN = np.radians(25)
+# cm a frame by which the body rises with the mean height of the path. When a new wish turns the path around
+# on a hill, that height may change by 20 cm at once, while the ground under the feet stays.
+MOST_CLIMB = 5.0
 
 # Parts of the state that have to be finite. The others are checked at the call or computed in each frame.
 CHECKED = (
@@ -48,6 +51,7 @@ CHECKED = (
         "foot_hold",
         "foot_lift",
         "foot_added",
+        "leg_shown",
     ),
     *("body_lift", "memory"),
 )
@@ -118,12 +122,23 @@ class Controller:
         self._y_joints = layout.y_joint_position.start
         assert network.skeleton is not None
         legs = feet.leg_joints(network.skeleton)
-        self._legs = (legs, feet.carried(network.skeleton, legs), feet.sole_heights(network, legs))
+        self._legs = (
+            legs,
+            feet.carried(network.skeleton, legs),
+            feet.sole_heights(network, legs),
+            feet.knees_ahead(network.skeleton),
+            self.bounds.fastest,
+        )
         self._hips = network.skeleton.role("hips")
         self._standing = np.append(legs[:, 2:].reshape(-1), self._hips)
         self._under = np.zeros((count, len(self._standing)))
         self._warned = False
         self._group(character)
+
+    def take_pose(self, other: Controller, of: np.ndarray) -> None:
+        """Character i gets the pose in which `other` drew its character of[i]. of: (C,) indices."""
+        for name in ("root", "yaw", "pose_position", "pose_rotation"):
+            getattr(self, name)[:] = getattr(other, name)[of]
 
     def _group(self, c: Character) -> None:
         """Group the arrays for the compiled functions. They only change in place, so this is done once."""
@@ -132,7 +147,10 @@ class Controller:
         self._channels = (c.channel_values, c.channel_targets, self._channel_steps)
         self._joints = (c.joint_position, c.joint_velocity, c.joint_rotation)
         self._drawn = (self.root, self.yaw, self.pose_position, self.pose_rotation)
-        self._feet = ((c.foot_lock, c.foot_hold, c.foot_step, c.foot_missed), c.foot_lift, c.foot_added)
+        self._feet = (
+            (c.foot_lock, c.foot_hold, c.foot_step, c.foot_missed),
+            *(c.foot_lift, c.foot_added, c.leg_shown, c.root_height, c.body_lift),
+        )
         self._contacts = self.y[:, self.layout.y_contacts]
         self._checked = tuple(getattr(c, name).reshape(len(c.phase), -1) for name in CHECKED)
 
@@ -207,8 +225,9 @@ class Controller:
     def _output(self, ground: Ground | None) -> None:
         c = self.character
         _take_output(
-            self.y, self._y_joints, self._path, c.root_height, self._joints, self.bounds.fastest, self._drawn
-        )
+            self.y, self._y_joints, self._path, (c.root_height, c.body_lift), self._joints,
+            self.bounds.fastest, self._drawn,
+        )  # fmt: skip
         if ground is not None:
             at = np.ascontiguousarray(self.pose_position[:, self._standing]).reshape(-1, 3)
             self._under[:] = _heights(ground, at[:, 0], at[:, 2]).reshape(self._under.shape)
@@ -301,23 +320,32 @@ def _fill_input(
 
 @njit
 def _take_output(
-    y: Any, first: int, path: trajectory.Trajectory, height: Any, pose: Joints, fastest: float, drawn: Drawn
+    y: Any,
+    first: int,
+    path: trajectory.Trajectory,
+    heights: tuple[Any, Any],
+    pose: Joints,
+    fastest: float,
+    drawn: Drawn,
 ) -> None:
     """Turn the prediction y (C, Y), whose joints begin in column `first`, into the world poses of `pose` and
     `drawn`.
 
-    A joint's position is the mean of the predicted one and the old one plus velocity. No joint moves further
+    heights: (C,) of the ground under the root, and the lift of the body, see `feet.carry_body`. A joint's
+    position is the mean of the predicted one and the old one plus velocity. No joint moves further
     than `fastest` (not counting the change of the ground's height), and no joint turns by more than
     FASTEST_TURN from the last frame.
     """
     position, direction, _ = path
     joints, velocities, rotations = pose
     root, yaw, pose_position, pose_rotation = drawn
+    height, lift = heights
     slowest = np.cos(FASTEST_TURN / 2)
     middle, count = position.shape[1] // 2, joints.shape[1]
     for c in range(y.shape[0]):
         sin, cos = direction[c, middle, 0], direction[c, middle, 1]
         climbed = height[c] - root[c, 1]
+        lift[c] += min(max(climbed, -MOST_CLIMB), MOST_CLIMB) - climbed
         root[c, 0], root[c, 1], root[c, 2] = position[c, middle, 0], height[c], position[c, middle, 1]
         yaw[c] = np.arctan2(sin, cos)
         half_cos, half_sin = np.cos(yaw[c] / 2), np.sin(yaw[c] / 2)
