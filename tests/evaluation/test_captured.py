@@ -57,7 +57,7 @@ def rows(world) -> ClipRows:
     return ClipRows("a", LAYOUT, {}, x, y, phase, {"injury": severity}, frame, 0 * frame, fits, heights, mean)
 
 
-def test_motion_round_trips(rows, world) -> None:
+def test_captured_motion_is_recovered_from_its_rows(rows, world) -> None:
     (found,) = captured(rows)
     assert len(found) == FRAMES
     yaw, root, joints = world["yaw"], world["root"][:-1], world["joints"][:-1]
@@ -72,7 +72,7 @@ def test_motion_round_trips(rows, world) -> None:
     np.testing.assert_array_equal(found.channels["injury"], rows.channels["injury"])
 
 
-def test_a_gap_separates_stretches(rows, tmp_path) -> None:
+def test_a_gap_in_the_frames_separates_two_stretches(rows, tmp_path) -> None:
     rows.frame[30:] += 2
     first, second = captured(rows)
     assert (len(first), len(second)) == (30, 20)
