@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -153,8 +154,27 @@ class ProceduralAnimation:
         else:
             ahead = self._level("facing", facing, self.axes.directions_in)
             yaws = np.arctan2(ahead[:, 0], ahead[:, 1])
-        self.state: Character = start(self.network, count, np.array(places, float), yaws)
-        self._controller = Controller(self._predictor, self.state, **self._of_controller)
+        self._control(start(self.network, count, np.array(places, float), yaws))
+
+    def copies(self, of: np.ndarray) -> ProceduralAnimation:
+        """A new animation, whose character i goes on as this one's character of[i] would. of: (C',) indices.
+
+        What is done with one of the two later does not change the other. Raises ValueError if the characters
+        follow waypoints.
+        """
+        if self.follower is not None:
+            raise ValueError("characters that follow waypoints cannot be copied")
+        out = copy.copy(self)
+        out.characters = len(of)
+        out._control(self.state.copies(of))
+        out._controller.take_pose(self._controller, of)
+        return out
+
+    def _control(self, state: Character) -> None:
+        """Go on from `state`."""
+        count = self.characters
+        self.state = state
+        self._controller = Controller(self._predictor, state, **self._of_controller)
         self._target_gait = np.zeros((count, len(self._gaits)))
         self._target_strafe, self._target_look = np.zeros(count), np.zeros((count, 2))
         self._nowhere = np.zeros((count, 2))

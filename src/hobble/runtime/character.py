@@ -55,6 +55,10 @@ class Character:
     placed: np.ndarray
     memory: Array
 
+    def copies(self, of: np.ndarray) -> Character:
+        """A new state, whose character i is a copy of this one's character of[i]. of: (C',) indices."""
+        return Character(**{field.name: getattr(self, field.name)[of] for field in fields(self)})
+
 
 class Snapshot:
     """A copy of the state (and of other arrays), to restore it if the frame fails."""

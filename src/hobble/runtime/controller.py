@@ -135,6 +135,11 @@ class Controller:
         self._warned = False
         self._group(character)
 
+    def take_pose(self, other: Controller, of: np.ndarray) -> None:
+        """Character i gets the pose in which `other` drew its character of[i]. of: (C,) indices."""
+        for name in ("root", "yaw", "pose_position", "pose_rotation"):
+            getattr(self, name)[:] = getattr(other, name)[of]
+
     def _group(self, c: Character) -> None:
         """Group the arrays for the compiled functions. They only change in place, so this is done once."""
         self._path = (c.position, c.direction, c.gait)
